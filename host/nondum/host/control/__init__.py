@@ -1,0 +1,1 @@
+"""How people and tools talk to a running daemon: JSON lines over a local socket."""

@@ -1,0 +1,88 @@
+"""A client's end of the control socket: blocking, and quick to import."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from nondum.host.control import protocol
+from nondum.sdk.errors import GoalRefused, HostUnreachable, NondumError, Problem
+
+
+class ControlClient:
+    """One connection to a daemon."""
+
+    def __init__(self, path: Path, *, timeout_s: float | None = 30.0) -> None:
+        """Connect. Raises `HostUnreachable` when no daemon listens at `path`."""
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._socket.settimeout(timeout_s)
+        try:
+            self._socket.connect(str(path))
+        except OSError as error:
+            self._socket.close()
+            raise _unreachable(path, error) from error
+        self._path = path
+        self._lines = self._socket.makefile("rb")
+
+    def ask(self, verb: str, **arguments: Any) -> Any:
+        """Send one request and return its result. Raises `NondumError` with what the host says."""
+        self._send(verb, arguments)
+        return self._receive()
+
+    def follow(self, verb: str, **arguments: Any) -> Iterator[Any]:
+        """Send one request and yield results until the daemon or the caller leaves."""
+        self._send(verb, arguments)
+        while True:
+            try:
+                yield self._receive()
+            except HostUnreachable:
+                return
+
+    def close(self) -> None:
+        """Hang up."""
+        self._lines.close()
+        self._socket.close()
+
+    def __enter__(self) -> ControlClient:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _send(self, verb: str, arguments: dict[str, Any]) -> None:
+        try:
+            self._socket.sendall(protocol.encode_request(protocol.Request(verb, arguments)))
+        except OSError as error:
+            raise _unreachable(self._path, error) from error
+
+    def _receive(self) -> Any:
+        try:
+            line = self._lines.readline()
+        except OSError as error:
+            raise _unreachable(self._path, error) from error
+        if not line:
+            raise _unreachable(self._path, ConnectionResetError("the daemon hung up"))
+        result, problems = protocol.decode_answer(line)
+        if problems:
+            kind = GoalRefused if problems[0].code.startswith("GOAL_") else NondumError
+            raise kind(*problems)
+        return result
+
+
+def _unreachable(path: Path, error: OSError) -> HostUnreachable:
+    return HostUnreachable(
+        Problem(
+            "HOST_UNREACHABLE",
+            f"no daemon answers ({error})",
+            where=str(path),
+            fix="start one with `nondum host run --user`, or name its socket with --control",
+        )
+    )

@@ -1,0 +1,69 @@
+"""The words of the control socket: one JSON object a line, in either direction.
+
+A request is `{"verb": …, "arguments": {…}}`; each answer line is `{"result": …}` or
+`{"problems": [{code, message, …}]}`. A verb that follows (`watch`) sends result lines until the
+asking side closes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from nondum.sdk.errors import Problem, ProtocolViolation
+
+LINE_LIMIT = 8 * 1024 * 1024
+"""Bytes in one line; a catalogue of hundreds of components stays far below."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What one client asks."""
+
+    verb: str
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+
+
+def encode_request(request: Request) -> bytes:
+    """One line that asks."""
+    return _line({"verb": request.verb, "arguments": dict(request.arguments)})
+
+
+def decode_request(line: bytes) -> Request:
+    """Parse a line that asks. Raises `ProtocolViolation` (CONTROL_REQUEST)."""
+    try:
+        data = json.loads(line)
+    except (ValueError, RecursionError) as error:
+        raise _violation(f"not a line of JSON ({error})") from error
+    if not isinstance(data, dict) or not isinstance(data.get("verb"), str):
+        raise _violation('expected {"verb": …, "arguments": {…}}')
+    arguments = data.get("arguments", {})
+    if not isinstance(arguments, dict):
+        raise _violation("arguments must be an object")
+    return Request(data["verb"], arguments)
+
+
+def encode_result(result: Any) -> bytes:
+    """One line that answers."""
+    return _line({"result": result})
+
+
+def encode_problems(problems: Sequence[Problem]) -> bytes:
+    """One line that refuses."""
+    return _line({"problems": [problem.to_dict() for problem in problems]})
+
+
+def decode_answer(line: bytes) -> tuple[Any, tuple[Problem, ...]]:
+    """The result of an answer line, and its problems: one of them is empty."""
+    data = json.loads(line)
+    return data.get("result"), tuple(Problem(**p) for p in data.get("problems", ()))
+
+
+def _line(data: Mapping[str, Any]) -> bytes:
+    return json.dumps(data, ensure_ascii=False, separators=(",", ":")).encode() + b"\n"
+
+
+def _violation(message: str) -> ProtocolViolation:
+    return ProtocolViolation(Problem("CONTROL_REQUEST", message, where="control socket"))
