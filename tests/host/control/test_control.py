@@ -1,0 +1,135 @@
+"""The control socket: questions over a real socket, answered or refused in words."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import stat
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nondum.host.control import protocol
+from nondum.host.control.client import ControlClient
+from nondum.host.control.server import ControlServer
+from nondum.sdk.errors import GoalRefused, HostUnreachable, NondumError, Problem, ProtocolViolation
+
+pytestmark = pytest.mark.anyio
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.text(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+    max_leaves=10,
+)
+
+
+async def echo(arguments: Mapping[str, Any]) -> Any:
+    return dict(arguments)
+
+
+async def refuse(arguments: Mapping[str, Any]) -> Any:
+    raise GoalRefused(Problem("GOAL_UNKNOWN_WORDS", "no such goal", fix="see `nondum goals`"))
+
+
+async def crash(arguments: Mapping[str, Any]) -> Any:
+    raise RuntimeError("a fault of the daemon")
+
+
+async def count(arguments: Mapping[str, Any]) -> AsyncIterator[Any]:
+    for i in range(arguments["to"]):
+        yield i
+
+
+@asynccontextmanager
+async def serving(path: Path) -> AsyncIterator[None]:
+    server = ControlServer(path, {"echo": echo, "refuse": refuse, "crash": crash}, {"count": count})
+    await server.open()
+    try:
+        yield
+    finally:
+        await server.close()
+
+
+def ask(path: Path, verb: str, **arguments: Any) -> Any:
+    with ControlClient(path) as client:
+        return client.ask(verb, **arguments)
+
+
+async def test_an_answer_comes_back(tmp_path: Path) -> None:
+    async with serving(tmp_path / "control.sock"):
+        answer = await asyncio.to_thread(ask, tmp_path / "control.sock", "echo", words="héllo")
+    assert answer == {"words": "héllo"}
+
+
+async def test_a_refusal_keeps_its_words(tmp_path: Path) -> None:
+    async with serving(tmp_path / "control.sock"):
+        with pytest.raises(GoalRefused) as refused:
+            await asyncio.to_thread(ask, tmp_path / "control.sock", "refuse")
+    assert str(refused.value) == "GOAL_UNKNOWN_WORDS no such goal → see `nondum goals`"
+
+
+async def test_an_unknown_verb_names_the_nearest(tmp_path: Path) -> None:
+    async with serving(tmp_path / "control.sock"):
+        with pytest.raises(NondumError, match="did you mean 'echo'"):
+            await asyncio.to_thread(ask, tmp_path / "control.sock", "ecoh")
+
+
+async def test_a_fault_of_the_daemon_is_told_and_survived(tmp_path: Path) -> None:
+    path = tmp_path / "control.sock"
+    async with serving(path):
+        with pytest.raises(NondumError, match="INTERNAL daemon: RuntimeError"):
+            await asyncio.to_thread(ask, path, "crash")
+        assert await asyncio.to_thread(ask, path, "echo") == {}
+
+
+async def test_following_yields_until_the_end(tmp_path: Path) -> None:
+    def collect() -> list[int]:
+        with ControlClient(tmp_path / "control.sock") as client:
+            answers = client.follow("count", to=3)
+            return [next(answers) for _ in range(3)]
+
+    async with serving(tmp_path / "control.sock"):
+        assert await asyncio.to_thread(collect) == [0, 1, 2]
+
+
+async def test_garbage_is_refused_and_the_next_line_answered(tmp_path: Path) -> None:
+    def talk() -> list[bytes]:
+        with socket.socket(socket.AF_UNIX) as raw:
+            raw.connect(str(tmp_path / "control.sock"))
+            raw.sendall(b"\xff{not json\n" + protocol.encode_request(protocol.Request("echo")))
+            lines = raw.makefile("rb")
+            return [lines.readline(), lines.readline()]
+
+    async with serving(tmp_path / "control.sock"):
+        refused, answered = await asyncio.to_thread(talk)
+    assert b"CONTROL_REQUEST" in refused
+    assert answered == b'{"result":{}}\n'
+
+
+async def test_only_owner_and_group_may_open_it(tmp_path: Path) -> None:
+    async with serving(tmp_path / "control.sock"):
+        assert stat.S_IMODE((tmp_path / "control.sock").stat().st_mode) == 0o660
+
+
+def test_no_daemon_is_told_with_the_remedy(tmp_path: Path) -> None:
+    with pytest.raises(HostUnreachable, match="nondum host run --user"):
+        ControlClient(tmp_path / "nobody.sock")
+
+
+@given(st.text(), st.dictionaries(st.text(), JSON))
+def test_requests_survive_the_wire(verb: str, arguments: dict[str, Any]) -> None:
+    request = protocol.Request(verb, arguments)
+    assert protocol.decode_request(protocol.encode_request(request)) == request
+
+
+@given(st.binary())
+def test_any_bytes_are_a_request_or_a_violation(line: bytes) -> None:
+    try:
+        protocol.decode_request(line)
+    except ProtocolViolation as error:
+        assert error.code == "CONTROL_REQUEST"
