@@ -1,0 +1,1 @@
+"""The host's database of what it knows: payloads, components, devices, mounts, and the journal."""

@@ -1,0 +1,1 @@
+"""Where payloads come from: sources that watch drives, and the child that reads one."""

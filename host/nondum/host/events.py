@@ -1,0 +1,461 @@
+"""What has happened on a host: frozen values in past tense, the only news that travels inside it.
+
+Sources (drives, devices, workers, people) emit events; the component manager turns them into new
+state and effects; executors report back with events again. An event that tells of recomposition
+is journalled; those that only tell how the world looks, many a second, are not.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar, TypeAlias
+
+from nondum.sdk.description import PluginDescription
+from nondum.sdk.errors import Problem
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Anything that has happened."""
+
+    JOURNALLED: ClassVar[bool] = True
+    """Whether the journal keeps it."""
+
+    @property
+    def name(self) -> str:
+        """The event's name as the journal writes it: `DriveInserted`."""
+        return type(self).__name__
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for the journal and for people's tools."""
+        pairs = ((f.name, getattr(self, f.name)) for f in dataclasses.fields(self))
+        return {key: plain(value) for key, value in pairs}
+
+
+Emit: TypeAlias = Callable[[Event], None]
+"""Hands an event on; never blocks, called on the loop's thread."""
+
+
+def plain(value: Any) -> Any:
+    """Values of events as JSON can carry them.
+
+    >>> plain((Path("/media/a"), frozenset({"b"})))
+    ['/media/a', ['b']]
+    """
+    if isinstance(value, Problem | PluginDescription):
+        return value.to_dict()
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, frozenset):
+        return sorted(plain(item) for item in value)
+    if isinstance(value, tuple | list):
+        return [plain(item) for item in value]
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    return value
+
+
+# Drives
+
+
+@dataclass(frozen=True, slots=True)
+class DriveInserted(Event):
+    """A drive is there: a slot's entry or a block device."""
+
+    drive: str
+    """Name of this insertion: `slot-a`, `sdb1`."""
+    root: Path
+    """Where its files are, or will be once `node` is mounted there."""
+    kind: str
+    """`slot`, `block` or `installed`."""
+    node: Path | None = None
+    """The block device to mount at `root`; None: `root` is readable as it is."""
+    filesystem: str = ""
+    """File system of `node`, as udev names it."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveRemoved(Event):
+    """A drive was pulled, or its source says that it is not there."""
+
+    drive: str
+
+
+@dataclass(frozen=True, slots=True)
+class DriveRead(Event):
+    """A drive has been looked through; `payloads` (keys) are all that it carries."""
+
+    drive: str
+    payloads: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class DriveUnreadable(Event):
+    """A drive could not be mounted or looked through, or carries no payload."""
+
+    drive: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class DrivesScanned(Event):
+    """A source of drives has told every drive that was there when it started."""
+
+    source: str
+    drives: tuple[str, ...]
+
+
+# Payloads
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadFound(Event):
+    """A payload folder was seen on a drive and its contents list read, once."""
+
+    payload: str
+    """Key of the payload on this host: the first 16 hex digits of `digest`."""
+    drive: str
+    folder: Path
+    digest: str
+    """SHA-256 of the contents list; the payload's identity."""
+    payload_id: str
+    version: str
+    release: int
+    fleet: str = ""
+    problems: tuple[Problem, ...] = ()
+    """What is already known to be wrong with it."""
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadCopied(Event):
+    """What this host needs of the payload lies in staging, each file as its hash says."""
+
+    payload: str
+    bytes_copied: int = 0
+    bytes_known: int = 0
+    """Bytes of wheels that the store had already, so that they were not copied."""
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadVerified(Event):
+    """Manifest, locks, index and wheels were checked, and they fit this host."""
+
+    payload: str
+    components: tuple[str, ...]
+    """Ids of the components that it brings."""
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadStaged(Event):
+    """The checked copy is in its lasting place; the drive is not needed any more."""
+
+    payload: str
+
+
+@dataclass(frozen=True, slots=True)
+class WheelsStored(Event):
+    """Every wheel of the payload is in the store, unpacked and safe on disk."""
+
+    payload: str
+    fresh: int
+    """How many were not in the store before."""
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentsProbed(Event):
+    """Every component's venv was made and its worker said what `index.json` says."""
+
+    payload: str
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadActivated(Event):
+    """The payload's components are ready to be entered in the catalogue."""
+
+    payload: str
+    components: tuple[Any, ...] = field(repr=False)
+    """Their `ComponentRecord`s."""
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadRefused(Event):
+    """The payload is not what it claims, or does not fit this host."""
+
+    payload: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadFailed(Event):
+    """The payload's components could not be brought to life."""
+
+    payload: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadWithdrawn(Event):
+    """The payload's last source is gone: nothing of it may be used from now on."""
+
+    payload: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadCleared(Event):
+    """Nothing of the payload runs, and its venvs, staging and folder are gone."""
+
+    payload: str
+
+
+@dataclass(frozen=True, slots=True)
+class RetryAsked(Event):
+    """A person asked that a refused or quarantined payload be tried again."""
+
+    payload: str
+
+
+@dataclass(frozen=True, slots=True)
+class RemovalAsked(Event):
+    """A person asked that an installed payload be removed for good."""
+
+    payload: str
+
+
+@dataclass(frozen=True, slots=True)
+class HostStarted(Event):
+    """The daemon is up; `recovered` says what it found half done and did about it."""
+
+    host: str
+    recovered: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Recomposed(Event):
+    """The catalogue has a new revision: components came, went or changed."""
+
+    revision: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class ProgressMade(Event):
+    """A step of an installation is `done` of `total` through."""
+
+    JOURNALLED: ClassVar[bool] = False
+    payload: str
+    phase: str
+    done: int
+    total: int
+
+
+# Workers
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerReady(Event):
+    """A worker runs its plugin and has described it."""
+
+    component: str
+    description: PluginDescription
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerExited(Event):
+    """A worker ended or was ended, and will be started again unless a failure follows."""
+
+    component: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerFailed(Event):
+    """A worker will not be started again: it is quarantined."""
+
+    component: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class BehaviourStarted(Event):
+    """A behaviour was asked to run."""
+
+    component: str
+    behaviour: str
+    call_id: int
+    arguments: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class BehaviourEstablished(Event):
+    """A lasting behaviour's effects begin to hold."""
+
+    component: str
+    behaviour: str
+    call_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class BehaviourProgressed(Event):
+    """A behaviour said how far it is."""
+
+    JOURNALLED: ClassVar[bool] = False
+    component: str
+    behaviour: str
+    call_id: int
+    fraction: float
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class BehaviourEnded(Event):
+    """A behaviour ended, however it ended."""
+
+    component: str
+    behaviour: str
+    call_id: int
+    outcome: str
+    """`SUCCEEDED`, `FAILED` or `HALTED`."""
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class FactKnown(Event):
+    """A component says that something is so."""
+
+    JOURNALLED: ClassVar[bool] = False
+    component: str
+    predicate: str
+    arguments: tuple[str, ...]
+    value: Any = None
+    """`[type, header]` of a valued fact, as it travels."""
+
+
+@dataclass(frozen=True, slots=True)
+class FactForgotten(Event):
+    """A component says that something is not so, or not known, any more."""
+
+    JOURNALLED: ClassVar[bool] = False
+    component: str
+    predicate: str
+    arguments: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class StreamFlowing(Event):
+    """A stream's first message has gone out, or (not `flowing`) it has ended or stalled."""
+
+    JOURNALLED: ClassVar[bool] = False
+    component: str
+    stream: str
+    """Full object name."""
+    flowing: bool
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerLogged(Event):
+    """A plugin logged a line."""
+
+    JOURNALLED: ClassVar[bool] = False
+    component: str
+    level: str
+    message: str
+
+
+# Devices
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceAppeared(Event):
+    """A device is there."""
+
+    device: str
+    """Name of the device on this host: a sysfs path or the name of its slot file."""
+    node: Path
+    properties: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceRemoved(Event):
+    """A device was pulled."""
+
+    device: str
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceClaimed(Event):
+    """A device was given to the component that declared a need for it."""
+
+    device: str
+    component: str
+    need: str
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceReleased(Event):
+    """A component lost a device, or gave it back."""
+
+    device: str
+    component: str
+    need: str
+
+
+# People and plans
+
+
+@dataclass(frozen=True, slots=True)
+class MountSet(Event):
+    """A person said where a unit sits on its body (metres; roll, pitch, yaw in radians)."""
+
+    unit: str
+    xyz: tuple[float, float, float]
+    rpy: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class GoalGiven(Event):
+    """A person, or something that speaks for one, wants something."""
+
+    goal: str
+    """Id of the goal on this host."""
+    text: str
+    kind: str
+    """`achieve` or `maintain`."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanMade(Event):
+    """A goal has a plan."""
+
+    goal: str
+    revision: int
+    steps: tuple[str, ...]
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanMissing(Event):
+    """A goal has no plan as things are; it waits, suspended."""
+
+    goal: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class GoalReached(Event):
+    """A goal holds."""
+
+    goal: str
+
+
+@dataclass(frozen=True, slots=True)
+class GoalEnded(Event):
+    """A goal is not pursued any more: achieved, halted or replaced."""
+
+    goal: str
+    reason: str
