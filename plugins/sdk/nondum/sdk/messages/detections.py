@@ -1,0 +1,56 @@
+"""What a detector found in an image (vision_msgs/Detection2DArray)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+from nondum.sdk.messages.fields import Message
+from nondum.sdk.messages.header import Header
+from nondum.sdk.messages.images import CameraModel
+
+
+@dataclass(frozen=True, slots=True)
+class BoundingBox2D:
+    """An upright box in the image, by its centre and size in pixels."""
+
+    cx: float
+    cy: float
+    width: float
+    height: float
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """One thing found."""
+
+    class_id: str
+    """An object of type `class` in planning: `person`."""
+    score: float
+    """0..1, higher is surer."""
+    box: BoundingBox2D
+    id: str = ""
+    """The same over time where the detector follows things; empty where it does not."""
+
+
+@dataclass(frozen=True, slots=True)
+class Detections(Message):
+    """All that was found in one image; its stamp and frame are the image's."""
+
+    TYPE: ClassVar[str] = "detections"
+    header: Header
+    detections: tuple[Detection, ...]
+    image_width: int
+    image_height: int
+    camera: CameraModel | None = None
+
+    def faults(self) -> Iterator[str]:
+        """An empty image, scores outside 0..1, boxes without size."""
+        if self.image_width <= 0 or self.image_height <= 0:
+            yield f"image size {self.image_width}×{self.image_height} is not positive"
+        for i, found in enumerate(self.detections):
+            if not 0 <= found.score <= 1:
+                yield f"detections[{i}].score {found.score} is not within 0..1"
+            if found.box.width <= 0 or found.box.height <= 0:
+                yield f"detections[{i}].box has no size"

@@ -1,0 +1,91 @@
+"""Sound, words, single numbers and clouds of points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from nondum.sdk.messages.fields import Buffer, Message
+from nondum.sdk.messages.header import Header
+
+if TYPE_CHECKING:
+    import numpy as np
+
+
+@dataclass(frozen=True, slots=True)
+class Audio(Message):
+    """A piece of sound, channels interleaved. Encodings: s16le, f32le (-1..1)."""
+
+    TYPE: ClassVar[str] = "audio"
+    BUFFER: ClassVar[str | None] = "data"
+    SAMPLE_BYTES: ClassVar[Mapping[str, int]] = {"s16le": 2, "f32le": 4}
+    header: Header
+    rate_hz: int
+    channels: int
+    encoding: str
+    data: Buffer
+
+    def faults(self) -> Iterator[str]:
+        """Unknown encoding, no rate, no channels, or half a frame of samples."""
+        size = self.SAMPLE_BYTES.get(self.encoding)
+        if size is None:
+            yield f"encoding {self.encoding!r} is none of {', '.join(self.SAMPLE_BYTES)}"
+            return
+        if self.rate_hz <= 0 or self.channels <= 0:
+            yield f"{self.rate_hz} Hz and {self.channels} channels are not both positive"
+        elif memoryview(self.data).nbytes % (size * self.channels):
+            yield "the samples end within a frame"
+
+
+@dataclass(frozen=True, slots=True)
+class Text(Message):
+    """Words, said or to be said."""
+
+    TYPE: ClassVar[str] = "text"
+    header: Header
+    text: str
+    language: str = "en"
+    """BCP 47."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar(Message):
+    """One measured number."""
+
+    TYPE: ClassVar[str] = "scalar"
+    header: Header
+    value: float
+    unit: str
+    """SI symbol: `V`, `°C`, `Sv/h`; `1` where there is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Points(Message):
+    """A cloud of points (sensor_msgs/PointCloud2 with x, y, z): N×3 float32, metres."""
+
+    TYPE: ClassVar[str] = "points"
+    BUFFER: ClassVar[str | None] = "data"
+    POINT_BYTES: ClassVar[int] = 12
+    header: Header
+    data: Buffer
+
+    def array(self) -> np.ndarray[Any, np.dtype[Any]]:
+        """View the points as numpy array (N, 3) of float32 without copying."""
+        import numpy as np
+
+        return np.frombuffer(self.data, dtype="<f4").reshape(-1, 3)
+
+    @classmethod
+    def from_array(cls, header: Header, array: np.ndarray[Any, Any]) -> Points:
+        """Make a message of an array (N, 3). Raises `ValueError` for any other shape."""
+        import numpy as np
+
+        if array.ndim != 2 or array.shape[1] != 3:
+            raise ValueError(f"points need shape (N, 3), found {array.shape}")
+        return cls(header, np.ascontiguousarray(array, "<f4").reshape(-1).view(np.uint8).data)
+
+    def faults(self) -> Iterator[str]:
+        """Bytes that are not a whole number of points."""
+        if memoryview(self.data).nbytes % self.POINT_BYTES:
+            yield "the bytes end within a point"
