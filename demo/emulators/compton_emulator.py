@@ -1,0 +1,27 @@
+"""Program: a Compton camera on a pseudo-terminal. Prints the terminal's path, nothing else."""
+
+import sys
+from pathlib import Path
+
+if __name__ == "__main__":  # a program of its own, whatever folder it is started in
+    sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from demo.emulators.compton import ComptonCamera
+from demo.emulators.port import Port
+from demo.emulators.program import arguments, ticks
+
+TICK_S = 0.02
+
+
+def main() -> None:
+    """Send what the instrument would, in real time, until the parent process is gone."""
+    camera = ComptonCamera(arguments(__doc__ or "").scenario)
+    port = Port()
+    print(port.path, flush=True)
+    for wait_s in ticks(TICK_S):
+        port.read(wait_s)  # the instrument takes no commands
+        port.write(camera.advance(TICK_S))
+
+
+if __name__ == "__main__":
+    main()

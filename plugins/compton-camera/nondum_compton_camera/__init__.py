@@ -1,0 +1,1 @@
+"""A Compton camera on a serial line: where the radiation comes from."""
