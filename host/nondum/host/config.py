@@ -1,0 +1,226 @@
+"""The host's configuration: one TOML file, every key with a default, all mistakes told at once."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+import socket
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, dataclass, field, fields
+from pathlib import Path
+from types import GenericAlias
+from typing import Any, get_args, get_type_hints
+
+from nondum.sdk.errors import ConfigRefused, Problem
+
+SYSTEM_FILE = Path("/etc/nondum/host.toml")
+HOST_NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
+
+
+@dataclass(frozen=True, slots=True)
+class HostSection:
+    """Who this host is, and where it keeps what it knows."""
+
+    name: str = field(default_factory=lambda: default_name(socket.gethostname()))
+    """Name of the host, and of its body's frame: lower-case letters, digits and single hyphens."""
+    state: Path = Path("/var/lib/nondum")
+    """Folder of catalogue, store and venvs."""
+    control: Path = Path("/run/nondum/control.sock")
+    """The control socket."""
+    system_tree: str = "nondum.host.mind.system_tree:default_tree"
+    """`package:function` that makes the system tree."""
+
+
+@dataclass(frozen=True, slots=True)
+class DrivesSection:
+    """Where drives come from, and what is asked of them."""
+
+    slots: tuple[Path, ...] = ()
+    """Folders whose entries stand for drives."""
+    block_devices: bool = True
+    """Mount USB drives; needs root."""
+    allow_unsigned: bool = False
+    """Accept payloads without a signature: for development; every status says so."""
+
+
+@dataclass(frozen=True, slots=True)
+class DevicesSection:
+    """Where devices come from."""
+
+    slots: tuple[Path, ...] = ()
+    """Folders of TOML files that stand for devices."""
+    udev: bool = True
+    """Follow the machine's own devices."""
+
+
+@dataclass(frozen=True, slots=True)
+class InstallSection:
+    """How payloads become venvs."""
+
+    method: str = "store"
+    """`store`: hard links from the store. `pip`: pip itself."""
+    reserve_mb: int = 64
+    """Disk that is left free whatever is plugged in."""
+    quota_mb: int = 4096
+    """Size that the store is pruned to, least recently used first."""
+
+
+@dataclass(frozen=True, slots=True)
+class WorkersSection:
+    """Limits of one worker, unless its payload asks for less."""
+
+    memory_mb: int = 2048
+    tasks: int = 256
+    descriptors: int = 1024
+
+
+@dataclass(frozen=True, slots=True)
+class PlanningSection:
+    """How plans are searched for."""
+
+    deadline_s: float = 10.0
+    memory_mb: int = 512
+
+
+@dataclass(frozen=True, slots=True)
+class HostConfig:
+    """All of it."""
+
+    host: HostSection = field(default_factory=HostSection)
+    drives: DrivesSection = field(default_factory=DrivesSection)
+    devices: DevicesSection = field(default_factory=DevicesSection)
+    install: InstallSection = field(default_factory=InstallSection)
+    workers: WorkersSection = field(default_factory=WorkersSection)
+    planning: PlanningSection = field(default_factory=PlanningSection)
+
+
+def default_name(hostname: str) -> str:
+    """A host name made of the machine's.
+
+    >>> default_name("Spot_7.local")
+    'spot-7'
+    """
+    name = re.sub(r"[^a-z0-9]+", "-", hostname.split(".")[0].lower()).strip("-")
+    return name or "host"
+
+
+def user_config() -> HostConfig:
+    """The defaults of a host that a user runs without root: state and socket are the user's."""
+    state = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "nondum"
+    runtime = os.environ.get("XDG_RUNTIME_DIR")
+    control = (Path(runtime) / "nondum" if runtime else state) / "control.sock"
+    return HostConfig(
+        host=HostSection(state=state, control=control),
+        drives=DrivesSection(slots=(state / "slots",), block_devices=False),
+        devices=DevicesSection(slots=(state / "device-slots",)),
+    )
+
+
+def load(path: Path, defaults: HostConfig) -> HostConfig:
+    """Read a file over the defaults. Raises `ConfigRefused` with everything wrong in it."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigRefused(
+            Problem("CONFIG_UNREADABLE", f"cannot be read ({error})", where=str(path))
+        ) from error
+    return parse(text, str(path), defaults)
+
+
+def parse(text: str, where: str, defaults: HostConfig) -> HostConfig:
+    """Parse TOML over the defaults. Raises `ConfigRefused` with everything wrong in it."""
+    try:
+        data = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise ConfigRefused(Problem("CONFIG_TOML", str(error), where=where)) from error
+    problems: list[Problem] = []
+    sections = {f.name: getattr(defaults, f.name) for f in fields(HostConfig)}
+    for name, table in data.items():
+        if name not in sections:
+            problems.append(_unknown(name, sections, where))
+        elif not isinstance(table, dict):
+            problems.append(_wrong(f"[{name}]", "a table", table, where))
+        else:
+            sections[name] = _section(name, sections[name], table, where, problems)
+    problems.extend(_contradictions(sections["host"], sections["install"], where))
+    if problems:
+        raise ConfigRefused(*problems)
+    return HostConfig(**sections)
+
+
+def documented() -> Iterator[tuple[str, str, Any]]:
+    """Section, key and default of every key, for the reference and its test."""
+    for section in fields(HostConfig):
+        kind = get_type_hints(HostConfig)[section.name]
+        for key in fields(kind):
+            yield section.name, key.name, None if key.default is MISSING else key.default
+
+
+def _section(
+    name: str, default: Any, table: Mapping[str, Any], where: str, problems: list[Problem]
+) -> Any:
+    hints = get_type_hints(type(default))
+    values = {key: getattr(default, key) for key in hints}
+    for key, value in table.items():
+        if key not in hints:
+            problems.append(_unknown(key, hints, f"{where} [{name}]"))
+            continue
+        typed = _typed(hints[key], value)
+        if typed is None:
+            kind = _KINDS.get(hints[key], "another kind of value")
+            problems.append(_wrong(f"[{name}] {key}", kind, value, where))
+        else:
+            values[key] = typed
+    return type(default)(**values)
+
+
+_KINDS: Mapping[Any, str] = {
+    str: "a string",
+    int: "a whole number of at least 0",
+    float: "a number above 0",
+    bool: "true or false",
+    Path: "a path as a string",
+    tuple[Path, ...]: "a list of paths",
+}
+
+
+def _typed(hint: Any, value: Any) -> Any:
+    """The value as `hint` wants it, or None when it is of another kind."""
+    if isinstance(hint, GenericAlias):
+        (item, _) = get_args(hint)
+        typed = [_typed(item, v) for v in value] if isinstance(value, list) else [None]
+        return None if None in typed else tuple(typed)
+    if hint is Path:
+        return Path(value).expanduser() if isinstance(value, str) and value else None
+    if hint is float:
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        return float(value) if is_number and value > 0 else None
+    if hint is int:
+        return value if type(value) is int and value >= 0 else None
+    return value if type(value) is hint else None
+
+
+def _contradictions(host: HostSection, install: InstallSection, where: str) -> Iterator[Problem]:
+    if not HOST_NAME.fullmatch(host.name):
+        yield Problem(
+            "CONFIG_VALUE",
+            f"[host] name = {host.name!r} is not a host name",
+            where=where,
+            fix=f"lower-case letters, digits and single hyphens: {default_name(host.name)!r}",
+        )
+    if install.method not in ("store", "pip"):
+        yield _wrong("[install] method", '"store" or "pip"', install.method, where)
+    if not re.fullmatch(r"[\w.]+:\w+", host.system_tree):
+        yield _wrong("[host] system_tree", '"package:function"', host.system_tree, where)
+
+
+def _unknown(key: str, known: Mapping[str, Any], where: str) -> Problem:
+    near = difflib.get_close_matches(key, known, n=1)
+    fix = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(sorted(known))}"
+    return Problem("CONFIG_KEY", f"unknown key {key!r}", where=where, fix=fix)
+
+
+def _wrong(key: str, expected: str, value: Any, where: str) -> Problem:
+    return Problem("CONFIG_VALUE", f"{key} = {value!r}: expected {expected}", where=where)

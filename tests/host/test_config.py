@@ -1,0 +1,83 @@
+"""The configuration file: read over defaults, every mistake told at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nondum.host.config import HOST_NAME as HOST_NAME_PATTERN
+from nondum.host.config import HostConfig, default_name, load, parse
+from nondum.sdk.errors import ConfigRefused
+
+
+def refused(text: str) -> list[str]:
+    with pytest.raises(ConfigRefused) as caught:
+        parse(text, "host.toml", HostConfig())
+    return [str(problem) for problem in caught.value.problems]
+
+
+def test_an_empty_file_gives_the_defaults() -> None:
+    assert parse("", "host.toml", HostConfig()) == HostConfig()
+
+
+def test_what_is_written_stands_over_the_defaults() -> None:
+    config = parse(
+        '[host]\nname = "spot"\n[drives]\nslots = ["/a", "/b"]\n[planning]\ndeadline_s = 3\n',
+        "host.toml",
+        HostConfig(),
+    )
+    assert config.host.name == "spot"
+    assert config.drives.slots == (Path("/a"), Path("/b"))
+    assert config.planning.deadline_s == 3.0
+    assert config.host.state == HostConfig().host.state
+
+
+def test_all_mistakes_are_told_at_once() -> None:
+    assert refused(
+        '[host]\nname = "Spot 7"\nstat = "/x"\n[drives]\nslots = "/a"\n[dirves]\n'
+        '[install]\nmethod = "conda"\nreserve_mb = true\n'
+    ) == [
+        "CONFIG_KEY host.toml [host]: unknown key 'stat' → did you mean 'state'?",
+        "CONFIG_VALUE host.toml: [drives] slots = '/a': expected a list of paths",
+        "CONFIG_KEY host.toml: unknown key 'dirves' → did you mean 'drives'?",
+        "CONFIG_VALUE host.toml: [install] reserve_mb = True: expected a whole number of at "
+        "least 0",
+        "CONFIG_VALUE host.toml: [host] name = 'Spot 7' is not a host name → lower-case letters, "
+        "digits and single hyphens: 'spot-7'",
+        'CONFIG_VALUE host.toml: [install] method = \'conda\': expected "store" or "pip"',
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[host", "CONFIG_TOML host.toml: Expected ']'"),
+        ("host = 3", "CONFIG_VALUE host.toml: [host] = 3: expected a table"),
+        ('[host]\nsystem_tree = "tree"', 'expected "package:function"'),
+        ("[planning]\ndeadline_s = 0", "expected a number above 0"),
+    ],
+)
+def test_a_mistake_names_place_and_expectation(text: str, words: str) -> None:
+    (problem,) = refused(text)
+    assert words in problem
+
+
+def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
+    with pytest.raises(ConfigRefused, match="CONFIG_UNREADABLE"):
+        load(tmp_path / "none.toml", HostConfig())
+
+
+@given(st.text())
+def test_any_machine_name_gives_a_host_name(hostname: str) -> None:
+    assert HOST_NAME_PATTERN.fullmatch(default_name(hostname))
+
+
+@given(st.text())
+def test_any_text_is_a_config_or_refused(text: str) -> None:
+    try:
+        parse(text, "host.toml", HostConfig())
+    except ConfigRefused as error:
+        assert all(problem.code.startswith("CONFIG_") for problem in error.problems)
