@@ -21,8 +21,8 @@ _CRC = struct.Struct("<H")
 _EVENT = struct.Struct("<IQhhhHhhhH")
 _STATUS = struct.Struct("<III")
 _LENGTHS = {EVENT: _EVENT.size, STATUS: _STATUS.size}
-_MM = 0.01
-_KEV = 0.1
+_PER_MM = 100
+_PER_KEV = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,4 +140,4 @@ def _record(kind: int, payload: bytes) -> Event | Status | None:
 
 def _interaction(numbers: list[int]) -> Interaction:
     x, y, z, energy = numbers
-    return Interaction((x * _MM, y * _MM, z * _MM), energy * _KEV)
+    return Interaction((x / _PER_MM, y / _PER_MM, z / _PER_MM), energy / _PER_KEV)

@@ -1,0 +1,53 @@
+"""A serial line on the event loop; pyserial's errors become `BehaviourFailed` SERIAL_FAILED."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import TracebackType
+
+import serial
+
+from nondum.sdk import BehaviourFailed, Problem
+
+
+class Line:
+    """An open port, ours alone. A context manager: leaving it closes the port."""
+
+    def __init__(self, node: str, baud: int) -> None:
+        self._node = node
+        with self._translated():
+            self._port = serial.Serial(node, baud, timeout=0, exclusive=True)
+
+    async def receive(self) -> bytes:
+        """The bytes that have come, after waiting for the first of them."""
+        loop, ready = asyncio.get_running_loop(), asyncio.Event()
+        # Only while somebody waits: unread bytes would keep the loop busy otherwise.
+        loop.add_reader(self._port.fileno(), ready.set)
+        try:
+            await ready.wait()
+        finally:
+            loop.remove_reader(self._port.fileno())
+        with self._translated():
+            return bytes(self._port.read(max(1, self._port.in_waiting)))
+
+    def __enter__(self) -> Line:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._port.close()
+
+    @contextmanager
+    def _translated(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:  # pyserial's own errors are OSErrors too
+            raise BehaviourFailed(
+                Problem("SERIAL_FAILED", str(error), where=self._node, fix="check the cable")
+            ) from error
