@@ -1,0 +1,180 @@
+"""Letting components into a merge one by one, each whole or not at all.
+
+Rules M2-M14 of merging: words are shared by plain name; whoever comes first in precedence has the
+say, and what contradicts it is kept out, with both places named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+from nondum.planning.claims import Claims
+from nondum.planning.core import CORE_NAME, CORE_VERSION, core, core_graph, core_predicates
+from nondum.planning.domain import Action, Object, Origin, Predicate
+from nondum.planning.scope import Report
+from nondum.planning.syntax import Place, type_text
+from nondum.planning.typegraph import ROOT, TypeGraph
+from nondum.planning.vocabulary import cycle_text
+
+Types = tuple[str, ...]
+
+
+@dataclass(slots=True)
+class Agreement:
+    """What the components that were let in agree upon."""
+
+    parents: dict[str, frozenset[str]] = field(default_factory=dict)
+    type_origins: dict[str, tuple[Origin, ...]] = field(default_factory=dict)
+    predicates: dict[str, Predicate] = field(default_factory=dict)
+    objects: dict[str, Object] = field(default_factory=dict)
+    actions: dict[str, Action] = field(default_factory=dict)
+
+    @classmethod
+    def of_core(cls, hosts: Iterable[str]) -> Agreement:
+        """Where every merge begins: the core's words, and the hosts as objects."""
+        origins: dict[str, tuple[Origin, ...]] = {
+            type_.name: (Origin("", CORE_NAME, CORE_VERSION, type_.place),)
+            for type_ in core().types
+        }
+        return cls(
+            parents=dict(core_graph().parents),
+            type_origins=origins,
+            predicates=dict(core_predicates()),
+            objects={host: Object(host, ("host",)) for host in hosts},
+        )
+
+    def joined_by(self, claims: Claims, report: Report) -> Agreement:
+        """The agreement with one component more; whatever contradicts goes to the report, and then
+        the answer means nothing."""
+        wider = Agreement(
+            dict(self.parents),
+            dict(self.type_origins),
+            dict(self.predicates),
+            dict(self.objects),
+            dict(self.actions),
+        )
+        _join_types(wider, claims, report)
+        if not report.problems:
+            graph = TypeGraph(wider.parents)
+            _join_predicates(wider, claims, graph, report)
+            _join_objects(wider, claims, graph, report)
+            _join_actions(wider, claims, report)
+        return wider
+
+
+def _join_types(agreed: Agreement, claims: Claims, report: Report) -> None:
+    both = dict(agreed.parents)
+    for claim in claims.types:
+        both[claim.name] = both.get(claim.name, frozenset()) | claim.parents
+    graph = TypeGraph(both)
+    cycle = graph.cycle()
+    if cycle:
+        named = [claim for claim in claims.types if claim.name in cycle]
+        others = _places(o for name in cycle for o in agreed.type_origins.get(name, ()))
+        message = f"types in a circle: {cycle_text(cycle)}, together with {others}"
+        report.problem("E-TYPE-CYCLE", message, _place(named[0].origin))
+        return
+    for claim in claims.types:
+        known = agreed.parents.get(claim.name, frozenset())
+        if _says_no_less(graph, claim.parents, known):
+            agreed.parents[claim.name] = claim.parents
+        elif not _says_no_less(graph, known, claim.parents):
+            others = _places(agreed.type_origins[claim.name])
+            message = (
+                f"type {claim.name!r} is a kind of {type_text(tuple(sorted(claim.parents)))} here,"
+                f" of {type_text(tuple(sorted(known)))} in {others}"
+            )
+            report.problem("E-TYPE-PARENT", message, _place(claim.origin), "choose another name")
+        origins = agreed.type_origins.get(claim.name, ())
+        agreed.type_origins[claim.name] = (*origins, claim.origin)
+
+
+def _says_no_less(graph: TypeGraph, parents: frozenset[str], known: frozenset[str]) -> bool:
+    """Whether being a kind of all `parents` includes being a kind of all `known`."""
+    above = frozenset(a for parent in parents for a in graph.ancestors(parent)) | {ROOT}
+    return known <= above
+
+
+def _join_predicates(agreed: Agreement, claims: Claims, graph: TypeGraph, report: Report) -> None:
+    for claim in claims.predicates:
+        known = agreed.predicates.get(claim.name)
+        if known is None:
+            agreed.predicates[claim.name] = claim
+            continue
+        if known.arity != claim.arity:
+            message = (
+                f"predicate {claim.name!r}: {claim.arity} arguments here,"
+                f" {known.arity} in {_places(known.origins)}"
+            )
+            report.problem("E-PRED-ARITY", message, _place(claim.origins[0]), "choose another name")
+            continue
+        agreed.predicates[claim.name] = replace(
+            known,
+            parameters=_wider(known, claim, graph, report),
+            valued=known.valued or claim.valued,
+            functional=known.functional or claim.functional,
+            origins=known.origins + claim.origins,
+        )
+
+
+def _wider(
+    known: Predicate, claim: Predicate, graph: TypeGraph, report: Report
+) -> tuple[Types, ...]:
+    wider = []
+    pairs = zip(known.parameters, claim.parameters, strict=True)
+    for position, (theirs, mine) in enumerate(pairs, 1):
+        difference = (
+            f"predicate {claim.name!r}, argument {position}: {type_text(mine)} here,"
+            f" {type_text(theirs)} in {_places(known.origins)}"
+        )
+        place = _place(claim.origins[0])
+        if not graph.comparable(mine, theirs):
+            report.problem("E-PRED-TYPE", difference, place, "choose another name")
+        elif set(mine) != set(theirs):
+            report.warning("E-PRED-TYPE", f"{difference}; taken as the wider one", place)
+        wider.append(theirs if graph.all_kind_of(mine, theirs) else mine)
+    return tuple(wider)
+
+
+def _join_objects(agreed: Agreement, claims: Claims, graph: TypeGraph, report: Report) -> None:
+    for claim in claims.objects:
+        known = agreed.objects.get(claim.name)
+        if known is None:
+            agreed.objects[claim.name] = Object(claim.name, claim.types, origins=(claim.origin,))
+            continue
+        if not graph.comparable(claim.types, known.types):
+            message = (
+                f"{claim.name!r} is {type_text(claim.types)} here,"
+                f" {type_text(known.types)} in {_places(known.origins) or 'this robot'}"
+            )
+            report.problem("E-OBJ-TYPE", message, _place(claim.origin), "choose another name")
+            continue
+        is_closer = graph.all_kind_of(claim.types, known.types)
+        agreed.objects[claim.name] = replace(
+            known,
+            types=claim.types if is_closer else known.types,
+            origins=(*known.origins, claim.origin),
+        )
+
+
+def _join_actions(agreed: Agreement, claims: Claims, report: Report) -> None:
+    for action in claims.actions:
+        known = agreed.actions.setdefault(action.name, action)
+        if known is action:
+            continue
+        if known != action:
+            message = f"action {action.name!r} differs from the one in {_places(known.origins)}"
+            fix = "run one version of the plugin on this host"
+            report.problem("E-VERSION", message, _place(action.origins[0]), fix)
+            continue
+        agreed.actions[action.name] = replace(known, origins=known.origins + action.origins)
+
+
+def _place(origin: Origin) -> Place:
+    assert origin.place is not None, "what fragments claim has a place"
+    return origin.place
+
+
+def _places(origins: Iterable[Origin]) -> str:
+    return " and ".join(map(str, origins))

@@ -1,0 +1,95 @@
+"""What one component says, checked by itself: the part of a merge that needs no one else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+from nondum.planning.contribution import Contribution
+from nondum.planning.core import core_graph, core_predicates
+from nondum.planning.domain import Action, Origin, Predicate
+from nondum.planning.execution import behaviours_of
+from nondum.planning.inventory import FactClaim, ObjectClaim, facts_of, objects_of, own_objects
+from nondum.planning.parse import parse_fragment
+from nondum.planning.schema import schema_of
+from nondum.planning.scope import Report, Scope
+from nondum.planning.syntax import DomainFragment, FragmentSyntax, ProblemFragment
+from nondum.planning.vocabulary import TypeClaim, predicates_of, types_of
+from nondum.sdk.errors import FragmentRefused, Problem
+
+
+@dataclass(frozen=True, slots=True)
+class Claims:
+    """One component's fragments, names resolved. With problems, the rest is empty."""
+
+    contribution: Contribution
+    types: tuple[TypeClaim, ...] = ()
+    predicates: tuple[Predicate, ...] = ()
+    objects: tuple[ObjectClaim, ...] = ()
+    actions: tuple[Action, ...] = ()
+    facts: tuple[FactClaim, ...] = ()
+    problems: tuple[Problem, ...] = ()
+    warnings: tuple[Problem, ...] = ()
+
+
+@lru_cache(maxsize=4096)
+def claims_of(contribution: Contribution) -> Claims:
+    """Parse and check one contribution; all its problems at once."""
+    by = Origin(contribution.component, contribution.plugin, contribution.version)
+    report = Report(by, {fragment.name: fragment.text for fragment in contribution.fragments})
+    fragments = _parsed(contribution, report)
+    domains = [fragment for fragment in fragments if isinstance(fragment, DomainFragment)]
+    types = types_of(domains, report)
+    if report.problems:
+        return Claims(contribution, problems=tuple(report.problems))
+    graph = core_graph().with_parents({claim.name: claim.parents for claim in types})
+    scope = Scope(report, contribution.host, contribution.local_names(), graph)
+    scope.predicates.update(core_predicates())
+    predicates = predicates_of(domains, scope)
+    scope.predicates.update({predicate.name: predicate for predicate in predicates})
+    scope.objects.update(own_objects(contribution, scope))
+    objects = objects_of(fragments, scope)
+    scope.objects.update({claim.name: claim.types for claim in objects})
+    claims = Claims(
+        contribution=contribution,
+        types=types,
+        predicates=predicates,
+        objects=objects,
+        actions=_actions(domains, contribution, scope),
+        facts=facts_of(fragments, scope),
+        warnings=tuple(report.warnings),
+    )
+    return Claims(contribution, problems=tuple(report.problems)) if report.problems else claims
+
+
+def _parsed(contribution: Contribution, report: Report) -> list[FragmentSyntax]:
+    fragments: list[FragmentSyntax] = []
+    for fragment in contribution.fragments:
+        try:
+            parsed = parse_fragment(fragment.text, fragment.name)
+        except FragmentRefused as refused:
+            report.problems.extend(report.signed(problem) for problem in refused.problems)
+            continue
+        if isinstance(parsed, ProblemFragment) and parsed.goal is not None:
+            message = "a fragment has no goal: people give goals"
+            report.problem("E-GOAL", message, parsed.goal.place, "declare a phrase for the goal")
+        fragments.append(parsed)
+    return fragments
+
+
+def _actions(
+    domains: Sequence[DomainFragment], contribution: Contribution, scope: Scope
+) -> tuple[Action, ...]:
+    declared = [action for domain in domains for action in domain.actions]
+    first = {action.name: action for action in reversed(declared)}
+    for action in declared:
+        if action is not first[action.name]:
+            message = f"action {action.name!r} is declared twice, first at"
+            scope.report.problem("E-TWICE", f"{message} {first[action.name].place}", action.place)
+    behaviours = behaviours_of(contribution, first, scope.report)
+    schemas = (
+        schema_of(action, contribution.plugin, behaviours.get(action.name), scope)
+        for action in first.values()
+    )
+    return tuple(schema for schema in schemas if schema)

@@ -1,0 +1,144 @@
+"""PDDL text into syntax, or a refusal that says where and what was expected instead."""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+from importlib import resources
+from typing import cast
+
+from lark import Lark, Token, UnexpectedCharacters, UnexpectedInput
+from lark.exceptions import VisitError
+
+from nondum.planning.build import Builder
+from nondum.planning.caret import Misplaced, nearest, refusal
+from nondum.planning.syntax import Formula, FragmentSyntax, Place, PredicateDeclaration
+from nondum.sdk.errors import FragmentRefused, Problem
+
+SIZE_LIMIT_BYTES = 256 * 1024
+DEPTH_LIMIT = 64
+
+_COMMENT = re.compile(r";[^\n]*")
+_WORD = re.compile(r"[^\s()]+|.", re.DOTALL)
+_LOWER = {upper: upper + 32 for upper in range(ord("A"), ord("Z") + 1)}
+_SECTIONS_NOT_HANDLED = {
+    ":durative-action": "durative actions",
+    ":derived": "derived predicates",
+    ":constraints": "trajectory constraints",
+}
+_SAID = {
+    "LPAR": "'('",
+    "RPAR": "')'",
+    "MINUS": "'-'",
+    "NAME": "a name",
+    "VARIABLE": "a variable",
+    "NUMBER": "a number",
+    "COMPARISON": "a comparison",
+    "CHANGE": "a numeric effect",
+    "EQUALS": "'='",
+    "$END": "the end",
+}
+
+
+def parse_fragment(
+    text: str, file: str, *, size_limit_bytes: int = SIZE_LIMIT_BYTES
+) -> FragmentSyntax:
+    """Parse a whole domain or problem; `file` is the name that messages give.
+
+    Raises `FragmentRefused`: E-SYNTAX, E-UNSUPPORTED, E-TWICE, PDDL_TOO_BIG, PDDL_TOO_DEEP.
+    """
+    return _parse_cached(text, file, size_limit_bytes)
+
+
+@lru_cache(maxsize=1024)
+def _parse_cached(text: str, file: str, size_limit_bytes: int) -> FragmentSyntax:
+    if len(text.encode()) > size_limit_bytes:
+        need, have = f"at most {size_limit_bytes} bytes", f"{len(text.encode())}"
+        raise FragmentRefused(Problem("PDDL_TOO_BIG", "the text is too long", file, need, have))
+    return cast(FragmentSyntax, _parse(text, file, "fragment"))
+
+
+def parse_formula(text: str, file: str) -> Formula:
+    """Parse one condition, such as a goal. Raises `FragmentRefused` as `parse_fragment` does."""
+    return cast(Formula, _parse(text, file, "formula"))
+
+
+def parse_signature(text: str, file: str) -> PredicateDeclaration:
+    """Parse `(name ?parameter - type …)`. Raises `FragmentRefused` as `parse_fragment` does."""
+    return cast(PredicateDeclaration, _parse(text, file, "signature"))
+
+
+@lru_cache(maxsize=1)
+def _parser() -> Lark:
+    grammar = resources.files("nondum.planning") / "grammar" / "pddl.lark"
+    return Lark(
+        grammar.read_text(encoding="utf-8"),
+        parser="lalr",
+        start=["fragment", "formula", "signature"],
+        maybe_placeholders=False,
+    )
+
+
+def _parse(text: str, file: str, start: str) -> object:
+    clean = _COMMENT.sub(lambda comment: " " * len(comment[0]), text).translate(_LOWER)
+    _check_depth(clean, text, file)
+    try:
+        return Builder(file).transform(_parser().parse(clean, start=start))
+    except UnexpectedInput as error:
+        raise FragmentRefused(_unexpected(error, clean, text, file)) from error
+    except VisitError as error:
+        if not isinstance(error.orig_exc, Misplaced):
+            raise
+        raise FragmentRefused(error.orig_exc.problem(text)) from error
+
+
+def _check_depth(clean: str, text: str, file: str) -> None:
+    depth = 0
+    for bracket in re.finditer(r"[()]", clean):
+        depth += 1 if bracket[0] == "(" else -1
+        if depth > DEPTH_LIMIT:
+            place = _place(clean, bracket.start(), file)
+            message = f"brackets are nested more than {DEPTH_LIMIT} deep"
+            raise FragmentRefused(refusal("PDDL_TOO_DEEP", message, place, text))
+
+
+def _place(text: str, offset: int, file: str) -> Place:
+    line = text.count("\n", 0, offset) + 1
+    return Place(file, line, offset - (text.rfind("\n", 0, offset) + 1) + 1)
+
+
+def _unexpected(error: UnexpectedInput, clean: str, text: str, file: str) -> Problem:
+    offset = len(clean.rstrip()) if _at_end(error) else cast(int, error.pos_in_stream)
+    match = _WORD.match(clean, offset)
+    found = match[0] if match else ""
+    place = _place(clean, offset, file)
+    if found in _SECTIONS_NOT_HANDLED:
+        message = f"{_SECTIONS_NOT_HANDLED[found]} are not handled"
+        return refusal("E-UNSUPPORTED", message, place, text)
+    expected = _expected(error)
+    listed = " or ".join(expected) if len(expected) < 6 else "one of " + ", ".join(expected)
+    message = f"expected {listed}, found {repr(found) if found else 'the end of the text'}"
+    fix = nearest(found, (word.strip("'") for word in expected)) if len(found) > 2 else ""
+    return refusal("E-SYNTAX", message, place, text, fix=fix)
+
+
+def _at_end(error: UnexpectedInput) -> bool:
+    token = getattr(error, "token", None)
+    return isinstance(token, Token) and token.type == "$END"
+
+
+def _expected(error: UnexpectedInput) -> list[str]:
+    names: set[str]
+    if isinstance(error, UnexpectedCharacters):
+        names = error.allowed or set()
+    else:
+        names = getattr(error, "accepts", None) or getattr(error, "expected", None) or set()
+    return sorted({_said(name) for name in names if name != "_KEYWORD"})
+
+
+def _said(terminal: str) -> str:
+    """A terminal in a person's words; keywords are named after what they match."""
+    if terminal in _SAID:
+        return _SAID[terminal]
+    pattern = next(t.pattern.value for t in _parser().terminals if t.name == terminal)
+    return f"'{pattern.split('(?!')[0]}'"

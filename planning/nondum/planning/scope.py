@@ -1,0 +1,146 @@
+"""What the names in one component's fragments mean, and the problems found on the way.
+
+A fragment may use the core's words, those that the fragments of its own component declare, and
+nothing else: so a stranger who leaves takes no meaning with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+from nondum.planning.caret import nearest, refusal
+from nondum.planning.core import HOST_PREDICATES, TAKEN_PREDICATES
+from nondum.planning.domain import Origin, Predicate
+from nondum.planning.normal import Effect
+from nondum.planning.syntax import Atom, Place, Term, type_text
+from nondum.planning.typegraph import TypeGraph
+from nondum.sdk.errors import Problem
+
+SELF = "self"
+"""What fragments and goals call the host."""
+
+OWNED_MARK = "__"
+"""Only names of units and streams contain it."""
+
+
+@dataclass(slots=True)
+class Report:
+    """Collects everything wrong with one component, so that a person reads it all at once."""
+
+    by: Origin
+    texts: Mapping[str, str]
+    """File name → text, for the lines that problems show."""
+    problems: list[Problem] = field(default_factory=list)
+    warnings: list[Problem] = field(default_factory=list)
+
+    def problem(self, code: str, message: str, place: Place, fix: str = "") -> None:
+        """Something that keeps the component out."""
+        self.problems.append(self._at(code, message, place, fix))
+
+    def warning(self, code: str, message: str, place: Place, fix: str = "") -> None:
+        """Something that a person should know."""
+        self.warnings.append(self._at(code, message, place, fix))
+
+    def origin(self, place: Place) -> Origin:
+        """The component, at a place."""
+        return Origin(self.by.component, self.by.plugin, self.by.version, place)
+
+    def signed(self, problem: Problem) -> Problem:
+        """A problem found in one text, with the plugin that brought it."""
+        return replace(problem, where=f"{self.by.plugin} {self.by.version} {problem.where}")
+
+    def _at(self, code: str, message: str, place: Place, fix: str) -> Problem:
+        by = f"{self.by.plugin} {self.by.version}"
+        return refusal(code, message, place, self.texts.get(place.file, ""), by=by, fix=fix)
+
+
+@dataclass(slots=True)
+class Scope:
+    """Names of one component: the core's and its own. Checks add to the report."""
+
+    report: Report
+    host: str
+    locals: Mapping[str, str]
+    """The component's own units and slots: local name → object."""
+    graph: TypeGraph
+    predicates: dict[str, Predicate] = field(default_factory=dict)
+    objects: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    """Object → types."""
+
+    def resolve(self, name: str) -> str:
+        """The object that a local name, `self` or a shared name stands for."""
+        return self.host if name == SELF else self.locals.get(name, name)
+
+    def known_types(self, types: Iterable[str], place: Place) -> bool:
+        """Check that all types are declared (E-UNDECL)."""
+        unknown = [name for name in types if name not in self.graph]
+        for name in unknown:
+            fix = nearest(name, self.graph.parents) or "declare it in :types"
+            self.report.problem("E-UNDECL", f"nobody declares type {name!r}", place, fix)
+        return not unknown
+
+    def check_atom(self, atom: Atom, variables: Mapping[str, tuple[str, ...]]) -> bool:
+        """Check predicate, arity, names and types of an atom (E-UNDECL, E-PRED-ARITY, E-TYPE)."""
+        predicate = self.predicates.get(atom.predicate)
+        if predicate is None:
+            fix = nearest(atom.predicate, self.predicates) or "declare it in :predicates"
+            message = f"nobody declares predicate {atom.predicate!r}"
+            self.report.problem("E-UNDECL", message, atom.place, fix)
+            return False
+        if len(atom.terms) != predicate.arity:
+            message = f"{atom} has {len(atom.terms)} arguments, {_declared(predicate)}"
+            self.report.problem("E-PRED-ARITY", message, atom.place)
+            return False
+        return all(
+            [
+                self.check_term(term, types, variables)
+                for term, types in zip(atom.terms, predicate.parameters, strict=True)
+            ]
+        )
+
+    def check_term(
+        self, term: Term, types: tuple[str, ...], variables: Mapping[str, tuple[str, ...]]
+    ) -> bool:
+        """Check that a term means something that can be one of `types` (E-UNDECL, E-TYPE)."""
+        found = variables.get(term.name) or self.objects.get(self.resolve(term.name))
+        if found is None:
+            if term.is_variable:
+                message = f"{term} is not a parameter"
+                fix = nearest(term.name, variables)
+            else:
+                message = f"nobody declares {term.name!r}"
+                fix = nearest(term.name, [*self.objects, *self.locals, SELF])
+            self.report.problem("E-UNDECL", message, term.place, fix)
+            return False
+        if not self.graph.may_be(found, types):
+            message = f"expected {type_text(types)}, {term} is {type_text(found)}"
+            self.report.problem("E-TYPE", message, term.place)
+            return False
+        return True
+
+    def check_ownership(self, effect: Effect, *, lasting: bool) -> None:
+        """Check that an effect writes nothing that is the host's (E-OWNED).
+
+        A lasting action may delete `idle` and `free`: so it takes them for as long as it runs.
+        """
+        for atom in effect.add:
+            self.check_writable(atom)
+        for atom in effect.delete:
+            if atom.predicate not in TAKEN_PREDICATES:
+                self.check_writable(atom)
+            elif not lasting:
+                message = f"only a lasting behaviour may take {atom}"
+                fix = "make the behaviour lasting, or leave the effect out"
+                self.report.problem("E-OWNED", message, atom.place, fix)
+
+    def check_writable(self, atom: Atom) -> None:
+        """Check that a plugin may write an atom (E-OWNED)."""
+        if atom.predicate in HOST_PREDICATES:
+            message = f"{atom.predicate!r} is the host's to say; plugins may only read it"
+            self.report.problem("E-OWNED", message, atom.place)
+
+
+def _declared(predicate: Predicate) -> str:
+    signature = " ".join(f"?{i} - {type_text(t)}" for i, t in enumerate(predicate.parameters, 1))
+    return f"({' '.join(filter(None, (predicate.name, signature)))}) is declared"

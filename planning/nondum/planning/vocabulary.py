@@ -1,0 +1,138 @@
+"""The types and predicates that one component declares."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from nondum.planning.caret import nearest
+from nondum.planning.core import core_graph, core_predicates
+from nondum.planning.domain import Origin, Predicate
+from nondum.planning.facts import is_twin
+from nondum.planning.scope import Report, Scope
+from nondum.planning.syntax import DomainFragment, PredicateDeclaration, TypedName, type_text
+from nondum.planning.typegraph import ROOT, TypeGraph
+
+
+@dataclass(frozen=True, slots=True)
+class TypeClaim:
+    """A type and the parents claimed for it; none: no claim."""
+
+    name: str
+    parents: frozenset[str]
+    origin: Origin
+
+
+def types_of(domains: Sequence[DomainFragment], report: Report) -> tuple[TypeClaim, ...]:
+    """The types beyond the core's (E-TYPE-PARENT, E-TYPE-CYCLE, E-TWICE; undeclared parents are
+    declared under `object` with a warning)."""
+    claims: dict[str, TypeClaim] = {}
+    declared = [type_ for domain in domains for type_ in domain.types]
+    for type_ in declared:
+        if _is_core(type_, report):
+            continue
+        claim = TypeClaim(type_.name, frozenset(type_.types), report.origin(type_.place))
+        known = claims.setdefault(type_.name, claim)
+        if known.parents != claim.parents:
+            message = f"type {type_.name!r} has other parents at {known.origin.place}"
+            report.problem("E-TWICE", message, type_.place)
+    for type_ in declared:
+        for parent in sorted(set(type_.types) - claims.keys()):
+            if parent not in core_graph():
+                claims[parent] = TypeClaim(parent, frozenset(), report.origin(type_.place))
+                fix = nearest(parent, core_graph().parents) or "declare it in :types"
+                message = f"type {parent!r} is not declared; taken as an object"
+                report.warning("E-UNDECL", message, type_.place, fix)
+    _check_cycle(claims, report)
+    return tuple(claims.values())
+
+
+def _is_core(type_: TypedName, report: Report) -> bool:
+    """Whether the core has the type already. It keeps its parents: others live by them."""
+    if type_.name not in core_graph():
+        return False
+    if type_.name == ROOT:
+        if set(type_.types) - {ROOT}:
+            report.problem("E-TYPE-CYCLE", "'object' is above all types", type_.place)
+    elif not set(type_.types) <= core_graph().ancestors(type_.name):
+        parents = type_text(tuple(sorted(core_graph().parents[type_.name])))
+        message = f"in the core, {type_.name!r} is a kind of {parents}"
+        report.problem("E-TYPE-PARENT", message, type_.place, "choose another name")
+    return True
+
+
+def _check_cycle(claims: dict[str, TypeClaim], report: Report) -> None:
+    cycle = TypeGraph({claim.name: claim.parents for claim in claims.values()}).cycle()
+    if cycle:
+        place = claims[cycle[0]].origin.place
+        assert place is not None, "claims of fragments have a place"
+        report.problem("E-TYPE-CYCLE", f"types in a circle: {cycle_text(cycle)}", place)
+
+
+def cycle_text(cycle: tuple[str, ...]) -> str:
+    """Every edge of a circle of types.
+
+    >>> cycle_text(("a", "b"))
+    'a - b, b - a'
+    """
+    return ", ".join(f"{a} - {b}" for a, b in zip(cycle, cycle[1:] + cycle[:1], strict=True))
+
+
+def predicates_of(domains: Sequence[DomainFragment], scope: Scope) -> tuple[Predicate, ...]:
+    """The predicates beyond the core's (E-RESERVED, E-UNDECL, E-PRED-ARITY, E-PRED-TYPE)."""
+    valued = set(_marked("valued", domains, scope))
+    functional = set(_marked("functional", domains, scope))
+    found: dict[str, Predicate] = {}
+    for declared in (predicate for domain in domains for predicate in domain.predicates):
+        predicate = Predicate.declared(
+            declared,
+            scope.report.origin(declared.place),
+            valued=declared.name in valued,
+            functional=declared.name in functional,
+        )
+        known = core_predicates().get(declared.name) or found.get(declared.name)
+        if not _types_known(declared, scope):
+            continue
+        if is_twin(declared.name):
+            message = "names that begin with 'not-' stand for negated facts"
+            scope.report.problem("E-RESERVED", message, declared.place, "choose another name")
+        elif known is None:
+            found[declared.name] = predicate
+        else:
+            _compare(predicate, known, declared, scope)
+    return tuple(found.values())
+
+
+def _types_known(declared: PredicateDeclaration, scope: Scope) -> bool:
+    return all([scope.known_types(p.types, p.place) for p in declared.parameters])
+
+
+def _compare(
+    predicate: Predicate, known: Predicate, declared: PredicateDeclaration, scope: Scope
+) -> None:
+    other = f"as {known.origins[0]} declares it"
+    if predicate.arity != known.arity:
+        message = f"predicate {known.name!r}: {predicate.arity} arguments, {known.arity} {other}"
+        scope.report.problem("E-PRED-ARITY", message, declared.place, "choose another name")
+        return
+    for position, (mine, theirs) in enumerate(
+        zip(predicate.parameters, known.parameters, strict=True), 1
+    ):
+        if not scope.graph.comparable(mine, theirs):
+            message = (
+                f"predicate {known.name!r}, argument {position}: {type_text(mine)},"
+                f" {type_text(theirs)} {other}"
+            )
+            scope.report.problem("E-PRED-TYPE", message, declared.place, "choose another name")
+
+
+def _marked(section: str, domains: Sequence[DomainFragment], scope: Scope) -> Iterator[str]:
+    declared = {predicate.name for domain in domains for predicate in domain.predicates}
+    for domain in domains:
+        for name in domain.valued if section == "valued" else domain.functional:
+            if name.name in declared - core_predicates().keys():
+                yield name.name
+            else:
+                message = f"{name.name!r} in :{section} is no predicate that this plugin declares"
+                fix = nearest(name.name, declared)
+                scope.report.problem("E-UNDECL", message, name.place, fix)
