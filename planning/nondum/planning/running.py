@@ -1,0 +1,105 @@
+"""The seam between plans and behaviours: who starts an action, and what is known while it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+from nondum.planning.step import Step
+from nondum.sdk.planner import GroundAction
+
+
+class RunState(Enum):
+    """How far a started action is."""
+
+    STARTING = "starting"
+    """Asked to run. A finishing one stays here until it ends."""
+    ESTABLISHED = "established"
+    """A lasting one whose effects hold now."""
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    HALTED = "halted"
+    """Ended because it was asked to, or because its component went away."""
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether nothing of it runs any more."""
+        return self in (RunState.SUCCEEDED, RunState.FAILED, RunState.HALTED)
+
+
+class RunningAction(Protocol):
+    """One started action. Its state changes between ticks, never by itself within one."""
+
+    @property
+    def state(self) -> RunState:
+        """How far it is."""
+        ...
+
+    @property
+    def reason(self) -> str:
+        """Why it failed or was halted, in the author's words; empty otherwise."""
+        ...
+
+    def halt(self) -> None:
+        """Ask it to end. Returns at once; asking again is harmless."""
+        ...
+
+
+class Runner(Protocol):
+    """Starts actions."""
+
+    def start(self, action: GroundAction) -> RunningAction:
+        """Start an action. Never blocks and never raises: what cannot start has FAILED."""
+        ...
+
+
+class World(Protocol):
+    """What is believed at one moment."""
+
+    @property
+    def facts(self) -> frozenset[str]:
+        """Every fact that holds, the effects of established lasting behaviours included."""
+        ...
+
+    def facts_without(self, ended: Collection[str]) -> frozenset[str]:
+        """The facts that would hold if the lasting behaviours of these names had ended: what they
+        add is gone unless it has another source, what they delete is back."""
+        ...
+
+
+@dataclass(slots=True)
+class Run:
+    """A started action in the hands of a task tree."""
+
+    step: Step
+    action: RunningAction
+    started_s: float
+    established_s: float | None = None
+    """When it was first seen established."""
+    halted_because: str = ""
+    """Why it was asked to end; from then on nothing counts on it."""
+    ineffective_s: float | None = None
+    """Since when it is established and yet its effects do not hold."""
+
+    @property
+    def is_halting(self) -> bool:
+        """Whether it was asked to end."""
+        return bool(self.halted_because)
+
+    @property
+    def is_pending(self) -> bool:
+        """Whether its effects are still to come."""
+        return not self.is_halting and self.action.state is RunState.STARTING
+
+    @property
+    def is_established(self) -> bool:
+        """Whether its effects are there to be counted on."""
+        return not self.is_halting and self.action.state is RunState.ESTABLISHED
+
+    def halt(self, because: str) -> None:
+        """Ask it to end, once."""
+        if not self.is_halting:
+            self.halted_because = because
+            self.action.halt()

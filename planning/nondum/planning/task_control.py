@@ -1,0 +1,266 @@
+"""The decisions of a task tree: what goes on, what is halted, what is started, and why.
+
+Pure but for the `Runner`: the same world at the same time gives the same decision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from enum import Enum
+from typing import Literal, TypeAlias
+
+from nondum.planning.attempts import Attempts, Patience
+from nondum.planning.guards import Footing, facts_after, footing, twins_in
+from nondum.planning.partial_order import GOAL, bits
+from nondum.planning.regression import Regression, Rest, Stuck
+from nondum.planning.running import Run, Runner, RunState, World
+from nondum.planning.step import Step
+
+GoalKind: TypeAlias = Literal["achieve", "maintain"]
+
+GOAL_REACHED = "the goal is reached"
+NOT_NEEDED = "nothing that is left to do needs it"
+
+
+class Phase(Enum):
+    """Where a task is after a decision."""
+
+    UNDER_WAY = "under way"
+    """Something runs, or will as soon as it may."""
+    HOLDING = "holding"
+    """The goal holds and is kept so."""
+    REACHED = "reached"
+    """The goal holds, and everything was halted."""
+    STUCK = "stuck"
+    """The plan does not fit the world any more, or one of its actions keeps failing."""
+
+
+class TaskControl:
+    """Carries a plan out by regression. One `decide` is one tick."""
+
+    def __init__(
+        self,
+        regression: Regression,
+        *,
+        runner: Runner,
+        kind: GoalKind,
+        exclusive: frozenset[str] = frozenset(),
+        runs: Iterable[Run] = (),
+        patience: Patience | None = None,
+    ) -> None:
+        """`exclusive` are units that serve one behaviour at a time and move the body; `runs` are
+        taken over from the task before."""
+        self.regression = regression
+        self.kind = kind
+        self.phase = Phase.UNDER_WAY
+        self.rest = Rest((1 << len(regression.steps)) - 1, frozenset())
+        self.needs_replan: str | None = None
+        self.exhausted: tuple[str, ...] = ()
+        """Actions that were given up and should not be in the next plan."""
+        self.runs: dict[str, Run] = {run.step.name: run for run in runs}
+        self.attempts = Attempts(patience or Patience())
+        self._runner = runner
+        self._exclusive = exclusive
+        self._waiting: dict[int, str] = {}
+        self._twins = twins_in(regression.goal, *(s.precondition | s.add for s in regression.steps))
+
+    def decide(self, world: World, now_s: float) -> Phase:
+        """Look at the world, halt and start what that asks for, and say where the task is."""
+        self._collect(now_s)
+        if self.phase is Phase.REACHED:  # done is done, though what reached it is halted again
+            return self.phase
+        ground = self._uphold(world)
+        self.needs_replan, self.exhausted, self._waiting = None, (), {}
+        rest = self.regression.rest(ground.facts)
+        if isinstance(rest, Stuck):
+            rest = self._unlock(world, rest, now_s)
+        if isinstance(rest, Stuck):
+            self.phase = self._stay(ground, rest)
+        else:
+            self.phase = self._pursue(rest, ground, now_s)
+        return self.phase
+
+    def halt(self, because: str) -> None:
+        """Ask everything to end."""
+        for run in self.runs.values():
+            run.halt(because)
+
+    def release(self) -> tuple[Run, ...]:
+        """Hand over what runs, so that another task can go on with it."""
+        runs = tuple(self.runs.values())
+        self.runs = {}
+        return runs
+
+    def waits_for(self, index: int) -> str:
+        """Why a step that could be next was not started at the last decision, or nothing."""
+        return self._waiting.get(index, "")
+
+    # What ended, and what lost its footing
+
+    def _collect(self, now_s: float) -> None:
+        for name, run in list(self.runs.items()):
+            state = run.action.state
+            if state is RunState.ESTABLISHED and run.established_s is None:
+                run.established_s = now_s
+            if state.has_ended:
+                del self.runs[name]
+                if not run.is_halting:
+                    self._judge(run, state, now_s)
+
+    def _judge(self, run: Run, state: RunState, now_s: float) -> None:
+        name, since_s = run.step.name, run.established_s
+        if since_s is not None and now_s - since_s >= self.attempts.patience.steady_s:
+            self.attempts.effective(name)
+        if state is RunState.SUCCEEDED and not run.step.lasting:
+            self.attempts.succeeded(name, now_s)
+        else:
+            self.attempts.failed(name, run.action.reason or f"it {state.value} by itself")
+
+    def _uphold(self, world: World) -> Footing:
+        ground = footing(world, self.runs.values(), self._twins)
+        for run, lacking in ground.fallen:
+            run.halt(f"its guard is broken: {in_words(lacking)} does not hold")
+        return ground
+
+    # When no rest of the plan is supported
+
+    def _unlock(self, world: World, stuck: Stuck, now_s: float) -> Rest | Stuck:
+        """Find runs that withhold what is missing, and halt them if the plan then goes on."""
+        ended = {name for name, run in self.runs.items() if run.is_halting}
+        blockers: set[str] = set()
+        result: Rest | Stuck = stuck
+        while isinstance(result, Stuck):
+            more = {
+                name
+                for name, run in self.runs.items()
+                if name not in blockers and not run.is_pending and run.step.delete & result.facts
+            }
+            if not more:
+                return stuck
+            blockers |= more
+            result = self.regression.rest(facts_after(world, ended | blockers, self._twins))
+        for run in (self.runs[name] for name in sorted(blockers - ended)):
+            if self._is_out_of_patience(run, now_s):
+                run.halt("it withholds what the plan needs next")
+        return result
+
+    def _is_out_of_patience(self, run: Run, now_s: float) -> bool:
+        """Whether a run that does not do its part of the plan has had its time."""
+        if run.step.name not in {step.name for step in self.regression.steps}:
+            return True
+        if run.ineffective_s is None:
+            run.ineffective_s = now_s
+        if now_s - run.ineffective_s < self.attempts.patience.settle_s:
+            return False
+        self.attempts.failed(run.step.name, "it runs, but its effects do not hold")
+        return True
+
+    def _stay(self, ground: Footing, stuck: Stuck) -> Phase:
+        """Let what runs go on if its success would help; otherwise ask for another plan."""
+        pending = [run for run in self.runs.values() if run.is_pending]
+        gone = frozenset[str]().union(*(run.step.delete for run in pending))
+        come = frozenset[str]().union(*(run.step.add for run in pending))
+        if pending and isinstance(self.regression.rest(ground.facts - gone | come), Rest):
+            return Phase.UNDER_WAY
+        link = stuck.missing[0]
+        needed = "the goal" if link.consumer == GOAL else self.regression.steps[link.consumer].name
+        return self._give_up(f"{in_words(stuck.facts)} does not hold, which {needed} needs")
+
+    def _give_up(self, why: str) -> Phase:
+        """Hold safely until there is another plan: nothing that moves the body goes on."""
+        self.needs_replan = why
+        for run in self.runs.values():
+            if run.step.actor in self._exclusive:
+                run.halt(f"the plan is stuck: {why}")
+        return Phase.STUCK
+
+    # When a rest of the plan is supported
+
+    def _pursue(self, rest: Rest, ground: Footing, now_s: float) -> Phase:
+        self.rest = rest
+        left = {self.regression.steps[index].name for index in bits(rest.steps)}
+        for name in self.attempts.names():
+            if name not in left:
+                self.attempts.effective(name)
+        for run in self.runs.values():
+            if run.step.add <= ground.facts:
+                run.ineffective_s = None
+        if not rest.steps and self.kind == "achieve":
+            self.halt(GOAL_REACHED)
+            return Phase.REACHED
+        self._halt_unneeded(rest, left)
+        if not rest.steps:
+            return Phase.HOLDING
+        return self._advance(rest, ground, now_s)
+
+    def _halt_unneeded(self, rest: Rest, left: Collection[str]) -> None:
+        """Keep what the rest or a kept run needs, along causal links; halt all other runs."""
+        kept = [run for name, run in self.runs.items() if name in left and not run.is_halting]
+        needed = set(rest.needs).union(*(run.step.guard for run in kept))
+        others = [r for r in self.runs.values() if not r.is_halting and r not in kept]
+        while wanted := [r for r in others if r.is_established and r.step.add & needed]:
+            for run in wanted:
+                needed |= run.step.guard
+                others.remove(run)
+        for run in others:
+            run.halt(NOT_NEEDED)
+
+    def _advance(self, rest: Rest, ground: Footing, now_s: float) -> Phase:
+        for index in self.regression.order.first_of(rest.steps):
+            step = self.regression.steps[index]
+            if step.name in self.runs:
+                self._await(index, self.runs[step.name], now_s)
+            elif self.attempts.is_settling(step.name, now_s):
+                self._waiting[index] = "waits for its effects to be seen"
+            elif self.attempts.given_up(step.name):
+                self.exhausted += (step.name,)
+            elif obstacle := self._obstacle(step, ground):
+                self._waiting[index] = obstacle
+            else:
+                self.runs[step.name] = Run(step, self._runner.start(step.action), now_s)
+        if self.exhausted:
+            reasons = (f"{n} {self.attempts.given_up(n)}" for n in self.exhausted)
+            return self._give_up("; ".join(reasons))
+        if self._may_change(now_s):
+            return Phase.UNDER_WAY
+        return self._give_up("; ".join(sorted(set(self._waiting.values()))))
+
+    def _may_change(self, now_s: float) -> bool:
+        """Whether something that this task started, halted or waits for can bring it further."""
+        return any(self.attempts.is_settling(n, now_s) for n in self.attempts.names()) or any(
+            run.is_pending or run.is_halting or run.ineffective_s is not None
+            for run in self.runs.values()
+        )
+
+    def _await(self, index: int, run: Run, now_s: float) -> None:
+        if run.is_halting:
+            self._waiting[index] = "waits until it has ended, to start again"
+        elif run.is_established and self._is_out_of_patience(run, now_s):
+            run.halt("it runs, but its effects do not hold")
+
+    def _obstacle(self, step: Step, ground: Footing) -> str:
+        """Why a step may not start yet, or nothing."""
+        if lacking := step.precondition - ground.facts:
+            return f"waits for {in_words(lacking)}"
+        for run in self.runs.values():
+            if step.actor == run.step.actor and step.actor in self._exclusive:
+                return f"waits for {step.actor}, which {run.step.name} uses"
+            if run.is_pending and interferes(step, run.step):
+                return f"waits for {run.step.name} to end"
+        return ""
+
+
+def interferes(one: Step, other: Step) -> bool:
+    """Whether two steps may not be under way at once: one takes what the other needs or gives."""
+    return bool(
+        one.delete & (other.precondition | other.add) or other.delete & (one.precondition | one.add)
+    )
+
+
+def in_words(facts: Collection[str]) -> str:
+    """Facts as PDDL for people.
+
+    >>> in_words({"ready cam"})
+    '(ready cam)'
+    """
+    return ", ".join(f"({fact})" for fact in sorted(facts))

@@ -1,0 +1,176 @@
+"""The task tree: a plan as a py_trees composite, one leaf for each step.
+
+The composite decides (see `task_control`); leaves show where each step is and answer why. It is
+ticked like any other node: SUCCESS once an achieve goal is reached, RUNNING while it is under way
+or a maintain goal is held, FAILURE while it is stuck (then `needs_replan` says why). Being
+interrupted halts everything that it runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeAlias
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.composites import Composite
+
+from nondum.planning.attempts import Patience
+from nondum.planning.partial_order import GOAL
+from nondum.planning.regression import Regression
+from nondum.planning.running import Run, Runner, RunState, World
+from nondum.planning.step import steps_of, words
+from nondum.planning.task_control import GoalKind, Phase, TaskControl
+from nondum.sdk.planner import GroundTask, Plan
+
+Sight: TypeAlias = Callable[[], tuple[World, float]]
+"""What is believed now, and the time in seconds; asked once a tick."""
+
+_STATUS = {
+    Phase.UNDER_WAY: Status.RUNNING,
+    Phase.HOLDING: Status.RUNNING,
+    Phase.REACHED: Status.SUCCESS,
+    Phase.STUCK: Status.FAILURE,
+}
+
+
+class StepLeaf(Behaviour):
+    """Shows one step of the plan. The composite acts; this only reports."""
+
+    def __init__(self, control: TaskControl, index: int) -> None:
+        step = control.regression.steps[index]
+        super().__init__(name=step.name)
+        self.step = step
+        self.index = index
+        self._control = control
+
+    def update(self) -> Status:
+        """Where the step is: done or standing, under way, given up, or still to come."""
+        run = self._control.runs.get(self.step.name)
+        if run is not None and not run.is_halting:
+            return Status.RUNNING
+        if not self._control.rest.steps >> self.index & 1:
+            return Status.SUCCESS
+        return Status.FAILURE if self.step.name in self._control.exhausted else Status.INVALID
+
+    def why(self) -> str:
+        """Why the step is where it is, in one sentence."""
+        control, name = self._control, self.step.name
+        run = control.runs.get(name)
+        if run is not None:
+            return self._why_running(run)
+        if not control.rest.steps >> self.index & 1:
+            return "done: what the rest of the plan needs of it holds"
+        waits = control.waits_for(self.index) or self._predecessors()
+        failure = control.attempts.last_failure(name)
+        return f"{waits}; last time: {failure}" if failure else waits
+
+    def _why_running(self, run: Run) -> str:
+        if run.is_halting:
+            return f"being halted: {run.halted_because}"
+        if run.action.state is RunState.ESTABLISHED:
+            return f"runs for {', '.join(self._needed_by())}"
+        return "is starting" if self.step.lasting else "is running"
+
+    def _needed_by(self) -> list[str]:
+        regression = self._control.regression
+        users = dict.fromkeys(
+            "the goal" if link.consumer == GOAL else regression.steps[link.consumer].name
+            for link in regression.links
+            if link.provider == self.index
+        )
+        return list(users) or ["nothing"]
+
+    def _predecessors(self) -> str:
+        regression = self._control.regression
+        mask = regression.order.before[self.index] & self._control.rest.steps
+        names = [s.name for i, s in enumerate(regression.steps) if mask >> i & 1]
+        return f"comes after {', '.join(names)}" if names else "is next"
+
+
+class TaskTree(Composite):
+    """Runs a plan until its goal holds, and for a maintain goal, keeps it so."""
+
+    def __init__(
+        self,
+        task: GroundTask,
+        plan: Plan,
+        *,
+        lasting: frozenset[str],
+        runner: Runner,
+        kind: GoalKind,
+        sight: Sight,
+        exclusive: frozenset[str] = frozenset(),
+        runs: Iterable[Run] = (),
+        patience: Patience | None = None,
+        name: str = "task",
+    ) -> None:
+        """Make the tree of a plan that is valid in `task`.
+
+        `lasting` names the schemas of lasting behaviours, `exclusive` the units that serve one
+        behaviour at a time and move the body. `runs` is what another tree released: what the plan
+        needs of it goes on, the rest is halted.
+        """
+        steps = steps_of(task, plan, lasting)
+        self.control = TaskControl(
+            Regression(steps, words(task, task.goal)),
+            runner=runner,
+            kind=kind,
+            exclusive=exclusive,
+            runs=runs,
+            patience=patience,
+        )
+        self._sight = sight
+        self._leaves = [StepLeaf(self.control, index) for index in range(len(steps))]
+        super().__init__(name, self._leaves)
+
+    @property
+    def needs_replan(self) -> str | None:
+        """Why the plan cannot go on, or None while it can."""
+        return self.control.needs_replan
+
+    def why(self) -> str:
+        """Why the task is where it is, in one sentence."""
+        control = self.control
+        if control.phase is Phase.STUCK:
+            return f"stuck: {control.needs_replan}"
+        left = control.rest.steps.bit_count()
+        return {
+            Phase.UNDER_WAY: f"{left} of {len(self._leaves)} steps are left",
+            Phase.HOLDING: "the goal holds and is kept so",
+            Phase.REACHED: "the goal is reached",
+        }[control.phase]
+
+    def release(self) -> tuple[Run, ...]:
+        """Hand over what runs, for the tree that takes this one's place."""
+        return self.control.release()
+
+    def halt(self, because: str) -> None:
+        """Halt everything that runs, at once and without another plan."""
+        self.control.halt(because)
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Decide, then show: leaves whose step moved are ticked, so that visitors see them."""
+        if self.status is not Status.RUNNING:
+            self.initialise()
+        phase = self.control.decide(*self._sight())
+        self.current_child = None
+        for leaf in self._leaves:
+            status = leaf.update()
+            if status is Status.RUNNING:
+                self.current_child = leaf
+                yield from leaf.tick()
+            elif status is not leaf.status:
+                leaf.stop(status)
+                yield leaf
+        status = _STATUS[phase]
+        if status is Status.RUNNING:
+            self.status = status
+        else:
+            self.stop(status)
+        yield self
+
+    def terminate(self, new_status: Status) -> None:
+        """Halt everything when something of higher priority interrupts the task."""
+        if new_status is Status.INVALID:
+            self.control.halt("the task was interrupted")
