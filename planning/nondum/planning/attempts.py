@@ -48,6 +48,11 @@ class Attempts:
         self.failed(name, "it ended in success, but its effects do not hold")
         return False
 
+    @property
+    def is_anything_settling(self) -> bool:
+        """Whether the effects of some success are still to be seen."""
+        return bool(self._succeeded_s)
+
     def given_up(self, name: str) -> str | None:
         """Why an action is not tried any more, or None while it may be tried again."""
         reasons = self._failures.get(name, [])

@@ -81,17 +81,19 @@ def partial_order(steps: Sequence[Step], links: Sequence[CausalLink]) -> Partial
     readers: dict[str, int] = defaultdict(int)
     deleters: dict[str, int] = defaultdict(int)
     users = _users(links)
+    direct: list[int] = []
     before: list[int] = []
     for index, step in enumerate(steps):
-        direct = 0
+        earlier = 0
         for fact in step.precondition:
-            direct |= adders[fact] | deleters[fact]
+            earlier |= adders[fact] | deleters[fact]
         for fact in step.add:
-            direct |= deleters[fact]
+            earlier |= deleters[fact]
         for fact in step.delete:
-            direct |= adders[fact] | readers[fact]
-            direct |= _users_of_guarded(steps, users, readers[fact], fact, index)
-        before.append(_closure(direct, before))
+            earlier |= adders[fact] | readers[fact]
+            earlier |= _users_of_guarded(steps, users, readers[fact], fact, index)
+        direct.append(earlier)
+        before.append(_closure(earlier, before))
         bit = 1 << index
         for facts, table in (
             (step.precondition, readers),
@@ -100,7 +102,7 @@ def partial_order(steps: Sequence[Step], links: Sequence[CausalLink]) -> Partial
         ):
             for fact in facts:
                 table[fact] |= bit
-    return PartialOrder(tuple(before), _reversed(before))
+    return PartialOrder(tuple(before), _after(direct))
 
 
 def threats(steps: Sequence[Step], links: Sequence[CausalLink]) -> tuple[Threat, ...]:
@@ -141,16 +143,16 @@ def _users_of_guarded(
     return mask
 
 
-def _closure(direct: int, before: Sequence[int]) -> int:
-    closed = direct
-    for index in bits(direct):
+def _closure(earlier: int, before: Sequence[int]) -> int:
+    closed = earlier
+    for index in bits(earlier):
         closed |= before[index]
     return closed
 
 
-def _reversed(before: Sequence[int]) -> tuple[int, ...]:
-    after = [0] * len(before)
-    for index, mask in enumerate(before):
-        for earlier in bits(mask):
-            after[earlier] |= 1 << index
+def _after(direct: Sequence[int]) -> tuple[int, ...]:
+    after = [0] * len(direct)
+    for index in reversed(range(len(direct))):
+        for earlier in bits(direct[index]):
+            after[earlier] |= 1 << index | after[index]
     return tuple(after)

@@ -60,7 +60,8 @@ class World(Protocol):
 
     @property
     def facts(self) -> frozenset[str]:
-        """Every fact that holds, the effects of established lasting behaviours included."""
+        """Every fact that holds, the effects of established lasting behaviours included. The same
+        object is returned until something changes."""
         ...
 
     def facts_without(self, ended: Collection[str]) -> frozenset[str]:

@@ -61,24 +61,45 @@ class TaskControl:
         self.attempts = Attempts(patience or Patience())
         self._runner = runner
         self._exclusive = exclusive
+        self.decisions = 0
+        """How often the world asked for a new decision."""
+        self._seen: frozenset[str] | None = None
+        self._run_states: list[tuple[str, RunState, bool]] = []
         self._waiting: dict[int, str] = {}
         self._twins = twins_in(regression.goal, *(s.precondition | s.add for s in regression.steps))
 
     def decide(self, world: World, now_s: float) -> Phase:
         """Look at the world, halt and start what that asks for, and say where the task is."""
-        self._collect(now_s)
-        if self.phase is Phase.REACHED:  # done is done, though what reached it is halted again
+        if self._is_as_before(world):
             return self.phase
+        self.decisions += 1
+        self._collect(now_s)
+        if self.phase is not Phase.REACHED:  # done is done, though what reached it is halted again
+            self.phase = self._decide(world, now_s)
+        self._seen, self._run_states = world.facts, self._states()
+        return self.phase
+
+    def _decide(self, world: World, now_s: float) -> Phase:
         ground = self._uphold(world)
         self.needs_replan, self.exhausted, self._waiting = None, (), {}
         rest = self.regression.rest(ground.facts)
         if isinstance(rest, Stuck):
             rest = self._unlock(world, rest, now_s)
         if isinstance(rest, Stuck):
-            self.phase = self._stay(ground, rest)
-        else:
-            self.phase = self._pursue(rest, ground, now_s)
-        return self.phase
+            return self._stay(ground, rest)
+        return self._pursue(rest, ground, now_s)
+
+    def _is_as_before(self, world: World) -> bool:
+        """Whether nothing has changed since the last decision, and nothing waits for time."""
+        return (
+            self._seen is world.facts
+            and self._run_states == self._states()
+            and not self.attempts.is_anything_settling
+            and not any(run.ineffective_s is not None for run in self.runs.values())
+        )
+
+    def _states(self) -> list[tuple[str, RunState, bool]]:
+        return [(name, run.action.state, run.is_halting) for name, run in self.runs.items()]
 
     def halt(self, because: str) -> None:
         """Ask everything to end."""

@@ -121,6 +121,7 @@ class TaskTree(Composite):
             patience=patience,
         )
         self._sight = sight
+        self._shown = 0
         self._leaves = [StepLeaf(self.control, index) for index in range(len(steps))]
         super().__init__(name, self._leaves)
 
@@ -150,10 +151,21 @@ class TaskTree(Composite):
         self.control.halt(because)
 
     def tick(self) -> Iterator[Behaviour]:
-        """Decide, then show: leaves whose step moved are ticked, so that visitors see them."""
+        """Decide, then show: where something moved, leaves are ticked so that visitors see them."""
         if self.status is not Status.RUNNING:
             self.initialise()
         phase = self.control.decide(*self._sight())
+        if self.control.decisions != self._shown:
+            self._shown = self.control.decisions
+            yield from self._show()
+        status = _STATUS[phase]
+        if status is Status.RUNNING:
+            self.status = status
+        else:
+            self.stop(status)
+        yield self
+
+    def _show(self) -> Iterator[Behaviour]:
         self.current_child = None
         for leaf in self._leaves:
             status = leaf.update()
@@ -163,12 +175,6 @@ class TaskTree(Composite):
             elif status is not leaf.status:
                 leaf.stop(status)
                 yield leaf
-        status = _STATUS[phase]
-        if status is Status.RUNNING:
-            self.status = status
-        else:
-            self.stop(status)
-        yield self
 
     def terminate(self, new_status: Status) -> None:
         """Halt everything when something of higher priority interrupts the task."""
