@@ -5,13 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import pytest
-from nondum_planner_pyperplan import PyperplanPlanner
-
-from nondum.planning.contribution import Contribution
-from nondum.planning.validate import validate
-from nondum.sdk.description import PluginDescription
-from nondum.sdk.errors import GoalRefused
-from nondum.sdk.planner import GroundTask, Plan, Unsolvable
 from tests.planning.strangers import (
     MOBILE_BASE,
     PAN_TILT_UNIT,
@@ -24,6 +17,13 @@ from tests.planning.strangers import (
     components,
     task,
 )
+
+from nondum.planning.contribution import Contribution
+from nondum.planning.validate import validate
+from nondum.sdk.description import PluginDescription
+from nondum.sdk.errors import GoalRefused
+from nondum.sdk.planner import GroundTask, Plan, Unsolvable
+from nondum_planner_pyperplan import PyperplanPlanner
 
 FOLLOW = "(following self person)"
 POINT = "(pointing self radiation-source)"

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from nondum.planning.facts import fact
-from nondum.sdk.description import Behaviour, Fragment, PluginDescription
+from nondum.sdk.description import Behaviour, Fragment, Label, Phrase, PluginDescription
 
 
 def object_name(host: str, component: str, local: str) -> str:
@@ -56,6 +56,8 @@ class Contribution:
     streams: tuple[StreamObject, ...] = ()
     behaviours: tuple[Behaviour, ...] | None = None
     """What carries the actions out; None where only the PDDL is known."""
+    phrases: tuple[Phrase, ...] = ()
+    labels: tuple[Label, ...] = ()
 
     @classmethod
     def from_description(
@@ -86,6 +88,8 @@ class Contribution:
             units=units,
             streams=streams,
             behaviours=description.behaviours,
+            phrases=description.phrases,
+            labels=description.labels,
         )
 
     def local_names(self) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -10,7 +11,8 @@ from nondum.planning.domain import Merged, Origin
 from nondum.planning.normal import Condition, condition_of
 from nondum.planning.parse import parse_formula
 from nondum.planning.scope import SELF, Report, Scope
-from nondum.planning.syntax import Atom, Equal, Not, Term
+from nondum.planning.syntax import Not
+from nondum.planning.typegraph import ROOT
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
 
 GoalExpr: TypeAlias = Condition
@@ -18,7 +20,8 @@ GoalExpr: TypeAlias = Condition
 
 GoalKind: TypeAlias = Literal["achieve", "maintain"]
 
-_FILE = "goal"
+FILE = "goal"
+"""Where problems with a goal's text are said to be."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,20 +44,20 @@ def parse_goal(text: str, merged: Merged, *, kind: GoalKind = "achieve") -> Goal
     Raises `GoalRefused`: the codes of syntax, E-UNDECL, E-TYPE, E-PRED-ARITY, E-UNSUPPORTED.
     """
     try:
-        condition = condition_of(parse_formula(text, _FILE))
+        condition = condition_of(parse_formula(text, FILE))
     except FragmentRefused as refused:
         raise GoalRefused(*refused.problems) from refused
     except Misplaced as wrong:
         raise GoalRefused(wrong.problem(text)) from wrong
-    problems = _problems(condition, text, merged)
+    problems = condition_problems(condition, text, merged)
     if problems:
         raise GoalRefused(*problems)
-    return Goal(_bound(condition, merged.self_host), kind, text)
+    return Goal(condition.bound({SELF: merged.self_host}), kind, text)
 
 
 def goal_problems(goal: Goal, merged: Merged) -> tuple[Problem, ...]:
     """What keeps a goal from being asked for now: names that have gone since it was given."""
-    return _problems(goal.expr, goal_text(goal.expr), merged)
+    return condition_problems(goal.expr, goal_text(goal.expr), merged)
 
 
 def goal_text(expr: GoalExpr) -> str:
@@ -69,32 +72,23 @@ def goal_text(expr: GoalExpr) -> str:
     return written if len(literals) == 1 else f"(and {written})"
 
 
-def _problems(condition: Condition, text: str, merged: Merged) -> tuple[Problem, ...]:
-    report = Report(Origin("", "", ""), {_FILE: text})
+def condition_problems(
+    condition: Condition,
+    text: str,
+    merged: Merged,
+    variables: Mapping[str, tuple[str, ...]] | None = None,
+) -> tuple[Problem, ...]:
+    """What is wrong with a condition read from `text`: names, arities, types of terms.
+
+    `variables` are the types of those it may contain.
+    """
+    report = Report(Origin("", "", ""), {FILE: text})
     scope = Scope(report, merged.self_host, {}, merged.domain.types)
     scope.predicates.update(merged.domain.predicates)
     scope.objects.update({name: found.types for name, found in merged.objects.items()})
     for atom in condition.atoms():
-        scope.check_atom(atom, {})
-    for pair in condition.equal + condition.unequal:
+        scope.check_atom(atom, variables or {})
+    for pair in condition.pairs():
         for term in (pair.left, pair.right):
-            scope.check_term(term, ("object",), {})
+            scope.check_term(term, (ROOT,), variables or {})
     return tuple(report.problems)
-
-
-def _bound(condition: Condition, host: str) -> Condition:
-    def term(found: Term) -> Term:
-        return Term(host, found.place) if found.name == SELF else found
-
-    def atoms(found: tuple[Atom, ...]) -> tuple[Atom, ...]:
-        return tuple(Atom(a.predicate, tuple(map(term, a.terms)), a.place) for a in found)
-
-    def pairs(found: tuple[Equal, ...]) -> tuple[Equal, ...]:
-        return tuple(Equal(term(p.left), term(p.right), p.place) for p in found)
-
-    return Condition(
-        atoms(condition.positive),
-        atoms(condition.negative),
-        pairs(condition.equal),
-        pairs(condition.unequal),
-    )

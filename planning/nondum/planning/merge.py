@@ -39,7 +39,7 @@ def merge(contributions: Iterable[Contribution], self_host: str) -> Merged:
         report.problems.extend(claims.problems)
         wider = agreement if claims.problems else agreement.joined_by(claims, report)
         if report.problems:
-            quarantined[_key(contribution, self_host)] = tuple(report.problems)
+            quarantined[quarantine_key(contribution, self_host)] = tuple(report.problems)
             continue
         agreement = wider
         admitted.append(claims)
@@ -53,7 +53,8 @@ def _refuse_doubles(ordered: Sequence[Contribution]) -> None:
             raise ValueError(f"two contributions of {second.component} on {second.host}")
 
 
-def _key(contribution: Contribution, self_host: str) -> str:
+def quarantine_key(contribution: Contribution, self_host: str) -> str:
+    """How `Merged.quarantined` names a component: a peer's with its host."""
     here = contribution.host == self_host
     return contribution.component if here else f"{contribution.host}/{contribution.component}"
 

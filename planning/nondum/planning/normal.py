@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from nondum.planning.caret import Misplaced
@@ -16,6 +16,7 @@ from nondum.planning.syntax import (
     Numeric,
     Or,
     Quantified,
+    Term,
     When,
 )
 
@@ -33,6 +34,39 @@ class Condition:
     def atoms(self) -> tuple[Atom, ...]:
         """The atoms it reads, whether true or false."""
         return self.positive + self.negative
+
+    def pairs(self) -> tuple[Equal, ...]:
+        """The terms it compares."""
+        return self.equal + self.unequal
+
+    def terms(self) -> Iterator[Term]:
+        """Every term in it."""
+        for atom in self.atoms():
+            yield from atom.terms
+        for pair in self.pairs():
+            yield from (pair.left, pair.right)
+
+    def bound(self, names: Mapping[str, str]) -> Condition:
+        """The same with terms replaced by others' names; those not in `names` stay."""
+        return Condition(
+            tuple(_bound_atom(atom, names) for atom in self.positive),
+            tuple(_bound_atom(atom, names) for atom in self.negative),
+            tuple(_bound_pair(pair, names) for pair in self.equal),
+            tuple(_bound_pair(pair, names) for pair in self.unequal),
+        )
+
+
+def _bound_term(term: Term, names: Mapping[str, str]) -> Term:
+    return Term(names.get(term.name, term.name), term.place)
+
+
+def _bound_atom(atom: Atom, names: Mapping[str, str]) -> Atom:
+    terms = tuple(_bound_term(term, names) for term in atom.terms)
+    return Atom(atom.predicate, terms, atom.place)
+
+
+def _bound_pair(pair: Equal, names: Mapping[str, str]) -> Equal:
+    return Equal(_bound_term(pair.left, names), _bound_term(pair.right, names), pair.place)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from itertools import chain
 
 from nondum.planning.caret import Misplaced
 from nondum.planning.domain import Action
 from nondum.planning.normal import Condition, Effect, condition_of, effect_of
 from nondum.planning.scope import SELF, Scope
-from nondum.planning.syntax import ActionDeclaration, Term, TypedName
+from nondum.planning.syntax import ActionDeclaration, TypedName
 from nondum.planning.typegraph import types_or_root
 from nondum.sdk.description import Behaviour
 
@@ -69,23 +70,16 @@ def _variables(declared: ActionDeclaration, scope: Scope) -> dict[str, tuple[str
 def _check_names(
     condition: Condition, effect: Effect, variables: Mapping[str, tuple[str, ...]], scope: Scope
 ) -> None:
-    for term in _terms(condition, effect):
+    for term in chain(condition.terms(), (t for atom in effect.atoms() for t in atom.terms)):
         if term.name == SELF or term.name in scope.locals:
             message = f"{term.name!r} names one instance, and an action serves all of them"
             fix = "use a parameter, such as ?h - host with (on ?u ?h)"
             scope.report.problem("E-INSTANCE", message, term.place, fix)
     for atom in condition.atoms() + effect.atoms():
         scope.check_atom(atom, variables)
-    for pair in condition.equal + condition.unequal:
+    for pair in condition.pairs():
         for term in (pair.left, pair.right):
             scope.check_term(term, ("object",), variables)
-
-
-def _terms(condition: Condition, effect: Effect) -> Iterator[Term]:
-    for atom in condition.atoms() + effect.atoms():
-        yield from atom.terms
-    for pair in condition.equal + condition.unequal:
-        yield from (pair.left, pair.right)
 
 
 def _takes_something(effect: Effect) -> bool:

@@ -1,0 +1,176 @@
+"""Goals in words: phrases of one plugin, labels of another, and what is said when they fail."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from tests.planning.strangers import (
+    COMPTON_CAMERA,
+    MOBILE_BASE,
+    PAN_TILT_UNIT,
+    PEOPLE_DETECTOR,
+    ROVER,
+    SPEAKER,
+    components,
+)
+
+from nondum.planning.goal import Goal, goal_text
+from nondum.planning.merge import merge
+from nondum.planning.phrases import Phrasebook, phrasebook
+from nondum.sdk.description import Behaviour, Label, Phrase, PluginDescription
+from nondum.sdk.errors import GoalRefused
+
+
+def saying(plugin: PluginDescription, *phrases: str) -> PluginDescription:
+    """The plugin with phrases on its first behaviour."""
+    first, *others = plugin.behaviours
+    return replace(plugin, behaviours=(replace(first, phrases=phrases), *others))
+
+
+POINTER = saying(PAN_TILT_UNIT, "point at {t}")
+COMPTON = replace(COMPTON_CAMERA, labels=(Label("radiation-source", "the radiation source"),))
+BASE = replace(
+    MOBILE_BASE,
+    phrases=(Phrase("follow {c:class} [through {words:text}]", "(following self ?c)", "maintain"),),
+)
+DETECTOR = replace(PEOPLE_DETECTOR, labels=(Label("person", "me"), Label("person", "people")))
+
+
+def book(*plugins: PluginDescription) -> Phrasebook:
+    contributions = components(plugins)
+    return phrasebook(contributions, merge(contributions, ROVER))
+
+
+def asked(goal: Goal) -> tuple[str, str]:
+    return goal.kind, goal_text(goal.expr)
+
+
+@pytest.mark.parametrize(
+    "sentence",
+    ["point at the radiation source", "Point at radiation-source!", "POINT AT radiation source"],
+)
+def test_phrase_and_label_of_two_strangers_meet(sentence: str) -> None:
+    goal = book(POINTER, COMPTON).goal(sentence)
+    assert asked(goal) == ("maintain", "(pointing rover radiation-source)")
+    assert goal.text == sentence
+
+
+@pytest.mark.parametrize(
+    "sentence", ["follow me", "follow me through the facility", "follow people", "follow person"]
+)
+def test_free_words_bind_nothing(sentence: str) -> None:
+    goal = book(BASE, DETECTOR).goal(sentence)
+    assert asked(goal) == ("maintain", "(following rover person)")
+
+
+def test_finishing_behaviour_is_achieved() -> None:
+    goal = book(saying(SPEAKER, "report {class}"), DETECTOR).goal("report people")
+    assert asked(goal) == ("achieve", "(reported person rover)")
+
+
+def test_slot_may_be_named_by_type() -> None:
+    goal = book(saying(PAN_TILT_UNIT, "look at {target}"), COMPTON).goal("look at radiation source")
+    assert goal_text(goal.expr) == "(pointing rover radiation-source)"
+
+
+def test_same_meaning_twice_is_not_ambiguous() -> None:
+    other = replace(BASE, name="other-base")
+    assert book(BASE, other, DETECTOR).goal("follow me").kind == "maintain"
+
+
+def test_different_meanings_are_told() -> None:
+    speaker = replace(
+        saying(SPEAKER), phrases=(Phrase("follow {c:class}", "(reported ?c self)", "achieve"),)
+    )
+    with pytest.raises(GoalRefused, match=r"may mean .*following.* or .*reported") as refused:
+        book(BASE, speaker, DETECTOR).goal("follow me")
+    assert refused.value.code == "PHRASE_AMBIGUOUS"
+
+
+def test_label_of_two_objects_is_ambiguous() -> None:
+    goose = PluginDescription(
+        "goose-detector", "1", fragments=DETECTOR.fragments[:1], labels=(Label("goose", "me"),)
+    )
+    text = goose.fragments[0].text.replace("person", "goose")
+    goose = replace(
+        goose, fragments=(replace(goose.fragments[0], text=text),), behaviours=DETECTOR.behaviours
+    )
+    with pytest.raises(GoalRefused) as refused:
+        book(BASE, DETECTOR, goose).goal("follow me")
+    assert refused.value.code == "PHRASE_AMBIGUOUS"
+
+
+def test_unknown_sentence_gets_near_phrases() -> None:
+    with pytest.raises(GoalRefused) as refused:
+        book(POINTER, COMPTON, BASE, DETECTOR).goal("please point on the radiation source")
+    problem = refused.value.problems[0]
+    assert problem.code == "PHRASE_UNKNOWN"
+    assert '"point at the radiation source"' in problem.fix
+
+
+def test_unknown_name_gets_known_ones() -> None:
+    with pytest.raises(GoalRefused) as refused:
+        book(POINTER, COMPTON).goal("point at the moon")
+    problem = refused.value.problems[0]
+    assert problem.code == "PHRASE_WORDS_UNKNOWN"
+    assert "no target is called 'the moon'" in problem.message
+    assert '"the radiation source"' in problem.fix
+
+
+def test_name_of_another_type_is_not_taken() -> None:
+    with pytest.raises(GoalRefused, match="no target is called 'me'"):
+        book(POINTER, COMPTON, DETECTOR).goal("point at me")
+
+
+def test_offers_list_what_can_be_said() -> None:
+    assert book(POINTER, COMPTON, BASE, DETECTOR).offers() == (
+        "follow me",
+        "point at the radiation source",
+    )
+
+
+def test_phrase_without_things_to_name_is_not_offered() -> None:
+    assert book(POINTER).offers() == ()
+
+
+@pytest.mark.parametrize(
+    ("pattern", "why"),
+    [
+        ("point at {x}", "no parameter"),
+        ("point [at {t}]", "cannot name"),
+        ("{t}", "no word"),
+        ("point at {t", "not understood"),
+        ("point ] at {t}", "closes nothing"),
+        ("point [at {t}", "not closed"),
+        ("point", "nothing true of what is named"),
+    ],
+)
+def test_bad_pattern_is_told(pattern: str, why: str) -> None:
+    problems = book(saying(PAN_TILT_UNIT, pattern), COMPTON).problems
+    assert [problem.code for problem in problems] == ["PHRASE_INVALID"]
+    assert why in problems[0].message
+
+
+@pytest.mark.parametrize(
+    ("goal", "why"),
+    [
+        ("(following self ?x)", "?x is not a parameter"),
+        ("(follow self ?c)", "did you mean 'following'?"),
+        ("(following self", "expected"),
+        ("(or (following self ?c))x", "expected the end"),
+    ],
+)
+def test_bad_goal_of_a_phrase_is_told(goal: str, why: str) -> None:
+    plugin = replace(MOBILE_BASE, phrases=(Phrase("follow {c:class}", goal),))
+    [problem] = book(plugin).problems
+    assert problem.code == "PHRASE_INVALID"
+    assert why in str(problem)
+
+
+def test_quarantined_component_says_nothing() -> None:
+    wrong = replace(BASE, behaviours=(Behaviour("drive", "(drive ?u - base)"),))
+    contributions = components([wrong, DETECTOR])
+    merged = merge(contributions, ROVER)
+    assert list(merged.quarantined) == ["mobile-base"]
+    assert phrasebook(contributions, merged).offers() == ()
