@@ -1,0 +1,77 @@
+"""The marks by which a plugin's behaviours and conditions are found: `@behaviour`, `@condition`.
+
+They return what they mark unchanged, so that it can still be called and tested directly. Nothing is
+checked here; `nondum.sdk.plugin.describe` checks everything and reports it at once.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+from nondum.sdk.description import Behaviour, Condition
+
+_Marked = TypeVar("_Marked", bound=Callable[..., Any])
+
+BEHAVIOUR_MARK = "__nondum_behaviour__"
+CONDITION_MARK = "__nondum_condition__"
+
+
+def behaviour(
+    name: str,
+    *,
+    action: str,
+    lasting: bool = False,
+    phrase: str | Sequence[str] | None = None,
+) -> Callable[[_Marked], _Marked]:
+    """Mark a function, method or `TickedBehaviour` subclass as a behaviour.
+
+    It carries out the action whose signature is `action`: `(point ?u - pointer ?h - host)`. Its
+    parameters are `ctx` and then the action's, by name and in order; it gets the objects' names.
+    A coroutine function runs on the worker's loop, a plain function in a thread of its own.
+
+    Returning is SUCCESS, raising `BehaviourFailed` is FAILURE, and so is any other error; being
+    cancelled is being halted. A lasting behaviour never ends by itself and says
+    `await ctx.established()` when its effects begin to hold.
+
+    `phrase` is one pattern, or several, of words that ask for it: `"point at {t}"`.
+    """
+    phrases = (phrase,) if isinstance(phrase, str) else tuple(phrase or ())
+
+    def mark(marked: _Marked) -> _Marked:
+        described = Behaviour(name, action, lasting, phrases, _first_line(marked))
+        setattr(marked, BEHAVIOUR_MARK, described)
+        return marked
+
+    return mark
+
+
+def condition(name: str, *, predicates: Sequence[str]) -> Callable[[_Marked], _Marked]:
+    """Mark a function or method, with the one parameter `ctx`, as a condition.
+
+    It runs from the worker's start to its stop and keeps facts of the named predicates true or
+    false with `ctx.know` and `ctx.forget`. When it ends, what it said is forgotten.
+    """
+
+    def mark(marked: _Marked) -> _Marked:
+        setattr(marked, CONDITION_MARK, Condition(name, tuple(predicates), _first_line(marked)))
+        return marked
+
+    return mark
+
+
+def behaviour_of(marked: object) -> Behaviour | None:
+    """The behaviour that a function, method or class is marked with."""
+    found = getattr(marked, BEHAVIOUR_MARK, None)
+    return found if isinstance(found, Behaviour) else None
+
+
+def condition_of(marked: object) -> Condition | None:
+    """The condition that a function or method is marked with."""
+    found = getattr(marked, CONDITION_MARK, None)
+    return found if isinstance(found, Condition) else None
+
+
+def _first_line(marked: object) -> str:
+    return (inspect.getdoc(marked) or "").partition("\n")[0]

@@ -1,0 +1,239 @@
+"""Packets between two ends: over a SOCK_SEQPACKET socket, or in memory for tests.
+
+The seam under links and streams (unix(7), SCM_RIGHTS). A packet arrives whole, in order, with the
+*handles* that were sent along: descriptors over a socket.
+"""
+
+from __future__ import annotations
+
+import array
+import asyncio
+import os
+import socket
+from collections.abc import Callable, Sequence
+from typing import Protocol, TypeAlias, Union
+
+from nondum.sdk.errors import Problem, ProtocolViolation
+
+MAX_HANDLES = 4
+"""Descriptors in one packet."""
+BATCH = 64
+"""Packets read before the loop gets its turn: a flood cannot starve the rest."""
+
+Handle: TypeAlias = Union[int, "Packets"]
+"""What a packet can carry to a new connection: a descriptor, or an end in memory."""
+OnPacket: TypeAlias = Callable[[bytes, tuple[Handle, ...]], None]
+OnClosed: TypeAlias = Callable[[ProtocolViolation | None], None]
+
+
+class Packets(Protocol):
+    """One end of a connection."""
+
+    shares_memory: bool
+    """Whether memory can be handed over by descriptor."""
+
+    def open(self, on_packet: OnPacket, on_closed: OnClosed) -> None:
+        """Begin to read, on the running loop.
+
+        `on_packet` owns the handles it gets. `on_closed` is called once, unless `close` came first,
+        when the other end is gone (None) or broke the limits of packets.
+        """
+        ...
+
+    def send(self, data: bytes, handles: Sequence[Handle] = ()) -> bool:
+        """Send a packet now, or answer False, with nothing sent, when the other end is slow.
+
+        The caller keeps its handles. What is sent to an end that is gone disappears.
+        """
+        ...
+
+    def when_writable(self, callback: Callable[[], None]) -> None:
+        """Call back once, as soon as `send` may succeed again."""
+        ...
+
+    def close(self) -> None:
+        """Stop and let go. Closing twice is allowed."""
+        ...
+
+
+class SocketPackets:
+    """Packets over a non-blocking AF_UNIX SOCK_SEQPACKET socket, which it owns."""
+
+    shares_memory = True
+
+    def __init__(self, sock: socket.socket, limit: int, max_handles: int = MAX_HANDLES) -> None:
+        sock.settimeout(0)
+        self._sock = sock
+        self._limit = limit
+        self._max_handles = max_handles
+        self._ancillary = socket.CMSG_SPACE(MAX_HANDLES * array.array("i").itemsize)
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    def open(self, on_packet: OnPacket, on_closed: OnClosed) -> None:
+        """Begin to read (see `Packets`)."""
+        self._on_packet, self._on_closed = on_packet, on_closed
+        self._loop = asyncio.get_running_loop()
+        self._loop.add_reader(self._sock.fileno(), self._on_readable)
+
+    def send(self, data: bytes, handles: Sequence[Handle] = ()) -> bool:
+        """Send a packet (see `Packets`)."""
+        if self._sock.fileno() < 0:
+            return True
+        try:
+            if handles:
+                socket.send_fds(self._sock, [data], [h for h in handles if isinstance(h, int)])
+            else:
+                self._sock.send(data)
+        except (BlockingIOError, InterruptedError):
+            return False
+        except OSError:  # EPIPE, ECONNRESET: told by the reader, on a turn of its own
+            if self._loop is not None:
+                self._loop.call_soon(self._lose, None)
+        return True
+
+    def when_writable(self, callback: Callable[[], None]) -> None:
+        """Call back once (see `Packets`)."""
+        if self._loop is None or self._sock.fileno() < 0:
+            return
+        loop, descriptor = self._loop, self._sock.fileno()
+
+        def writable() -> None:
+            loop.remove_writer(descriptor)
+            callback()
+
+        loop.add_writer(descriptor, writable)
+
+    def close(self) -> None:
+        """Stop reading and close the socket."""
+        if self._sock.fileno() < 0:
+            return
+        if self._loop is not None:
+            self._loop.remove_reader(self._sock.fileno())
+            self._loop.remove_writer(self._sock.fileno())
+        self._sock.close()
+
+    def _on_readable(self) -> None:
+        for _ in range(BATCH):
+            if self._sock.fileno() < 0:
+                return  # closed by what a packet led to
+            try:
+                data, ancillary, flags, _ = self._sock.recvmsg(
+                    self._limit + 1, self._ancillary, socket.MSG_CMSG_CLOEXEC
+                )
+            except (BlockingIOError, InterruptedError):
+                return
+            except OSError:
+                data, ancillary, flags = b"", [], 0
+            handles = _descriptors(ancillary) if ancillary else ()
+            if not data:
+                _close_all(handles)
+                self._lose(None)
+                return
+            problem = self._broken(flags, len(handles))
+            if problem is not None:
+                _close_all(handles)
+                self._lose(ProtocolViolation(problem))
+                return
+            self._on_packet(data, handles)
+
+    def _broken(self, flags: int, handles: int) -> Problem | None:
+        if flags & socket.MSG_TRUNC:
+            return Problem("PACKET_TOO_LONG", f"a packet is longer than {self._limit} bytes")
+        if flags & socket.MSG_CTRUNC or handles > self._max_handles:
+            return Problem(
+                "PACKET_DESCRIPTORS", f"a packet carries more than {self._max_handles} descriptors"
+            )
+        return None
+
+    def _lose(self, violation: ProtocolViolation | None) -> None:
+        if self._sock.fileno() >= 0:
+            self.close()
+            self._on_closed(violation)
+
+
+class MemoryPackets:
+    """Packets within one process and loop: for tests, and for systems without such sockets."""
+
+    shares_memory = False
+
+    def __init__(self) -> None:
+        self._peer: MemoryPackets | None = None
+        self._waiting: list[tuple[bytes, tuple[Handle, ...]]] = []
+        self._on_packet: OnPacket | None = None
+        self._on_closed: OnClosed | None = None
+
+    @classmethod
+    def pair(cls) -> tuple[MemoryPackets, MemoryPackets]:
+        """Make two connected ends."""
+        one, other = cls(), cls()
+        one._peer, other._peer = other, one
+        return one, other
+
+    def open(self, on_packet: OnPacket, on_closed: OnClosed) -> None:
+        """Begin to read (see `Packets`)."""
+        self._on_packet, self._on_closed = on_packet, on_closed
+        loop = asyncio.get_running_loop()
+        for data, handles in self._waiting:
+            loop.call_soon(self._deliver, data, handles)
+        self._waiting.clear()
+        if self._peer is None:
+            loop.call_soon(self._lose)
+
+    def send(self, data: bytes, handles: Sequence[Handle] = ()) -> bool:
+        """Send a packet (see `Packets`); it arrives on a later turn of the loop."""
+        peer = self._peer
+        if peer is not None and peer._on_packet is None:
+            peer._waiting.append((data, tuple(handles)))
+        elif peer is not None:
+            asyncio.get_running_loop().call_soon(peer._deliver, data, tuple(handles))
+        return True
+
+    def when_writable(self, callback: Callable[[], None]) -> None:
+        """Call back on the next turn of the loop: memory is always writable."""
+        asyncio.get_running_loop().call_soon(callback)
+
+    def close(self) -> None:
+        """Let go of the other end, which is told."""
+        peer, self._peer, self._on_packet, self._on_closed = self._peer, None, None, None
+        if peer is not None:
+            peer._peer = None
+            if peer._on_closed is not None:
+                asyncio.get_running_loop().call_soon(peer._lose)
+
+    def _deliver(self, data: bytes, handles: tuple[Handle, ...]) -> None:
+        if self._on_packet is not None:
+            self._on_packet(data, handles)
+
+    def _lose(self) -> None:
+        on_closed, self._on_packet, self._on_closed = self._on_closed, None, None
+        if on_closed is not None:
+            on_closed(None)
+
+
+def adopt(handle: Handle, limit: int) -> Packets:
+    """Make an end of a handle that arrived, and own it."""
+    if isinstance(handle, int):
+        return SocketPackets(socket.socket(fileno=handle), limit)
+    return handle
+
+
+def discard(handles: Sequence[Handle]) -> None:
+    """Close handles that nobody wants."""
+    for handle in handles:
+        if isinstance(handle, int):
+            os.close(handle)
+        else:
+            handle.close()
+
+
+def _descriptors(ancillary: list[tuple[int, int, bytes]]) -> tuple[int, ...]:
+    found = array.array("i")
+    for level, kind, data in ancillary:
+        if level == socket.SOL_SOCKET and kind == socket.SCM_RIGHTS:
+            found.frombytes(data[: len(data) - len(data) % found.itemsize])
+    return tuple(found)
+
+
+def _close_all(handles: tuple[int, ...]) -> None:
+    for handle in handles:
+        os.close(handle)

@@ -1,0 +1,245 @@
+"""A plugin, found by its entry point, registered with pluggy, and asked what it is.
+
+Everything wrong with a description is reported at once.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import re
+import traceback
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib import metadata
+from typing import Any
+
+import pluggy
+
+from nondum.sdk import hooks
+from nondum.sdk.decorators import behaviour_of, condition_of
+from nondum.sdk.description import Behaviour, Condition, PluginDescription, Unit
+from nondum.sdk.errors import NondumError, Problem, WorkerFailed
+from nondum.sdk.signature import parse_signature
+from nondum.sdk.ticked import TickedBehaviour
+
+_NAME = re.compile(r"[a-z0-9][a-z0-9_-]*")
+
+
+@dataclass(frozen=True, slots=True)
+class Plugin:
+    """A loaded plugin; nothing of it has run but its import."""
+
+    subject: object
+    """The module or object that implements the hooks."""
+    manager: pluggy.PluginManager
+    distribution: str
+    """Normalised name of the distribution: the plugin's name."""
+    version: str
+
+    @property
+    def hook(self) -> pluggy.HookRelay:
+        """The hooks, each answering with a list: empty when the plugin does not implement it."""
+        return self.manager.hook
+
+    def implements(self, hook: str) -> bool:
+        """Whether the plugin has this hook."""
+        return bool(getattr(self.hook, hook).get_hookimpls())
+
+    def answer(self, hook: str, default: Any, **arguments: Any) -> Any:
+        """Call a hook and give its answer, or `default` when there is none.
+
+        Raises `WorkerFailed` (HOOK_FAILED) when the hook does.
+        """
+        try:
+            answers = getattr(self.hook, hook)(**arguments)
+        except Exception as error:
+            raise WorkerFailed(_told("HOOK_FAILED", f"hook {hook!r} raised", error)) from error
+        return answers[0] if answers else default
+
+
+def load(target: str | object, distribution: str = "") -> Plugin:
+    """Import and register a plugin.
+
+    `target` is an entry point's value (`module` or `module:attribute`), or the module, class or
+    object itself; a class is made without arguments. `distribution` defaults to the top-level
+    package's name.
+
+    Raises `WorkerFailed` (IMPORT_FAILED, HOOK_UNKNOWN).
+    """
+    subject = _import(target) if isinstance(target, str) else target
+    if isinstance(subject, type):
+        subject = _make(subject)
+    name = distribution or _package_of(subject)
+    manager = pluggy.PluginManager(hooks.PROJECT)
+    manager.add_hookspecs(hooks)
+    try:
+        manager.register(subject, name)
+        manager.check_pending()
+    except pluggy.PluginValidationError as error:
+        raise WorkerFailed(Problem("HOOK_UNKNOWN", str(error), where=name)) from error
+    return Plugin(subject, manager, _normalised(name), version_of(name))
+
+
+def describe(plugin: Plugin) -> PluginDescription:
+    """Ask a plugin all that it says about itself.
+
+    Raises `WorkerFailed` (HOOK_FAILED, DESCRIPTION_INVALID, ACTION_SIGNATURE, BEHAVIOUR_PARAMETERS)
+    with everything that is wrong.
+    """
+    about = plugin.answer("describe", {})
+    behaviours = tuple(behaviours_of(plugin).values())
+    described = PluginDescription(
+        name=plugin.distribution,
+        version=plugin.version,
+        summary=about.get("summary", (inspect.getdoc(plugin.subject) or "").partition("\n")[0]),
+        behaviours=tuple(_marks(behaviours, behaviour_of)),
+        conditions=tuple(_marks(conditions_of(plugin).values(), condition_of)),
+        fragments=tuple(plugin.answer("fragments", ())),
+        units=tuple(plugin.answer("units", ())),
+        devices=tuple(plugin.answer("devices", ())),
+        phrases=tuple(plugin.answer("phrases", ())),
+        labels=tuple(plugin.answer("labels", ())),
+    )
+    problems = [
+        *(problem for function in behaviours for problem in _parameter_problems(function)),
+        *_unit_problems(described.units),
+    ]
+    if problems:
+        raise WorkerFailed(*problems)
+    # Round trip: a hook that gives values of wrong types is told so here, not by the host.
+    return PluginDescription.parse(described.to_dict(), where=plugin.distribution)
+
+
+def behaviours_of(plugin: Plugin) -> dict[str, Callable[..., Any]]:
+    """The plugin's marked behaviours by name, in order of name. Raises `WorkerFailed`."""
+    return _collected(plugin, "behaviours", behaviour_of)
+
+
+def conditions_of(plugin: Plugin) -> dict[str, Callable[..., Any]]:
+    """The plugin's marked conditions by name, in order of name. Raises `WorkerFailed`."""
+    return _collected(plugin, "conditions", condition_of)
+
+
+def _collected(
+    plugin: Plugin, hook: str, mark_of: Callable[[object], Behaviour | Condition | None]
+) -> dict[str, Callable[..., Any]]:
+    found = plugin.answer(hook, None)
+    members = list(_members(plugin.subject)) if found is None else list(found)
+    marked = {id(member): (mark_of(member), member) for member in members}
+    named: dict[str, Callable[..., Any]] = {}
+    for mark, member in marked.values():
+        if mark is None:
+            if found is not None:
+                raise _invalid(f"hook {hook!r} gave {member!r}, which carries no mark")
+            continue
+        if mark.name in named:
+            raise _invalid(f"two {hook} are called {mark.name!r}")
+        named[mark.name] = member
+    return dict(sorted(named.items()))
+
+
+def _members(subject: object) -> Iterator[Any]:
+    """What a module or object has, without running any property."""
+    for name, member in inspect.getmembers_static(subject):
+        if not isinstance(member, property):
+            yield getattr(subject, name)
+
+
+def _marks(functions: Any, mark_of: Callable[[object], Any]) -> Iterator[Any]:
+    return (mark_of(function) for function in functions)
+
+
+def _parameter_problems(function: Callable[..., Any]) -> Iterator[Problem]:
+    described = behaviour_of(function)
+    if described is None:
+        return
+    where = f"behaviour {described.name!r}"
+    try:
+        action = parse_signature(described.action)
+    except NondumError as error:
+        yield from (Problem(p.code, p.message, where=where) for p in error.problems)
+        return
+    expected = ["ctx", *(parameter.identifier for parameter in action.parameters)]
+    found = list(_parameters(function))
+    if found != expected:
+        yield Problem(
+            "BEHAVIOUR_PARAMETERS",
+            f"{getattr(function, '__qualname__', function)} takes ({', '.join(found)}), but its "
+            f"action has ({', '.join(expected)})",
+            where=where,
+            fix="give the function `ctx` and then the action's parameters, by name and in order",
+        )
+
+
+def _parameters(function: Callable[..., Any]) -> Iterator[str]:
+    if isinstance(function, type) and issubclass(function, TickedBehaviour):
+        yield from list(inspect.signature(function.initialise).parameters)[1:]
+    else:
+        yield from inspect.signature(function).parameters
+
+
+def _unit_problems(units: tuple[Unit, ...]) -> Iterator[Problem]:
+    if not all(isinstance(unit, Unit) for unit in units):
+        yield Problem("DESCRIPTION_INVALID", "hook 'units' gave something that is no Unit")
+        return
+    slots = [slot.name for unit in units for slot in unit.outputs]
+    for what, names in (("unit", [unit.name for unit in units]), ("output slot", slots)):
+        for name in sorted({name for name in names if names.count(name) > 1}):
+            yield Problem("DESCRIPTION_INVALID", f"two of the {what}s are called {name!r}")
+        for name in names:
+            if not _NAME.fullmatch(name) or "__" in name:
+                yield Problem(
+                    "DESCRIPTION_INVALID",
+                    f"{name!r} is no name of a {what}",
+                    need="small letters, digits, - and single _",
+                    have=repr(name),
+                )
+
+
+def _import(target: str) -> object:
+    module, _, attribute = target.partition(":")
+    try:
+        found: object = importlib.import_module(module)
+        for part in filter(None, attribute.split(".")):
+            found = getattr(found, part)
+    except Exception as error:
+        raise WorkerFailed(_told("IMPORT_FAILED", f"cannot import {target!r}", error)) from error
+    return found
+
+
+def _make(plugin_class: type[Any]) -> object:
+    try:
+        return plugin_class()
+    except Exception as error:
+        what = f"cannot make {plugin_class.__qualname__}"
+        raise WorkerFailed(_told("IMPORT_FAILED", what, error)) from error
+
+
+def _told(code: str, what: str, error: BaseException) -> Problem:
+    """An author's error as a problem that names its file and line."""
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f"{frames[-1].filename}:{frames[-1].lineno}" if frames else ""
+    return Problem(code, f"{what}: {type(error).__name__}: {error}", where=place)
+
+
+def _invalid(message: str) -> WorkerFailed:
+    return WorkerFailed(Problem("DESCRIPTION_INVALID", message))
+
+
+def _package_of(subject: object) -> str:
+    module = subject.__name__ if inspect.ismodule(subject) else type(subject).__module__
+    return module.partition(".")[0]
+
+
+def _normalised(name: str) -> str:
+    """The name as PyPA normalises it."""
+    return re.sub(r"[-_.]+", "-", name).lower().strip("-")
+
+
+def version_of(distribution: str) -> str:
+    """The installed version of a distribution; "0" when it runs from its source folder."""
+    try:
+        return metadata.version(distribution)
+    except metadata.PackageNotFoundError:
+        return "0"

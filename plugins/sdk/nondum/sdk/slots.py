@@ -1,0 +1,156 @@
+"""Frames in sealed shared memory: one memfd per slot (memfd_create(2), fcntl(2) F_ADD_SEALS).
+
+The producer maps a slot for writing, then seals it, so that no holder of the descriptor can shrink
+it under a reader, grow it, or write to it. The producer alone counts who still reads a slot.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import mmap
+import os
+from collections.abc import Iterator
+
+from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.messages import Buffer
+from nondum.sdk.packets import Handle, discard
+
+F_SEAL_FUTURE_WRITE = 0x10  # Linux 5.1; Python names it from 3.13 on
+SEALS = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | F_SEAL_FUTURE_WRITE
+
+MAX_SLOTS = 64
+"""Slots of one stream that live at once."""
+MAX_SLOT_BYTES = 256 * 1024 * 1024
+
+
+class Slot:
+    """A place for one frame, as its producer has it."""
+
+    __slots__ = ("descriptor", "id", "memory", "readers", "size")
+
+    def __init__(self, slot_id: int, size: int) -> None:
+        self.id = slot_id
+        self.size = size
+        self.readers = 0
+        """How many hand-overs of it are unreleased, or waiting."""
+        self.descriptor = os.memfd_create("nondum-slot", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+        try:
+            os.ftruncate(self.descriptor, size)
+            self.memory = mmap.mmap(self.descriptor, size)
+            fcntl.fcntl(self.descriptor, fcntl.F_ADD_SEALS, SEALS | fcntl.F_SEAL_SEAL)
+        except BaseException:
+            os.close(self.descriptor)
+            raise
+
+    def close(self) -> None:
+        """Let go of the memory; readers' own mappings live on."""
+        self.memory.close()
+        os.close(self.descriptor)
+
+
+class SlotRing:
+    """A producer's slots. Not a queue: a frame goes to whichever slot nobody reads."""
+
+    def __init__(self) -> None:
+        self._slots: dict[int, Slot] = {}
+        self._next_id = 1
+
+    def write(self, data: Buffer, length: int) -> Slot | None:
+        """Copy `length` bytes into a slot that nobody reads; None when all are being read.
+
+        Raises `OSError` when the system has no memory or descriptors left.
+        """
+        slot = self._free_slot(length)
+        if slot is not None:
+            slot.memory[:length] = data
+        return slot
+
+    def retire(self, keep: int, length: int = 0) -> Iterator[int]:
+        """Let go of unread slots shorter than `length`, and of those beyond `keep`; give their ids.
+
+        Readers must be told, so that they unmap them.
+        """
+        for slot in list(self._slots.values()):
+            if not slot.readers and (slot.size < length or len(self._slots) > keep):
+                del self._slots[slot.id]
+                slot.close()
+                yield slot.id
+
+    def close(self) -> None:
+        """Let go of all slots."""
+        for slot in self._slots.values():
+            slot.close()
+        self._slots.clear()
+
+    def _free_slot(self, length: int) -> Slot | None:
+        for slot in self._slots.values():
+            if not slot.readers and slot.size >= length:
+                return slot
+        if len(self._slots) >= MAX_SLOTS:
+            return None
+        slot = Slot(self._next_id, -(-length // mmap.PAGESIZE) * mmap.PAGESIZE)
+        self._next_id += 1
+        self._slots[slot.id] = slot
+        return slot
+
+
+class MappedSlots:
+    """A consumer's view of a producer's slots; believes nothing."""
+
+    def __init__(self) -> None:
+        self._slots: dict[int, mmap.mmap] = {}
+
+    def add(self, slot_id: int, handle: Handle) -> None:
+        """Map a slot whose descriptor was handed over, and close that.
+
+        Raises `ProtocolViolation` (SLOT_SEALS, SLOT_SIZE, SLOT_UNKNOWN).
+        """
+        try:
+            if slot_id in self._slots or len(self._slots) >= MAX_SLOTS:
+                raise _violation("SLOT_UNKNOWN", f"slot {slot_id} is one too many")
+            if not isinstance(handle, int):
+                raise _violation("SLOT_SEALS", "a slot is no sealed memory")
+            self._slots[slot_id] = _map_sealed(handle)
+        finally:
+            discard((handle,))
+
+    def read(self, slot_id: int, length: int) -> bytes:
+        """Copy a frame out of its slot. Raises `ProtocolViolation`."""
+        return self.check(slot_id, length)[:length]
+
+    def check(self, slot_id: int, length: int) -> mmap.mmap:
+        """Give the slot's memory if the slot is known and as long as claimed."""
+        memory = self._slots.get(slot_id)
+        if memory is None:
+            raise _violation("SLOT_UNKNOWN", f"slot {slot_id} was never handed over")
+        if not 0 <= length <= len(memory):
+            raise _violation("SLOT_LENGTH", f"{length} bytes in a slot of {len(memory)}")
+        return memory
+
+    def remove(self, slot_id: int) -> None:
+        """Unmap a slot that its producer has retired."""
+        memory = self._slots.pop(slot_id, None)
+        if memory is not None:
+            memory.close()
+
+    def close(self) -> None:
+        """Unmap all."""
+        for slot_id in list(self._slots):
+            self.remove(slot_id)
+
+
+def _map_sealed(descriptor: int) -> mmap.mmap:
+    try:
+        seals = fcntl.fcntl(descriptor, fcntl.F_GET_SEALS)
+        size = os.fstat(descriptor).st_size
+        if seals & SEALS != SEALS:  # without them the producer could shrink it under the reader
+            raise _violation("SLOT_SEALS", f"a slot has the seals {seals:#x}, not {SEALS:#x}")
+        if not 0 < size <= MAX_SLOT_BYTES:
+            raise _violation("SLOT_SIZE", f"a slot has {size} bytes")
+        return mmap.mmap(descriptor, size, prot=mmap.PROT_READ)
+    except (OSError, ValueError) as error:  # no memfd at all, or not mappable
+        raise _violation("SLOT_SEALS", f"a slot is no sealed memory: {error}") from error
+
+
+def _violation(code: str, message: str) -> ProtocolViolation:
+    return ProtocolViolation(Problem(code, message))

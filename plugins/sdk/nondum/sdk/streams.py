@@ -1,0 +1,284 @@
+"""One stream's way from its producer to each of its consumers on the same host.
+
+Each pair has a connection of its own; the host brokers it and is out of the data path. Frames lie
+in shared slots (`nondum.sdk.slots`), small messages travel inline. At most two messages are
+outstanding per consumer; while they are, the newest one waits and older ones are dropped, so that a
+slow, stopped or dead consumer costs its producer nothing. Only messages cross: no shared counters.
+
+    producer → consumer   [0, seq, header, bytes or nil]         a message, inline
+                          [1, seq, slot, length, header]         a message in a slot; the first time
+                                                                 with the slot's descriptor
+                          [2, slot]                              the slot is retired
+    consumer → producer   [seq]                                  the message has been read
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from nondum.sdk.errors import MessageInvalid, Problem, ProtocolViolation
+from nondum.sdk.messages import Buffer, Message, message_from_wire
+from nondum.sdk.packets import Handle, Packets, discard
+from nondum.sdk.slots import MappedSlots, Slot, SlotRing
+from nondum.sdk.wire import MAX_PACKET, pack, unpack
+
+OUTSTANDING = 2
+"""Messages that a consumer may hold."""
+INLINE_BYTES = 16 * 1024
+"""Bulk bytes up to here travel in the packet."""
+SPARE_SLOTS = 2
+"""One that waits for slow consumers and one that is being written."""
+UNLIMITED = 2**31
+"""Packets that never leave the process may be this long."""
+
+_INLINE, _IN_SLOT, _RETIRED = range(3)
+
+
+@dataclass(frozen=True, slots=True)
+class _Frame:
+    """A message, ready for any number of consumers."""
+
+    seq: int
+    packet: bytes
+    slot: Slot | None = None
+
+
+class Producer:
+    """The sending end of a stream. Its methods run on the loop."""
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+        """The stream's type."""
+        self._outlets: dict[str, _Outlet] = {}
+        self._ring = SlotRing()
+        self._seq = 0
+
+    def connect(self, consumer: str, packets: Packets) -> None:
+        """Feed one more consumer, from the next message on; owns `packets`."""
+        self.disconnect(consumer)
+        self._outlets[consumer] = _Outlet(packets, lambda: self.disconnect(consumer))
+
+    def disconnect(self, consumer: str) -> None:
+        """Stop feeding a consumer; unknown ones are ignored."""
+        outlet = self._outlets.pop(consumer, None)
+        if outlet is not None:
+            outlet.close()
+            self._retire()
+
+    def send(self, message: Message) -> None:
+        """Hand a message to every consumer that can take it; never waits.
+
+        Raises `MessageInvalid` for wrong values or a header that fits no packet.
+        """
+        message.check()
+        if not self._outlets:
+            return
+        header, buffer = message.to_wire()
+        self._seq += 1
+        shared = [outlet for outlet in self._outlets.values() if outlet.packets.shares_memory]
+        apart = [outlet for outlet in self._outlets.values() if not outlet.packets.shares_memory]
+        length = 0 if buffer is None else memoryview(buffer).nbytes
+        if buffer is not None and length > INLINE_BYTES and shared:
+            self._offer_slot(shared, header, buffer, length)
+        else:
+            self._offer(shared, self._inline(header, buffer, MAX_PACKET))
+        if apart:
+            self._offer(apart, self._inline(header, buffer, UNLIMITED))
+
+    def close(self) -> None:
+        """End the stream for all consumers."""
+        for consumer in list(self._outlets):
+            self.disconnect(consumer)
+        self._ring.close()
+
+    def _inline(self, header: dict[str, Any], buffer: Buffer | None, limit: int) -> _Frame:
+        return _Frame(self._seq, _packed([_INLINE, self._seq, header, buffer], limit))
+
+    def _offer_slot(
+        self, outlets: list[_Outlet], header: dict[str, Any], buffer: Buffer, length: int
+    ) -> None:
+        self._retire(length)
+        slot = self._ring.write(buffer, length)
+        if slot is None:
+            return  # every slot is being read: this frame is dropped for all
+        fields = [_IN_SLOT, self._seq, slot.id, length, header]
+        self._offer(outlets, _Frame(self._seq, _packed(fields, MAX_PACKET), slot))
+
+    def _offer(self, outlets: list[_Outlet], frame: _Frame) -> None:
+        for outlet in outlets:
+            outlet.offer(frame)
+
+    def _retire(self, length: int = 0) -> None:
+        keep = OUTSTANDING * len(self._outlets) + SPARE_SLOTS
+        for slot_id in self._ring.retire(keep, length):
+            for outlet in self._outlets.values():
+                outlet.forget(slot_id)
+
+
+class _Outlet:
+    """What a producer knows of one consumer."""
+
+    def __init__(self, packets: Packets, on_closed: Callable[[], None]) -> None:
+        self.packets = packets
+        self._on_closed = on_closed
+        self._outstanding: dict[int, _Frame] = {}
+        self._newest: _Frame | None = None
+        self._mapped: set[int] = set()
+        packets.open(self._released, lambda _violation: on_closed())
+
+    def offer(self, frame: _Frame) -> None:
+        """Send a message now, or let it wait in place of an older one."""
+        _hold(frame)
+        if self._newest is not None:
+            _drop(self._newest)
+        self._newest = frame
+        self._send_newest()
+
+    def forget(self, slot_id: int) -> None:
+        """Tell the consumer that a slot is gone."""
+        if slot_id in self._mapped:
+            self._mapped.discard(slot_id)
+            # Nothing is outstanding in that slot, so at most a few such notices can be under way.
+            self.packets.send(pack([_RETIRED, slot_id]))
+
+    def close(self) -> None:
+        """Take back all that the consumer held."""
+        self.packets.close()
+        for frame in self._outstanding.values():
+            _drop(frame)
+        self._outstanding.clear()
+        if self._newest is not None:
+            _drop(self._newest)
+            self._newest = None
+
+    def _send_newest(self) -> None:
+        frame = self._newest
+        if frame is None or len(self._outstanding) >= OUTSTANDING:
+            return
+        is_new = frame.slot is not None and frame.slot.id not in self._mapped
+        handles = (frame.slot.descriptor,) if frame.slot is not None and is_new else ()
+        if not self.packets.send(frame.packet, handles):
+            self.packets.when_writable(self._send_newest)
+            return
+        if frame.slot is not None:
+            self._mapped.add(frame.slot.id)
+        self._outstanding[frame.seq] = frame
+        self._newest = None
+
+    def _released(self, data: bytes, handles: tuple[Handle, ...]) -> None:
+        discard(handles)
+        try:
+            match unpack(data):
+                case [int(seq)] if seq in self._outstanding and not handles:
+                    _drop(self._outstanding.pop(seq))
+                    self._send_newest()
+                case _:
+                    self._on_closed()
+        except ProtocolViolation:
+            self._on_closed()
+
+
+class Consumer:
+    """The receiving end of a stream; keeps only the newest message until it is taken."""
+
+    def __init__(
+        self,
+        kind: str,
+        packets: Packets,
+        on_message: Callable[[], None],
+        on_closed: Callable[[ProtocolViolation | None], None],
+    ) -> None:
+        """Own `packets` and begin to read.
+
+        `on_message` is called whenever a newer message waits. `on_closed` is called once when the
+        producer is gone (None) or broke the protocol; not after `close`.
+        """
+        self._kind, self._packets = kind, packets
+        self._on_message, self._on_closed = on_message, on_closed
+        self._slots = MappedSlots()
+        self._waiting: tuple[int, dict[str, Any], Callable[[], bytes | None]] | None = None
+        self._limit = MAX_PACKET if packets.shares_memory else UNLIMITED
+        packets.open(self._receive, self._lose)
+
+    def take(self) -> Message | None:
+        """Copy the waiting message out and let its slot go; None when none waits.
+
+        Raises `MessageInvalid` when it is not what its type says, `ProtocolViolation` when its slot
+        was taken away.
+        """
+        if self._waiting is None:
+            return None
+        seq, header, read = self._waiting
+        self._waiting = None
+        buffer = read()
+        self._release(seq)
+        return message_from_wire(self._kind, header, buffer)
+
+    def close(self) -> None:
+        """Stop reading."""
+        self._waiting = None
+        self._packets.close()
+        self._slots.close()
+
+    def _receive(self, data: bytes, handles: tuple[Handle, ...]) -> None:
+        unclaimed = list(handles)
+        try:
+            self._accept(unpack(data, self._limit), unclaimed)
+            if unclaimed:
+                raise ProtocolViolation(
+                    Problem("PACKET_DESCRIPTORS", "a packet carries descriptors nobody asked for")
+                )
+        except ProtocolViolation as violation:
+            self._lose(violation)
+        finally:
+            discard(unclaimed)
+
+    def _accept(self, fields: Any, handles: list[Handle]) -> None:
+        match fields:
+            case [0, int(seq), dict(header), bytes() | None as buffer]:
+                self._replace(seq, header, lambda: buffer)
+            case [1, int(seq), int(slot), int(length), dict(header)]:
+                if handles:
+                    self._slots.add(slot, handles.pop(0))
+                self._slots.check(slot, length)
+                self._replace(seq, header, lambda: self._slots.read(slot, length))
+            case [2, int(slot)]:
+                self._slots.remove(slot)
+            case _:
+                raise ProtocolViolation(Problem("STREAM_PACKET", "no packet of a stream"))
+
+    def _replace(self, seq: int, header: dict[str, Any], read: Callable[[], bytes | None]) -> None:
+        older, self._waiting = self._waiting, (seq, header, read)
+        if older is not None:
+            self._release(older[0])
+        self._on_message()
+
+    def _release(self, seq: int) -> None:
+        # A producer that lets releases pile up until the socket is full harms only itself.
+        self._packets.send(pack([seq]))
+
+    def _lose(self, violation: ProtocolViolation | None) -> None:
+        self._packets.close()
+        self._on_closed(violation)
+        self.close()
+
+
+def _packed(fields: list[Any], limit: int) -> bytes:
+    try:
+        return pack(fields, limit)
+    except ProtocolViolation as violation:
+        raise MessageInvalid(
+            Problem("MESSAGE_TOO_LONG", f"the message fits no packet: {violation}")
+        ) from violation
+
+
+def _hold(frame: _Frame) -> None:
+    if frame.slot is not None:
+        frame.slot.readers += 1
+
+
+def _drop(frame: _Frame) -> None:
+    if frame.slot is not None:
+        frame.slot.readers -= 1

@@ -1,0 +1,155 @@
+"""What a worker knows of its place: names, settings, devices, facts with values, frames, streams.
+
+One per worker. Contexts read it; the session changes it as the host tells. All on the loop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from nondum.sdk.description import PluginDescription
+from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.geometry import FrameTree
+from nondum.sdk.messages import Message, value_from_wire
+from nondum.sdk.ports import InputPort, OutputPort
+
+Tell = Callable[[str, Mapping[str, Any], int | None], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Device:
+    """A device that the host has granted."""
+
+    node: str
+    """Path of the device node."""
+    properties: Mapping[str, str]
+    """Its udev properties."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Who and where a worker is: the host's welcome."""
+
+    host: str
+    component: str
+    units: Mapping[str, str] = field(default_factory=dict)
+    """Local name → object."""
+    outputs: Mapping[str, str] = field(default_factory=dict)
+    """Output slot → stream object."""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    scratch: Path = Path()
+    """A folder of the component's own, emptied when it is removed."""
+    devices: Mapping[str, Device] = field(default_factory=dict)
+    mounts: Mapping[str, Any] = field(default_factory=dict)
+    limits: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def from_wire(cls, body: Mapping[str, Any]) -> Place:
+        """Make one of a Welcome's body; other keys are for other versions.
+
+        Raises `ProtocolViolation` (WELCOME).
+        """
+        try:
+            return cls(
+                host=body["host"],
+                component=body["component"],
+                units=dict(body.get("units", {})),
+                outputs=dict(body.get("outputs", {})),
+                settings=dict(body.get("settings", {})),
+                scratch=Path(body.get("scratch", "")),
+                devices={name: Device(**d) for name, d in body.get("devices", {}).items()},
+                mounts=dict(body.get("mounts", {})),
+                limits=dict(body.get("limits", {})),
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            problem = Problem("WELCOME", f"the host's welcome cannot be read: {error!r}")
+            raise ProtocolViolation(problem) from error
+
+
+class Workplace:
+    """The changing part of what a worker knows."""
+
+    def __init__(self, place: Place, tell: Tell) -> None:
+        self.place = place
+        self.tell = tell
+        """Send an event to the host: name, body, call id."""
+        self.devices = dict(place.devices)
+        self.frames = FrameTree.from_wire(place.mounts)
+        self.values: dict[tuple[str, ...], Message] = {}
+        """(predicate, object, …) → value of that fact."""
+        self.outputs: dict[str, OutputPort] = {}
+        """By stream object."""
+        self._inputs: dict[str, InputPort] = {}
+        self._optional_inputs: dict[tuple[str, str], InputPort] = {}
+
+    def declare(self, description: PluginDescription) -> None:
+        """Make the ports of all that the plugin declares."""
+        for unit in description.units:
+            for output in unit.outputs:
+                stream = self.place.outputs.get(output.name, output.name)
+                self.outputs[stream] = OutputPort(stream, output.type, self._on_flow)
+            for slot in unit.inputs:
+                self._optional_inputs[unit.name, slot.name] = InputPort()
+
+    def update_values(self, set_: list[Any], unset: list[Any]) -> None:
+        """Take over values of facts: `[[predicate, [object …], value]]`; and drop some."""
+        for predicate, arguments, value in set_:
+            self.values[predicate, *arguments] = value_from_wire(value)
+        for predicate, arguments in unset:
+            self.values.pop((predicate, *arguments), None)
+
+    def output(self, name: str) -> OutputPort:
+        """The port of a stream object or output slot. Raises `LookupError`."""
+        stream = self.place.outputs.get(name, name)
+        if stream not in self.outputs:
+            raise LookupError(f"{name!r} is no output of this plugin; it has: {self._slots()}")
+        return self.outputs[stream]
+
+    def input(self, stream: str) -> InputPort:
+        """The port of a stream that an action reads; made when first asked for."""
+        return self._inputs.setdefault(stream, InputPort())
+
+    def optional_input(self, slot: str, unit: str | None) -> InputPort:
+        """The port of an optional input, its unit by local or object name.
+
+        Raises `LookupError`.
+        """
+        local_names = {object_: local for local, object_ in self.place.units.items()}
+        wanted = local_names.get(unit, unit) if unit is not None else None
+        found = [
+            port
+            for (owner, name), port in self._optional_inputs.items()
+            if name == slot and wanted in (None, owner)
+        ]
+        if not found:
+            raise LookupError(f"no unit {wanted or ''} of this plugin has an input {slot!r}")
+        return found[0]
+
+    def input_for(self, body: Mapping[str, Any]) -> InputPort:
+        """The port that a `consume` means: an optional input when it names a slot.
+
+        Raises `LookupError`.
+        """
+        if body.get("slot"):
+            return self.optional_input(body["slot"], body.get("unit"))
+        return self.input(body["stream"])
+
+    def remount(self, mounts: Mapping[str, Any]) -> None:
+        """Take over the mount table `{frame: [parent, xyz, xyzw]}`."""
+        self.frames = FrameTree.from_wire(mounts)
+
+    def close(self) -> None:
+        """End all streams."""
+        for output in self.outputs.values():
+            output.close()
+        for port in (*self._inputs.values(), *self._optional_inputs.values()):
+            port.disconnect()
+
+    def _slots(self) -> str:
+        return ", ".join(self.place.outputs) or "none"
+
+    def _on_flow(self, port: OutputPort) -> None:
+        self.tell("flow", {"stream": port.stream, "flowing": port.is_flowing}, None)
