@@ -99,7 +99,7 @@ def mount(
 
     Axes follow REP-103: x forward, y left, z up; roll, pitch and yaw turn about them in that order.
 
-    Example: nondum mount panther__pan-tilt-unit__head --xyz 0.1 0 0.4 --rpy 0 0 1.57
+    Example: nondum mount panther__turret__head --xyz 0.1 0 0.4 --rpy 0 0 1.57
     """
     with connect(ctx.obj) as client:
         mounted = client.ask("mount", unit=unit, xyz=list(xyz), rpy=list(rpy))
