@@ -15,11 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from demo.emulators.pose import Floats, Mount
+from demo.emulators.pose import Floats, Mount, rotation
 
 DISTANCES_M = (15.0, 40.0)
 REACH_PAN_RAD = math.radians(150)
 REACH_TILT_RAD = (math.radians(-40), math.radians(26))
+DECISIVE_RAD = math.radians(15)
+"""How far beside the source the laser must fall if a mount is left out of account."""
 PARALLAX_RAD = math.radians(1.2)
 """A bearing says nothing of distance: how far apart the instruments may see the source."""
 
@@ -39,6 +41,8 @@ class Scenario:
     pan_rad: float
     """Where the pan-tilt unit points when it is switched on."""
     tilt_rad: float
+    seized: bool = False
+    """The pan-tilt unit counts steps and does not move: its gears are stuck."""
 
     @classmethod
     def read(cls, path: Path) -> Scenario:
@@ -52,12 +56,13 @@ class Scenario:
 
 
 def random_scenario(seed: int) -> Scenario:
-    """A run that a person could set up: the source within the pointer's reach, little parallax."""
+    """A run that a person could set up: the source within the pointer's reach, little parallax; and
+    one that shows whether mounts were used: without either or both the laser would miss."""
     dice = random.Random(seed)
     while True:
         camera, pointer = _mount(dice), _mount(dice)
         source = _source(dice)
-        if is_fair(source, camera, pointer):
+        if is_fair(source, camera, pointer) and is_decisive(source, camera, pointer):
             break
     return Scenario(
         seed=seed,
@@ -79,6 +84,14 @@ def is_fair(source_m: tuple[float, float, float], camera: Mount, pointer: Mount)
     parallax = math.acos(min(1.0, float(from_camera @ from_pointer)))
     low, high = REACH_TILT_RAD
     return abs(pan) <= REACH_PAN_RAD and low <= tilt <= high and parallax <= PARALLAX_RAD
+
+
+def is_decisive(source_m: tuple[float, float, float], camera: Mount, pointer: Mount) -> bool:
+    """Whether aims that leave out the camera's mount, the pointer's or both miss by far."""
+    way = _unit(np.asarray(source_m))
+    seen, turn = rotation(camera.rpy).T @ way, rotation(pointer.rpy)
+    misses = (seen, turn @ way, turn @ seen)  # each in the body frame, against `way`
+    return all(float(miss @ way) < math.cos(DECISIVE_RAD) for miss in misses)
 
 
 def _mount(dice: random.Random) -> Mount:

@@ -24,9 +24,8 @@ class Axis:
     lower_speed: int = 31
     resolution_arcsec: float = 185.1428
     velocity: float = 0.0
-    stuck: bool = False
-    """A seized gear: steps are counted, nothing moves (`angle_rad` stays)."""
-    _seized_at: float = 0.0
+    _seized_at: float | None = None
+    """Where the gear is stuck; steps are counted on."""
 
     @property
     def is_moving(self) -> bool:
@@ -35,11 +34,11 @@ class Axis:
     @property
     def angle_rad(self) -> float:
         """Where the head really points."""
-        position = self._seized_at if self.stuck else self.position
+        position = self.position if self._seized_at is None else self._seized_at
         return math.radians(position * self.resolution_arcsec / 3600)
 
     def seize(self) -> None:
-        self._seized_at, self.stuck = self.position, True
+        self._seized_at = self.position
 
     def halt(self) -> None:
         self.target = round(self.position + math.copysign(self._braking(), self.velocity))

@@ -46,13 +46,14 @@ class ComptonCamera:
         self._fifo = bytearray()
 
     def advance(self, dt_s: float) -> bytes:
-        """What leaves the line in the next `dt_s`."""
+        """What leaves the line in the next `dt_s`, which must be short: a twentieth of a second."""
         for frame in self._frames(dt_s):
             self._push(frame)
         self._now_s += dt_s
         if self._now_s >= self._next_status_s:
             self._next_status_s += 1.0
-            self._push(_frame(2, _STATUS.pack(int(self._now_s * 1e3), self._sequence, self._lost)))
+            status = _STATUS.pack(int(self._now_s * 1e3), self._sequence, self._lost)
+            self._fifo += _frame(2, status)  # there is always room for this one
         room = int(BYTES_PER_S * dt_s)
         sent = bytes(self._fifo[:room])
         del self._fifo[:room]

@@ -38,6 +38,11 @@ class PanTiltUnit:
         self._waiting: list[str] = []
         self._awaited: Callable[[], str | None] | None = None
 
+    def seize(self) -> None:
+        """Stick both gears: the motors go on stepping, the head stays."""
+        self.pan.seize()
+        self.tilt.seize()
+
     def receive(self, data: bytes) -> bytes:
         """Take bytes off the line; give what is answered at once."""
         answer = bytearray()

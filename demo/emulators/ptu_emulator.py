@@ -26,6 +26,8 @@ def main() -> None:
     """Answer in real time until the parent process is gone."""
     given = arguments(__doc__ or "")
     unit, relay = PanTiltUnit(given.scenario.pan_rad, given.scenario.tilt_rad), Relay()
+    if given.scenario.seized:
+        unit.seize()
     head, switch = Port(), Port()
     print(head.path, switch.path, sep="\n", flush=True)
     log = given.log.open("a", encoding="utf-8") if given.log else None

@@ -9,7 +9,7 @@ from types import TracebackType
 
 import serial
 
-from nondum.sdk import BehaviourFailed, Problem
+from nondum.sdk.errors import BehaviourFailed, Problem
 
 
 class Line:

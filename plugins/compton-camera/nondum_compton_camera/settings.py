@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
-from nondum.sdk import ConfigRefused, Problem
+from nondum.sdk.errors import ConfigRefused, Problem
 
 
 @dataclass(frozen=True, slots=True)

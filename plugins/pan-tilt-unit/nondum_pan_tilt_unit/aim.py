@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from nondum.sdk import BehaviourFailed, Problem
+from nondum.sdk.errors import BehaviourFailed, Problem
 
 Vector = tuple[float, float, float]
 

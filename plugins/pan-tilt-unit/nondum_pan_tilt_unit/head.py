@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from nondum.sdk import BehaviourFailed, Problem
+from nondum.sdk.errors import BehaviourFailed, Problem
 from nondum_pan_tilt_unit.aim import Axis
 from nondum_pan_tilt_unit.line import Line
 from nondum_pan_tilt_unit.replies import LimitHit, Replies, Reply
@@ -21,6 +21,8 @@ BAUD = 9600
 _ANSWER_S = 1.0
 _RESET_S = 60.0
 _QUIET_S = 0.1
+_CHATTER = 100
+"""So many pieces of old talk are waited for, at most."""
 _POLL_S = 0.05
 _SETTLE_STEPS = 1
 _MARGIN_S = 3.0
@@ -137,13 +139,15 @@ class Head:
     async def _clear(self) -> None:
         """End a command that someone left half typed, and drop all answers to what was before."""
         self._line.send(b"\r")
-        try:
-            while True:
+        for _ in range(_CHATTER):
+            try:
                 async with asyncio.timeout(_QUIET_S):
                     await self._line.receive()
-        except TimeoutError:
-            self._replies.clear()
-            self._waiting.clear()
+            except TimeoutError:
+                self._replies.clear()
+                self._waiting.clear()
+                return
+        raise _failed("PTU_REFUSED", "the device never stops talking: it is no pan-tilt unit")
 
 
 def is_at(position: Aim, aim: Aim) -> bool:

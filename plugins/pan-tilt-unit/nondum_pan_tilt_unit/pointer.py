@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from types import TracebackType
 
-from nondum.sdk import BehaviourFailed, Problem
+from nondum.sdk.errors import BehaviourFailed, Problem
 from nondum_pan_tilt_unit.aim import Vector, apart, pan_tilt
 from nondum_pan_tilt_unit.head import Aim, Head, is_at
 from nondum_pan_tilt_unit.relay import Laser

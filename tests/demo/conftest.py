@@ -1,0 +1,9 @@
+"""The instruments' drivers are no part of the host: they are taken from their own folders."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+sys.path += [str(ROOT / "plugins" / name) for name in ("compton-camera", "pan-tilt-unit")]
