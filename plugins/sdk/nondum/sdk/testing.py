@@ -1,1 +1,31 @@
-"""Pytest fixtures for authors of plugins."""
+"""Pytest fixtures for authors of plugins; loaded by pytest itself, so it imports nothing early."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from nondum.sdk.bench import WorkerFactory
+
+
+@pytest.fixture
+def worker(tmp_path: Path) -> Iterator[WorkerFactory]:
+    """Run plugins in this process, without a host, over the host's own protocol.
+
+        def test_points_at_the_source(worker):
+            head = worker("nondum_pan_tilt_unit", mounts={"head": ((0, 0, 1), (0, 0, 0))})
+            head.set_value("bearing-known", "source", "robot", value=Bearing(…))
+            call = head.behave("point", u="head", t="source", h="robot")
+            call.wait_established()
+            call.halt()
+
+    See `nondum.sdk.bench.Bench` for what can be done with it.
+    """
+    from nondum.sdk.bench import WorkerFactory
+
+    with WorkerFactory(tmp_path) as factory:
+        yield factory

@@ -206,8 +206,10 @@ async def run_in_thread(
             outcome = (None, RuntimeError("cancelled itself without being halted"))
         except StopIteration as error:  # which a future cannot carry
             outcome = (None, RuntimeError(f"StopIteration: {error}"))
-        except BaseException as error:
+        except Exception as error:
             outcome = (None, error)
+        except BaseException as error:  # SystemExit would end the whole worker
+            outcome = (None, RuntimeError(f"{type(error).__name__}: {error}"))
         with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits any more
             loop.call_soon_threadsafe(settle, *outcome)
 

@@ -1,0 +1,284 @@
+"""A plugin on the test bench: a worker in this process, and the host's side of it in plain calls.
+
+The plugin runs on a loop in a thread of its own and is reached through the same codec as in a
+worker process, so that what passes here passes there. Needs no Linux.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable, Coroutine, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self, TypeVar
+
+from nondum.sdk.bench_host import HostSide, Run
+from nondum.sdk.description import PluginDescription
+from nondum.sdk.errors import Problem
+from nondum.sdk.geometry import Transform
+from nondum.sdk.messages import Message, Vector, value_to_wire
+from nondum.sdk.plugin import describe, load
+from nondum.sdk.signature import parse_signature
+
+TIMEOUT_S = 5.0
+"""How long the bench waits for anything before the test fails."""
+
+_T = TypeVar("_T")
+
+
+class Call:
+    """A behaviour at work."""
+
+    def __init__(self, bench: Bench, run: Run) -> None:
+        self._bench, self._run = bench, run
+
+    @property
+    def state(self) -> str:
+        """running, established, succeeded, failed or halted."""
+        return self._run.state
+
+    @property
+    def problem(self) -> Problem | None:
+        """Why it failed."""
+        return self._run.problem
+
+    @property
+    def progress(self) -> list[tuple[float, str]]:
+        """What it said about how far it is."""
+        return list(self._run.progress)
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether it runs no more."""
+        return self.state in ("succeeded", "failed", "halted")
+
+    def wait_established(self, timeout_s: float = TIMEOUT_S) -> Self:
+        """Wait until it says that its effects hold; an `AssertionError` if it never does."""
+        self._bench.wait_until(lambda: self.state != "running", "established", timeout_s)
+        assert self.state == "established", f"ended before it was established: {self}"
+        return self
+
+    def wait(self, timeout_s: float = TIMEOUT_S) -> Self:
+        """Wait until it ends."""
+        self._bench.wait_until(lambda: self.has_ended, "the end of the behaviour", timeout_s)
+        return self
+
+    def halt(self, timeout_s: float = TIMEOUT_S) -> Self:
+        """Halt it and wait until it has ended."""
+        self._bench.on_loop(lambda: self._bench.side.link.cancel(self._run.pending.id))
+        return self.wait(timeout_s)
+
+    def assert_succeeded(self, timeout_s: float = TIMEOUT_S) -> Self:
+        """Wait for its end and demand success."""
+        assert self.wait(timeout_s).state == "succeeded", str(self)
+        return self
+
+    def assert_failed(self, code: str = "BEHAVIOUR_FAILED", timeout_s: float = TIMEOUT_S) -> Self:
+        """Wait for its end and demand a failure with this code."""
+        assert self.wait(timeout_s).state == "failed", str(self)
+        assert self.problem is not None and self.problem.code == code, str(self)
+        return self
+
+    def __str__(self) -> str:
+        return f"{self.state}: {self.problem}" if self.problem else self.state
+
+
+class Bench:
+    """One plugin, started. The `worker` fixture makes it and stops it.
+
+    Everywhere a name is expected, the local name of one of the plugin's own units or output slots
+    stands for its object.
+    """
+
+    def __init__(
+        self,
+        plugin: str | object,
+        *,
+        scratch: Path,
+        host: str = "robot",
+        component: str = "plugin",
+        settings: Mapping[str, Any] | None = None,
+        devices: Mapping[str, str] | None = None,
+        mounts: Mapping[str, tuple[Vector, Vector]] | None = None,
+    ) -> None:
+        """Load, describe and start a plugin.
+
+        `plugin` is an entry point's value, a module, a class or an object. `devices`: declared name
+        → node. `mounts`: unit → position in metres and roll, pitch, yaw in radians, on the body.
+        Raises what the plugin's description or start hook raises, as `WorkerFailed`.
+        """
+        self.description: PluginDescription = describe(load(plugin))
+        """What the plugin says about itself."""
+        self.host = host
+        """The host's name, which is also its object and body frame."""
+        units = [unit.name for unit in self.description.units]
+        slots = [slot.name for unit in self.description.units for slot in unit.outputs]
+        self.objects = {name: f"{host}__{component}__{name}" for name in (*units, *slots)}
+        """Local names of units and output slots → objects."""
+        self._changed = threading.Condition()
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever, name="bench")
+        self._thread.start()
+        self.side = self.on_loop(lambda: HostSide(plugin, self._notify))
+        """The host's side; reach it through `on_loop` only."""
+        welcome = {
+            "host": host,
+            "component": component,
+            "units": {name: self.objects[name] for name in units},
+            "outputs": {name: self.objects[name] for name in slots},
+            "settings": dict(settings or {}),
+            "scratch": str(scratch),
+            "devices": {
+                name: {"node": node, "properties": {}} for name, node in (devices or {}).items()
+            },
+            "mounts": {self._object(u): _mount(host, *pose) for u, pose in (mounts or {}).items()},
+        }
+        try:
+            answered = self._wait(self.side.start(welcome))
+        except BaseException:
+            self.stop()
+            raise
+        assert answered == self.description, "describing hooks must answer the same every time"
+
+    @property
+    def facts(self) -> dict[tuple[str, ...], Message | None]:
+        """What the plugin said is true: (predicate, object, …) → value."""
+        return dict(self.side.facts)
+
+    @property
+    def flowing(self) -> set[str]:
+        """Objects of the streams that flow."""
+        return set(self.side.flowing)
+
+    @property
+    def logs(self) -> list[tuple[str, str]]:
+        """Level and message of what the plugin logged with `ctx.log`."""
+        return list(self.side.logs)
+
+    def behave(self, behaviour: str, **arguments: str) -> Call:
+        """Start a behaviour with the action's parameters by name."""
+        described = {b.name: b for b in self.description.behaviours}[behaviour]
+        parameters = parse_signature(described.action).parameters
+        names = {parameter.identifier: parameter.name for parameter in parameters}
+        bound = {names.get(key, key): self._object(name) for key, name in arguments.items()}
+        body = {"behaviour": behaviour, "arguments": bound, "values": []}
+        return Call(self, self._wait(self.side.behave(body)))
+
+    def feed(self, message: Message, *, stream: str = "", slot: str = "", unit: str = "") -> None:
+        """Send a message on a stream that a behaviour reads, or to an optional input's slot."""
+        stream = self._object(stream) if stream else f"fed-to-{slot}"
+        self._wait(self.side.feed(message, stream, slot, unit))
+
+    def read(self, slot: str, timeout_s: float = TIMEOUT_S) -> Any:
+        """The next unread message of an output slot, waited for."""
+        kept = self.side.outputs[self._object(slot)]
+        self.wait_until(lambda: bool(kept), f"a message on {slot}", timeout_s)
+        return kept.popleft()
+
+    def drain(self, slot: str) -> list[Any]:
+        """All unread messages of an output slot, now."""
+        kept, drained = self.side.outputs[self._object(slot)], []
+        while kept:
+            drained.append(kept.popleft())
+        return drained
+
+    def set_value(self, predicate: str, *objects: str, value: Message) -> None:
+        """Let a valued fact hold, as if another component had said so."""
+        entry = [predicate, [self._object(name) for name in objects], value_to_wire(value)]
+        self._tell("values", {"set": [entry], "unset": []})
+
+    def unset_value(self, predicate: str, *objects: str) -> None:
+        """Let a valued fact hold no more."""
+        entry = [predicate, [self._object(name) for name in objects]]
+        self._tell("values", {"set": [], "unset": [entry]})
+
+    def wait_fact(self, predicate: str, *objects: str, timeout_s: float = TIMEOUT_S) -> Any:
+        """Wait until the plugin says that a fact is true; give its value."""
+        fact = (predicate, *map(self._object, objects))
+        self.wait_until(lambda: fact in self.side.facts, f"({' '.join(fact)})", timeout_s)
+        return self.facts[fact]
+
+    def wait_until(
+        self, is_so: Callable[[], bool], what: str, timeout_s: float = TIMEOUT_S
+    ) -> None:
+        """Wait for something that the plugin tells; an `AssertionError` after `timeout_s`."""
+        with self._changed:
+            if not self._changed.wait_for(is_so, timeout_s):
+                raise AssertionError(f"waited {timeout_s} s in vain for {what}; logs: {self.logs}")
+
+    def attach(self, device: str, node: str, properties: Mapping[str, str] | None = None) -> None:
+        """Grant a device."""
+        self.ask("attach", device=device, node=node, properties=dict(properties or {}))
+
+    def detach(self, device: str) -> None:
+        """Take a device away."""
+        self.ask("detach", device=device)
+
+    def ask(self, verb: str, **body: Any) -> dict[str, Any]:
+        """Ask like a host: `ask("speak", text="hello")`. Raises `WorkerFailed`."""
+        return self._wait(self.side.link.request(verb, body))
+
+    def stop(self) -> None:
+        """Halt all, run the stop hook, and end. Stopping twice is allowed."""
+        if self._thread.is_alive():
+            try:
+                self._wait(self.side.stop())
+            finally:
+                self._loop.call_soon_threadsafe(self._loop.stop)
+                self._thread.join()
+                self._loop.close()
+
+    def on_loop(self, function: Callable[[], _T]) -> _T:
+        """Call a function on the bench's loop and give its result."""
+
+        async def called() -> _T:
+            return function()
+
+        return self._wait(called())
+
+    def _tell(self, event: str, body: Mapping[str, Any]) -> None:
+        self.on_loop(lambda: self.side.link.send_event(event, body))
+
+    def _notify(self) -> None:
+        with self._changed:
+            self._changed.notify_all()
+
+    def _object(self, name: str) -> str:
+        return self.objects.get(name, name)
+
+    def _wait(self, work: Coroutine[Any, Any, _T]) -> _T:
+        return asyncio.run_coroutine_threadsafe(work, self._loop).result(2 * TIMEOUT_S)
+
+
+class WorkerFactory:
+    """What the `worker` fixture gives: call it with a plugin to get a started `Bench`."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._benches: list[Bench] = []
+
+    def __call__(self, plugin: str | object, **options: Any) -> Bench:
+        """Start a plugin; the options are those of `Bench`."""
+        scratch = self._folder / f"scratch-{len(self._benches)}"
+        scratch.mkdir()
+        bench = Bench(plugin, scratch=scratch, **options)
+        self._benches.append(bench)
+        return bench
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        for bench in self._benches:
+            bench.stop()
+
+
+def _mount(host: str, xyz: Vector, rpy: Vector) -> list[Any]:
+    transform = Transform.from_rpy(xyz, rpy)
+    return [host, list(transform.translation), list(transform.rotation)]
