@@ -1,0 +1,65 @@
+"""The process that one planner runs in: `python -m nondum.host.mind.planner_child NAME MEMORY_MB`.
+
+It reads tasks from standard input and writes answers to standard output until the input ends. It is
+niced and limited in memory, and dies with the daemon.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import resource
+import signal
+import sys
+from typing import Any, BinaryIO
+
+from importlib_metadata import entry_points
+
+from nondum.host.mind import planner_wire as wire
+from nondum.sdk.planner import Planner
+
+GROUP = "nondum.planners"
+NICENESS = 10
+_PR_SET_PDEATHSIG = 1  # linux/prctl.h
+
+
+def main(name: str, memory_mb: int) -> int:
+    """Serve one planner until standard input ends."""
+    tasks, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb", buffering=0)
+    os.dup2(2, 1)  # what a planner prints must not get between the answers
+    _limit(memory_mb)
+    planner: Planner = entry_points(group=GROUP)[name].load()()
+    answers.write(wire.frame(["ready", planner.speaks]))
+    while (body := _read(tasks)) is not None:
+        answers.write(wire.frame(_answer(planner, wire.unframed(body))))
+    return 0
+
+
+def _limit(memory_mb: int) -> None:
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    os.nice(NICENESS)
+    size = memory_mb * 1024 * 1024
+    resource.setrlimit(resource.RLIMIT_AS, (size, size))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _answer(planner: Planner, request: Any) -> list[Any]:
+    deadline_s, task = request
+    try:
+        return wire.answer_to_wire(planner.plan(wire.task_from_wire(task), deadline_s))
+    except MemoryError:
+        return ["gave up", "it ran out of memory"]
+    except Exception as error:  # whatever a planner raises is told to the host, and it may go on
+        return ["failed", f"{type(error).__name__}: {error}"]
+
+
+def _read(stream: BinaryIO) -> bytes | None:
+    head = stream.read(wire.LENGTH.size)
+    if len(head) < wire.LENGTH.size:
+        return None
+    (length,) = wire.LENGTH.unpack(head)
+    return stream.read(length)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1], int(sys.argv[2])))

@@ -1,0 +1,127 @@
+"""One planner in a process of its own: kept warm, killed when it overruns or is not wanted."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import sys
+from asyncio.subprocess import DEVNULL, PIPE, Process
+from collections.abc import Mapping
+
+from nondum.host.mind import planner_wire as wire
+from nondum.sdk.errors import PlannerFailed, Problem
+from nondum.sdk.planner import Answer, GaveUp, GroundTask
+
+START_S = 20.0
+"""How long a planner may take to load."""
+GRACE_S = 0.5
+"""How much longer than its deadline a planner may take before it is killed."""
+
+
+class PlannerProcess:
+    """Serves one task at a time. Close it when done."""
+
+    def __init__(
+        self, name: str, *, memory_mb: int, environment: Mapping[str, str] | None = None
+    ) -> None:
+        """`name` is an entry point in group `nondum.planners` of the child's environment, which is
+        that of this process, with `environment` added."""
+        self.name = name
+        self._memory_mb = memory_mb
+        self._environment = {**os.environ, "PYTHONHASHSEED": "0", **(environment or {})}
+        self._process: Process | None = None
+        self._is_ready = False
+        self._lock = asyncio.Lock()
+
+    @property
+    def pid(self) -> int | None:
+        """Process id of the child, while there is one."""
+        return self._process.pid if self._process else None
+
+    async def warm(self) -> None:
+        """Start the child, so that the first task need not wait. Raises `PlannerFailed`."""
+        async with self._lock:
+            await self._running()
+
+    async def plan(self, task: GroundTask, deadline_s: float) -> Answer:
+        """Ask for a plan. Being cancelled kills the child.
+
+        Raises `PlannerFailed` (PLANNER_START, PLANNER_DIED, PLANNER_ANSWER, PLANNER_RAISED).
+        """
+        async with self._lock:
+            try:
+                process = await self._running()
+                async with asyncio.timeout(deadline_s + GRACE_S):
+                    return await self._asked(process, task, deadline_s)
+            except TimeoutError:
+                await self._kill()
+                return GaveUp(f"it overran its deadline of {deadline_s:g} s and was killed")
+            except (PlannerFailed, asyncio.CancelledError) as error:
+                if not isinstance(error, PlannerFailed) or error.code != "PLANNER_RAISED":
+                    await self._kill()
+                raise
+
+    async def close(self) -> None:
+        """End the child, and with it a search that is under way."""
+        if self._process is not None:
+            with contextlib.suppress(ProcessLookupError):
+                self._process.kill()
+        async with self._lock:
+            await self._kill()
+
+    async def _asked(self, process: Process, task: GroundTask, deadline_s: float) -> Answer:
+        assert process.stdin is not None  # started with pipes
+        try:
+            process.stdin.write(wire.frame([deadline_s, wire.task_to_wire(task)]))
+            await process.stdin.drain()
+        except ConnectionError as error:
+            raise self._failure("PLANNER_DIED", "it ended before it was asked") from error
+        return wire.answer_from_wire(await self._read(process))
+
+    async def _running(self) -> Process:
+        if self._process is not None and self._process.returncode is None and self._is_ready:
+            return self._process
+        await self._kill()
+        module = "nondum.host.mind.planner_child"
+        self._process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", module, self.name, str(self._memory_mb)),
+            stdin=PIPE,
+            stdout=PIPE,
+            stderr=DEVNULL,
+            env=self._environment,
+            start_new_session=True,
+        )
+        try:
+            async with asyncio.timeout(START_S):
+                hello = await self._read(self._process)
+        except (TimeoutError, PlannerFailed) as error:
+            await self._kill()
+            raise self._failure("PLANNER_START", "it does not start") from error
+        if hello != ["ready", "ground"]:
+            await self._kill()
+            raise self._failure("PLANNER_START", f"it speaks no language of this host: {hello}")
+        self._is_ready = True
+        return self._process
+
+    async def _read(self, process: Process) -> object:
+        assert process.stdout is not None  # started with pipes
+        try:
+            (length,) = wire.LENGTH.unpack(await process.stdout.readexactly(wire.LENGTH.size))
+            if length > wire.MAX_BYTES:
+                raise self._failure("PLANNER_ANSWER", f"an answer of {length} bytes")
+            return wire.unframed(await process.stdout.readexactly(length))
+        except asyncio.IncompleteReadError as error:
+            raise self._failure("PLANNER_DIED", "it ended without an answer") from error
+
+    async def _kill(self) -> None:
+        process, self._process, self._is_ready = self._process, None, False
+        if process is None:
+            return
+        with contextlib.suppress(ProcessLookupError):
+            process.kill()
+        # Also takes both pipes off the loop; shielded, since the caller may be being cancelled.
+        await asyncio.shield(process.communicate())
+
+    def _failure(self, code: str, message: str) -> PlannerFailed:
+        return PlannerFailed(Problem(code, message, where=f"planner {self.name}"))
