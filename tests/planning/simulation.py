@@ -9,8 +9,9 @@ from tests.planning.tasks import search
 
 from nondum.planning.attempts import Patience
 from nondum.planning.facts import parts
+from nondum.planning.goal import GoalKind
 from nondum.planning.running import RunState
-from nondum.planning.task_control import GoalKind, Phase
+from nondum.planning.task_control import Phase
 from nondum.planning.task_tree import TaskTree
 from nondum.planning.world import WorldModel
 from nondum.sdk.planner import GroundAction, GroundTask, Plan

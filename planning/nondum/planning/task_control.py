@@ -7,16 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from enum import Enum
-from typing import Literal, TypeAlias
 
 from nondum.planning.attempts import Attempts, Patience
+from nondum.planning.goal import GoalKind
 from nondum.planning.guards import Footing, facts_after, footing, twins_in
 from nondum.planning.partial_order import GOAL, bits
 from nondum.planning.regression import Regression, Rest, Stuck
 from nondum.planning.running import Run, Runner, RunState, World
 from nondum.planning.step import Step
-
-GoalKind: TypeAlias = Literal["achieve", "maintain"]
 
 GOAL_REACHED = "the goal is reached"
 NOT_NEEDED = "nothing that is left to do needs it"

@@ -16,11 +16,12 @@ from py_trees.common import Status
 from py_trees.composites import Composite
 
 from nondum.planning.attempts import Patience
+from nondum.planning.goal import GoalKind
 from nondum.planning.partial_order import GOAL
 from nondum.planning.regression import Regression
 from nondum.planning.running import Run, Runner, RunState, World
 from nondum.planning.step import steps_of, words
-from nondum.planning.task_control import GoalKind, Phase, TaskControl
+from nondum.planning.task_control import Phase, TaskControl
 from nondum.sdk.planner import GroundTask, Plan
 
 Sight: TypeAlias = Callable[[], tuple[World, float]]
