@@ -1,0 +1,462 @@
+"""Strangers' words become one domain, or a conflict is named and kept out."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import pytest
+
+from nondum.planning.contribution import Contribution
+from nondum.planning.domain import Merged
+from nondum.planning.merge import merge
+from nondum.sdk.description import Behaviour
+from nondum.sdk.errors import Problem
+from tests.planning.fragments import HOST, brings
+
+
+def merged(*contributions: Contribution) -> Merged:
+    result = merge(contributions, HOST)
+    assert not result.quarantined, result.quarantined
+    return result
+
+
+def refused(*contributions: Contribution) -> Problem:
+    """The first problem of the last contribution, which alone is kept out."""
+    result = merge(contributions, HOST)
+    assert list(result.quarantined) == [contributions[-1].component]
+    return result.quarantined[contributions[-1].component][0]
+
+
+# One component by itself
+
+ALONE = {
+    "undeclared type": (
+        "(:constants a - rom)",
+        "E-UNDECL",
+        "a - rom",
+        "nobody declares type 'rom'",
+    ),
+    "undeclared predicate": (
+        "(:action go :parameters (?u - base) :precondition (redy ?u))",
+        "E-UNDECL",
+        "redy",
+        "nobody declares predicate 'redy'",
+    ),
+    "unbound variable": (
+        "(:action go :parameters (?u - base) :precondition (ready ?v))",
+        "E-UNDECL",
+        "?v",
+        "?v is not a parameter",
+    ),
+    "undeclared object": (
+        "(:action go :parameters (?u - base) :precondition (recognises ?u goose))",
+        "E-UNDECL",
+        "goose",
+        "nobody declares 'goose'",
+    ),
+    "wrong arity": (
+        "(:action go :parameters (?u - base) :precondition (on ?u))",
+        "E-PRED-ARITY",
+        "on ?u",
+        "(on ?u) has 1 arguments, (on ?1 - unit ?2 - host) is declared",
+    ),
+    "wrong type": (
+        "(:action go :parameters (?u - base) :precondition (flowing ?u))",
+        "E-TYPE",
+        "?u))",
+        "expected stream, ?u is base",
+    ),
+    "no actor": (
+        "(:action go :parameters (?h - host))",
+        "E-ACTOR",
+        "?h - host",
+        "the first parameter of 'go' is not a unit",
+    ),
+    "no parameters": ("(:action go)", "E-ACTOR", "go)", "is not a unit"),
+    "writes a host's word": (
+        "(:action go :parameters (?u - base) :effect (ready ?u))",
+        "E-OWNED",
+        "ready",
+        "'ready' is the host's to say",
+    ),
+    "gives back by itself": (
+        "(:action go :parameters (?u - base) :effect (idle ?u))",
+        "E-OWNED",
+        "idle",
+        "'idle' is the host's to say",
+    ),
+    "deletes readiness": (
+        "(:action go :parameters (?u - base) :effect (not (ready ?u)))",
+        "E-OWNED",
+        "ready",
+        "'ready' is the host's to say",
+    ),
+    "names self in an action": (
+        "(:action go :parameters (?u - base) :precondition (on ?u self))",
+        "E-INSTANCE",
+        "self",
+        "'self' names one instance",
+    ),
+    "names its own unit in an action": (
+        "(:action go :parameters (?u - base) :precondition (ready wheels))",
+        "E-INSTANCE",
+        "wheels",
+        "'wheels' names one instance",
+    ),
+    "disjunction": (
+        "(:action go :parameters (?u - base) :precondition (or (ready ?u) (idle ?u)))",
+        "E-UNSUPPORTED",
+        "or",
+        "'or' is not handled",
+    ),
+    "quantifier": (
+        "(:action go :parameters (?u - base) :precondition (forall (?x - unit) (idle ?x)))",
+        "E-UNSUPPORTED",
+        "forall",
+        "'forall' is not handled",
+    ),
+    "conditional effect": (
+        "(:predicates (up)) (:action go :parameters (?u - base) :effect (when (up) (up)))",
+        "E-UNSUPPORTED",
+        "when",
+        "'when' is not handled",
+    ),
+    "numeric effect": (
+        "(:action go :parameters (?u - base) :effect (decrease (fuel) 1))",
+        "E-UNSUPPORTED",
+        "decrease",
+        "numeric effect (decrease (fuel) 1)",
+    ),
+    "effect as condition": (
+        "(:predicates (up)) (:action go :parameters (?u - base) :precondition (when (up) (up)))",
+        "E-MISPLACED",
+        "when",
+        "'when' belongs in an effect",
+    ),
+    "condition as effect": (
+        "(:predicates (up)) (:action go :parameters (?u - base) :effect (or (up) (up)))",
+        "E-MISPLACED",
+        "or",
+        "'or' is not an effect",
+    ),
+    "action twice": (
+        "(:action go :parameters (?u - base)) (:action go :parameters (?u - base))",
+        "E-TWICE",
+        "go :parameters (?u - base)))",
+        "action 'go' is declared twice",
+    ),
+    "circle of types": (
+        "(:types a - b b - a)",
+        "E-TYPE-CYCLE",
+        "a - b",
+        "types in a circle: a - b, b - a",
+    ),
+    "parent of object": ("(:types object - x)", "E-TYPE-CYCLE", "object", "above all"),
+    "core type elsewhere": (
+        "(:types camera - sensor)",
+        "E-TYPE-PARENT",
+        "camera",
+        "in the core, 'camera' is a kind of unit",
+    ),
+    "core predicate otherwise": (
+        "(:predicates (ready ?u ?v))",
+        "E-PRED-ARITY",
+        "ready",
+        "predicate 'ready': 2 arguments, 1 as nondum-core",
+    ),
+    "core predicate of another type": (
+        "(:predicates (ready ?u - place))",
+        "E-PRED-TYPE",
+        "ready",
+        "argument 1: place, unit as nondum-core",
+    ),
+    "name of a twin": (
+        "(:predicates (not-done ?u))",
+        "E-RESERVED",
+        "not-done",
+        "names that begin with 'not-'",
+    ),
+    "value of nothing": (
+        "(:valued dose)",
+        "E-UNDECL",
+        "dose",
+        "'dose' in :valued is no predicate",
+    ),
+    "object of another component": (
+        "(:constants rover__camera__lens - camera)",
+        "E-OWNED",
+        "rover__",
+        "has the form of another component's unit",
+    ),
+    "own unit of another type": (
+        "(:constants wheels - camera)",
+        "E-OBJ-TYPE",
+        "wheels",
+        "'wheels' is base, not camera",
+    ),
+}
+
+
+@pytest.mark.parametrize(("body", "code", "culprit", "message"), ALONE.values(), ids=ALONE)
+def test_wrong_fragment_keeps_its_component_out(
+    body: str, code: str, culprit: str, message: str
+) -> None:
+    found = refused(brings("drive", body, units={"wheels": "base"}))
+    assert found.code == code
+    assert message in found.message
+    _, line, caret = found.message.splitlines()
+    column = caret.index("^")
+    assert line[column:].startswith(culprit)
+    assert found.where == f"drive 1.0 domain.pddl:1:{column + 1}"
+
+
+INITS = {
+    "host's word": ("(:init (ready wheels))", "E-OWNED", "'ready' is the host's to say"),
+    "no fact": ("(:init (not (found goose self)))", "E-INIT", "is not a fact"),
+    "wrong type": ("(:init (found self self))", "E-TYPE", "expected class, self is host"),
+    "variable": ("(:init (recognises ?u person))", "E-UNDECL", "?u is not a parameter"),
+    "stranger's unit": (
+        "(:init (recognises rover__detector__hog goose))",
+        "E-OWNED",
+        "another component's unit",
+    ),
+    "goal": ("(:goal (ready wheels))", "E-GOAL", "a fragment has no goal"),
+}
+
+
+@pytest.mark.parametrize(("init", "code", "message"), INITS.values(), ids=INITS)
+def test_wrong_problem_keeps_its_component_out(init: str, code: str, message: str) -> None:
+    found = refused(brings("drive", init=init, units={"wheels": "base"}))
+    assert found.code == code
+    assert message in found.message
+
+
+def test_all_problems_are_told_at_once() -> None:
+    body = "(:action go :parameters (?u - base) :precondition (and (a) (b)) :effect (c))"
+    result = merge([brings("drive", body)], HOST)
+    assert len(result.quarantined["drive"]) == 3
+
+
+def test_nearest_name_is_suggested() -> None:
+    body = "(:action go :parameters (?u - base) :precondition (redy ?u))"
+    assert refused(brings("drive", body)).fix == "did you mean 'ready'?"
+
+
+def test_syntax_error_names_its_plugin() -> None:
+    assert refused(brings("drive", "(:typos)")).where == "drive 1.0 domain.pddl:1:25"
+
+
+def test_undeclared_parent_is_taken_with_a_warning() -> None:
+    result = merged(brings("drive", "(:types cart - vehicle)"))
+    assert result.domain.types.is_kind_of("cart", "vehicle")
+    assert "type 'vehicle' is not declared" in result.warnings[0].message
+
+
+# Lasting and finishing behaviours
+
+GO = "(:action go :parameters (?u - base) :precondition (idle ?u) :effect (not (idle ?u)))"
+
+
+def test_lasting_behaviour_may_take_its_unit() -> None:
+    result = merged(brings("drive", GO, behaviours=(Behaviour("go", "(go ?u - base)", True),)))
+    assert result.lasting() == {"drive.go"}
+    assert result.action("drive.go").behaviour == "go"
+
+
+def test_finishing_behaviour_may_not_take_anything() -> None:
+    found = refused(brings("drive", GO, behaviours=(Behaviour("go", "(go ?u - base)"),)))
+    assert found.code == "E-OWNED"
+    assert "only a lasting behaviour may take (idle ?u)" in found.message
+
+
+BEHAVIOURS = {
+    "other parameters": ((Behaviour("go", "(go ?b - base)", True),), "has (?u - base)"),
+    "other action": (
+        (Behaviour("go", "(goo ?u - base)", True),),
+        "no fragment declares its action 'goo'",
+    ),
+    "none": ((), "no behaviour carries out action 'go'"),
+    "two": (
+        (Behaviour("go", "(go ?u - base)", True), Behaviour("run", "(go ?u - base)", True)),
+        "'go' and 'run' carry out 'go'",
+    ),
+    "unreadable": ((Behaviour("go", "go ?u", True),), "expected '('"),
+}
+
+
+@pytest.mark.parametrize(("behaviours", "message"), BEHAVIOURS.values(), ids=BEHAVIOURS)
+def test_behaviours_and_actions_must_agree(behaviours: tuple[Behaviour, ...], message: str) -> None:
+    result = merge([brings("drive", GO, behaviours=behaviours)], HOST)
+    assert any(message in str(problem) for problem in result.quarantined["drive"])
+
+
+# Two strangers
+
+CONFLICTS = {
+    "arity": (
+        "(:predicates (at ?u - base ?p - place))",
+        "(:predicates (at ?u - base))",
+        "E-PRED-ARITY",
+        "predicate 'at': 1 arguments here, 2 in a 1.0 domain.pddl:1:34",
+    ),
+    "predicate types": (
+        "(:predicates (at ?u - base))",
+        "(:predicates (at ?u - place))",
+        "E-PRED-TYPE",
+        "argument 1: place here, base in a 1.0",
+    ),
+    "parents": (
+        "(:types rotor - base)",
+        "(:types rotor - arm)",
+        "E-TYPE-PARENT",
+        "type 'rotor' is a kind of arm here, of base in a 1.0",
+    ),
+    "circle": (
+        "(:types x - y y)",
+        "(:types y - x x)",
+        "E-TYPE-CYCLE",
+        "x - y, y - x",
+    ),
+    "object types": (
+        "(:constants goose - class)",
+        "(:constants goose - target)",
+        "E-OBJ-TYPE",
+        "'goose' is target here, class in a 1.0",
+    ),
+}
+
+
+@pytest.mark.parametrize(("first", "second", "code", "message"), CONFLICTS.values(), ids=CONFLICTS)
+def test_conflict_names_both_and_keeps_one_out(
+    first: str, second: str, code: str, message: str
+) -> None:
+    found = refused(brings("a", first), brings("b", second))
+    assert found.code == code
+    assert found.where.startswith("b 1.0 domain.pddl:1:")
+    assert message in found.message
+
+
+def test_rank_decides_before_name() -> None:
+    first, second = CONFLICTS["arity"][:2]
+    result = merge([brings("a", first, rank=1), brings("b", second, rank=0)], HOST)
+    assert list(result.quarantined) == ["a"]
+
+
+def test_conflict_with_one_that_is_kept_out_is_none() -> None:
+    first, second = CONFLICTS["arity"][:2]
+    result = merge([brings("a", first), brings("b", second), brings("c", second)], HOST)
+    assert list(result.quarantined) == ["b", "c"]
+    without = merge([brings("b", second), brings("c", second)], HOST)
+    assert not without.quarantined
+
+
+def test_more_specific_parent_is_kept() -> None:
+    for bodies in permutations(["(:types cart - base)", "(:types cart - unit)", "(:types cart)"]):
+        result = merged(*(brings(name, b) for name, b in zip("abc", bodies, strict=True)))
+        assert result.domain.types.parents["cart"] == {"base"}
+
+
+def test_wider_predicate_is_kept_with_a_warning() -> None:
+    result = merged(
+        brings("a", "(:predicates (at ?u - base))"), brings("b", "(:predicates (at ?u - unit))")
+    )
+    assert result.domain.predicates["at"].parameters == (("unit",),)
+    assert "taken as the wider one" in result.warnings[0].message
+
+
+def test_more_specific_type_of_a_shared_object_is_kept() -> None:
+    result = merged(
+        brings("a", "(:constants door - place)"), brings("b", "(:constants door - object)")
+    )
+    assert result.objects["door"].types == ("place",)
+    assert [origin.component for origin in result.objects["door"].origins] == ["a", "b"]
+
+
+def test_same_action_name_of_two_plugins_is_no_conflict() -> None:
+    result = merged(brings("a", GO), brings("b", GO))
+    assert sorted(result.domain.actions) == ["a.go", "b.go"]
+
+
+def test_two_instances_share_one_schema() -> None:
+    left = brings("drive", GO, component="left", units={"wheels": "base"})
+    right = brings("drive", GO, component="right", units={"wheels": "base"})
+    result = merged(left, right)
+    assert list(result.domain.actions) == ["drive.go"]
+    actor = result.action("drive.go").parameters[0]
+    assert list(result.objects_of(*actor.types)) == [
+        "rover__left__wheels",
+        "rover__right__wheels",
+    ]
+
+
+def test_two_versions_with_other_schemas_conflict() -> None:
+    other = GO.replace("(idle ?u) :effect", "(ready ?u) :effect")
+    found = refused(
+        brings("drive", GO, component="a"), brings("drive", other, component="b", version="2.0")
+    )
+    assert found.code == "E-VERSION"
+
+
+def test_component_that_speaks_twice_is_a_mistake() -> None:
+    with pytest.raises(ValueError, match="two contributions of drive on rover"):
+        merge([brings("drive", GO), brings("drive", "(:types x)")], HOST)
+
+
+def test_peers_component_is_quarantined_under_its_host() -> None:
+    assert list(merge([brings("a", "(:typos)", host="mule")], HOST).quarantined) == ["mule/a"]
+
+
+# Facts
+
+SENSE = "(:constants source - target)"
+
+
+def test_facts_name_own_units_and_self() -> None:
+    result = merged(
+        brings(
+            "gas",
+            SENSE,
+            "(:init (senses nose source) (bearing-known source self))",
+            units={"nose": "sensor"},
+        )
+    )
+    assert list(result.init) == ["bearing-known source rover", "senses rover__gas__nose source"]
+
+
+def test_fact_waits_for_its_object() -> None:
+    waiting = brings("gas", "(:types x)", "(:init (senses nose source))", units={"nose": "sensor"})
+    assert list(merged(waiting).parked) == ["senses rover__gas__nose source"]
+    together = merged(waiting, brings("other", SENSE))
+    assert not together.parked
+    assert list(together.init) == ["senses rover__gas__nose source"]
+
+
+def test_fact_lives_while_one_asserts_it() -> None:
+    init = "(:init (bearing-known source self))"
+    a, b = brings("a", SENSE, init), brings("b", SENSE, init)
+    [origins] = merged(a, b).init.values()
+    assert [origin.component for origin in origins] == ["a", "b"]
+    assert list(merged(b).init) == list(merged(a, b).init)
+
+
+def test_words_go_with_the_last_who_uses_them() -> None:
+    both = merged(brings("a", "(:types cart)"), brings("b", "(:types cart)"))
+    assert "cart" in both.domain.types
+    assert "cart" not in merged(brings("c", "(:types van)")).domain.types
+
+
+# Lookups
+
+
+def test_owner_of_a_unit_is_found() -> None:
+    result = merged(brings("cam", component="left", units={"lens": "camera"}))
+    assert result.owner("rover__left__lens") == ("rover", "left")
+    with pytest.raises(KeyError):
+        result.owner("rover")
+
+
+def test_local_name_and_types_of_objects_are_kept() -> None:
+    result = merged(brings("cam", units={"lens": "camera"}, slots={"frames": "image"}))
+    assert result.objects["rover__cam__frames"].local == "frames"
+    assert result.stream_type("rover__cam__frames") == "image"
+    assert list(result.objects_of("unit")) == ["rover__cam__lens"]

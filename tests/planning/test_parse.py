@@ -1,0 +1,224 @@
+"""PDDL texts are read with places, or refused with a caret under the culprit."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nondum.planning.parse import SIZE_LIMIT_BYTES, parse_formula, parse_fragment, parse_signature
+from nondum.planning.syntax import (
+    And,
+    Atom,
+    DomainFragment,
+    Equal,
+    Imply,
+    Not,
+    Numeric,
+    Or,
+    Place,
+    ProblemFragment,
+    Quantified,
+    When,
+)
+from nondum.sdk.errors import FragmentRefused, Problem
+
+DOMAIN = """\
+; A comment with (brackets and "quotes
+(define (domain Freight)
+  (:requirements :strips :typing :action-costs)
+  (:types truck - (either vehicle asset) vehicle asset room)
+  (:constants depot - room)
+  (:predicates (at ?t - truck ?r - (either room vehicle)) (Locked ?r))
+  (:functions (total-cost) - number)
+  (:valued locked)
+  (:functional at)
+  (:action move
+    :parameters (?t - truck ?from ?to - room)
+    :precondition (and (at ?t ?from) (not (locked ?to)) (not (= ?from ?to)))
+    :effect (and (at ?t ?to) (not (at ?t ?from)) (increase (total-cost) 3))))
+"""
+
+
+def refused(text: str) -> Problem:
+    with pytest.raises(FragmentRefused) as error:
+        parse_fragment(text, "d.pddl")
+    return error.value.problems[0]
+
+
+def domain(text: str) -> DomainFragment:
+    parsed = parse_fragment(text, "d.pddl")
+    assert isinstance(parsed, DomainFragment)
+    return parsed
+
+
+def test_domain_is_read_whole() -> None:
+    parsed = domain(DOMAIN)
+    assert parsed.name == "freight"
+    assert [str(t) for t in parsed.types] == [
+        "truck - (either vehicle asset)",
+        "vehicle",
+        "asset",
+        "room",
+    ]
+    assert [str(c) for c in parsed.constants] == ["depot - room"]
+    assert str(parsed.predicates[0]) == "(at ?t - truck ?r - (either room vehicle))"
+    assert [name.name for name in parsed.valued + parsed.functional] == ["locked", "at"]
+    [move] = parsed.actions
+    assert [p.types for p in move.parameters] == [("truck",), ("room",), ("room",)]
+    assert str(move.precondition) == "(and (at ?t ?from) (not (locked ?to)) (not (= ?from ?to)))"
+    assert str(move.effect).endswith("(increase (total-cost) 3))")
+
+
+def test_names_know_their_place() -> None:
+    [move] = domain(DOMAIN).actions
+    assert move.place == Place("d.pddl", 10, 12)
+    assert isinstance(move.precondition, And)
+    assert str(move.precondition.parts[0].place) == "d.pddl:12:25"
+
+
+def test_places_do_not_count_in_comparison() -> None:
+    moved = domain(DOMAIN.replace("(:action", "\n\n (:action"))
+    assert moved == domain(DOMAIN)
+
+
+def test_problem_is_read_whole() -> None:
+    parsed = parse_fragment(
+        """(define (problem one) (:domain freight) (:objects t1 - truck spare)
+             (:init (at t1 depot) (= (total-cost) 0)) (:goal (not (at t1 depot)))
+             (:metric minimize (total-cost)))""",
+        "p.pddl",
+    )
+    assert isinstance(parsed, ProblemFragment)
+    assert (parsed.name, parsed.domain) == ("one", "freight")
+    assert [str(o) for o in parsed.objects] == ["t1 - truck", "spare"]
+    assert [str(f) for f in parsed.init] == ["(at t1 depot)", "(= (total-cost) 0)"]
+    assert str(parsed.goal) == "(not (at t1 depot))"
+
+
+@pytest.mark.parametrize(
+    ("text", "kind"),
+    [
+        ("()", And),
+        ("(and)", And),
+        ("(or (a) (b ?x))", Or),
+        ("(not (a))", Not),
+        ("(imply (a) (b))", Imply),
+        ("(forall (?x - room) (locked ?x))", Quantified),
+        ("(exists (?x ?y - (either room truck)) (at ?x ?y))", Quantified),
+        ("(when (a) (not (b)))", When),
+        ("(= ?x depot)", Equal),
+        ("(>= (fuel ?t) 3)", Numeric),
+        ("(increase (total-cost) (distance ?x ?y))", Numeric),
+        ("(domain define)", Atom),
+        ("(android assignment)", Atom),
+    ],
+    ids=str,
+)
+def test_formula_is_read_and_written_back(text: str, kind: type) -> None:
+    formula = parse_formula(text, "f")
+    assert isinstance(formula, kind)
+    assert parse_formula(str(formula), "f") == formula
+
+
+def test_case_does_not_count() -> None:
+    assert parse_formula("(AT ?T Depot)", "f") == parse_formula("(at ?t depot)", "f")
+
+
+def test_signature_is_read() -> None:
+    parsed = parse_signature("(point ?u - pointer ?t - target)", "s")
+    assert str(parsed) == "(point ?u - pointer ?t - target)"
+
+
+SYNTAX_ERRORS = {
+    "nothing": ("", "1:1", "expected '(', found the end of the text"),
+    "unclosed": ("(define (domain d)", "1:19", "found the end of the text"),
+    "section": ("(define (domain d) (:typos a))", "1:21", "found ':typos'"),
+    "no type": ("(define (domain d) (:types a - ))", "1:32", "expected '(' or a name, found ')'"),
+    "no name": ("(define (domain d) (:types - a))", "1:30", "expected a name before '-'"),
+    "glued": ("(define (domain d) (:typesa))", "1:21", "found ':typesa'"),
+    "sign": ("(define (domain d) (:types $))", "1:28", "found '$'"),
+    "variable": (
+        "(define (domain d) (:action a :parameters (x)))",
+        "1:44",
+        "found 'x'",
+    ),
+    "too much": ("(define (domain d)) x", "1:21", "expected the end"),
+}
+
+
+@pytest.mark.parametrize(("text", "place", "message"), SYNTAX_ERRORS.values(), ids=SYNTAX_ERRORS)
+def test_syntax_error_names_place_and_expectation(text: str, place: str, message: str) -> None:
+    problem = refused(text)
+    assert problem.code == "E-SYNTAX"
+    assert problem.where == f"d.pddl:{place}"
+    assert message in problem.message
+
+
+def test_caret_stands_under_the_culprit() -> None:
+    message = refused("(define (domain d)\n\t(:typos a))").message
+    assert message.splitlines()[1:] == ["\t(:typos a))", "\t ^"]
+
+
+def test_nearest_keyword_is_suggested() -> None:
+    assert refused("(define (domain d) (:predicate (a)))").fix == "did you mean ':predicates'?"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("(define (domain d) (:durative-action a))", "durative actions are not handled"),
+        ("(define (domain d) (:derived (a) (b)))", "derived predicates are not handled"),
+        ("(define (problem d) (:metric maximize (x)))", "metrics that maximize are not handled"),
+    ],
+)
+def test_what_is_not_handled_is_named(text: str, message: str) -> None:
+    problem = refused(text)
+    assert problem.code == "E-UNSUPPORTED"
+    assert problem.message.startswith(message)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "(define (domain d) (:types a) (:types b))",
+        "(define (domain d) (:action a :effect (x) :effect (y)))",
+        "(define (domain d) (:action a :parameters (?x ?x)))",
+    ],
+)
+def test_what_stands_twice_is_refused(text: str) -> None:
+    assert refused(text).code == "E-TWICE"
+
+
+def test_deep_brackets_are_refused() -> None:
+    assert refused("(" * 100_000).code == "PDDL_TOO_DEEP"
+
+
+def test_long_text_is_refused() -> None:
+    problem = refused(" " * (SIZE_LIMIT_BYTES + 1))
+    assert problem.code == "PDDL_TOO_BIG"
+    assert problem.have == str(SIZE_LIMIT_BYTES + 1)
+
+
+PIECES = st.sampled_from(
+    "( ) - ; \n ? ?x :types :action :parameters define domain problem and or not forall a b 3 = <".split(
+        " "
+    )
+)
+
+
+@given(st.lists(PIECES, max_size=40).map(" ".join))
+def test_any_text_is_read_or_refused(text: str) -> None:
+    for start in ("", "(define (domain d) ", "(define (problem p) "):
+        try:
+            parse_fragment(start + text, "d.pddl")
+        except FragmentRefused as error:
+            assert error.problems[0].where.startswith("d.pddl:")
+
+
+@given(st.text(max_size=60))
+def test_any_characters_are_read_or_refused(text: str) -> None:
+    try:
+        parse_formula(text, "f")
+    except FragmentRefused as error:
+        assert error.problems[0].where.startswith("f:")
