@@ -11,6 +11,7 @@ from nondum.planning.attempts import Patience
 from nondum.planning.facts import parts
 from nondum.planning.goal import GoalKind
 from nondum.planning.running import RunState
+from nondum.planning.step import Step
 from nondum.planning.task_control import Phase
 from nondum.planning.task_tree import TaskTree
 from nondum.planning.world import WorldModel
@@ -80,7 +81,8 @@ class Robot:
 
     # Runner
 
-    def start(self, action: GroundAction) -> SimulatedAction:
+    def start(self, step: Step) -> SimulatedAction:
+        action = step.action
         alive = self.names(RunState.STARTING, RunState.ESTABLISHED)
         assert action.name not in alive, "started twice"
         assert self.words(action.precondition) <= self.world.facts, f"{action.name} cannot start"

@@ -48,6 +48,23 @@ def test_observation_beats_lasting_effect(world: WorldModel) -> None:
     assert world.holds("flowing img")
 
 
+def test_stall_that_is_over_is_taken_back(world: WorldModel) -> None:
+    stream(world)
+    world.forget("flowing img", "camera", 2.0)
+    world.recant("flowing img", "camera")
+    assert world.holds("flowing img")
+    world.end("stream cam")
+    assert not world.holds("flowing img")
+
+
+def test_silent_component_observes_and_runs_nothing(world: WorldModel) -> None:
+    stream(world)
+    world.know("seen person", "camera", 0.0)
+    world.succeed("scan", "camera", add=["scanned room"], delete=[], at_s=0.0)
+    world.silence("camera")
+    assert world.facts == {"free img", "ready cam", "scanned room"}
+
+
 def test_succeeded_behaviour_is_believed(world: WorldModel) -> None:
     world.know("at a", "map", 0.0)
     world.succeed("go a b", "base", add=["at b"], delete=["at a"], at_s=1.0)

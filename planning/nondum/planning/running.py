@@ -8,7 +8,6 @@ from enum import Enum
 from typing import Protocol
 
 from nondum.planning.step import Step
-from nondum.sdk.planner import GroundAction
 
 
 class RunState(Enum):
@@ -50,8 +49,8 @@ class RunningAction(Protocol):
 class Runner(Protocol):
     """Starts actions."""
 
-    def start(self, action: GroundAction) -> RunningAction:
-        """Start an action. Never blocks and never raises: what cannot start has FAILED."""
+    def start(self, step: Step) -> RunningAction:
+        """Start a step's action. Never blocks and never raises: what cannot start has FAILED."""
         ...
 
 

@@ -236,7 +236,7 @@ class TaskControl:
             elif obstacle := self._obstacle(step, ground):
                 self._waiting[index] = obstacle
             else:
-                self.runs[step.name] = Run(step, self._runner.start(step.action), now_s)
+                self.runs[step.name] = Run(step, self._runner.start(step), now_s)
         if self.exhausted:
             reasons = (f"{n} {self.attempts.given_up(n)}" for n in self.exhausted)
             return self._give_up("; ".join(reasons))

@@ -173,6 +173,20 @@ class WorldModel:
         said = f"{component} says that it does not hold"
         self._deny(fact, Source(SourceKind.OBSERVATION, component, said, at_s))
 
+    def recant(self, fact: str, component: str) -> None:
+        """A component takes back what it said against a fact, without saying that it holds."""
+        denial = self._denials.get(fact)
+        if denial and denial.who == component:
+            self._undeny(fact)
+
+    def silence(self, component: str) -> None:
+        """A component can say nothing any more: what it observes and what it runs is unknown."""
+        voice = (SourceKind.OBSERVATION, component)
+        for fact in [f for f, voices in self._supports.items() if voice in voices]:
+            self._silence(fact, [voice])
+        for name in [n for n, o in self._overlays.items() if o.source.who == component]:
+            self.end(name)
+
     # What behaviours do
 
     def establish(
