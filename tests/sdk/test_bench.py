@@ -6,10 +6,10 @@ import math
 from typing import Any
 
 import pytest
+from tests.sdk import greeter
+
 from nondum.sdk import Bearing, Header, Text, WorkerFailed
 from nondum.sdk.bench import Bench, WorkerFactory
-
-from tests.sdk import greeter
 
 
 @pytest.fixture
