@@ -64,5 +64,5 @@ def _plain(parameters: tuple[TypedName, ...]) -> list[tuple[str, tuple[str, ...]
 
 
 def _refuse(behaviour: Behaviour, message: str, report: Report, fix: str = "") -> None:
-    where = f"{report.by.plugin} {report.by.version} behaviour {behaviour.name!r}"
+    where = f"{report.by} behaviour {behaviour.name!r}"
     report.problems.append(Problem("E-BEHAVIOUR", message, where=where, fix=fix))

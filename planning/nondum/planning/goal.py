@@ -57,7 +57,8 @@ def parse_goal(text: str, merged: Merged, *, kind: GoalKind = "achieve") -> Goal
 
 def goal_problems(goal: Goal, merged: Merged) -> tuple[Problem, ...]:
     """What keeps a goal from being asked for now: names that have gone since it was given."""
-    return condition_problems(goal.expr, goal_text(goal.expr), merged)
+    text = goal_text(goal.expr)
+    return condition_problems(condition_of(parse_formula(text, FILE)), text, merged)
 
 
 def goal_text(expr: GoalExpr) -> str:

@@ -53,7 +53,7 @@ def own_objects(contribution: Contribution, scope: Scope) -> dict[str, tuple[str
 
 def _check_kind(owned: UnitObject | StreamObject, local: str, kind: str, scope: Scope) -> None:
     by = scope.report.by
-    where = f"{by.plugin} {by.version} {kind} {local!r}"
+    where = f"{by} {kind} {local!r}"
     if owned.type not in scope.graph:
         problem = Problem("E-UNDECL", f"nobody declares type {owned.type!r}", where=where)
     elif not scope.graph.is_kind_of(owned.type, kind):

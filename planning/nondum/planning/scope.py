@@ -48,11 +48,11 @@ class Report:
 
     def signed(self, problem: Problem) -> Problem:
         """A problem found in one text, with the plugin that brought it."""
-        return replace(problem, where=f"{self.by.plugin} {self.by.version} {problem.where}")
+        return replace(problem, where=f"{self.by} {problem.where}")
 
     def _at(self, code: str, message: str, place: Place, fix: str) -> Problem:
-        by = f"{self.by.plugin} {self.by.version}"
-        return refusal(code, message, place, self.texts.get(place.file, ""), by=by, fix=fix)
+        text = self.texts.get(place.file, "")
+        return refusal(code, message, place, text, by=str(self.by), fix=fix)
 
 
 @dataclass(slots=True)
