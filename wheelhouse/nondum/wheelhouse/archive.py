@@ -1,0 +1,229 @@
+"""A wheel as a zip file, judged by its bytes before anything in it is unpacked.
+
+Two readers of one file must see the same thing: what Python's zipfile, pip and this module could
+disagree about is refused (PyPI refuses the same since 2025). Offsets are into the file's bytes.
+"""
+
+from __future__ import annotations
+
+import io
+import itertools
+import stat
+import struct
+import zipfile
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from nondum.sdk.errors import Problem
+
+Bytes = memoryview
+MAX_MEMBERS = 20_000
+MAX_TOTAL_BYTES = 2 * 1024**3
+MAX_RATIO = 1000
+RATIO_COUNTS_ABOVE = 1024**2
+MAX_NAME = 255
+
+_END = b"PK\x05\x06"
+_END_LENGTH = 22
+_LOCAL = struct.Struct("<4s5H3L2H")
+_CHUNK = 1024 * 1024
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A file in the archive."""
+
+    path: str
+    size: int
+    """Unpacked, in bytes."""
+    is_packed: bool
+    """Deflated rather than stored."""
+    start: int
+    """Where its bytes begin."""
+    end: int
+    crc: int
+    is_executable: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Archive:
+    """What a zip file holds, and what is wrong with it."""
+
+    members: tuple[Member, ...]
+    problems: tuple[Problem, ...]
+
+
+def read(data: Bytes, where: str) -> Archive:
+    """List the members of an archive, and everything that makes it unsafe to unpack."""
+    try:
+        listed = zipfile.ZipFile(io.BufferedReader(_View(data))).infolist()
+    except (zipfile.BadZipFile, NotImplementedError, OSError, ValueError, struct.error) as error:
+        return Archive((), (Problem("WHEEL_STRUCTURE", f"is no zip file ({error})", where=where),))
+    problems = [
+        *(Problem("WHEEL_STRUCTURE", text, where=where) for text in _outline_flaws(data, listed)),
+        *(Problem("WHEEL_BOMB", text, where=where) for text in _bomb_flaws(listed)),
+        *_path_problems(listed, where),
+    ]
+    if problems:
+        return Archive((), tuple(problems))
+    members = tuple(_member(data, info) for info in listed if not info.is_dir())
+    overlaps = tuple(
+        Problem("WHEEL_BOMB", f"{text} overlap", where=where) for text in _overlaps(members)
+    )
+    return Archive(members, overlaps)
+
+
+def unpack(data: Bytes, member: Member) -> Iterator[bytes]:
+    """The member's bytes in pieces. Raises `zlib.error` or `ValueError` when they are not whole."""
+    raw = data[member.start : member.end]
+    if not member.is_packed:
+        yield from _checked(iter([bytes(raw)]), member)
+        return
+    yield from _checked(_inflated(raw), member)
+
+
+def _inflated(raw: Bytes) -> Iterator[bytes]:
+    inflate = zlib.decompressobj(-zlib.MAX_WBITS)
+    piece = inflate.decompress(raw, _CHUNK)
+    while piece:
+        yield piece
+        piece = inflate.decompress(inflate.unconsumed_tail, _CHUNK)
+    if not inflate.eof or inflate.unused_data:
+        raise ValueError("the packed bytes do not end where the directory says")
+
+
+def _checked(pieces: Iterator[bytes], member: Member) -> Iterator[bytes]:
+    size, crc = 0, 0
+    for piece in pieces:
+        size += len(piece)
+        crc = zlib.crc32(piece, crc)
+        if size > member.size:
+            break
+        yield piece
+    if size != member.size or crc != member.crc:
+        raise ValueError("size or checksum is not what the directory says")
+
+
+def _member(data: Bytes, info: zipfile.ZipInfo) -> Member:
+    local = _LOCAL.unpack_from(data, info.header_offset)
+    start = info.header_offset + _LOCAL.size + local[9] + local[10]
+    return Member(
+        path=info.filename,
+        size=info.file_size,
+        is_packed=info.compress_type == zipfile.ZIP_DEFLATED,
+        start=start,
+        end=start + info.compress_size,
+        crc=info.CRC,
+        is_executable=bool(info.external_attr >> 16 & stat.S_IXUSR),
+    )
+
+
+def _outline_flaws(data: Bytes, listed: list[zipfile.ZipInfo]) -> Iterator[str]:
+    if len(data) < _END_LENGTH or bytes(data[-_END_LENGTH:][:4]) != _END:
+        yield "bytes follow the end of the archive"
+    if listed and min(info.header_offset for info in listed) != 0:
+        yield "bytes precede the archive"
+    names = [info.filename for info in listed]
+    for name in sorted({name for name in names if names.count(name) > 1})[:3]:
+        yield f"{name!r} stands twice"
+    for info in listed:
+        yield from _entry_flaws(data, info)
+
+
+def _entry_flaws(data: Bytes, info: zipfile.ZipInfo) -> Iterator[str]:
+    if info.flag_bits & 0x1:
+        yield f"{info.filename!r} is encrypted"
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        yield f"{info.filename!r} is packed by another method than deflate"
+    try:
+        local = _LOCAL.unpack_from(data, info.header_offset)
+    except struct.error:
+        yield f"{info.filename!r} lies outside the file"
+        return
+    start = info.header_offset + _LOCAL.size
+    name = bytes(data[start : start + local[9]])
+    if local[0] != b"PK\x03\x04" or name != info.orig_filename.encode(
+        "utf-8" if info.flag_bits & 0x800 else "cp437"
+    ):
+        yield f"{info.filename!r} has another name in its own header"
+    if start + local[9] + local[10] + info.compress_size > len(data):
+        yield f"{info.filename!r} lies outside the file"
+
+
+def _bomb_flaws(listed: list[zipfile.ZipInfo]) -> Iterator[str]:
+    if len(listed) > MAX_MEMBERS:
+        yield f"has {len(listed)} members, more than {MAX_MEMBERS}"
+    total = sum(info.file_size for info in listed)
+    if total > MAX_TOTAL_BYTES:
+        yield f"unpacks to {total} bytes, more than {MAX_TOTAL_BYTES}"
+    for info in listed:
+        grows = info.file_size > MAX_RATIO * max(info.compress_size, 1)
+        if info.file_size > RATIO_COUNTS_ABOVE and grows:
+            yield f"{info.filename!r} unpacks to more than {MAX_RATIO} times its size"
+
+
+def _overlaps(members: tuple[Member, ...]) -> Iterator[str]:
+    ordered = sorted(members, key=lambda member: (member.start, member.end))
+    for one, other in itertools.pairwise(ordered):
+        if other.start < one.end:
+            yield f"{one.path!r} and {other.path!r}"
+
+
+def _path_problems(listed: list[zipfile.ZipInfo], where: str) -> Iterator[Problem]:
+    folded: dict[str, str] = {}
+    for info in listed:
+        if flaw := _path_flaw(info):
+            text = f"member {info.filename[:80]!r} {flaw}"
+            yield Problem("WHEEL_PATH", text, where=where)
+        other = folded.setdefault(info.filename.lower(), info.filename)
+        if other != info.filename:
+            text = f"{info.filename!r} and {other!r} are one file on some systems"
+            yield Problem("WHEEL_PATH", text, where=where)
+
+
+def _path_flaw(info: zipfile.ZipInfo) -> str | None:
+    path = info.filename
+    parts = path.rstrip("/").split("/")
+    if path.startswith("/") or ".." in parts:
+        return "leaves the wheel"
+    if "\\" in info.orig_filename or ":" in path or any(ord(c) < 32 for c in info.orig_filename):
+        return "has characters that paths may not have"
+    if "" in parts or "." in parts:
+        return "is not in its shortest form"
+    if any(len(part.encode()) > MAX_NAME for part in parts):
+        return f"has a part longer than {MAX_NAME} bytes"
+    kind = stat.S_IFMT(info.external_attr >> 16)
+    if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
+        return "is no regular file"
+    return None
+
+
+class _View(io.RawIOBase):
+    """A memoryview as a raw file, without copying it."""
+
+    def __init__(self, data: Bytes) -> None:
+        self._data = data
+        self._position = 0
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        base = {io.SEEK_SET: 0, io.SEEK_CUR: self._position, io.SEEK_END: len(self._data)}[whence]
+        if base + offset < 0:
+            raise OSError("seek before the start")
+        self._position = base + offset
+        return self._position
+
+    def tell(self) -> int:
+        return self._position
+
+    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]  # any writable buffer
+        piece = self._data[self._position : self._position + len(buffer)]
+        buffer[: len(piece)] = piece
+        self._position += len(piece)
+        return len(piece)
