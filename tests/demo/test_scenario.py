@@ -59,5 +59,5 @@ def test_rotation_is_roll_then_pitch_then_yaw() -> None:
 
 def test_seen_inverts_to_body() -> None:
     mount = Mount((0.1, -0.2, 0.3), (0.1, -0.05, 2.5))
-    point = np.array((12.0, -7.0, 1.0))
+    point = (12.0, -7.0, 1.0)
     assert np.allclose(mount.to_body(mount.seen(point)) + mount.xyz, point)

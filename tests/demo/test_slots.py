@@ -5,6 +5,7 @@ from __future__ import annotations
 import fnmatch
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 from demo import slots
@@ -48,6 +49,6 @@ def test_each_device_meets_its_need_and_no_other(
     assert matched == [(plugin, need)]
 
 
-def needs(plugin: str) -> list[dict[str, dict[str, str]]]:
+def needs(plugin: str) -> list[dict[str, Any]]:
     manifest = tomllib.loads((ROOT / "plugins" / plugin / "payload.toml").read_text("utf-8"))
     return [device for part in manifest["component"] for device in part.get("device", [])]

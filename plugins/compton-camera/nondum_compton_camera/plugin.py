@@ -62,7 +62,8 @@ def labels() -> tuple[Label, ...]:
 
 
 @hookimpl
-def start(ctx: Context) -> None:
+async def start(ctx: Context) -> None:
+    """Refuse wrong settings."""
     Settings.parse(ctx.settings)
 
 

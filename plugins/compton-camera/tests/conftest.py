@@ -1,51 +1,23 @@
-"""Frames and skies for tests, made here so that the plugin is judged against something else."""
+"""What every test of this plugin may ask for."""
 
 from __future__ import annotations
 
-import binascii
-import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+from line_bench import Camera
 
 from nondum_compton_camera.kinematics import Cones
-from nondum_compton_camera.listmode import Event
 
-MakeFrame = Callable[[int, bytes], bytes]
-EncodeEvent = Callable[[Event], bytes]
 MakeSky = Callable[..., Cones]
 
 
 @pytest.fixture
-def anyio_backend() -> str:
-    return "asyncio"
-
-
-@pytest.fixture(scope="session")
-def frame() -> MakeFrame:
-    """Makes a frame of a type and payload, as docs/compton-listmode.md has it."""
-
-    def make(kind: int, payload: bytes) -> bytes:
-        body = bytes((kind, len(payload))) + payload
-        return b"\xeb\x90" + body + struct.pack("<H", binascii.crc_hqx(body, 0xFFFF))
-
-    return make
-
-
-@pytest.fixture(scope="session")
-def encoded(frame: MakeFrame) -> EncodeEvent:
-    """Makes the frame of an event."""
-
-    def make(event: Event) -> bytes:
-        hits = [
-            number
-            for hit in (event.first, event.second)
-            for number in (*(round(x * 100) for x in hit.position_mm), round(hit.energy_kev * 10))
-        ]
-        return frame(1, struct.pack("<IQhhhHhhhH", event.sequence, event.time_ns, *hits))
-
-    return make
+def camera() -> Iterator[Camera]:
+    on_table = Camera()
+    yield on_table
+    on_table.close()
 
 
 @pytest.fixture(scope="session")

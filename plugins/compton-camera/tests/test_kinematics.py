@@ -22,7 +22,7 @@ def event(first_kev: float, second_kev: float, apart_mm: float = 20.0) -> Event:
 
 
 def scattered(theta_rad: float) -> float:
-    return LINE / (1 + LINE / 510.99895 * (1 - np.cos(theta_rad)))
+    return float(LINE / (1 + LINE / 510.99895 * (1 - np.cos(theta_rad))))
 
 
 @pytest.mark.parametrize("degrees", [10, 45, 90, 150, 180])

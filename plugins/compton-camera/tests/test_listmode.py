@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from line_bench import encoded, frame
 
 from nondum_compton_camera.listmode import Decoder, Event, Interaction, Status, crc
-
-Encode = Callable[[Event], bytes]
-Frame = Callable[[int, bytes], bytes]
 
 _coordinates = st.integers(-32768, 32767).map(lambda n: n / 100)
 _interactions = st.builds(
@@ -31,7 +28,7 @@ LONGEST = 300
 
 @given(st.lists(_events, max_size=4), st.binary(max_size=40), st.data())
 def test_frames_survive_garbage_and_cutting(
-    encoded: Encode, events: list[Event], garbage: bytes, data: st.DataObject
+    events: list[Event], garbage: bytes, data: st.DataObject
 ) -> None:
     stream = garbage + garbage.join(encoded(event) for event in events) + bytes(LONGEST)
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=6)))
@@ -42,13 +39,13 @@ def test_frames_survive_garbage_and_cutting(
 
 
 @given(st.integers(1, 33))
-def test_a_start_within_a_frame_costs_that_frame_only(encoded: Encode, start: int) -> None:
+def test_a_start_within_a_frame_costs_that_frame_only(start: int) -> None:
     decoder = Decoder()
     assert decoder.feed(encoded(EVENT)[start:] + encoded(EVENT) + bytes(LONGEST)) == [EVENT]
 
 
 @given(st.integers(2, 33), st.integers(1, 255))
-def test_a_damaged_frame_is_no_event(encoded: Encode, place: int, flipped: int) -> None:
+def test_a_damaged_frame_is_no_event(place: int, flipped: int) -> None:
     damaged = bytearray(encoded(EVENT))
     damaged[place] ^= flipped
     decoder = Decoder()
@@ -56,18 +53,18 @@ def test_a_damaged_frame_is_no_event(encoded: Encode, place: int, flipped: int) 
     assert decoder.discarded >= len(damaged)
 
 
-def test_a_false_sync_hides_no_frame(encoded: Encode) -> None:
+def test_a_false_sync_hides_no_frame() -> None:
     decoder = Decoder()
     assert decoder.feed(b"\xeb\x90\x01\x1c" + encoded(EVENT) * 2) == [EVENT, EVENT]
 
 
-def test_unknown_types_are_passed_over(encoded: Encode, frame: Frame) -> None:
+def test_unknown_types_are_passed_over() -> None:
     decoder = Decoder()
     assert decoder.feed(frame(0x7F, b"later firmware") + encoded(EVENT)) == [EVENT]
     assert decoder.discarded == 0
 
 
-def test_status_tells_of_lost_events(frame: Frame) -> None:
+def test_status_tells_of_lost_events() -> None:
     payload = struct.pack("<III", 61_000, 9_000, 12)
     assert Decoder().feed(frame(2, payload)) == [Status(live_ms=61_000, events=9_000, lost=12)]
 

@@ -115,7 +115,12 @@ def _node(ctx: Context, name: str) -> str:
 
 
 def _darken(ctx: Context) -> None:
+    """Switch the laser off as far as there is one; a behaviour tells of a broken relay better."""
     device = ctx.device(LASER)
-    if device is not None:
+    if device is None:
+        return
+    try:
         with Line(device.node, relay.BAUD) as line:
             Laser(line).off()
+    except BehaviourFailed as error:
+        ctx.log.warning("the laser could not be switched off: %s", error)

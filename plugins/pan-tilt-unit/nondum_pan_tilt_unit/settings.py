@@ -18,7 +18,7 @@ class Settings:
     """The head never turns beyond these, nor beyond what the unit itself reports."""
     tilt_min_deg: float = -90.0
     tilt_max_deg: float = 90.0
-    speed_deg_s: float = 60.0
+    speed_deg_s: float = 100.0
     reset: bool = False
     """Drive to the ends before the first aim, as after a power-up without room to move."""
 

@@ -12,6 +12,9 @@ import re
 import select
 import threading
 import tty
+from collections.abc import Callable
+
+_SWITCHING = re.compile(rb"\xa0\x01[\x00\x01].", re.DOTALL)
 
 
 class Bench:
@@ -23,6 +26,9 @@ class Bench:
         self.position = {"P": 300, "T": -100}
         self.light: list[bool] = []
         """Every switching of the laser, in order."""
+        self.order: list[str] = []
+        """Commands and switchings, in order."""
+        self._changed = threading.Condition()
         self.is_echoing = True
         self.is_silent = False
         self.is_seized = False
@@ -36,6 +42,11 @@ class Bench:
 
     def node(self, name: str) -> str:
         return os.ttyname(self._ports[name][1])
+
+    def wait_until(self, is_so: Callable[[], bool], timeout_s: float = 5.0) -> None:
+        """Wait for what the plugin does to the bench."""
+        with self._changed:
+            assert self._changed.wait_for(is_so, timeout_s), self.order
 
     def noise(self, data: bytes) -> None:
         """Bytes from the unit that nobody asked for."""
@@ -67,14 +78,20 @@ class Bench:
                 return
             if relay in ready:
                 switched += os.read(relay, 64)
-                self.light += [c[2] == 1 for c in re.findall(rb"\xa0\x01[\x00\x01].", switched)]
+                for command in _SWITCHING.findall(switched):
+                    self.order.append("laser on" if command[2] else "laser off")
+                    self.light.append(bool(command[2]))
                 switched = switched[len(switched) // 4 * 4 :]
             if head in ready:
                 *commands, typed = re.split("[ \r]", typed + os.read(head, 256).decode())
                 os.write(head, b"".join(self._answer(command) for command in commands if command))
 
+            with self._changed:
+                self._changed.notify_all()
+
     def _answer(self, command: str) -> bytes:
         self.commands.append(command)
+        self.order.append(command)
         if self.is_silent:
             return b""
         echo = f"{command} ".encode() if self.is_echoing else b""

@@ -1,0 +1,162 @@
+"""Both drivers against both emulators as programs: bytes only, scored from the truth afterwards."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from demo.emulators.pose import Mount
+from demo.pointing import HELD_S, Score, read_log, score
+from demo.scenario import Scenario, random_scenario
+
+from nondum.sdk.bench import WorkerFactory
+
+EMULATORS = Path(__file__).parents[2] / "demo/emulators"
+TARGET = {"t": "radiation-source", "h": "robot"}
+STRONG_BQ = 4e10
+"""Found at once, where finding it is not the point."""
+AT_HOME = Mount((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+@contextmanager
+def program(name: str, *arguments: object, paths: int) -> Iterator[list[str]]:
+    """A running emulator; the paths that it printed."""
+    command = [sys.executable, str(EMULATORS / f"{name}.py"), *map(str, arguments)]
+    running = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        assert running.stdout is not None
+        yield [running.stdout.readline().strip() for _ in range(paths)]
+    finally:
+        running.kill()
+        said, _ = running.communicate()
+    assert said == ""
+
+
+class Instruments:
+    """The emulators of one scenario, switched on."""
+
+    def __init__(self, folder: Path, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self._truth, self._log = folder / "truth.json", folder / "log.jsonl"
+        scenario.write(self._truth)
+        self._open = ExitStack()
+
+    def __enter__(self) -> Instruments:
+        camera = program("compton_emulator", "--scenario", self._truth, paths=1)
+        arguments = ("--scenario", self._truth, "--log", self._log)
+        unit = program("ptu_emulator", *arguments, paths=2)
+        (self.line,) = self._open.enter_context(camera)
+        self.head, self.relay = self._open.enter_context(unit)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._open.close()
+
+    def score(self, at_s: float) -> Score:
+        """Judge the second before; the log has to have come that far."""
+        deadline = time.monotonic() + 5
+        while (truths := read_log(self._log))[-1].at_s < at_s and time.monotonic() < deadline:
+            time.sleep(0.02)  # the log is a plain file
+        return score(self.scenario, truths, end_s=at_s)
+
+
+def run(
+    worker: WorkerFactory,
+    instruments: Instruments,
+    *,
+    camera: Mount,
+    pointer: Mount,
+) -> tuple[Score, Any]:
+    """Localise and point with the mounts that a person entered; the score, and the call."""
+    sensor = worker(
+        "nondum_compton_camera.plugin",
+        devices={"list-mode": instruments.line},
+        component="rays",
+    )
+    head = worker(
+        "nondum_pan_tilt_unit.plugin",
+        devices={"head": instruments.head, "laser-relay": instruments.relay},
+        component="arrow",
+        mounts={
+            "laser-pointer": (pointer.xyz, pointer.rpy),
+            sensor.objects["gamma-eye"]: (camera.xyz, camera.rpy),
+        },
+    )
+    sensor.behave("localise", u="gamma-eye", **TARGET).assert_succeeded(timeout_s=60)
+    value = sensor.facts["bearing-known", "radiation-source", "robot"]
+    assert value is not None
+    head.set_value("bearing-known", "radiation-source", "robot", value=value)
+    call = head.behave("point", u="laser-pointer", **TARGET).wait_established(timeout_s=30)
+    return instruments.score(time.monotonic() + HELD_S + 0.2), call
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_laser_comes_to_rest_on_the_source(
+    worker: WorkerFactory, tmp_path: Path, seed: int
+) -> None:
+    scenario = random_scenario(seed)
+    with Instruments(tmp_path, scenario) as instruments:
+        found, call = run(worker, instruments, camera=scenario.camera, pointer=scenario.pointer)
+        assert found.is_reached, str(found)
+        call.halt()
+        after = instruments.score(time.monotonic() + 0.2)
+    assert not after.lit
+
+
+@pytest.mark.parametrize("forgotten", ["camera", "pointer", "both"])
+def test_a_mount_left_out_fails(worker: WorkerFactory, tmp_path: Path, forgotten: str) -> None:
+    scenario = replace(random_scenario(2), activity_bq=STRONG_BQ)
+    mounts = {"camera": scenario.camera, "pointer": scenario.pointer}
+    mounts |= {name: AT_HOME for name in mounts if forgotten in (name, "both")}
+    with Instruments(tmp_path, scenario) as instruments:
+        found, _ = run(worker, instruments, **mounts)
+    assert found.lit
+    assert found.angle_rad > math.radians(10)
+
+
+def test_a_seized_head_fails_though_the_driver_cannot_know(
+    worker: WorkerFactory, tmp_path: Path
+) -> None:
+    scenario = replace(random_scenario(1), seized=True, activity_bq=STRONG_BQ)
+    with Instruments(tmp_path, scenario) as instruments:
+        found, call = run(worker, instruments, camera=scenario.camera, pointer=scenario.pointer)
+        assert call.state == "established"
+    assert not found.is_reached
+
+
+def test_emulators_end_with_who_started_them(tmp_path: Path) -> None:
+    random_scenario(1).write(tmp_path / "truth.json")
+    script = (
+        "import subprocess, sys;"
+        "p = subprocess.Popen([sys.executable, *sys.argv[1:]], stdout=subprocess.PIPE, text=True);"
+        "print(p.pid, p.stdout.readline().strip())"
+    )
+    emulator, truth = EMULATORS / "compton_emulator.py", tmp_path / "truth.json"
+    ran = subprocess.run(
+        [sys.executable, "-c", script, emulator, "--scenario", truth],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    pid, terminal = ran.stdout.split()
+    assert terminal.startswith("/dev/pts/")
+    deadline = time.monotonic() + 5
+    while is_running(pid) and time.monotonic() < deadline:
+        time.sleep(0.02)  # it is nobody's child here: there is nothing to wait on
+    assert not is_running(pid)
+
+
+def is_running(pid: str) -> bool:
+    try:
+        status = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8")
+    except OSError:
+        return False
+    return status.rpartition(")")[2].split()[0] != "Z"
