@@ -1,0 +1,251 @@
+"""Reading a drive: nothing is believed, and no byte is read twice.
+
+Only listed regular files are opened, step by step through directory descriptors, never through a
+link; each is hashed while it is copied, and from then on only the copy is read. A drive may vanish
+or lie at any byte.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import stat
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+
+from nondum.sdk.errors import DriveGone, InstallFailed, PayloadRefused, Problem
+from nondum.wheelhouse import contents, names
+from nondum.wheelhouse.contents import Contents, Entry
+from nondum.wheelhouse.signatures import MAX_SIGNATURE_BYTES
+
+Progress = Callable[[str, int, int], None]
+"""Phase, bytes done, bytes in all."""
+
+FOLDER = "nondum"
+MAX_PAYLOADS = 64
+
+_CHUNK = 1024 * 1024
+_OPEN_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+_OPEN_FILE = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+_GONE = frozenset({errno.EIO, errno.ENODEV, errno.ENXIO, errno.ENOMEDIUM, errno.ESTALE})
+_FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
+
+
+def find_payloads(root: Path) -> tuple[Path, ...]:
+    """The payload folders on a drive, by name; empty when it carries none.
+
+    Raises `DriveGone` when the drive cannot be read.
+    """
+    try:
+        listed = sorted((root / FOLDER).iterdir())
+    except (FileNotFoundError, NotADirectoryError) as error:
+        if not root.exists():
+            raise _gone(root, error) from error
+        return ()
+    except OSError as error:
+        raise _gone(root, error) from error
+    folders = [
+        path
+        for path in listed
+        if names.PAYLOAD_ID.fullmatch(path.name) and not path.is_symlink() and path.is_dir()
+    ]
+    return tuple(folders[:MAX_PAYLOADS])
+
+
+def read_contents(folder: Path) -> bytes:
+    """The contents list's bytes, at most one more than allowed. Raises as `read_signature`."""
+    data = _read_small(folder, contents.NAME, contents.MAX_BYTES)
+    if data is None:
+        raise PayloadRefused(
+            Problem(
+                "CONTENTS_MISSING",
+                f"there is no file {contents.NAME}",
+                where=str(folder),
+                fix="build the payload with `nondum payload build`",
+            )
+        )
+    return data
+
+
+def read_signature(folder: Path) -> bytes | None:
+    """The signature file's bytes, or None when there is none.
+
+    Raises `PayloadRefused` (PATH_UNSAFE, TOO_LARGE), `DriveGone`.
+    """
+    return _read_small(folder, contents.SIGNATURE_NAME, MAX_SIGNATURE_BYTES)
+
+
+def copy(
+    folder: Path,
+    listed: Contents,
+    staging: Path,
+    progress: Progress | None = None,
+    wanted: Callable[[Entry], bool] = lambda entry: True,
+) -> int:
+    """Copy the wanted listed files to `staging`, hashing on the way; returns bytes copied.
+
+    `staging` is made, and holds afterwards what the list says, or an error is raised:
+    `PayloadRefused` (FILE_MISSING, HASH_MISMATCH, PATH_UNSAFE) with every file that is wrong,
+    `DriveGone`, `InstallFailed` (DISK_FULL, IO_ERROR).
+    """
+    entries = [entry for entry in listed.entries if wanted(entry)]
+    total = sum(entry.size for entry in entries)
+    problems: list[Problem] = []
+    done = 0
+    staging.mkdir(parents=True)
+    with _folder(folder) as source:
+        for entry in entries:
+            problem = _copy(source, folder, entry, staging / entry.path)
+            if problem is not None:
+                problems.append(problem)
+            done += entry.size
+            if progress is not None:
+                progress("copy", done, total)
+    if problems:
+        raise PayloadRefused(*problems)
+    return total
+
+
+def _copy(source: int, folder: Path, entry: Entry, target: Path) -> Problem | None:
+    where = f"{folder.name}/{entry.path}"
+    try:
+        descriptor = _open(source, entry.path)
+    except FileNotFoundError:
+        return Problem("FILE_MISSING", "is listed but not there", where=where)
+    except _Unsafe as unsafe:
+        return Problem("PATH_UNSAFE", str(unsafe), where=where)
+    except OSError as error:
+        raise _gone(folder, error) from error
+    try:
+        _make_folder(target.parent)
+        digest, size = _copy_bytes(descriptor, entry, target, folder)
+    finally:
+        os.close(descriptor)
+    if size != entry.size or digest != entry.sha256:
+        return Problem(
+            "HASH_MISMATCH",
+            "its bytes are not those that were listed",
+            where=where,
+            need=f"{entry.size} bytes, {entry.sha256[:16]}…",
+            have=f"{'more' if size > entry.size else size} bytes, {digest[:16]}…",
+            fix="copy the payload to the drive again",
+        )
+    return None
+
+
+def _copy_bytes(descriptor: int, entry: Entry, target: Path, folder: Path) -> tuple[str, int]:
+    """Digest and size of what was read; at most one byte more than listed."""
+    digest, size = hashlib.sha256(), 0
+    try:
+        with target.open("xb", buffering=0) as out:
+            for piece in _pieces(descriptor, entry.size + 1, folder):
+                digest.update(piece)
+                size += len(piece)
+                out.write(piece)
+    except OSError as error:
+        code = "DISK_FULL" if error.errno in _FULL else "IO_ERROR"
+        text = f"cannot be staged: {error.strerror}"
+        raise InstallFailed(Problem(code, text, where=str(target))) from error
+    return digest.hexdigest(), size
+
+
+def _pieces(descriptor: int, limit: int, folder: Path) -> Iterator[bytes]:
+    while limit:
+        try:
+            piece = os.read(descriptor, min(_CHUNK, limit))
+        except OSError as error:
+            raise _gone(folder, error) from error
+        if not piece:
+            return
+        limit -= len(piece)
+        yield piece
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        code = "DISK_FULL" if error.errno in _FULL else "IO_ERROR"
+        text = f"cannot be staged: {error.strerror}"
+        raise InstallFailed(Problem(code, text, where=str(folder))) from error
+
+
+class _Unsafe(Exception):
+    """A listed path is not a plain file in plain folders."""
+
+
+@contextmanager
+def _folder(folder: Path) -> Iterator[int]:
+    try:
+        descriptor = os.open(folder, _OPEN_FOLDER)
+    except OSError as error:
+        raise _gone(folder, error) from error
+    try:
+        yield descriptor
+    finally:
+        os.close(descriptor)
+
+
+def _open(folder: int, path: str) -> int:
+    """Open a regular file below an open folder, following no link on the way."""
+    *parents, leaf = PurePosixPath(path).parts
+    current = os.dup(folder)
+    try:
+        for parent in parents:
+            inner = _step(parent, _OPEN_FOLDER, current)
+            os.close(current)
+            current = inner
+        descriptor = _step(leaf, _OPEN_FILE, current)
+    finally:
+        os.close(current)
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise _Unsafe("is no regular file")
+    return descriptor
+
+
+def _step(name: str, flags: int, folder: int) -> int:
+    try:
+        return os.open(name, flags, dir_fd=folder)
+    except OSError as error:
+        if error.errno in (errno.ELOOP, errno.EMLINK):
+            raise _Unsafe("leads through a link") from error
+        if error.errno in (errno.ENOTDIR, errno.ENXIO, errno.ENODEV):
+            raise _Unsafe("is no regular file in regular folders") from error
+        raise
+
+
+def _read_small(folder: Path, name: str, limit: int) -> bytes | None:
+    with _folder(folder) as source:
+        try:
+            descriptor = _open(source, name)
+        except FileNotFoundError:
+            return None
+        except _Unsafe as unsafe:
+            where = f"{folder.name}/{name}"
+            raise PayloadRefused(Problem("PATH_UNSAFE", str(unsafe), where=where)) from unsafe
+        except OSError as error:
+            raise _gone(folder, error) from error
+    try:
+        data = b"".join(_pieces(descriptor, limit + 1, folder))
+    finally:
+        os.close(descriptor)
+    if len(data) > limit:
+        where = f"{folder.name}/{name}"
+        text = f"is longer than {limit} bytes"
+        raise PayloadRefused(Problem("TOO_LARGE", text, where=where))
+    return data
+
+
+def _gone(folder: Path, error: OSError) -> DriveGone:
+    why = "was pulled" if error.errno in _GONE or not folder.exists() else "cannot be read"
+    return DriveGone(
+        Problem(
+            "DRIVE_GONE",
+            f"the drive {why} ({error.strerror})",
+            where=str(folder),
+            fix="plug it in again",
+        )
+    )

@@ -1,0 +1,188 @@
+"""Whether a payload fits this host, from what was parsed, before anything is installed.
+
+Every problem is told at once, with what is needed and what is there.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from packaging import markers, tags
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+from packaging.tags import Tag
+
+from nondum.sdk.errors import NondumError, PayloadRefused, Problem
+from nondum.wheelhouse import lock as locks_module
+from nondum.wheelhouse.lock import Lock, LockedWheel
+from nondum.wheelhouse.manifest import Manifest
+
+GROWTH = 4
+"""Unpacked wheels are at most about so many times their size; measured: 2.8 to 2.9."""
+_MB = 1024 * 1024
+
+
+@dataclass(frozen=True, slots=True)
+class HostFacts:
+    """What a host is and has."""
+
+    architecture: str
+    """As `uname -m` says."""
+    python: str
+    """Full version of the interpreter that workers run."""
+    environment: Mapping[str, str]
+    """Environment markers (PEP 508)."""
+    tags: tuple[Tag, ...]
+    """Wheel tags that it takes, best first."""
+    free_disk_mb: int
+    """On the store's file system, less the reserve."""
+    free_memory_mb: int
+    gpu_memory_mb: int | None
+    """None: no GPU that is known of."""
+    confinement: int
+    """Level at which workers run here."""
+
+
+def probe(state: Path, *, reserve_mb: int, confinement: int) -> HostFacts:
+    """Look at this machine. `state` is where the store is, or will be."""
+    environment = {key: str(value) for key, value in markers.default_environment().items()}
+    there = next(folder for folder in (state, *state.parents) if folder.exists())
+    return HostFacts(
+        architecture=platform.machine(),
+        python=platform.python_version(),
+        environment=environment,
+        tags=tuple(tags.sys_tags()),
+        free_disk_mb=max(0, shutil.disk_usage(there).free // _MB - reserve_mb),
+        free_memory_mb=_free_memory_mb(),
+        gpu_memory_mb=None,
+        confinement=confinement,
+    )
+
+
+def select(
+    manifest: Manifest, locks: Mapping[str, Lock], facts: HostFacts
+) -> dict[str, tuple[LockedWheel, ...]]:
+    """The wheels of each component for this host. Raises `PayloadRefused` with all problems."""
+    chosen: dict[str, tuple[LockedWheel, ...]] = {}
+    problems: list[Problem] = []
+    for component in manifest.components:
+        if component.id not in locks:
+            continue
+        try:
+            chosen[component.id] = locks_module.select(
+                locks[component.id], facts.environment, facts.tags
+            )
+        except NondumError as error:
+            problems.extend(error.problems)
+    if problems:
+        raise PayloadRefused(*problems)
+    return chosen
+
+
+def preflight(
+    manifest: Manifest, locks: Mapping[str, Lock], facts: HostFacts
+) -> tuple[Problem, ...]:
+    """Everything that keeps this payload from running here."""
+    problems = [*_version_problems(manifest, facts), *_resource_problems(manifest, facts)]
+    for component in manifest.components:
+        where = locks_module.file_name(component.id)
+        if component.id not in locks:
+            text = f"component {component.id!r} has no lock"
+            problems.append(Problem("LOCK_MISSING", text, where=where))
+        elif component.distribution not in locks[component.id].packages:
+            text = f"{component.distribution} itself is not locked"
+            problems.append(Problem("LOCK_INCOMPLETE", text, where=where))
+    try:
+        chosen = select(manifest, locks, facts)
+    except PayloadRefused as error:
+        return (*problems, *error.problems)
+    return (*problems, *_disk_problems(manifest, chosen, facts))
+
+
+def unmet(
+    requirements: Mapping[str, Sequence[str]],
+    chosen: Sequence[LockedWheel],
+    facts: HostFacts,
+    where: str,
+) -> Iterator[Problem]:
+    """Dependencies that no chosen wheel meets; `requirements` are distribution → Requires-Dist."""
+    versions = {wheel.name: wheel.version for wheel in chosen}
+    for distribution, lines in requirements.items():
+        for line in lines:
+            wanted = Requirement(line)
+            environment = {**facts.environment, "extra": ""}
+            if wanted.marker is not None and not wanted.marker.evaluate(environment):
+                continue
+            name = wanted.name.lower().replace("_", "-").replace(".", "-")
+            have = versions.get(name)
+            if have is None or not wanted.specifier.contains(have, prereleases=True):
+                yield Problem(
+                    "LOCK_INCOMPLETE",
+                    f"{distribution} needs {wanted.name}",
+                    where=where,
+                    need=f"{wanted.name}{wanted.specifier}",
+                    have=have or "none",
+                    fix="build the payload again: every dependency must be locked",
+                )
+
+
+def _version_problems(manifest: Manifest, facts: HostFacts) -> Iterator[Problem]:
+    wanted = SpecifierSet(manifest.requires.python)
+    if not wanted.contains(facts.python, prereleases=True):
+        yield Problem(
+            "PYTHON_VERSION",
+            "this Python does not fit",
+            where=manifest.id,
+            need=str(wanted),
+            have=facts.python,
+            fix="use a payload that was built for this Python",
+        )
+    if manifest.requires.confinement > facts.confinement:
+        yield Problem(
+            "CONFINEMENT",
+            "workers cannot be confined as it demands",
+            where=manifest.id,
+            need=f"level {manifest.requires.confinement}",
+            have=f"level {facts.confinement}",
+        )
+
+
+def _resource_problems(manifest: Manifest, facts: HostFacts) -> Iterator[Problem]:
+    needs = manifest.requires
+    if needs.memory_mb > facts.free_memory_mb:
+        yield _short("NO_MEMORY", "memory", needs.memory_mb, facts.free_memory_mb, manifest)
+    if needs.gpu_memory_mb > (facts.gpu_memory_mb or 0):
+        have = facts.gpu_memory_mb or 0
+        yield _short("NO_GPU_MEMORY", "GPU memory", needs.gpu_memory_mb, have, manifest)
+
+
+def _disk_problems(
+    manifest: Manifest, chosen: Mapping[str, Sequence[LockedWheel]], facts: HostFacts
+) -> Iterator[Problem]:
+    wheels = {wheel.sha256: wheel.size for group in chosen.values() for wheel in group}
+    needed = max(manifest.requires.disk_mb, GROWTH * sum(wheels.values()) // _MB)
+    if needed > facts.free_disk_mb:
+        yield _short("DISK_FULL", "disk", needed, facts.free_disk_mb, manifest)
+
+
+def _short(code: str, what: str, need: int, have: int, manifest: Manifest) -> Problem:
+    return Problem(
+        code,
+        f"there is too little {what}",
+        where=manifest.id,
+        need=f"{need} MB",
+        have=f"{have} MB",
+        fix=f"free some {what}, or use another host",
+    )
+
+
+def _free_memory_mb() -> int:
+    for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
+        if line.startswith("MemAvailable:"):
+            return int(line.split()[1]) // 1024
+    return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // _MB

@@ -1,0 +1,146 @@
+"""A component's venv: made in-process, filled with hard links to the store, run by its worker only.
+
+In purelib and platlib the result is what `pip install --no-index --no-deps --require-hashes` gives,
+installer metadata apart. `make_with_pip` runs pip itself instead.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from nondum.sdk.errors import InstallFailed, Problem
+from nondum.wheelhouse.lock import LockedWheel
+from nondum.wheelhouse.store import StoredWheel
+
+PIP_TIMEOUT_S = 600
+
+
+def site_packages(venv: Path) -> Path:
+    """Where a venv's distributions lie."""
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    return venv / "lib" / version / "site-packages"
+
+
+def make(venv: Path, python: Path, wheels: Sequence[StoredWheel]) -> None:
+    """Make a venv of stored wheels, replacing any that is there; whole, or not at all.
+
+    Raises `InstallFailed` (FILES_COLLIDE, DISK_FULL, IO_ERROR).
+    """
+    unfinished = _fresh(venv)
+    try:
+        _skeleton(unfinished, python)
+        target = site_packages(unfinished)
+        made: set[str] = set()
+        owners: dict[str, tuple[str, str]] = {}
+        for stored in wheels:
+            _link_all(stored, target, made, owners)
+        unfinished.rename(venv)
+    except OSError as error:
+        shutil.rmtree(unfinished, ignore_errors=True)
+        code = "DISK_FULL" if error.errno in (28, 122) else "IO_ERROR"  # ENOSPC, EDQUOT
+        raise InstallFailed(
+            Problem(code, f"the venv cannot be made: {error.strerror}", where=str(venv))
+        ) from error
+    except InstallFailed:
+        shutil.rmtree(unfinished, ignore_errors=True)
+        raise
+
+
+def make_with_pip(venv: Path, python: Path, folder: Path, wheels: Sequence[LockedWheel]) -> None:
+    """Make a venv by pip, from the wheels of a staged payload folder, by hash and offline.
+
+    pip runs from this interpreter, never from the venv. Raises `InstallFailed` (PIP_FAILED).
+    """
+    unfinished = _fresh(venv)
+    _skeleton(unfinished, python)
+    requirements = unfinished / "requirements.txt"
+    requirements.write_text(
+        "".join(f"{(folder / w.path).resolve()} --hash=sha256:{w.sha256}\n" for w in wheels),
+        encoding="utf-8",
+    )
+    command = [
+        *(sys.executable, "-m", "pip", "--isolated", "install", "--no-index", "--no-deps"),
+        *("--only-binary", ":all:", "--require-hashes", "--no-cache-dir", "--no-compile"),
+        *("--no-input", "--disable-pip-version-check", "--quiet", "--no-warn-script-location"),
+        *("--target", str(site_packages(unfinished)), "--requirement", str(requirements)),
+    ]
+    done = subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        timeout=PIP_TIMEOUT_S,
+        env={"PATH": os.defpath, "LC_ALL": "C.UTF-8"},
+        check=False,
+    )
+    if done.returncode:
+        shutil.rmtree(unfinished, ignore_errors=True)
+        last = (done.stderr.strip().splitlines() or ["pip said nothing"])[-1]
+        raise InstallFailed(Problem("PIP_FAILED", last, where=str(folder)))
+    requirements.unlink()
+    unfinished.rename(venv)
+
+
+def remove(venv: Path) -> None:
+    """Delete a venv, if it is there."""
+    for path in (venv, _unfinished(venv)):
+        shutil.rmtree(path, ignore_errors=True)
+
+
+def _unfinished(venv: Path) -> Path:
+    return venv.with_name(f".{venv.name}.part")
+
+
+def _fresh(venv: Path) -> Path:
+    remove(venv)
+    unfinished = _unfinished(venv)
+    unfinished.mkdir(parents=True)
+    return unfinished
+
+
+def _skeleton(venv: Path, python: Path) -> None:
+    """What makes a folder a venv to interpreters and tools (PEP 405)."""
+    version = f"{sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
+    (venv / "pyvenv.cfg").write_text(
+        f"home = {python.parent}\ninclude-system-site-packages = false\nversion = {version}\n",
+        encoding="utf-8",
+    )
+    (venv / "bin").mkdir()
+    (venv / "bin/python").symlink_to(python)
+    site_packages(venv).mkdir(parents=True)
+
+
+def _link_all(
+    stored: StoredWheel, target: Path, made: set[str], owners: dict[str, tuple[str, str]]
+) -> None:
+    for file in stored.files:
+        owner, sha256 = owners.setdefault(file.path, (stored.filename, file.sha256))
+        if owner != stored.filename:
+            if sha256 == file.sha256:
+                continue  # old-style namespace packages all carry the same __init__.py
+            raise InstallFailed(
+                Problem(
+                    "FILES_COLLIDE",
+                    f"{file.path} is in {owner} and, with other contents, in {stored.filename}",
+                    where=str(target),
+                    fix="ask their authors: two distributions may not share a file",
+                )
+            )
+        parent = os.path.dirname(file.path)  # noqa: PTH120  # half the time of pathlib, per file
+        if parent and parent not in made:
+            (target / parent).mkdir(parents=True, exist_ok=True)
+            made.add(parent)
+        _link(f"{stored.root}/{file.path}", f"{target}/{file.path}")
+
+
+def _link(source: str, target: str) -> None:
+    try:
+        os.link(source, target)  # strings, not paths: thousands of files
+    except OSError as error:
+        if error.errno != 18:  # EXDEV: the store lies on another file system
+            raise
+        shutil.copy2(source, target)
