@@ -72,6 +72,7 @@ class WorldModel:
         self._observed: frozenset[str] = frozenset()
         self._objects: frozenset[str] | None = None
         self._facts: frozenset[str] | None = None
+        self._bare: frozenset[str] | None = None
 
     # Asking
 
@@ -91,7 +92,9 @@ class WorldModel:
     @property
     def bare_facts(self) -> frozenset[str]:
         """The facts that would hold if every lasting behaviour had ended: what plans start from."""
-        return self.facts_without(self._overlays)
+        if self._bare is None:
+            self._bare = self.facts_without(self._overlays)
+        return self._bare
 
     def holds(self, fact: str) -> bool:
         """Whether a fact is believed."""
@@ -260,7 +263,7 @@ class WorldModel:
 
     def _changed(self) -> None:
         self.revision += 1
-        self._facts = None
+        self._facts = self._bare = None
 
     def _holding(self, overlays: Iterable[Overlay]) -> frozenset[str]:
         overlays = tuple(overlays)

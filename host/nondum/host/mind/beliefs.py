@@ -1,0 +1,96 @@
+"""The world model kept up to date: snapshots of the catalogue and news of workers in, facts out."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+
+from nondum.host.catalogue.records import Snapshot
+from nondum.host.events import Event, FactForgotten, FactKnown, StreamFlowing, WorkerExited
+from nondum.host.mind.composition import Composition, always_produced, body_facts, own_objects
+from nondum.planning.core import HOST_PREDICATES
+from nondum.planning.facts import fact
+from nondum.planning.scope import SELF
+from nondum.planning.world import WorldModel
+
+log = logging.getLogger(__name__)
+
+
+class Beliefs:
+    """What this host believes, and how it comes to."""
+
+    def __init__(self, host: str, now_s: Callable[[], float]) -> None:
+        """`now_s` is the clock that facts are stamped with, in seconds."""
+        self.world = WorldModel()
+        self.snapshot = Snapshot(host, revision=0)
+        self.flowing: frozenset[str] = frozenset()
+        """Streams that messages arrive on."""
+        self._now_s = now_s
+        self._names: dict[str, Mapping[str, str]] = {}
+        self._always: frozenset[str] = frozenset()
+
+    def see(self, snapshot: Snapshot) -> tuple[str, ...]:
+        """Take over a snapshot; what is gone from it is withdrawn at once. Gives the components
+        that are gone."""
+        old, self.snapshot = self.snapshot, snapshot
+        present = {component.id: component.payload for component in snapshot.components}
+        gone = [c for c in old.components if present.get(c.id) != c.payload]
+        for component in gone:
+            objects = own_objects(old.host, component).values()
+            self.world.remove_component(component.id, set(objects))
+            self.flowing -= set(objects)
+        self._names = {c.id: own_objects(snapshot.host, c) for c in snapshot.components}
+        self._always = always_produced(snapshot)
+        self.world.set_host_facts(snapshot.host, body_facts(snapshot), self._now_s())
+        return tuple(component.id for component in gone)
+
+    def adopt(self, composition: Composition) -> None:
+        """Take over what merging made of the snapshot: objects, and what fragments say."""
+        self.world.frame(objects=composition.objects, observed=composition.observed)
+        now_s = self._now_s()
+        for component, facts in sorted(composition.seeds().items()):
+            self.world.seed(component, facts, now_s)
+
+    def on_event(self, event: Event) -> bool:
+        """Take in news of a worker. Says whether it was news for the world model."""
+        match event:
+            case FactKnown(component, predicate, arguments, value) if self._may_say(event):
+                text = self._text(component, predicate, arguments)
+                self.world.know(text, component, self._now_s(), value=value)
+            case FactForgotten(component, predicate, arguments) if self._may_say(event):
+                text = self._text(component, predicate, arguments)
+                self.world.forget(text, component, self._now_s())
+            case StreamFlowing(component, stream, flowing) if component in self._names:
+                self._on_flow(component, stream, is_flowing=flowing)
+            case WorkerExited(component):
+                self.world.silence(component)
+                self.flowing -= set(self._names.get(component, {}).values())
+            case _:
+                return False
+        return True
+
+    def _may_say(self, event: FactKnown | FactForgotten) -> bool:
+        """Whether a component may have a say; stragglers and usurpers may not."""
+        if event.component not in self._names:
+            return False
+        if event.predicate in HOST_PREDICATES:
+            log.warning("%s may not say (%s …): the host does", event.component, event.predicate)
+            return False
+        return True
+
+    def _text(self, component: str, predicate: str, arguments: tuple[str, ...]) -> str:
+        """A fact with full object names: components may use their local ones, and `self`."""
+        names = {SELF: self.snapshot.host, **self._names[component]}
+        return fact(predicate, *(names.get(argument, argument) for argument in arguments))
+
+    def _on_flow(self, component: str, stream: str, *, is_flowing: bool) -> None:
+        """A stream that a behaviour produces flows while the behaviour is established; news of it
+        can only say that it has stalled. One that is always produced flows while it is said to."""
+        text, now_s = fact("flowing", stream), self._now_s()
+        self.flowing = self.flowing | {stream} if is_flowing else self.flowing - {stream}
+        if not is_flowing:
+            self.world.forget(text, component, now_s)
+        elif stream in self._always:
+            self.world.know(text, component, now_s)
+        else:
+            self.world.recant(text, component)

@@ -1,0 +1,139 @@
+"""What the host is made of at one revision, as planning sees it: a function of the snapshot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from nondum.host.catalogue.records import ComponentRecord, Snapshot
+from nondum.planning.contribution import Contribution, object_name
+from nondum.planning.domain import Merged
+from nondum.planning.facts import fact
+from nondum.planning.merge import merge
+from nondum.planning.phrases import Phrasebook, phrasebook
+from nondum.sdk.description import ACTUATORS
+
+
+@dataclass(frozen=True, slots=True)
+class Composition:
+    """One revision of the catalogue, merged."""
+
+    snapshot: Snapshot
+    contributions: tuple[Contribution, ...]
+    merged: Merged
+    book: Phrasebook
+    exclusive: frozenset[str]
+    """Units that move the body or say that they serve one user."""
+    observed: frozenset[str]
+    """Predicates that conditions keep true or false."""
+
+    @property
+    def host(self) -> str:
+        """The host's name."""
+        return self.snapshot.host
+
+    @property
+    def revision(self) -> int:
+        """The catalogue's revision."""
+        return self.snapshot.revision
+
+    @property
+    def objects(self) -> frozenset[str]:
+        """Everything that facts may be about."""
+        return frozenset(self.merged.objects)
+
+    def seeds(self) -> Mapping[str, frozenset[str]]:
+        """Component → what its problem fragments say, parked facts included."""
+        found: dict[str, set[str]] = {c.component: set() for c in self.contributions}
+        for table in (self.merged.init, self.merged.parked):
+            for text, origins in table.items():
+                for origin in origins:
+                    found.setdefault(origin.component, set()).add(text)
+        return {component: frozenset(facts) for component, facts in found.items() if component}
+
+
+def contributions_of(snapshot: Snapshot) -> tuple[Contribution, ...]:
+    """What each component brings to planning."""
+    return tuple(
+        Contribution.from_description(
+            component.description, host=snapshot.host, component=component.id, rank=component.rank
+        )
+        for component in snapshot.components
+    )
+
+
+def compose(snapshot: Snapshot) -> Composition:
+    """Merge a snapshot. Takes some ten milliseconds for a dozen components."""
+    contributions = contributions_of(snapshot)
+    merged = merge(contributions, snapshot.host)
+    return Composition(
+        snapshot,
+        contributions,
+        merged,
+        phrasebook(contributions, merged),
+        exclusive=frozenset(_exclusive(snapshot, merged)),
+        observed=frozenset(
+            predicate
+            for component in snapshot.components
+            for condition in component.description.conditions
+            for predicate in condition.predicates
+        ),
+    )
+
+
+def _exclusive(snapshot: Snapshot, merged: Merged) -> Iterator[str]:
+    types = merged.domain.types
+    for component in snapshot.components:
+        for unit in component.description.units:
+            name = object_name(snapshot.host, component.id, unit.name)
+            found = merged.objects.get(name)
+            if unit.users == 1 or (found and types.is_one_of(found.types, tuple(ACTUATORS))):
+                yield name
+
+
+def body_facts(snapshot: Snapshot) -> dict[str, str]:
+    """What the host itself asserts, each with the reason in words.
+
+    A unit is idle and a slot free unless a running behaviour takes it; slots that are always
+    produced are never free.
+    """
+    host = snapshot.host
+    facts = {fact("self", host): "this is the host that plans"}
+    for component in snapshot.components:
+        for text, why in _component_facts(host, component):
+            facts[text] = why
+    return facts
+
+
+def _component_facts(host: str, component: ComponentRecord) -> Iterator[tuple[str, str]]:
+    for unit in component.description.units:
+        name = object_name(host, component.id, unit.name)
+        yield fact("on", name, host), f"{component.id} is plugged into this host"
+        if component.is_ready:
+            yield fact("ready", name), f"{component.id} is healthy and its devices are there"
+            yield fact("idle", name), "nobody uses it"
+        for output in unit.outputs:
+            stream = object_name(host, component.id, output.name)
+            yield fact("output", name, stream), f"{component.id} declares it"
+            if output.always:
+                yield fact("from", stream, host), f"{component.id} produces it from its start on"
+            else:
+                yield fact("free", stream), "nobody uses it"
+
+
+def own_objects(host: str, component: ComponentRecord) -> dict[str, str]:
+    """Local name → object: a component's units and slots."""
+    names = [unit.name for unit in component.description.units]
+    names += [output.name for unit in component.description.units for output in unit.outputs]
+    return {name: object_name(host, component.id, name) for name in names}
+
+
+def always_produced(snapshot: Snapshot) -> frozenset[str]:
+    """The streams that are produced from their worker's start on."""
+    return frozenset(
+        object_name(snapshot.host, component.id, output.name)
+        for component in snapshot.components
+        for unit in component.description.units
+        for output in unit.outputs
+        if output.always
+    )

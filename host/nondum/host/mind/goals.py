@@ -1,0 +1,147 @@
+"""What people want of the host: one queue, the most wanted first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from enum import Enum
+
+from nondum.planning.goal import GoalKind
+from nondum.sdk.errors import GoalRefused, Problem
+
+MAX_ENDED = 50
+"""How many ended goals are remembered."""
+
+
+class GoalState(Enum):
+    """Where a goal is."""
+
+    QUEUED = "queued"
+    """Waits for its turn, or for its first plan."""
+    ACTIVE = "active"
+    """Its plan is carried out, or held."""
+    SUSPENDED = "suspended"
+    """There is no plan as things are; it is tried again when something new is known."""
+    REACHED = "reached"
+    """It was to be achieved, and was."""
+    HALTED = "halted"
+    """A person halted it, or it was replaced."""
+
+    @property
+    def is_final(self) -> bool:
+        """Whether the goal is over."""
+        return self in (GoalState.REACHED, GoalState.HALTED)
+
+
+@dataclass(frozen=True, slots=True)
+class GivenGoal:
+    """A goal as it stands."""
+
+    id: str
+    text: str
+    """As the person gave it: words or PDDL."""
+    pddl: str
+    kind: GoalKind
+    priority: int
+    number: int
+    """Counts up: a greater number was given later."""
+    state: GoalState = GoalState.QUEUED
+    reason: str = ""
+    """Why it is where it is."""
+    problems: tuple[Problem, ...] = ()
+    """What keeps it suspended."""
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain data for people's tools."""
+        return {
+            "id": self.id,
+            "goal": self.pddl,
+            "text": self.text,
+            "kind": self.kind,
+            "priority": self.priority,
+            "state": self.state.value,
+            "reason": self.reason,
+            "problems": [problem.to_dict() for problem in self.problems],
+        }
+
+
+def urgency(goal: GivenGoal) -> tuple[int, bool, int]:
+    """Sort key: by priority; what can be finished before what never ends; of goals to achieve the
+    first, of goals to maintain the last, for it is what the person wants now."""
+    lasts = goal.kind == "maintain"
+    return -goal.priority, lasts, -goal.number if lasts else goal.number
+
+
+class GoalQueue:
+    """The goals given to one host since it started."""
+
+    def __init__(self) -> None:
+        self._goals: dict[str, GivenGoal] = {}
+        self._given = 0
+
+    def __iter__(self) -> Iterator[GivenGoal]:
+        """All goals, in the order they were given."""
+        return iter(tuple(self._goals.values()))
+
+    def __getitem__(self, id: str) -> GivenGoal:
+        """The goal of that id. Raises `GoalRefused` (GOAL_UNKNOWN)."""
+        if id not in self._goals:
+            known = ", ".join(self._goals) or "none was given"
+            raise GoalRefused(
+                Problem("GOAL_UNKNOWN", f"there is no goal {id!r}", fix=f"goals: {known}")
+            )
+        return self._goals[id]
+
+    def give(self, text: str, pddl: str, kind: GoalKind, *, priority: int = 0) -> GivenGoal:
+        """Add a goal."""
+        self._given += 1
+        goal = GivenGoal(str(self._given), text, pddl, kind, priority, self._given)
+        self._goals[goal.id] = goal
+        self._forget_oldest()
+        return goal
+
+    def wanted(self, is_worth_a_try: Callable[[GivenGoal], bool]) -> GivenGoal | None:
+        """The most urgent goal that is not over. Suspended ones count if they are worth a try."""
+        candidates = [
+            goal
+            for goal in self._goals.values()
+            if not goal.state.is_final
+            and (goal.state is not GoalState.SUSPENDED or is_worth_a_try(goal))
+        ]
+        return min(candidates, key=urgency, default=None)
+
+    def put(
+        self, id: str, state: GoalState, reason: str = "", problems: tuple[Problem, ...] = ()
+    ) -> GivenGoal:
+        """Set where a goal is and why. Goals that are over stay so."""
+        goal = self._goals[id]
+        if not goal.state.is_final:
+            goal = self._goals[id] = replace(goal, state=state, reason=reason, problems=problems)
+        return goal
+
+    def activate(self, id: str) -> tuple[GivenGoal, ...]:
+        """Make a goal the active one. Gives the goals to maintain that it replaces."""
+        active = self.put(id, GoalState.ACTIVE)
+        replaced = []
+        for goal in self:
+            if goal.id == id or goal.state.is_final:
+                continue
+            if goal.state is GoalState.ACTIVE:
+                self.put(goal.id, GoalState.QUEUED, f"waits for goal {id}")
+            if is_replaced(goal, active):
+                replaced.append(self.put(goal.id, GoalState.HALTED, f"replaced by goal {id}"))
+        return tuple(replaced)
+
+    def _forget_oldest(self) -> None:
+        ended = [goal.id for goal in self._goals.values() if goal.state.is_final]
+        for id in ended[: max(0, len(ended) - MAX_ENDED)]:
+            del self._goals[id]
+
+
+def is_replaced(goal: GivenGoal, by: GivenGoal) -> bool:
+    """Whether a newer goal to maintain takes the place of an older one."""
+    return (
+        goal.kind == by.kind == "maintain"
+        and goal.priority <= by.priority
+        and goal.number < by.number
+    )

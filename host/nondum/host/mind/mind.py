@@ -1,0 +1,261 @@
+"""The mind of a host: it believes, wants, plans and acts, one short tick at a time.
+
+Events and snapshots of the catalogue come in between ticks; `run` ticks the system tree when there
+is news, and at a steady pace. Nothing here blocks the loop.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import time
+from collections.abc import Callable
+from typing import Any
+
+from py_trees.behaviour import Behaviour
+
+from nondum.host.catalogue.records import Snapshot
+from nondum.host.events import Emit, Event, GoalEnded, GoalGiven
+from nondum.host.mind.beliefs import Beliefs
+from nondum.host.mind.composition import Composition, compose
+from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState
+from nondum.host.mind.people import People, recomposed
+from nondum.host.mind.planners import Planners
+from nondum.host.mind.pursuit import Pursuit
+from nondum.host.mind.runner import BehaviourRunner, Calls
+from nondum.host.mind.search import SMALL
+from nondum.host.mind.system_tree import Duty, Hold, Parts, SystemTree, TaskSlot, default_tree
+from nondum.host.mind.views import Views
+from nondum.planning.goal import Goal, GoalKind, goal_text, parse_goal
+from nondum.sdk.errors import GoalRefused, Problem
+
+log = logging.getLogger(__name__)
+
+BUSY_S = 0.05
+"""Time between ticks while a task runs."""
+IDLE_S = 1.0
+"""Time between ticks while nothing is asked for."""
+
+
+class Mind:
+    """Composed by the host: `see` snapshots, `on_event`, `run`; then `close`."""
+
+    def __init__(
+        self,
+        host: str,
+        calls: Calls,
+        planners: Planners,
+        *,
+        emit: Emit,
+        deadline_s: float = 10.0,
+        system_tree: SystemTree = default_tree,
+        now_s: Callable[[], float] = time.monotonic,
+        wall_s: Callable[[], float] = time.time,
+    ) -> None:
+        """`emit` is told of goals and plans; `deadline_s` bounds a search for a plan."""
+        self.beliefs = Beliefs(host, now_s)
+        self.queue = GoalQueue()
+        self.people = People(wall_s)
+        self.runner = BehaviourRunner(calls, self.beliefs, now_s)
+        self.composition: Composition | None = None
+        self.version = 0
+        """Rises whenever a view may look different."""
+        self._planners = planners
+        self._emit = emit
+        self._news = asyncio.Event()
+        self._viewers = asyncio.Condition()
+        self._composing: asyncio.Task[Composition] | None = None
+        self._told_version: tuple[object, ...] = ()
+        self.pursuit = Pursuit(
+            queue=self.queue,
+            beliefs=self.beliefs,
+            runner=self.runner,
+            planners=planners,
+            people=self.people,
+            emit=emit,
+            now_s=now_s,
+            deadline_s=deadline_s,
+            wake=self.wake,
+        )
+        self.root: Behaviour = system_tree(self._parts())
+        self.views = Views(self)
+
+    # News
+
+    def see(self, snapshot: Snapshot) -> None:
+        """Take over a new revision of the catalogue: what is gone is withdrawn at once, what is new
+        is planned with from the next tick on."""
+        for component in self.beliefs.see(snapshot):
+            self.runner.lose(component, "its component is gone")
+        if self._composing is not None:
+            self._composing.cancel()
+            self._composing = None
+        if len(snapshot.components) > SMALL:
+            self._composing = asyncio.create_task(asyncio.to_thread(compose, snapshot))
+            self._composing.add_done_callback(lambda _: self.wake())
+        else:
+            self._adopt(compose(snapshot))
+        self.wake()
+
+    def on_event(self, event: Event) -> None:
+        """Take in what a worker or the component manager tells."""
+        was_run = self.runner.on_event(event)
+        if self.beliefs.on_event(event) or was_run:
+            self.wake()
+
+    def wake(self) -> None:
+        """Ask for a tick."""
+        self._news.set()
+
+    # Goals
+
+    def give(
+        self,
+        *,
+        words: str | None = None,
+        pddl: str | None = None,
+        kind: GoalKind | None = None,
+        priority: int = 0,
+    ) -> GivenGoal:
+        """Want something, said in words or in PDDL. Raises `GoalRefused`."""
+        goal = self._understood(words, pddl, kind)
+        text = words if words is not None else goal.text
+        given = self.queue.give(text, goal_text(goal.expr), goal.kind, priority=priority)
+        self._emit(GoalGiven(given.id, given.text, given.kind))
+        self.wake()
+        return given
+
+    def halt(self, *, id: str | None = None, now: bool = False) -> tuple[str, ...]:
+        """Halt a goal, or all of them; with `now` every behaviour that runs is halted directly.
+
+        Gives the names of what was asked to end. Needs no planner. Raises `GoalRefused`
+        (GOAL_UNKNOWN).
+        """
+        goals = [self.queue[id]] if id is not None else list(self.queue)
+        for goal in goals:
+            if not goal.state.is_final:
+                self.queue.put(goal.id, GoalState.HALTED, "halted by a person")
+                self._emit(GoalEnded(goal.id, "halted by a person"))
+                self.people.tell(f"goal {goal.id} is halted: {goal.text}")
+        current = self.pursuit.current
+        is_over = current is not None and self.queue[current.goal].state.is_final
+        running = tuple(run.step.name for run in self.runner) if now or is_over else ()
+        if now or is_over:
+            self.pursuit.drop("halted by a person")
+        if now:
+            self.runner.halt_all()
+        self.wake()
+        return running
+
+    # Ticking
+
+    def tick(self) -> None:
+        """Tick the system tree once."""
+        self.root.tick_once()
+
+    async def run(self) -> None:
+        """Tick until cancelled: at once when there is news, else every `BUSY_S` or `IDLE_S`."""
+        warming = asyncio.create_task(self._planners.warm())
+        try:
+            while True:
+                self._news.clear()
+                self._tick_safely()
+                if self._may_look_different():
+                    async with self._viewers:
+                        self._viewers.notify_all()
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(BUSY_S if self.pursuit.current else IDLE_S):
+                        await self._news.wait()
+        finally:
+            warming.cancel()
+            await asyncio.gather(warming, return_exceptions=True)
+
+    async def changed(self, since: int) -> int:
+        """Wait until `version` is not `since`, and give it: then views may look different."""
+        async with self._viewers:
+            await self._viewers.wait_for(lambda: self.version != since)
+        return self.version
+
+    async def close(self) -> None:
+        """Halt everything and end the planners."""
+        self.halt(now=True)
+        await self.pursuit.close()
+        if self._composing is not None:
+            self._composing.cancel()
+            await asyncio.gather(self._composing, return_exceptions=True)
+        await self._planners.close()
+
+    def _tick_safely(self) -> None:
+        """A fault in a tick, most likely of an integrator's own leaf, stops the robot, not the
+        host."""
+        try:
+            self.tick()
+        except Exception as error:
+            log.exception("a tick of the system tree failed")
+            self.runner.halt_all()
+            self.people.tell(f"the system tree is at fault: {type(error).__name__}: {error}")
+
+    # Parts of the system tree
+
+    def _parts(self) -> Parts:
+        return Parts(
+            monitor=Duty("monitor", self._monitor),
+            world_model=Duty("world model", lambda: f"{len(self.beliefs.world.facts)} facts hold"),
+            goals=Duty("goals", self._choose),
+            task=TaskSlot(lambda: self.pursuit.tree, Hold(self._waits_for)),
+            people=Duty("people", lambda: f"{self.people.last_number} sentences told"),
+        )
+
+    def _monitor(self) -> str:
+        if self._composing is not None and self._composing.done():
+            composing, self._composing = self._composing, None
+            self._adopt(composing.result())
+        revision = self.composition.revision if self.composition else 0
+        return f"revision {revision}{', another is being merged' if self._composing else ''}"
+
+    def _adopt(self, composition: Composition) -> None:
+        old, self.composition = self.composition, composition
+        self.beliefs.adopt(composition)
+        self.runner.adopt(composition)
+        self.pursuit.adopt(composition)
+        for sentence in recomposed(old, composition):
+            self.people.tell(sentence)
+
+    def _choose(self) -> str:
+        self.pursuit.step()
+        current = self.pursuit.current
+        return f"goal {current.goal}: {self.queue[current.goal].text}" if current else ""
+
+    def _waits_for(self) -> str:
+        if self.pursuit.is_searching:
+            return "a plan is being searched for"
+        if self.pursuit.current is not None:
+            return "another plan is needed"
+        open_goals = [goal for goal in self.queue if not goal.state.is_final]
+        return "; ".join(f"goal {g.id} is {g.state.value}: {g.reason}" for g in open_goals)
+
+    def _understood(self, words: str | None, pddl: str | None, kind: GoalKind | None) -> Goal:
+        if (words is None) == (pddl is None):
+            raise ValueError("a goal is given in words or in PDDL")
+        if self.composition is None:
+            raise GoalRefused(Problem("GOAL_TOO_EARLY", "the host does not know itself yet"))
+        if words is not None:
+            return self.composition.book.goal(words)
+        assert pddl is not None  # the other way to give one
+        return parse_goal(pddl, self.composition.merged, kind=kind or "achieve")
+
+    def _may_look_different(self) -> bool:
+        seen: tuple[Any, ...] = (
+            self.beliefs.world.revision,
+            self.people.last_number,
+            self.composition.revision if self.composition else 0,
+            tuple((node.id, node.status) for node in self.root.iterate()),
+            tuple((run.step.name, run.state, run.progress) for run in self.runner),
+            tuple((goal.id, goal.state, goal.reason) for goal in self.queue),
+        )
+        if seen == self._told_version:
+            return False
+        self._told_version = seen
+        self.version += 1
+        return True

@@ -1,0 +1,91 @@
+"""What people are told: sentences in the order things happened, never taken back."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from nondum.host.catalogue.records import ComponentRecord
+from nondum.host.mind.composition import Composition
+from nondum.planning.merge import quarantine_key
+
+MAX_SENTENCES = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """One sentence."""
+
+    number: int
+    """Counts up from 1, so that a reader can ask for what is new."""
+    wall_s: float
+    """Seconds since the epoch."""
+    text: str
+
+
+class People:
+    """Everything that people were told since the host started, the last thousand sentences."""
+
+    def __init__(self, wall_s: Callable[[], float]) -> None:
+        self._wall_s = wall_s
+        self._told: deque[Told] = deque(maxlen=MAX_SENTENCES)
+        self._number = 0
+
+    def __iter__(self) -> Iterator[Told]:
+        """The sentences, oldest first."""
+        return iter(tuple(self._told))
+
+    @property
+    def last_number(self) -> int:
+        """How many sentences there were."""
+        return self._number
+
+    def since(self, number: int) -> tuple[Told, ...]:
+        """What was told after the sentence of that number."""
+        return tuple(told for told in self._told if told.number > number)
+
+    def tell(self, text: str) -> None:
+        """Say a sentence."""
+        self._number += 1
+        self._told.append(Told(self._number, self._wall_s(), text))
+
+
+def recomposed(old: Composition | None, new: Composition) -> list[str]:
+    """Sentences on what a recomposition gains, loses and changes."""
+    before = {c.id: c for c in old.snapshot.components} if old else {}
+    after = {c.id: c for c in new.snapshot.components}
+    sentences = [f"{id} is gone: {_offers(before[id])}" for id in before if id not in after]
+    for id, component in after.items():
+        earlier = before.get(id)
+        if earlier is None or earlier.payload != component.payload:
+            sentences.append(f"{id} is here: {_offers(component)}")
+        elif earlier.is_ready != component.is_ready:
+            sentences.append(f"{id} is {_health(component)}")
+    return sentences + _kept_out(old, new)
+
+
+def _kept_out(old: Composition | None, new: Composition) -> list[str]:
+    known = old.merged.quarantined if old else {}
+    present = {quarantine_key(c, new.host) for c in new.contributions}
+    return [
+        f"{key} is kept out of planning: {problem}"
+        for key, problems in new.merged.quarantined.items()
+        if key in present and known.get(key) != problems
+        for problem in problems
+    ]
+
+
+def _offers(component: ComponentRecord) -> str:
+    names = [behaviour.name for behaviour in component.description.behaviours]
+    return f"it can {', '.join(names)}" if names else "it has no behaviours"
+
+
+def _health(component: ComponentRecord) -> str:
+    if component.is_ready:
+        return "ready"
+    missing = [c.name for c in component.devices if c.device is None and not c.optional]
+    if missing:
+        return f"not ready: it waits for the device {', '.join(missing)}"
+    reason = f": {component.problems[0]}" if component.problems else ""
+    return f"not ready, it is {component.state.value}{reason}"

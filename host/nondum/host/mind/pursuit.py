@@ -1,0 +1,315 @@
+"""The pursuit of goals: which one, by which plan, and what happens when the world says otherwise.
+
+One goal is pursued at a time. While another plan is searched for, the tree at hand goes on as far
+as it can by itself; it is replaced between two ticks, and what runs and is still needed runs on.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from nondum.host.events import Emit, GoalEnded, GoalReached, PlanMade, PlanMissing
+from nondum.host.mind.beliefs import Beliefs
+from nondum.host.mind.composition import Composition
+from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState
+from nondum.host.mind.people import People
+from nondum.host.mind.planners import Planners
+from nondum.host.mind.runner import BehaviourRunner
+from nondum.host.mind.search import NoPlan, Planned, Situation, search, task_of
+from nondum.planning.contribution import Contribution
+from nondum.planning.goal import parse_goal
+from nondum.planning.replay import replayed
+from nondum.planning.running import Run
+from nondum.planning.task_control import Phase
+from nondum.planning.task_tree import TaskTree
+from nondum.sdk.errors import GoalRefused, Problem
+from nondum.sdk.planner import GroundTask, Plan
+
+COOL_DOWN_S = 30.0
+"""How long an action that failed again and again is left out of plans."""
+
+
+@dataclass(slots=True)
+class Current:
+    """The goal that is being pursued, and how."""
+
+    goal: str
+    """Its id."""
+    task: GroundTask
+    plan: Plan
+    tree: TaskTree
+    is_outdated: bool = False
+    """The plan does not fit the components that are here now."""
+    phase: Phase = Phase.UNDER_WAY
+    """As people were last told."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the plan's actions."""
+        return tuple(self.task.actions[step].name for step in self.plan.steps)
+
+
+class Pursuit:
+    """Keeps the most urgent goal that can be had in a task tree."""
+
+    def __init__(
+        self,
+        *,
+        queue: GoalQueue,
+        beliefs: Beliefs,
+        runner: BehaviourRunner,
+        planners: Planners,
+        people: People,
+        emit: Emit,
+        now_s: Callable[[], float],
+        deadline_s: float,
+        wake: Callable[[], None],
+    ) -> None:
+        """`wake` asks for a tick: a search has ended."""
+        self.queue = queue
+        self.current: Current | None = None
+        self._beliefs = beliefs
+        self._runner = runner
+        self._planners = planners
+        self._people = people
+        self._emit = emit
+        self._now_s = now_s
+        self._deadline_s = deadline_s
+        self._wake = wake
+        self._composition: Composition | None = None
+        self._seen: dict[str, Contribution] = {}
+        self._search: asyncio.Task[Planned | NoPlan] | None = None
+        self._searched_for: Situation | None = None
+        self._tried: dict[str, Situation] = {}
+        self._excluded_until_s: dict[str, float] = {}
+        self._left_over: tuple[Run, ...] = ()
+
+    @property
+    def tree(self) -> TaskTree | None:
+        """The task tree to tick, if a goal is pursued."""
+        return self.current.tree if self.current else None
+
+    @property
+    def is_searching(self) -> bool:
+        """Whether a plan is being searched for."""
+        return self._search is not None
+
+    # Between ticks
+
+    def step(self) -> None:
+        """Draw the conclusions of the last tick, and see to a plan for what is wanted most."""
+        self._left_over = tuple(r for r in self._left_over if not r.action.state.has_ended)
+        self._conclude()
+        self._take_found()
+        if self._composition is None:
+            return
+        wanted = self.queue.wanted(lambda g: self._tried.get(g.id) != self._situation(g.id))
+        if self.current and (wanted is None or self.queue[self.current.goal].state.is_final):
+            self.drop("its goal is over")
+        if wanted is None:
+            self._cancel_search()
+        elif not self._is_on_its_way(wanted):
+            self._start_search(wanted)
+
+    def adopt(self, composition: Composition) -> None:
+        """Go on with the plan in a new composition if it still works there."""
+        self._composition = composition
+        self._seen |= {c.component: c for c in composition.contributions}
+        self._excluded_until_s.clear()
+        current = self.current
+        if current is None:
+            return
+        kept = self._replayed(composition, current)
+        if kept is None:
+            current.is_outdated = True
+        else:
+            self._grow(current.goal, *kept, phase=current.phase)
+
+    def drop(self, because: str) -> None:
+        """Stop pursuing: everything that runs is halted."""
+        if self.current is not None:
+            self.current.tree.halt(because)
+            self._left_over += self.current.tree.release()
+            self.current = None
+
+    async def close(self) -> None:
+        """Stop searching and pursuing."""
+        self.drop("the host is stopping")
+        if self._search is not None:
+            self._search.cancel()
+            await asyncio.gather(self._search, return_exceptions=True)
+
+    # What the last tick came to
+
+    def _conclude(self) -> None:
+        current = self.current
+        if current is None:
+            return
+        phase = current.tree.control.phase
+        if phase is not current.phase:
+            current.phase = phase
+            self._tell_phase(current, phase)
+        if phase is Phase.REACHED:
+            self.queue.put(current.goal, GoalState.REACHED, "it holds")
+            self._emit(GoalReached(current.goal))
+            self.drop("the goal is reached")
+
+    def _tell_phase(self, current: Current, phase: Phase) -> None:
+        goal = self.queue[current.goal]
+        if phase is Phase.REACHED:
+            self._people.tell(f"goal {goal.id} is reached: {goal.text}")
+        elif phase is Phase.HOLDING:
+            self.queue.put(goal.id, GoalState.ACTIVE, "it holds and is kept so")
+            self._people.tell(f"goal {goal.id} holds and is kept so: {goal.text}")
+        elif phase is Phase.UNDER_WAY:
+            self.queue.put(goal.id, GoalState.ACTIVE, "")
+        elif why := current.tree.needs_replan:
+            self.queue.put(goal.id, GoalState.ACTIVE, f"another plan is needed: {why}")
+            self._people.tell(f"goal {goal.id} needs another plan: {why}")
+
+    # Searching
+
+    def _situation(self, goal: str) -> Situation:
+        now_s = self._now_s()
+        revision = self._composition.revision if self._composition else 0
+        excluded = frozenset(n for n, until_s in self._excluded_until_s.items() if until_s > now_s)
+        return Situation(goal, revision, self._beliefs.world.bare_facts, excluded)
+
+    def _is_on_its_way(self, wanted: GivenGoal) -> bool:
+        """Whether a goal has a plan that goes on, or will have one soon."""
+        current = self.current
+        if current is not None and current.goal == wanted.id:
+            self._exclude(current.tree.control.exhausted)
+            if not current.is_outdated and current.tree.needs_replan is None:
+                self._cancel_search()
+                return True
+        return self._searched_for is not None and self._searched_for.is_like(
+            self._situation(wanted.id)
+        )
+
+    def _exclude(self, names: tuple[str, ...]) -> None:
+        now_s = self._now_s()
+        for name in names:
+            if self._excluded_until_s.get(name, 0.0) <= now_s:
+                self._excluded_until_s[name] = now_s + COOL_DOWN_S
+
+    def _start_search(self, wanted: GivenGoal) -> None:
+        assert self._composition is not None  # `step` waits for one
+        situation = self._situation(wanted.id)
+        if self._tried.get(wanted.id) == situation:
+            self._give_up_plan(wanted)
+            return
+        self._cancel_search()
+        self._searched_for = situation
+        self._search = asyncio.create_task(
+            search(
+                self._planners,
+                self._composition,
+                wanted,
+                situation,
+                deadline_s=self._deadline_s,
+                seen=tuple(self._seen.values()),
+            )
+        )
+        self._search.add_done_callback(lambda _: self._wake())
+
+    def _give_up_plan(self, wanted: GivenGoal) -> None:
+        """The plan at hand is stuck, and nothing new is known that another could be made of."""
+        why = self.current.tree.needs_replan if self.current else None
+        problem = Problem("PLAN_STUCK", why or "its plan does not go on", where=f"goal {wanted.id}")
+        self._suspend(NoPlan(self._situation(wanted.id), (problem,)))
+
+    def _cancel_search(self) -> None:
+        if self._search is not None:
+            self._search.cancel()
+            self._search = self._searched_for = None
+
+    def _take_found(self) -> None:
+        if self._search is None or not self._search.done():
+            return
+        found = self._search.result()
+        self._search = self._searched_for = None
+        goal = found.situation.goal
+        if self.queue[goal].state.is_final or not found.situation.is_like(self._situation(goal)):
+            return
+        self._tried[goal] = found.situation
+        if isinstance(found, NoPlan):
+            self._suspend(found)
+        elif self._still_works(found):
+            self._take_up(found)
+        else:
+            del self._tried[goal]  # the world has moved on; `step` searches again
+
+    def _still_works(self, found: Planned) -> bool:
+        assert self._composition is not None  # there was a search
+        lasting, believed = self._composition.merged.lasting(), self._beliefs.world.bare_facts
+        return replayed(found.task, found.names, believed, lasting) is not None
+
+    def _suspend(self, found: NoPlan) -> None:
+        goal = self.queue[found.situation.goal]
+        self._tried[goal.id] = found.situation
+        if self.current is not None and self.current.goal == goal.id:
+            self.drop("there is no plan any more")
+        if goal.state is not GoalState.SUSPENDED or goal.problems != found.problems:
+            words = "; ".join(problem.message for problem in found.problems)
+            fixes = "; ".join(problem.fix for problem in found.problems if problem.fix)
+            self._people.tell(f"cannot {goal.text!r} now: {words}{f' → {fixes}' if fixes else ''}")
+            self._emit(PlanMissing(goal.id, found.problems))
+        reason = found.problems[0].message
+        self.queue.put(goal.id, GoalState.SUSPENDED, reason, found.problems)
+
+    # Taking up a plan
+
+    def _take_up(self, found: Planned) -> None:
+        goal = self.queue[found.situation.goal]
+        reason = self._why_another_plan(goal.id)
+        for replaced in self.queue.activate(goal.id):
+            self._people.tell(f"goal {replaced.id} is {replaced.reason}: {replaced.text}")
+            self._emit(GoalEnded(replaced.id, replaced.reason))
+        self._grow(goal.id, found.task, found.plan)
+        steps = ", then ".join(found.names) or "nothing to do"
+        because = f", because {reason}" if reason else ""
+        self._people.tell(f"plan for {goal.text!r}{because}: {steps}")
+        self._emit(PlanMade(goal.id, found.situation.revision, found.names, reason))
+
+    def _why_another_plan(self, goal: str) -> str:
+        if self.current is None or self.current.goal != goal:
+            return ""
+        return self.current.tree.needs_replan or "the components changed"
+
+    def _grow(
+        self, id: str, task: GroundTask, plan: Plan, *, phase: Phase = Phase.UNDER_WAY
+    ) -> None:
+        """Put the tree of a plan in the place of the present one."""
+        assert self._composition is not None  # there is a task
+        runs = self.current.tree.release() if self.current else ()
+        goal = self.queue[id]
+        tree = TaskTree(
+            task,
+            plan,
+            lasting=self._composition.merged.lasting(),
+            runner=self._runner,
+            kind=goal.kind,
+            sight=lambda: (self._beliefs.world, self._now_s()),
+            exclusive=self._composition.exclusive,
+            runs=(*runs, *self._left_over),
+            name=f"goal {goal.id}",
+        )
+        self._left_over = ()
+        self.current = Current(goal.id, task, plan, tree, phase=phase)
+
+    def _replayed(
+        self, composition: Composition, current: Current
+    ) -> tuple[GroundTask, Plan] | None:
+        """The plan in the new composition, if what is left of it still reaches the goal there."""
+        given = self.queue[current.goal]
+        try:
+            goal = parse_goal(given.pddl, composition.merged, kind=given.kind)
+        except GoalRefused:
+            return None
+        task = task_of(composition, goal, self._situation(current.goal))
+        believed = self._beliefs.world.facts
+        plan = replayed(task, current.names, believed, composition.merged.lasting())
+        return None if plan is None else (task, plan)

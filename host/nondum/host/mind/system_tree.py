@@ -1,0 +1,137 @@
+"""The system tree: what a host does at every tick, a behaviour tree that integrators can replace.
+
+`default_tree` is monitor → world model → goals → task → people. An integrator's function gets the
+`Parts` of the mind and composes them, with behaviours of its own, to another tree:
+`system_tree = "package:function"` in the host's configuration. It is trusted, and its leaves must
+not block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TypeAlias
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import ParallelPolicy, Status
+from py_trees.composites import Composite, Parallel
+
+from nondum.planning.task_tree import TaskTree
+from nondum.sdk.errors import ConfigRefused, Problem
+
+
+class Duty(Behaviour):
+    """Something short that is done at every tick; says in words what came of it."""
+
+    def __init__(self, name: str, do: Callable[[], str]) -> None:
+        super().__init__(name)
+        self._do = do
+        self._why = ""
+
+    def update(self) -> Status:
+        """Do it."""
+        self._why = self._do()
+        return Status.SUCCESS
+
+    def why(self) -> str:
+        """What came of it."""
+        return self._why
+
+
+class Hold(Behaviour):
+    """Stands in while there is no plan to carry out: nothing is started."""
+
+    def __init__(self, waits_for: Callable[[], str]) -> None:
+        super().__init__("hold")
+        self._waits_for = waits_for
+
+    def update(self) -> Status:
+        """RUNNING while something is waited for, SUCCESS while nothing is asked for."""
+        return Status.RUNNING if self._waits_for() else Status.SUCCESS
+
+    def why(self) -> str:
+        """What is waited for."""
+        return self._waits_for() or "nothing is asked for"
+
+
+class TaskSlot(Composite):
+    """Where the task tree sits. While there is none, or it is stuck, the slot holds."""
+
+    def __init__(self, tree: Callable[[], TaskTree | None], hold: Hold) -> None:
+        super().__init__("task", [hold])
+        self._tree = tree
+        self._hold = hold
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Swap the tree if there is another one now, and tick it; hold where that fails."""
+        tree = self._tree()
+        self._swap(tree)
+        status = Status.FAILURE
+        if tree is not None:
+            yield from tree.tick()
+            status = tree.status
+        self.current_child = tree
+        if status is Status.FAILURE:
+            yield from self._hold.tick()
+            status, self.current_child = self._hold.status, self._hold
+        elif self._hold.status is not Status.INVALID:
+            self._hold.stop(Status.INVALID)
+        self.status = status
+        yield self
+
+    def why(self) -> str:
+        """Why the slot is where it is."""
+        tree = self._tree()
+        return tree.why() if tree is not None else self._hold.why()
+
+    def _swap(self, tree: TaskTree | None) -> None:
+        for child in [c for c in self.children if c is not tree and c is not self._hold]:
+            # What it ran was handed over or halted when it was replaced.
+            self.remove_child(child)
+        if tree is not None and tree not in self.children:
+            self.insert_child(tree, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What a system tree is composed of. Each may stand in the tree once."""
+
+    monitor: Behaviour
+    """Takes over a new composition when the catalogue has a new revision."""
+    world_model: Behaviour
+    """Tells what is believed; beliefs come in with the events, between ticks."""
+    goals: Behaviour
+    """Chooses the goal and sees to its plan."""
+    task: Behaviour
+    """The slot of the task tree."""
+    people: Behaviour
+    """Tells people."""
+
+
+SystemTree: TypeAlias = Callable[[Parts], Behaviour]
+
+
+def default_tree(parts: Parts) -> Behaviour:
+    """Every part at every tick, in this order."""
+    return Parallel(
+        "nondum",
+        policy=ParallelPolicy.SuccessOnAll(synchronise=False),
+        children=[parts.monitor, parts.world_model, parts.goals, parts.task, parts.people],
+    )
+
+
+def load_system_tree(path: str) -> SystemTree:
+    """Import `package:function`. Raises `ConfigRefused` (CONFIG_SYSTEM_TREE)."""
+    module, _, name = path.partition(":")
+    try:
+        function = getattr(import_module(module), name)
+    except (ImportError, AttributeError, ValueError) as error:
+        problem = Problem(
+            "CONFIG_SYSTEM_TREE",
+            f"cannot import {path!r} ({error})",
+            where="host.system_tree",
+            fix='name it "package.module:function"',
+        )
+        raise ConfigRefused(problem) from error
+    return function  # type: ignore[no-any-return]  # an integrator's own code is trusted

@@ -1,0 +1,200 @@
+"""What the mind shows of itself: plain data for the command line, the page and JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Protocol
+
+from py_trees.behaviour import Behaviour
+
+from nondum.host.catalogue.records import ComponentRecord
+from nondum.host.mind.beliefs import Beliefs
+from nondum.host.mind.composition import Composition, own_objects
+from nondum.host.mind.frames import implausible
+from nondum.host.mind.goals import GoalQueue
+from nondum.host.mind.people import People
+from nondum.host.mind.pursuit import Pursuit
+from nondum.host.mind.runner import BehaviourRunner
+from nondum.planning.goal import goal_text
+from nondum.planning.task_tree import StepLeaf
+from nondum.sdk.errors import GoalRefused
+
+Row = dict[str, Any]
+
+
+class Shown(Protocol):
+    """The parts of a mind that are looked at."""
+
+    beliefs: Beliefs
+    queue: GoalQueue
+    people: People
+    runner: BehaviourRunner
+    pursuit: Pursuit
+    composition: Composition | None
+    root: Behaviour
+
+
+class Views:
+    """Looks at a mind and changes nothing."""
+
+    def __init__(self, mind: Shown) -> None:
+        self._mind = mind
+
+    def plan(self) -> Row:
+        """The goal pursued, and each step of its plan: `step`, `action`, `state`, `why`."""
+        current = self._mind.pursuit.current
+        if current is None:
+            return {"goal": None, "kind": None, "steps": []}
+        goal = self._mind.queue[current.goal]
+        running = {run.step.name: run for run in self._mind.runner}
+        steps = []
+        for leaf in current.tree.children:
+            assert isinstance(leaf, StepLeaf)  # a task tree has no other children
+            run = running.get(leaf.name)
+            state = run.state.value if run else _STATES[leaf.status.value]
+            why = " ".join(filter(None, (leaf.why(), run.progress if run else "")))
+            row = {"step": leaf.index + 1, "action": leaf.name, "state": state, "why": why}
+            steps.append(row | {"component": run.component if run else None})
+        return {"goal": goal.pddl, "id": goal.id, "kind": goal.kind, "steps": steps}
+
+    def tree(self) -> Row:
+        """The whole behaviour tree as it was last ticked: `name`, `status`, `why`, `children`."""
+        return _node(self._mind.root)
+
+    def facts(self, *, why: str | None = None) -> list[Row]:
+        """All that is believed: `fact`, `source`, `value`. With `why`, one fact, true or not, with
+        a row for every reason."""
+        world = self._mind.beliefs.world
+        if why is not None:
+            text = " ".join(why.strip().strip("()").split())
+            value = world.value(text)
+            return [{"fact": text, "source": line, "value": value} for line in world.why(text)]
+        return [
+            {
+                "fact": text,
+                "source": "; ".join(source.said for source in world.sources(text)),
+                "value": world.value(text),
+            }
+            for text in sorted(world.facts)
+        ]
+
+    def goals(self) -> Row:
+        """What can be asked for now (`can`: `words`, `goal`, `kind`), and what was (`given`)."""
+        given = [goal.to_dict() for goal in self._mind.queue]
+        return {"can": list(self._offers()), "given": given}
+
+    def why(self) -> Row:
+        """Why the robot does what it does, or cannot: `sentences` and `problems`."""
+        current = self._mind.pursuit.current
+        sentences: list[str] = []
+        if current is not None:
+            goal = self._mind.queue[current.goal]
+            sentences.append(f"goal {goal.id}, {goal.text!r}: {current.tree.why()}")
+            sentences += [f"  {row['action']}: {row['why']}" for row in self.plan()["steps"]]
+        problems = []
+        for goal in self._mind.queue:
+            if not goal.state.is_final and (current is None or goal.id != current.goal):
+                sentences.append(f"goal {goal.id}, {goal.text!r}, is {goal.state.value}")
+                problems += [str(problem) for problem in goal.problems]
+        return {
+            "sentences": sentences or ["nothing is asked for"],
+            "problems": problems + self._quarantined(),
+            "told": [told.text for told in self._mind.people.since(self._last_few())],
+        }
+
+    def behaviours(self) -> list[Row]:
+        """What can be done: `behaviour`, `component`, `kind`, `running`, `phrases`."""
+        running = {(run.component, run.behaviour) for run in self._mind.runner}
+        return [
+            {
+                "behaviour": behaviour.name,
+                "component": component.id,
+                "kind": "lasting" if behaviour.lasting else "finishing",
+                "running": (component.id, behaviour.name) in running,
+                "phrases": list(behaviour.phrases),
+            }
+            for component in self._components()
+            for behaviour in component.description.behaviours
+        ]
+
+    def units(self) -> list[Row]:
+        """What there is to act with: `unit`, `type`, `component`, `ready`, mount and doubts."""
+        rows = []
+        for component in self._components():
+            names = own_objects(self._mind.beliefs.snapshot.host, component)
+            for unit in component.description.units:
+                pose = self._mind.beliefs.snapshot.mount(names[unit.name])
+                row = {
+                    "unit": names[unit.name],
+                    "type": unit.type,
+                    "component": component.id,
+                    "ready": component.is_ready,
+                    "xyz": list(pose.xyz) if pose else None,
+                    "rpy": list(pose.rpy) if pose else None,
+                    "mount": pose.origin if pose else "unknown",
+                    "warnings": list(implausible(pose)) if pose else [],
+                }
+                rows.append(row)
+        return rows
+
+    def streams(self) -> list[Row]:
+        """Who sends what to whom, as the running plan wires it: `stream`, `type`, `component`,
+        `flowing`, `consumers`."""
+        consumers: dict[str, list[str]] = {}
+        for run in self._mind.runner:
+            for stream in run.streams:
+                consumers.setdefault(stream, []).append(run.component)
+        rows = []
+        for component in self._components():
+            names = own_objects(self._mind.beliefs.snapshot.host, component)
+            for unit in component.description.units:
+                for output in unit.outputs:
+                    stream = names[output.name]
+                    readers = set(consumers.get(stream, [])) - {component.id}
+                    row: Row = {"stream": stream, "type": output.type, "component": component.id}
+                    row |= {"flowing": stream in self._mind.beliefs.flowing}
+                    rows.append(row | {"consumers": sorted(readers)})
+        return rows
+
+    def told(self, since: int = 0) -> list[Row]:
+        """What people were told after the sentence of that number."""
+        return [
+            {"number": told.number, "when": told.wall_s, "text": told.text}
+            for told in self._mind.people.since(since)
+        ]
+
+    def _components(self) -> tuple[ComponentRecord, ...]:
+        return self._mind.beliefs.snapshot.components
+
+    def _last_few(self) -> int:
+        return max(0, self._mind.people.last_number - 5)
+
+    def _offers(self) -> Iterator[Row]:
+        composition = self._mind.composition
+        if composition is None:
+            return
+        for sentence in composition.book.offers():
+            try:
+                goal = composition.book.goal(sentence)
+            except GoalRefused:  # ambiguous, or with free words still to be filled in
+                yield {"words": sentence, "goal": None, "kind": None}
+            else:
+                yield {"words": sentence, "goal": goal_text(goal.expr), "kind": goal.kind}
+
+    def _quarantined(self) -> list[str]:
+        composition = self._mind.composition
+        found = composition.merged.quarantined.values() if composition else ()
+        return [str(problem) for problems in found for problem in problems]
+
+
+_STATES = {"SUCCESS": "done", "RUNNING": "running", "FAILURE": "failed", "INVALID": "to do"}
+
+
+def _node(node: Behaviour) -> Row:
+    why = getattr(node, "why", None)
+    return {
+        "name": node.name,
+        "status": node.status.value,
+        "why": why() if why else node.feedback_message,
+        "children": [_node(child) for child in node.children],
+    }
