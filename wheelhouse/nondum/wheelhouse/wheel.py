@@ -19,6 +19,7 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from email.parser import HeaderParser
 from pathlib import Path, PurePosixPath
 
 from packaging.utils import InvalidWheelFilename, parse_wheel_filename
@@ -109,6 +110,15 @@ def check(path: Path) -> tuple[Problem, ...]:
     with opened(path) as data:
         layout = lay_out(data, path.name)
         return (*layout.problems, *_damaged(data, layout, path.name))
+
+
+def requirements(data: Bytes, layout: Layout) -> tuple[str, ...]:
+    """The `Requires-Dist` lines of a wheel that was laid out without problems."""
+    for file in layout.files:
+        if file.target.count("/") == 1 and file.target.endswith(".dist-info/METADATA"):
+            metadata = HeaderParser().parsestr(read_text(data, file.member))
+            return tuple(str(line) for line in metadata.get_all("Requires-Dist", ()))
+    return ()
 
 
 def _damaged(data: Bytes, layout: Layout, filename: str) -> Iterator[Problem]:

@@ -1,0 +1,157 @@
+"""A payload folder as a whole: its parts parsed, and everything wrong with it.
+
+`load` is for a staged copy, whose files are what its contents list says. `verify_folder` is what
+`nondum payload check` and the host both run on a folder as it is.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+from nondum.sdk.errors import NondumError, PayloadRefused, Problem
+from nondum.wheelhouse import contents, drive, index, lock, manifest, wheel
+from nondum.wheelhouse.contents import Contents
+from nondum.wheelhouse.index import Index
+from nondum.wheelhouse.lock import Lock, LockedWheel
+from nondum.wheelhouse.manifest import Manifest
+from nondum.wheelhouse.preflight import HostFacts, preflight, select, unmet
+from nondum.wheelhouse.signatures import Verifier
+
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True, slots=True)
+class StagedPayload:
+    """A payload whose files are in staging and were checked against its contents list."""
+
+    folder: Path
+    contents: Contents
+    manifest: Manifest
+    locks: Mapping[str, Lock]
+    index: Index
+
+    def wheels(self, facts: HostFacts) -> dict[str, tuple[LockedWheel, ...]]:
+        """The wheels of each component on such a host. Raises `PayloadRefused`."""
+        return select(self.manifest, self.locks, facts)
+
+
+def load(folder: Path, listed: Contents) -> StagedPayload:
+    """Parse a staged payload. Raises `PayloadRefused` with the problems of all its parts."""
+    problems: list[Problem] = []
+    said = _part(problems, lambda: manifest.parse(_text(folder, manifest.NAME), manifest.NAME))
+    described = _part(problems, lambda: index.parse(_bytes(folder, index.NAME), index.NAME))
+    locks = {}
+    for component in said.components if said else ():
+        if parsed := _part(problems, partial(_lock, folder, lock.file_name(component.id))):
+            locks[component.id] = parsed
+    if said is None or described is None or problems:
+        raise PayloadRefused(*problems)
+    problems.extend(_disagreements(listed, said, locks, described))
+    if problems:
+        raise PayloadRefused(*problems)
+    return StagedPayload(folder, listed, said, locks, described)
+
+
+def is_metadata(path: str) -> bool:
+    """Whether a listed file is needed to judge the payload, rather than a wheel."""
+    return not path.startswith("wheels/")
+
+
+def check_wheels(payload: StagedPayload, facts: HostFacts) -> tuple[Problem, ...]:
+    """What is wrong with the wheels that such a host would install, but for their contents,
+    which are checked as they are unpacked."""
+    problems: list[Problem] = []
+    for component, chosen in payload.wheels(facts).items():
+        requirements = {}
+        for locked in chosen:
+            with wheel.opened(payload.folder / locked.path) as data:
+                layout = wheel.lay_out(data, locked.filename)
+                problems.extend(p for p in layout.problems if p not in problems)
+                requirements[locked.name] = wheel.requirements(data, layout)
+        problems.extend(unmet(requirements, chosen, facts, lock.file_name(component)))
+    return tuple(problems)
+
+
+def verify_folder(
+    folder: Path, verifier: Verifier, facts: HostFacts | None = None
+) -> tuple[Problem, ...]:
+    """Everything wrong with a payload folder; with `facts`, also what keeps it from that host."""
+    try:
+        data = drive.read_contents(folder)
+        verdict = verifier.verify(data, drive.read_signature(folder))
+        if verdict.problems:
+            return verdict.problems
+        listed = contents.parse(data, f"{folder.name}/{contents.NAME}")
+        with tempfile.TemporaryDirectory(prefix="nondum-check-") as staging:
+            copied = Path(staging) / "payload"
+            drive.copy(folder, listed, copied)
+            return tuple(_verify_staged(load(copied, listed), facts))
+    except NondumError as error:
+        return error.problems
+
+
+def _verify_staged(payload: StagedPayload, facts: HostFacts | None) -> Iterator[Problem]:
+    for path in sorted((payload.folder / "wheels").glob("*.whl")):
+        yield from wheel.check(path)
+    if facts is not None:
+        problems = preflight(payload.manifest, payload.locks, facts)
+        yield from problems
+        if not problems:
+            yield from check_wheels(payload, facts)
+
+
+def _disagreements(
+    listed: Contents, said: Manifest, locks: Mapping[str, Lock], described: Index
+) -> Iterator[Problem]:
+    """Where the parts of a payload contradict one another."""
+    if said.id != listed.payload_id:
+        text = f"id is {said.id!r}, the contents list says {listed.payload_id!r}"
+        yield Problem("MANIFEST_VALUE", text, where=manifest.NAME)
+    sizes = {entry.path: (entry.sha256, entry.size) for entry in listed.entries}
+    for component, parsed in locks.items():
+        for locked in parsed.wheels:
+            if sizes.get(locked.path) != (locked.sha256, locked.size):
+                text = f"{locked.path} is not in the contents list as the lock has it"
+                yield Problem("LOCK_PATH", text, where=lock.file_name(component))
+    ids = {component.id for component in said.components}
+    for missing in sorted(ids - described.keys()):
+        yield Problem("INDEX_INVALID", f"component {missing!r} is missing", where=index.NAME)
+    for unknown in sorted(described.keys() - ids):
+        text = f"component {unknown!r} is not in the manifest"
+        yield Problem("INDEX_INVALID", text, where=index.NAME)
+
+
+def _part(problems: list[Problem], parse: Callable[[], _T]) -> _T | None:
+    """What `parse` makes, or None with its problems noted."""
+    try:
+        return parse()
+    except NondumError as error:
+        problems.extend(error.problems)
+        return None
+
+
+def _lock(folder: Path, name: str) -> Lock:
+    return lock.parse(_text(folder, name), name)
+
+
+def _bytes(folder: Path, name: str) -> bytes:
+    try:
+        return (folder / name).read_bytes()
+    except FileNotFoundError as error:
+        problem = Problem(
+            "FILE_MISSING", "is not in the payload", where=name, fix="build the payload again"
+        )
+        raise PayloadRefused(problem) from error
+
+
+def _text(folder: Path, name: str) -> str:
+    try:
+        return _bytes(folder, name).decode()
+    except UnicodeDecodeError as error:
+        problem = Problem("NOT_UTF8", f"byte {error.start} is not UTF-8", where=name)
+        raise PayloadRefused(problem) from error
