@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from importlib.metadata import entry_points
 
 from nondum.planning.contribution import Contribution
 from nondum.planning.domain import Merged
@@ -10,7 +11,7 @@ from nondum.planning.goal import parse_goal
 from nondum.planning.ground import ground
 from nondum.planning.merge import merge
 from nondum.sdk.description import Behaviour, Fragment, Output, PluginDescription, Unit
-from nondum.sdk.planner import GroundTask
+from nondum.sdk.planner import GroundTask, Planner
 
 ROVER = "rover"
 
@@ -237,3 +238,11 @@ def task(contributions: Iterable[Contribution], goal: str) -> GroundTask:
     merged = merge(present, ROVER)
     assert not merged.quarantined, merged.quarantined
     return ground(merged, at_rest(present, merged), parse_goal(goal, merged).expr)
+
+
+def planner() -> Planner:
+    """pyperplan's search, found as hosts find it."""
+    [found] = entry_points(group="nondum.planners", name="pyperplan")
+    made = found.load()()
+    assert isinstance(made, Planner)
+    return made

@@ -15,15 +15,16 @@ from tests.planning.strangers import (
     VISUAL_TRACKER,
     component,
     components,
+    planner,
     task,
 )
 
 from nondum.planning.contribution import Contribution
+from nondum.planning.merge import merge
 from nondum.planning.validate import validate
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import GoalRefused
 from nondum.sdk.planner import GroundTask, Plan, Unsolvable
-from nondum_planner_pyperplan import PyperplanPlanner
 
 FOLLOW = "(following self person)"
 POINT = "(pointing self radiation-source)"
@@ -33,7 +34,7 @@ REPORT = "(reported person self)"
 def plan(contributions: Iterable[Contribution], goal: str) -> list[str]:
     """The names of the plan's steps; fails if there is none, or it is wrong."""
     grounded = task(contributions, goal)
-    answer = PyperplanPlanner().plan(grounded, 5.0)
+    answer = planner().plan(grounded, 5.0)
     assert isinstance(answer, Plan), answer
     assert not validate(grounded, answer)
     return [grounded.actions[step].name for step in answer.steps]
@@ -44,7 +45,7 @@ def schemas(steps: Iterable[str]) -> list[str]:
 
 
 def has_no_plan(grounded: GroundTask) -> bool:
-    return isinstance(PyperplanPlanner().plan(grounded, 5.0), Unsolvable)
+    return isinstance(planner().plan(grounded, 5.0), Unsolvable)
 
 
 def test_person_is_followed() -> None:
@@ -130,3 +131,30 @@ def test_each_plugin_is_needed(missing: PluginDescription, goal: str) -> None:
 def test_goal_about_an_unknown_object_is_refused() -> None:
     with pytest.raises(GoalRefused, match="nobody declares 'radiation-source'"):
         task(components([PAN_TILT_UNIT]), POINT)
+
+
+def test_host_finds_what_a_call_needs() -> None:
+    """Which component to call, with which arguments, streams and values."""
+    present = components(STRANGERS)
+    merged = merge(present, "rover")
+    steps = {a.schema: a for goal in (FOLLOW, POINT) for a in task(present, goal).actions}
+    track = steps["visual-tracker.track"]
+    assert merged.owner(track.arguments[0]) == ("rover", "visual-tracker")
+    assert merged.action(track.schema).behaviour == "track"
+    assert merged.bound(track) == {
+        "u": "rover__visual-tracker__tracker",
+        "d": "rover__people-detector__found",
+        "o": "rover__visual-tracker__steering",
+        "h": "rover",
+        "c": "person",
+    }
+    assert merged.streams(track) == (
+        "rover__people-detector__found",
+        "rover__visual-tracker__steering",
+    )
+    point = steps["pan-tilt-unit.point"]
+    assert merged.streams(point) == ()
+    assert merged.valued_facts(point) == ("bearing-known radiation-source rover",)
+    assert merged.valued_facts(track) == ()
+    assert "mobile-base.drive" in merged.lasting()
+    assert "compton-camera.localise" not in merged.lasting()

@@ -6,6 +6,7 @@ import random
 from collections.abc import Iterable
 from itertools import product
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.planning.fragments import HOST, brings
@@ -17,6 +18,7 @@ from nondum.planning.goal import parse_goal
 from nondum.planning.ground import ground
 from nondum.planning.merge import merge
 from nondum.planning.relaxed import quick_answer
+from nondum.sdk.errors import FragmentRefused
 from nondum.sdk.planner import AlreadyTrue, GroundAction, GroundTask, Unsolvable
 
 WORDS = """(:constants a b c - place red - class)
@@ -192,6 +194,13 @@ def test_unreachable_goal_is_proved_so() -> None:
 
 def test_reachable_goal_needs_a_search() -> None:
     assert quick_answer(task(MOVE, [*ROAD, f"at {LEFT} a"], f"(at {LEFT} c)")) is None
+
+
+def test_action_that_binds_everything_is_refused() -> None:
+    wide = "(:action w :parameters (?u - base ?a ?b ?c ?d ?e ?f ?g ?h ?i) :effect (done ?u))"
+    with pytest.raises(FragmentRefused, match=r"of them of 'drive\.w'") as refused:
+        task(wide, [], f"(done {LEFT})")
+    assert refused.value.problems[0].where.startswith("drive 1.0 domain.pddl:")
 
 
 # Against a grounder that tries everything

@@ -5,13 +5,13 @@ from __future__ import annotations
 from itertools import permutations
 
 import pytest
+from tests.planning.fragments import HOST, brings
 
 from nondum.planning.contribution import Contribution
 from nondum.planning.domain import Merged
 from nondum.planning.merge import merge
 from nondum.sdk.description import Behaviour
 from nondum.sdk.errors import Problem
-from tests.planning.fragments import HOST, brings
 
 
 def merged(*contributions: Contribution) -> Merged:
@@ -250,6 +250,23 @@ def test_undeclared_parent_is_taken_with_a_warning() -> None:
     result = merged(brings("drive", "(:types cart - vehicle)"))
     assert result.domain.types.is_kind_of("cart", "vehicle")
     assert "type 'vehicle' is not declared" in result.warnings[0].message
+
+
+def test_mistakes_beyond_measure_are_cut_off() -> None:
+    atoms = " ".join(f"(unknown-{i})" for i in range(5000))
+    body = f"(:action go :parameters (?u - base) :precondition (and {atoms}))"
+    assert len(merge([brings("drive", body)], HOST).quarantined["drive"]) == 50
+
+
+def test_action_with_very_many_parameters_is_refused() -> None:
+    parameters = " ".join(f"?p{i} - place" for i in range(40))
+    found = refused(brings("drive", f"(:action go :parameters (?u - base {parameters}))"))
+    assert found.code == "PDDL_TOO_MANY"
+
+
+def test_very_many_types_are_refused() -> None:
+    chain = " ".join(f"t{i} - t{i + 1}" for i in range(5000))
+    assert refused(brings("drive", f"(:types {chain} t5000)")).code == "PDDL_TOO_MANY"
 
 
 # Lasting and finishing behaviours

@@ -200,11 +200,8 @@ def test_long_text_is_refused() -> None:
     assert problem.have == str(SIZE_LIMIT_BYTES + 1)
 
 
-PIECES = st.sampled_from(
-    "( ) - ; \n ? ?x :types :action :parameters define domain problem and or not forall a b 3 = <".split(
-        " "
-    )
-)
+WORDS = ":types :action :parameters define domain problem and or not forall a b 3 = < ?x"
+PIECES = st.sampled_from(["(", ")", "-", ";", "\n", "?", *WORDS.split()])
 
 
 @given(st.lists(PIECES, max_size=40).map(" ".join))

@@ -64,6 +64,8 @@ class Agreement:
 
 
 def _join_types(agreed: Agreement, claims: Claims, report: Report) -> None:
+    if not claims.types:
+        return
     both = dict(agreed.parents)
     for claim in claims.types:
         both[claim.name] = both.get(claim.name, frozenset()) | claim.parents

@@ -8,6 +8,9 @@ from difflib import get_close_matches
 from nondum.planning.syntax import Place
 from nondum.sdk.errors import Problem
 
+_LOOKED_AT = 1000
+"""How many names are compared: a fragment of nothing but mistakes must not cost minutes."""
+
 
 def caret(text: str, place: Place) -> str:
     """The line of `place`, and below it a caret under its column.
@@ -36,7 +39,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
     >>> nearest("redy", ["ready", "on"])
     "did you mean 'ready'?"
     """
-    found = get_close_matches(name, sorted(known), n=1, cutoff=0.6)
+    found = get_close_matches(name, sorted(known)[:_LOOKED_AT], n=1, cutoff=0.6)
     return f"did you mean {found[0]!r}?" if found else ""
 
 

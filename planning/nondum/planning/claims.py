@@ -13,7 +13,7 @@ from nondum.planning.execution import behaviours_of
 from nondum.planning.inventory import FactClaim, ObjectClaim, facts_of, objects_of, own_objects
 from nondum.planning.parse import parse_fragment
 from nondum.planning.schema import schema_of
-from nondum.planning.scope import Report, Scope
+from nondum.planning.scope import Report, Scope, TooManyProblems
 from nondum.planning.syntax import DomainFragment, FragmentSyntax, ProblemFragment
 from nondum.planning.vocabulary import TypeClaim, predicates_of, types_of
 from nondum.sdk.errors import FragmentRefused, Problem
@@ -35,14 +35,22 @@ class Claims:
 
 @lru_cache(maxsize=4096)
 def claims_of(contribution: Contribution) -> Claims:
-    """Parse and check one contribution; all its problems at once."""
+    """Parse and check one contribution; its problems at once, up to `PROBLEMS_LIMIT`."""
     by = Origin(contribution.component, contribution.plugin, contribution.version)
     report = Report(by, {fragment.name: fragment.text for fragment in contribution.fragments})
+    try:
+        claims = _claims(contribution, report)
+    except TooManyProblems:
+        claims = Claims(contribution)
+    return Claims(contribution, problems=tuple(report.problems)) if report.problems else claims
+
+
+def _claims(contribution: Contribution, report: Report) -> Claims:
     fragments = _parsed(contribution, report)
     domains = [fragment for fragment in fragments if isinstance(fragment, DomainFragment)]
     types = types_of(domains, report)
     if report.problems:
-        return Claims(contribution, problems=tuple(report.problems))
+        return Claims(contribution)
     graph = core_graph().with_parents({claim.name: claim.parents for claim in types})
     scope = Scope(report, contribution.host, contribution.local_names(), graph)
     scope.predicates.update(core_predicates())
@@ -51,7 +59,7 @@ def claims_of(contribution: Contribution) -> Claims:
     scope.objects.update(own_objects(contribution, scope))
     objects = objects_of(fragments, scope)
     scope.objects.update({claim.name: claim.types for claim in objects})
-    claims = Claims(
+    return Claims(
         contribution=contribution,
         types=types,
         predicates=predicates,
@@ -60,7 +68,6 @@ def claims_of(contribution: Contribution) -> Claims:
         facts=facts_of(fragments, scope),
         warnings=tuple(report.warnings),
     )
-    return Claims(contribution, problems=tuple(report.problems)) if report.problems else claims
 
 
 def _parsed(contribution: Contribution, report: Report) -> list[FragmentSyntax]:

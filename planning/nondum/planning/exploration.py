@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -10,6 +10,10 @@ from nondum.planning.domain import Action, Merged, bind
 from nondum.planning.facts import parts
 from nondum.planning.join import Binding, Pattern, Relations, Rule, bindings, unconditional
 from nondum.planning.syntax import Atom, Equal
+from nondum.sdk.errors import FragmentRefused, Problem
+
+INSTANCES_LIMIT = 100_000
+"""Ground actions that a domain may have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +48,14 @@ def explore(
     """Explore from where exactly `facts` hold; `objects` exist beside the merged ones.
 
     A condition that something is false counts as reachable, unless it is true and nothing can ever
-    make it false.
+    make it false. Raises `FragmentRefused` (PDDL_TOO_MANY) that names the action with most
+    bindings when there are more than `INSTANCES_LIMIT`: to leave some out would make a wrong proof.
     """
     types = {name: found.types for name, found in merged.objects.items()} | dict(objects or {})
     believed = frozenset(f for f in facts if all(o in types for o in parts(f)[1]))
     deletable = {a.predicate for action in _actions(merged) for a in action.effect.delete}
-    rules = [(action, _rule(action, types, merged)) for action in _actions(merged)]
+    members = members_of(merged, types)
+    rules = [(action, _rule(action, members)) for action in _actions(merged)]
     return _Fixpoint(rules, believed, frozenset(deletable)).run()
 
 
@@ -57,22 +63,39 @@ def _actions(merged: Merged) -> Iterable[Action]:
     return merged.domain.actions.values()
 
 
-def _rule(action: Action, types: Mapping[str, tuple[str, ...]], merged: Merged) -> Rule:
-    graph = merged.domain.types
+def members_of(merged: Merged, types: Mapping[str, tuple[str, ...]]) -> defaultdict[str, set[str]]:
+    """Type → the objects of it; `types` are the types of every object."""
+    members: defaultdict[str, set[str]] = defaultdict(set)
+    for name, of in types.items():
+        for type_ in of:
+            for above in merged.domain.types.ancestors(type_):
+                members[above].add(name)
+    return members
+
+
+def domains_of(action: Action, members: Mapping[str, set[str]]) -> dict[str, frozenset[str]]:
+    """Parameter → the objects that it may stand for."""
+    return {
+        parameter.name: frozenset().union(*(members.get(t, ()) for t in parameter.types))
+        for parameter in action.parameters
+    }
+
+
+def _rule(action: Action, members: Mapping[str, set[str]]) -> Rule:
     return Rule(
         variables=tuple(parameter.name for parameter in action.parameters),
-        domains={
-            parameter.name: frozenset(
-                name for name, of in types.items() if graph.is_one_of(of, parameter.types)
-            )
-            for parameter in action.parameters
-        },
-        patterns=tuple(
-            Pattern(atom.predicate, tuple(term.name for term in atom.terms))
-            for atom in action.precondition.positive
-        ),
+        domains=domains_of(action, members),
+        patterns=patterns_of(action),
         equal=_pairs(action.precondition.equal),
         unequal=_pairs(action.precondition.unequal),
+    )
+
+
+def patterns_of(action: Action) -> tuple[Pattern, ...]:
+    """The conditions that facts must match."""
+    return tuple(
+        Pattern(atom.predicate, tuple(term.name for term in atom.terms))
+        for atom in action.precondition.positive
     )
 
 
@@ -132,9 +155,22 @@ class _Fixpoint:
             cost=action.effect.cost,
         )
         self._instances[name] = instance
+        if len(self._instances) > INSTANCES_LIMIT:
+            raise self._too_many()
         new = add - self._reached
         self._reached |= new
         self._waiting += sorted(new)
+
+    def _too_many(self) -> FragmentRefused:
+        count = Counter(name.split(" ", 1)[0] for name in self._instances)
+        widest = max((action for action, _ in self._rules), key=lambda action: count[action.name])
+        message = (
+            f"more than {INSTANCES_LIMIT} ways to bind the actions,"
+            f" {count[widest.name]} of them of {widest.name!r}"
+        )
+        where = " and ".join(map(str, widest.origins))
+        fix = "add preconditions that say which objects belong together"
+        return FragmentRefused(Problem("PDDL_TOO_MANY", message, where, fix=fix))
 
 
 def _bound(atoms: Iterable[Atom], binding: Binding) -> frozenset[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -10,7 +11,7 @@ from nondum.planning.caret import Misplaced
 from nondum.planning.domain import Merged, Origin
 from nondum.planning.normal import Condition, condition_of
 from nondum.planning.parse import parse_formula
-from nondum.planning.scope import SELF, Report, Scope
+from nondum.planning.scope import SELF, Report, Scope, TooManyProblems
 from nondum.planning.syntax import Not
 from nondum.planning.typegraph import ROOT
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
@@ -87,9 +88,10 @@ def condition_problems(
     scope = Scope(report, merged.self_host, {}, merged.domain.types)
     scope.predicates.update(merged.domain.predicates)
     scope.objects.update({name: found.types for name, found in merged.objects.items()})
-    for atom in condition.atoms():
-        scope.check_atom(atom, variables or {})
-    for pair in condition.pairs():
-        for term in (pair.left, pair.right):
-            scope.check_term(term, (ROOT,), variables or {})
+    with suppress(TooManyProblems):
+        for atom in condition.atoms():
+            scope.check_atom(atom, variables or {})
+        for pair in condition.pairs():
+            for term in (pair.left, pair.right):
+                scope.check_term(term, (ROOT,), variables or {})
     return tuple(report.problems)

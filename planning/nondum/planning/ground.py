@@ -27,7 +27,8 @@ def ground(
     `facts` are all that is believed, those of `merged.init` included where they still hold; facts
     about objects that are not there are left out. `objects` (name → types) exist beside the merged
     ones. A fact that must be false somewhere has its twin in the task (`facts.twin`). The same
-    input gives the same task, whatever the order of `facts`.
+    input gives the same task, whatever the order of `facts`. Raises `FragmentRefused` as `explore`
+    does.
     """
     found = explore(merged, facts, objects)
     wanted, unwanted = _goal_facts(goal)

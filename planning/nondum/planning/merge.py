@@ -15,7 +15,7 @@ from nondum.planning.claims import Claims, claims_of
 from nondum.planning.contribution import Contribution
 from nondum.planning.domain import Action, Domain, Merged, Object, Origin
 from nondum.planning.facts import parts
-from nondum.planning.scope import Report
+from nondum.planning.scope import Report, TooManyProblems
 from nondum.planning.typegraph import TypeGraph
 from nondum.sdk.errors import Problem
 
@@ -37,7 +37,7 @@ def merge(contributions: Iterable[Contribution], self_host: str) -> Merged:
         claims = claims_of(contribution)
         report = _report(contribution)
         report.problems.extend(claims.problems)
-        wider = agreement if claims.problems else agreement.joined_by(claims, report)
+        wider = agreement if claims.problems else _joined(agreement, claims, report)
         if report.problems:
             quarantined[quarantine_key(contribution, self_host)] = tuple(report.problems)
             continue
@@ -45,6 +45,13 @@ def merge(contributions: Iterable[Contribution], self_host: str) -> Merged:
         admitted.append(claims)
         warnings += (*claims.warnings, *report.warnings)
     return _merged(agreement, admitted, quarantined, tuple(warnings), self_host)
+
+
+def _joined(agreement: Agreement, claims: Claims, report: Report) -> Agreement:
+    try:
+        return agreement.joined_by(claims, report)
+    except TooManyProblems:
+        return agreement
 
 
 def _refuse_doubles(ordered: Sequence[Contribution]) -> None:

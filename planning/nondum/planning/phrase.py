@@ -17,7 +17,9 @@ from nondum.planning.syntax import Term, TypedName
 from nondum.sdk.description import Phrase
 from nondum.sdk.errors import FragmentRefused, Problem
 
-MAX_SLOTS = 4
+MAX_SLOTS = 3
+MAX_OPTIONAL_PARTS = 4
+"""Both bound the ways to read a sentence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +134,8 @@ def _check_slots(phrase: KnownPhrase, merged: Merged) -> None:
     slots = tuple(slots_of(phrase.parts))
     if len(slots) > MAX_SLOTS:
         raise PatternInvalid(f"more than {MAX_SLOTS} slots")
+    if _optional_parts(phrase.parts) > MAX_OPTIONAL_PARTS:
+        raise PatternInvalid(f"more than {MAX_OPTIONAL_PARTS} parts in []")
     for part in phrase.parts:
         if isinstance(part, Optional) and not all(slot.is_free for slot in slots_of(part.parts)):
             raise PatternInvalid("what is in [] may be left out, so it cannot name anything")
@@ -139,3 +143,7 @@ def _check_slots(phrase: KnownPhrase, merged: Merged) -> None:
         unknown = [name for name in slot.types if name not in merged.domain.types]
         if unknown or not slot.types:
             raise PatternInvalid(f"slot {{{slot.name}}} has no known type")
+
+
+def _optional_parts(parts: tuple[Part, ...]) -> int:
+    return sum(1 + _optional_parts(part.parts) for part in parts if isinstance(part, Optional))

@@ -24,7 +24,7 @@ from nondum.planning.phrase import KnownPhrase, known_phrases
 from nondum.planning.scope import SELF
 from nondum.sdk.errors import GoalRefused, Problem
 
-MAX_WORDS = 60
+MAX_WORDS = 40
 """A longer sentence is not looked at."""
 
 _Names = Mapping[tuple[str, ...], frozenset[str]]

@@ -15,6 +15,8 @@ from nondum.sdk.description import Behaviour
 
 ACTOR_TYPE = "unit"
 
+PARAMETERS_LIMIT = 16
+
 
 def schema_of(
     declared: ActionDeclaration, plugin: str, behaviour: Behaviour | None, scope: Scope
@@ -24,6 +26,10 @@ def schema_of(
     Without a behaviour it counts as lasting when it takes something (deletes `idle` or `free`).
     """
     problems_before = len(scope.report.problems)
+    if len(declared.parameters) > PARAMETERS_LIMIT:
+        message = f"action {declared.name!r} has more than {PARAMETERS_LIMIT} parameters"
+        scope.report.problem("PDDL_TOO_MANY", message, declared.place)
+        return None
     variables = _variables(declared, scope)
     try:
         precondition, effect = condition_of(declared.precondition), effect_of(declared.effect)

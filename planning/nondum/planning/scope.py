@@ -24,6 +24,14 @@ OWNED_MARK = "__"
 """Only names of units and streams contain it."""
 
 
+PROBLEMS_LIMIT = 50
+"""So many problems of one component are told at once."""
+
+
+class TooManyProblems(Exception):
+    """The report is full; the rest is not worth looking at."""
+
+
 @dataclass(slots=True)
 class Report:
     """Collects everything wrong with one component, so that a person reads it all at once."""
@@ -35,8 +43,10 @@ class Report:
     warnings: list[Problem] = field(default_factory=list)
 
     def problem(self, code: str, message: str, place: Place, fix: str = "") -> None:
-        """Something that keeps the component out."""
+        """Something that keeps the component out. Raises `TooManyProblems` after enough of them."""
         self.problems.append(self._at(code, message, place, fix))
+        if len(self.problems) >= PROBLEMS_LIMIT:
+            raise TooManyProblems
 
     def warning(self, code: str, message: str, place: Place, fix: str = "") -> None:
         """Something that a person should know."""

@@ -8,6 +8,7 @@ from enum import Enum
 
 from nondum.planning.core import HOST_PREDICATES
 from nondum.planning.domain import Action, Merged
+from nondum.planning.exploration import domains_of, members_of, patterns_of
 from nondum.planning.facts import parts
 from nondum.planning.join import Binding, Pattern, Relations, matched
 from nondum.planning.syntax import Atom, type_text
@@ -73,8 +74,9 @@ class Tracer:
     def __init__(
         self, merged: Merged, types: Mapping[str, tuple[str, ...]], reachable: Iterable[str]
     ) -> None:
+        members = members_of(merged, types)
         self._actions = tuple(merged.domain.actions.values())
-        self._domains = {action.name: _domains(action, merged, types) for action in self._actions}
+        self._domains = {action.name: domains_of(action, members) for action in self._actions}
         self._relations = Relations()
         for text in sorted(reachable):
             self._relations.add(*parts(text))
@@ -142,28 +144,13 @@ class Tracer:
         return distinct(replace(cause, path=(action.name, *cause.path)) for cause in causes)
 
 
-def _domains(
-    action: Action, merged: Merged, types: Mapping[str, tuple[str, ...]]
-) -> dict[str, frozenset[str]]:
-    graph = merged.domain.types
-    return {
-        parameter.name: frozenset(
-            name for name, of in types.items() if graph.is_one_of(of, parameter.types)
-        )
-        for parameter in action.parameters
-    }
-
-
 class _Search:
     """Branch and bound over the bindings of one action, for the fewest conditions missing."""
 
     def __init__(
         self, action: Action, domains: Mapping[str, frozenset[str]], relations: Relations
     ) -> None:
-        self._patterns = tuple(
-            Pattern(atom.predicate, tuple(term.name for term in atom.terms))
-            for atom in action.precondition.positive
-        )
+        self._patterns = patterns_of(action)
         self._domains = domains
         self._relations = relations
         self._best: tuple[Pattern, ...] = self._patterns

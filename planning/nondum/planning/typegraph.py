@@ -29,11 +29,13 @@ class TypeGraph:
         return TypeGraph({**self.parents, **parents})
 
     def ancestors(self, name: str) -> frozenset[str]:
-        """The type itself and all above it. The graph must have no cycle."""
+        """The type itself and all above it."""
         if name not in self._ancestors:
-            found = {name, ROOT}
-            for parent in self.parents.get(name, ()):
-                found |= self.ancestors(parent)
+            found, waiting = {name, ROOT}, [name]
+            while waiting:
+                new = self.parents.get(waiting.pop(), frozenset()) - found
+                found |= new
+                waiting += new
             self._ancestors[name] = frozenset(found)
         return self._ancestors[name]
 
@@ -71,16 +73,18 @@ class TypeGraph:
         return ()
 
     def _cycle_from(self, start: str, finished: set[str]) -> tuple[str, ...]:
-        path: list[str] = []
+        path: dict[str, None] = {}
         waiting = [(start, False)]
         while waiting:
-            name, left = waiting.pop()
-            if left:
-                finished.add(path.pop())
+            name, is_done = waiting.pop()
+            if is_done:
+                del path[name]
+                finished.add(name)
             elif name in path:
-                return tuple(path[path.index(name) :])
+                names = list(path)
+                return tuple(names[names.index(name) :])
             elif name not in finished:
-                path.append(name)
+                path[name] = None
                 waiting.append((name, True))
                 waiting += ((p, False) for p in sorted(self.parents.get(name, ())))
         return ()

@@ -13,6 +13,9 @@ from nondum.planning.scope import Report, Scope
 from nondum.planning.syntax import DomainFragment, PredicateDeclaration, TypedName, type_text
 from nondum.planning.typegraph import ROOT, TypeGraph
 
+TYPES_LIMIT = 500
+"""Types that one component may declare."""
+
 
 @dataclass(frozen=True, slots=True)
 class TypeClaim:
@@ -24,10 +27,16 @@ class TypeClaim:
 
 
 def types_of(domains: Sequence[DomainFragment], report: Report) -> tuple[TypeClaim, ...]:
-    """The types beyond the core's (E-TYPE-PARENT, E-TYPE-CYCLE, E-TWICE; undeclared parents are
-    declared under `object` with a warning)."""
+    """The types beyond the core's (E-TYPE-PARENT, E-TYPE-CYCLE, E-TWICE, PDDL_TOO_MANY).
+
+    Undeclared parents are declared under `object`, with a warning.
+    """
     claims: dict[str, TypeClaim] = {}
     declared = [type_ for domain in domains for type_ in domain.types]
+    if len(declared) > TYPES_LIMIT:
+        message = f"{len(declared)} types are declared, more than {TYPES_LIMIT}"
+        report.problem("PDDL_TOO_MANY", message, declared[TYPES_LIMIT].place)
+        return ()
     for type_ in declared:
         if _is_core(type_, report):
             continue
