@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
+from nondum.host.catalogue.records import ComponentRecord, MountPose
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
 
@@ -104,9 +105,9 @@ class DriveUnreadable(Event):
 
 @dataclass(frozen=True, slots=True)
 class DrivesScanned(Event):
-    """A source of drives has told every drive that was there when it started."""
+    """The source of one kind of drives has told every drive that was there when it started."""
 
-    source: str
+    kind: str
     drives: tuple[str, ...]
 
 
@@ -178,8 +179,14 @@ class PayloadActivated(Event):
     """The payload's components are ready to be entered in the catalogue."""
 
     payload: str
-    components: tuple[Any, ...] = field(repr=False)
-    """Their `ComponentRecord`s."""
+    components: tuple[ComponentRecord, ...] = field(repr=False)
+    """Their ranks are given as they are entered."""
+    mounts: tuple[MountPose, ...] = ()
+    """Where their units sit, as the payload says."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Only names: what the components are stands in the catalogue."""
+        return {"payload": self.payload, "components": [c.id for c in self.components]}
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,10 +228,12 @@ class RetryAsked(Event):
 
 
 @dataclass(frozen=True, slots=True)
-class RemovalAsked(Event):
-    """A person asked that an installed payload be removed for good."""
+class Recovered(Event):
+    """A payload was found half done when the daemon started, and sent forward or back."""
 
     payload: str
+    found: str
+    """The step that it was found at."""
 
 
 @dataclass(frozen=True, slots=True)

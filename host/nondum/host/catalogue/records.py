@@ -14,6 +14,44 @@ from nondum.sdk.errors import Problem
 Xyz = tuple[float, float, float]
 
 
+class Step(Enum):
+    """How far a payload has come on this host. `transitions.py` says what leads where."""
+
+    RECEIVED = "received"
+    """Its contents list was read; what this host needs of it is being copied to staging."""
+    COPIED = "copied"
+    """Each file that is needed lies in staging, hashed on the way; they are being checked."""
+    VERIFIED = "verified"
+    """Manifest, locks, index and wheels are sound and fit this host."""
+    STAGED = "staged"
+    """The checked copy is in its lasting place; the wheels are being unpacked into the store."""
+    STORED = "stored"
+    """All wheels are in the store and venvs linked from it; workers are asked what they are."""
+    PROBED = "probed"
+    """Each worker runs and said what the index says."""
+    ACTIVE = "active"
+    """Its components are in the catalogue and may act."""
+    REMOVING = "removing"
+    """Withdrawn; its processes end and its files are deleted."""
+    REFUSED = "refused"
+    """It is not what it claims, or does not fit this host: nothing of it was kept."""
+    QUARANTINED = "quarantined"
+    """It could not be brought to life; it waits for a replug or a person."""
+    GONE = "gone"
+    """Not on this host, or not any more."""
+
+
+class DriveState(Enum):
+    """How far a drive has been read."""
+
+    READING = "reading"
+    """It is being looked through."""
+    COPYING = "copying"
+    """All its payloads are known; some are still being copied."""
+    IDLE = "idle"
+    """Nothing is wanted of it any more; it is unmounted and safe to pull."""
+
+
 class ComponentState(Enum):
     """How a component of an active payload is."""
 
@@ -23,6 +61,16 @@ class ComponentState(Enum):
     """Its worker ended; supervision starts it again."""
     QUARANTINED = "quarantined"
     """Its worker failed too often; it waits for a replug or a person."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """When something happened, by both clocks."""
+
+    monotonic_s: float
+    """Seconds since boot, for durations."""
+    wall_s: float
+    """Seconds since the epoch, for people."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +84,7 @@ class MountPose:
     rpy: Xyz
     """Roll, pitch, yaw in radians."""
     origin: str
-    """`person` (set on this host; outlives the component), `payload` (its default) or `unknown`."""
+    """`person` (set on this host; outlives the component) or `payload` (its default)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,22 +142,19 @@ class ComponentRecord:
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
-    """When something happened, by both clocks."""
-
-    monotonic_s: float
-    """Seconds since boot, for durations."""
-    wall_s: float
-    """Seconds since the epoch, for people."""
-
-
-@dataclass(frozen=True, slots=True)
 class DriveRecord:
     """A drive that is in."""
 
     id: str
     kind: str
+    """`slot`, `block` or `installed`."""
     root: Path
+    node: Path | None = None
+    """Block device to mount at `root`, where there is one."""
+    filesystem: str = ""
+    state: DriveState = DriveState.READING
+    since: Moment = Moment(0.0, 0.0)
+    """When it was inserted."""
     problems: tuple[Problem, ...] = ()
 
 
@@ -123,15 +168,22 @@ class PayloadRecord:
     version: str
     release: int
     fleet: str
-    step: str
-    """Name of its step in the component manager's state machine."""
-    drives: tuple[str, ...]
-    """Where it is; `installed` among them means for good."""
-    attempts: int
+    step: Step
+    sources: Mapping[str, Path]
+    """Drive → the payload's folder on it."""
     phases: Mapping[str, Moment]
     """`seen`, `verified`, `installed`, `ready` → when, as far as it has come."""
+    attempts: int = 0
+    """How often a daemon has set out to bring it to life since it last was active."""
+    waits_for: str = ""
+    """Key of a payload that must be gone first: it brings the same components."""
     components: tuple[str, ...] = ()
     problems: tuple[Problem, ...] = ()
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Where it is, by name."""
+        return tuple(sorted(self.sources))
 
 
 @dataclass(frozen=True, slots=True)

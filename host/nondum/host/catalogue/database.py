@@ -1,0 +1,214 @@
+"""The catalogue's SQLite file: opened, checked, read whole, and written by difference. Blocking.
+
+WAL and FULL synchronous: what was committed survives power loss (sqlite.org/wal.html).
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from nondum.host.catalogue import rows
+from nondum.host.catalogue.records import ComponentRecord, JournalEntry
+from nondum.host.catalogue.state import Highwater, HostState
+from nondum.sdk.errors import ConfigRefused, Problem
+
+SCHEMA = 1
+
+_PRAGMAS = (
+    "PRAGMA journal_mode = WAL",
+    "PRAGMA synchronous = FULL",
+    "PRAGMA foreign_keys = ON",
+    "PRAGMA trusted_schema = OFF",
+    "PRAGMA busy_timeout = 5000",
+)
+
+
+def connect(path: Path) -> sqlite3.Connection:
+    """Open the file, made if it is not there.
+
+    Raises `sqlite3.DatabaseError` (see `is_damaged`) and `ConfigRefused` (CATALOGUE_VERSION).
+    """
+    connection = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
+    try:
+        connection.row_factory = sqlite3.Row
+        for pragma in _PRAGMAS:
+            connection.execute(pragma)
+        (verdict,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+        if verdict != "ok":
+            raise _damaged(verdict)
+        _prepare(connection)
+    except BaseException:
+        connection.close()
+        raise
+    return connection
+
+
+def is_damaged(error: sqlite3.DatabaseError) -> bool:
+    """Whether the file itself is broken, not only out of reach or out of room."""
+    return error.sqlite_errorcode in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+
+
+def _damaged(verdict: str) -> sqlite3.DatabaseError:
+    error = sqlite3.DatabaseError(verdict)
+    error.sqlite_errorcode = sqlite3.SQLITE_CORRUPT
+    return error
+
+
+def _prepare(connection: sqlite3.Connection) -> None:
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    if version == SCHEMA:
+        return
+    if version != 0:
+        raise ConfigRefused(
+            Problem(
+                "CATALOGUE_VERSION",
+                "the catalogue was written by another version of nondum",
+                need=f"schema {SCHEMA}",
+                have=f"schema {version}",
+                fix="run the nondum that wrote it, or move the file away",
+            )
+        )
+    script = resources.files(__package__).joinpath("schema.sql").read_text(encoding="utf-8")
+    connection.executescript(f"BEGIN IMMEDIATE; {script} PRAGMA user_version = {SCHEMA}; COMMIT;")
+
+
+def load(connection: sqlite3.Connection, host: str) -> HostState:
+    """Read all of it but the journal."""
+
+    def every(table: str, order: str = "rowid") -> list[sqlite3.Row]:
+        return connection.execute(f"SELECT * FROM {table} ORDER BY {order}").fetchall()
+
+    sources, claims = every("sources", "position"), every("claims", "position")
+    payloads = [
+        rows.payload(row, [s for s in sources if s["payload"] == row["key"]])
+        for row in every("payloads")
+    ]
+    components = [
+        rows.component(row, [c for c in claims if c["component"] == row["id"]])
+        for row in every("components")
+    ]
+    found = connection.execute("SELECT revision FROM host").fetchone()
+    return HostState(
+        host=host,
+        revision=found["revision"] if found else 0,
+        drives={d.id: d for d in map(rows.drive, every("drives"))},
+        payloads={p.key: p for p in payloads},
+        components={c.id: c for c in components},
+        devices={d.id: d for d in map(rows.device, every("devices"))},
+        mounts={m.unit: m for m in map(rows.mount, every("mounts"))},
+        highwater={
+            (row["fleet"], row["payload_id"]): Highwater(row["release"], row["digest"])
+            for row in every("highwater")
+        },
+    )
+
+
+def write(
+    connection: sqlite3.Connection,
+    before: HostState,
+    after: HostState,
+    entries: Sequence[JournalEntry],
+) -> None:
+    """Commit, at once, the difference of two states and the journal entries that tell of it."""
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        _write_state(connection, before, after)
+        for entry in entries:
+            _insert(connection, "journal", rows.entry_row(entry))
+        connection.execute("COMMIT")
+    except BaseException:
+        connection.execute("ROLLBACK")
+        raise
+
+
+def journal(
+    connection: sqlite3.Connection, subject: str | None, after: int, limit: int
+) -> tuple[JournalEntry, ...]:
+    """The last `limit` entries with an id above `after`, oldest first."""
+    found = connection.execute(
+        "SELECT * FROM journal WHERE id > ? AND (? IS NULL OR subject = ?) "
+        "ORDER BY id DESC LIMIT ?",
+        (after, subject, subject, limit),
+    )
+    return tuple(rows.entry(row) for row in reversed(found.fetchall()))
+
+
+def _write_state(connection: sqlite3.Connection, before: HostState, after: HostState) -> None:
+    if (before.host, before.revision) != (after.host, after.revision):
+        connection.execute("DELETE FROM host")
+        _insert(connection, "host", {"name": after.host, "revision": after.revision})
+    simple: Iterable[tuple[str, str, Any, Any, Callable[[Any], rows.Row]]] = (
+        ("drives", "id", before.drives, after.drives, rows.drive_row),
+        ("mounts", "unit", before.mounts, after.mounts, rows.mount_row),
+    )
+    for table, key, old, new, as_row in simple:
+        _difference(connection, table, key, old, new, as_row)
+    for (fleet, payload_id), newest in after.highwater.items():
+        if before.highwater.get((fleet, payload_id)) != newest:
+            known = {"fleet": fleet, "payload_id": payload_id}
+            row = {**known, "release": newest.release, "digest": newest.digest}
+            _insert(connection, "highwater", row)
+    _difference(connection, "payloads", "key", before.payloads, after.payloads, rows.payload_row)
+    for payload in _changed(before.payloads, after.payloads):
+        _replace_parts(connection, "sources", "payload", payload.key, rows.source_rows(payload))
+    _write_components(connection, before, after)
+
+
+def _write_components(connection: sqlite3.Connection, before: HostState, after: HostState) -> None:
+    """Devices around components: a claim refers to both."""
+    changed: list[ComponentRecord] = _changed(before.components, after.components)
+    gone = before.components.keys() - after.components.keys()
+    for id in sorted({*gone, *(component.id for component in changed)}):
+        connection.execute("DELETE FROM claims WHERE component = ?", (id,))
+    _difference(connection, "devices", "id", before.devices, after.devices, rows.device_row)
+    _difference(
+        connection, "components", "id", before.components, after.components, rows.component_row
+    )
+    for component in changed:
+        _replace_parts(connection, "claims", "component", component.id, rows.claim_rows(component))
+
+
+def _changed(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[Any]:
+    return [value for key, value in after.items() if before.get(key) != value]
+
+
+def _difference(
+    connection: sqlite3.Connection,
+    table: str,
+    key: str,
+    before: Mapping[str, Any],
+    after: Mapping[str, Any],
+    as_row: Callable[[Any], rows.Row],
+) -> None:
+    for gone in before.keys() - after.keys():
+        connection.execute(f"DELETE FROM {table} WHERE {key} = ?", (gone,))
+    for value in _changed(before, after):
+        _upsert(connection, table, key, as_row(value))
+
+
+def _replace_parts(
+    connection: sqlite3.Connection, table: str, owner: str, id: str, parts: list[rows.Row]
+) -> None:
+    connection.execute(f"DELETE FROM {table} WHERE {owner} = ?", (id,))
+    for part in parts:
+        _insert(connection, table, part)
+
+
+def _insert(connection: sqlite3.Connection, table: str, row: rows.Row) -> None:
+    names, marks = ", ".join(row), ", ".join(f":{name}" for name in row)
+    connection.execute(f"INSERT OR REPLACE INTO {table} ({names}) VALUES ({marks})", row)
+
+
+def _upsert(connection: sqlite3.Connection, table: str, key: str, row: rows.Row) -> None:
+    """Not REPLACE, which deletes the old row first and, by cascade, all that refers to it."""
+    names, marks = ", ".join(row), ", ".join(f":{name}" for name in row)
+    updates = ", ".join(f"{name} = excluded.{name}" for name in row if name != key)
+    connection.execute(
+        f"INSERT INTO {table} ({names}) VALUES ({marks}) "
+        f"ON CONFLICT ({key}) DO UPDATE SET {updates}",
+        row,
+    )

@@ -1,0 +1,234 @@
+"""Records as rows of `schema.sql`, and rows as records."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from nondum.host.catalogue.records import (
+    ComponentRecord,
+    ComponentState,
+    DeviceClaim,
+    DeviceRecord,
+    DriveRecord,
+    DriveState,
+    JournalEntry,
+    Moment,
+    MountPose,
+    PayloadRecord,
+    Step,
+)
+from nondum.host.events import plain
+from nondum.sdk.description import PluginDescription
+from nondum.sdk.errors import Problem
+
+Row = dict[str, Any]
+
+
+def as_json(value: Any) -> str:
+    """Any value of a record as JSON text."""
+    return json.dumps(plain(value), ensure_ascii=False, separators=(",", ":"))
+
+
+def _problems(text: str) -> tuple[Problem, ...]:
+    return tuple(Problem(**problem) for problem in json.loads(text))
+
+
+def _pair(moment: Moment) -> list[float]:
+    return [moment.monotonic_s, moment.wall_s]
+
+
+def drive_row(drive: DriveRecord) -> Row:
+    """A row of `drives`."""
+    return {
+        "id": drive.id,
+        "kind": drive.kind,
+        "root": str(drive.root),
+        "node": str(drive.node) if drive.node else None,
+        "filesystem": drive.filesystem,
+        "state": drive.state.value,
+        "since": as_json(_pair(drive.since)),
+        "problems": as_json(drive.problems),
+    }
+
+
+def drive(row: sqlite3.Row) -> DriveRecord:
+    """A drive of its row."""
+    return DriveRecord(
+        id=row["id"],
+        kind=row["kind"],
+        root=Path(row["root"]),
+        node=Path(row["node"]) if row["node"] else None,
+        filesystem=row["filesystem"],
+        state=DriveState(row["state"]),
+        since=Moment(*json.loads(row["since"])),
+        problems=_problems(row["problems"]),
+    )
+
+
+def payload_row(payload: PayloadRecord) -> Row:
+    """A row of `payloads`."""
+    return {
+        "key": payload.key,
+        "digest": payload.digest,
+        "payload_id": payload.payload_id,
+        "version": payload.version,
+        "release": payload.release,
+        "fleet": payload.fleet,
+        "step": payload.step.value,
+        "phases": as_json({name: _pair(moment) for name, moment in payload.phases.items()}),
+        "attempts": payload.attempts,
+        "waits_for": payload.waits_for,
+        "components": as_json(payload.components),
+        "problems": as_json(payload.problems),
+    }
+
+
+def payload(row: sqlite3.Row, sources: Iterable[sqlite3.Row]) -> PayloadRecord:
+    """A payload of its row and those of its sources, in their order."""
+    phases = json.loads(row["phases"])
+    return PayloadRecord(
+        key=row["key"],
+        digest=row["digest"],
+        payload_id=row["payload_id"],
+        version=row["version"],
+        release=row["release"],
+        fleet=row["fleet"],
+        step=Step(row["step"]),
+        sources={source["drive"]: Path(source["folder"]) for source in sources},
+        phases={name: Moment(*pair) for name, pair in phases.items()},
+        attempts=row["attempts"],
+        waits_for=row["waits_for"],
+        components=tuple(json.loads(row["components"])),
+        problems=_problems(row["problems"]),
+    )
+
+
+def source_rows(payload: PayloadRecord) -> list[Row]:
+    """Rows of `sources`."""
+    return [
+        {"payload": payload.key, "position": i, "drive": drive, "folder": str(folder)}
+        for i, (drive, folder) in enumerate(payload.sources.items())
+    ]
+
+
+def component_row(component: ComponentRecord) -> Row:
+    """A row of `components`."""
+    return {
+        "id": component.id,
+        "payload": component.payload,
+        "payload_id": component.payload_id,
+        "distribution": component.distribution,
+        "entry_point": component.entry_point,
+        "version": component.version,
+        "state": component.state.value,
+        "description": as_json(component.description),
+        "venv": str(component.venv),
+        "site_packages": str(component.site_packages),
+        "scratch": str(component.scratch),
+        "rank": component.rank,
+        "permissions": as_json(component.permissions),
+        "settings": as_json(component.settings),
+        "problems": as_json(component.problems),
+    }
+
+
+def component(row: sqlite3.Row, claims: Iterable[sqlite3.Row]) -> ComponentRecord:
+    """A component of its row and those of its claims, in their order."""
+    return ComponentRecord(
+        id=row["id"],
+        payload=row["payload"],
+        payload_id=row["payload_id"],
+        distribution=row["distribution"],
+        entry_point=row["entry_point"],
+        version=row["version"],
+        state=ComponentState(row["state"]),
+        description=PluginDescription.parse(json.loads(row["description"]), where=row["id"]),
+        venv=Path(row["venv"]),
+        site_packages=Path(row["site_packages"]),
+        scratch=Path(row["scratch"]),
+        rank=row["rank"],
+        permissions=tuple(json.loads(row["permissions"])),
+        settings=json.loads(row["settings"]),
+        devices=tuple(_claim(claim) for claim in claims),
+        problems=_problems(row["problems"]),
+    )
+
+
+def claim_rows(component: ComponentRecord) -> list[Row]:
+    """Rows of `claims`."""
+    return [
+        {
+            "component": component.id,
+            "position": i,
+            "name": claim.name,
+            "match": as_json(claim.match),
+            "optional": int(claim.optional),
+            "device": claim.device,
+            "contested_by": as_json(claim.contested_by),
+        }
+        for i, claim in enumerate(component.devices)
+    ]
+
+
+def _claim(row: sqlite3.Row) -> DeviceClaim:
+    return DeviceClaim(
+        name=row["name"],
+        match=json.loads(row["match"]),
+        optional=bool(row["optional"]),
+        device=row["device"],
+        contested_by=tuple(json.loads(row["contested_by"])),
+    )
+
+
+def device_row(device: DeviceRecord) -> Row:
+    """A row of `devices`."""
+    properties: Mapping[str, str] = device.properties
+    return {"id": device.id, "node": str(device.node), "properties": as_json(properties)}
+
+
+def device(row: sqlite3.Row) -> DeviceRecord:
+    """A device of its row."""
+    return DeviceRecord(row["id"], Path(row["node"]), json.loads(row["properties"]))
+
+
+def mount_row(mount: MountPose) -> Row:
+    """A row of `mounts`."""
+    return {"unit": mount.unit, "pose": as_json(mount.xyz + mount.rpy), "origin": mount.origin}
+
+
+def mount(row: sqlite3.Row) -> MountPose:
+    """A mount pose of its row."""
+    x, y, z, roll, pitch, yaw = json.loads(row["pose"])
+    return MountPose(row["unit"], (x, y, z), (roll, pitch, yaw), row["origin"])
+
+
+def entry_row(entry: JournalEntry) -> Row:
+    """A row of `journal`, but for its id, which the database gives."""
+    return {
+        "monotonic_s": entry.at.monotonic_s,
+        "wall_s": entry.at.wall_s,
+        "boot": entry.boot,
+        "event": entry.event,
+        "subject": entry.subject,
+        "step": entry.step,
+        "problems": as_json(entry.problems),
+        "detail": as_json(entry.detail),
+    }
+
+
+def entry(row: sqlite3.Row) -> JournalEntry:
+    """A journal entry of its row."""
+    return JournalEntry(
+        id=row["id"],
+        at=Moment(row["monotonic_s"], row["wall_s"]),
+        boot=row["boot"],
+        event=row["event"],
+        subject=row["subject"],
+        step=row["step"],
+        problems=_problems(row["problems"]),
+        detail=json.loads(row["detail"]),
+    )

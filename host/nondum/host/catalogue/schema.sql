@@ -1,0 +1,142 @@
+-- What a host knows. Values that only travel (descriptions, problems, phases) are JSON; the views
+-- below give what is in them as rows, so that everything can be asked in SQL.
+
+CREATE TABLE host (
+    name      TEXT NOT NULL,
+    revision  INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE drives (
+    id          TEXT PRIMARY KEY,
+    kind        TEXT NOT NULL,
+    root        TEXT NOT NULL,
+    node        TEXT,
+    filesystem  TEXT NOT NULL,
+    state       TEXT NOT NULL,
+    since       TEXT NOT NULL,           -- JSON [monotonic_s, wall_s]
+    problems    TEXT NOT NULL            -- JSON
+) STRICT;
+
+CREATE TABLE payloads (
+    key         TEXT PRIMARY KEY,
+    digest      TEXT NOT NULL,
+    payload_id  TEXT NOT NULL,
+    version     TEXT NOT NULL,
+    release     INTEGER NOT NULL,
+    fleet       TEXT NOT NULL,
+    step        TEXT NOT NULL,
+    phases      TEXT NOT NULL,           -- JSON {phase: [monotonic_s, wall_s]}
+    attempts    INTEGER NOT NULL,
+    waits_for   TEXT NOT NULL,
+    components  TEXT NOT NULL,           -- JSON, as its manifest names them
+    problems    TEXT NOT NULL            -- JSON
+) STRICT;
+
+CREATE TABLE sources (
+    payload   TEXT NOT NULL REFERENCES payloads (key) ON DELETE CASCADE,
+    position  INTEGER NOT NULL,          -- the first is copied from
+    drive     TEXT NOT NULL,
+    folder    TEXT NOT NULL,
+    PRIMARY KEY (payload, drive)
+) STRICT;
+
+CREATE TABLE components (
+    id             TEXT PRIMARY KEY,
+    payload        TEXT NOT NULL REFERENCES payloads (key) ON DELETE CASCADE,
+    payload_id     TEXT NOT NULL,
+    distribution   TEXT NOT NULL,
+    entry_point    TEXT NOT NULL,
+    version        TEXT NOT NULL,
+    state          TEXT NOT NULL,
+    description    TEXT NOT NULL,        -- JSON, as the plugin says
+    venv           TEXT NOT NULL,
+    site_packages  TEXT NOT NULL,
+    scratch        TEXT NOT NULL,
+    rank           INTEGER NOT NULL,
+    permissions    TEXT NOT NULL,        -- JSON
+    settings       TEXT NOT NULL,        -- JSON
+    problems       TEXT NOT NULL         -- JSON
+) STRICT;
+
+CREATE TABLE claims (
+    component     TEXT NOT NULL REFERENCES components (id) ON DELETE CASCADE,
+    position      INTEGER NOT NULL,
+    name          TEXT NOT NULL,
+    match         TEXT NOT NULL,         -- JSON
+    optional      INTEGER NOT NULL,
+    device        TEXT REFERENCES devices (id),
+    contested_by  TEXT NOT NULL,         -- JSON
+    PRIMARY KEY (component, name)
+) STRICT;
+
+CREATE TABLE devices (
+    id          TEXT PRIMARY KEY,
+    node        TEXT NOT NULL,
+    properties  TEXT NOT NULL            -- JSON
+) STRICT;
+
+CREATE TABLE mounts (
+    unit    TEXT PRIMARY KEY,
+    pose    TEXT NOT NULL,               -- JSON [x, y, z, roll, pitch, yaw]
+    origin  TEXT NOT NULL
+) STRICT;
+
+CREATE TABLE highwater (                 -- never pruned
+    fleet       TEXT NOT NULL,
+    payload_id  TEXT NOT NULL,
+    release     INTEGER NOT NULL,
+    digest      TEXT NOT NULL,
+    PRIMARY KEY (fleet, payload_id)
+) STRICT;
+
+CREATE TABLE journal (
+    id           INTEGER PRIMARY KEY AUTOINCREMENT,
+    monotonic_s  REAL NOT NULL,
+    wall_s       REAL NOT NULL,
+    boot         TEXT NOT NULL,
+    event        TEXT NOT NULL,
+    subject      TEXT NOT NULL,
+    step         TEXT NOT NULL,
+    problems     TEXT NOT NULL,          -- JSON
+    detail       TEXT NOT NULL           -- JSON
+) STRICT;
+
+CREATE INDEX journal_by_subject ON journal (subject, id);
+
+CREATE TRIGGER journal_is_never_changed BEFORE UPDATE ON journal
+BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;
+
+CREATE TRIGGER journal_is_never_deleted BEFORE DELETE ON journal
+BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;
+
+CREATE VIEW behaviours AS
+SELECT c.id AS component, b.value ->> 'name' AS name, b.value ->> 'action' AS action,
+       b.value ->> 'lasting' AS lasting, b.value -> 'phrases' AS phrases
+FROM components AS c, json_each(c.description, '$.behaviours') AS b;
+
+CREATE VIEW conditions AS
+SELECT c.id AS component, d.value ->> 'name' AS name, d.value -> 'predicates' AS predicates
+FROM components AS c, json_each(c.description, '$.conditions') AS d;
+
+CREATE VIEW fragments AS
+SELECT c.id AS component, f.value ->> 'name' AS name, f.value ->> 'text' AS text
+FROM components AS c, json_each(c.description, '$.fragments') AS f;
+
+CREATE VIEW units AS
+SELECT host.name || '__' || c.id || '__' || (u.value ->> 'name') AS unit, c.id AS component,
+       u.value ->> 'name' AS name, u.value ->> 'type' AS type
+FROM host, components AS c, json_each(c.description, '$.units') AS u;
+
+CREATE VIEW streams AS
+SELECT host.name || '__' || c.id || '__' || (o.value ->> 'name') AS stream, c.id AS component,
+       u.value ->> 'name' AS unit, o.value ->> 'type' AS type
+FROM host, components AS c, json_each(c.description, '$.units') AS u,
+     json_each(u.value, '$.outputs') AS o;
+
+CREATE VIEW phrases AS
+SELECT c.id AS component, p.value ->> 'pattern' AS pattern, p.value ->> 'goal' AS goal
+FROM components AS c, json_each(c.description, '$.phrases') AS p;
+
+CREATE VIEW labels AS
+SELECT c.id AS component, l.value ->> 'object' AS object, l.value ->> 'words' AS words
+FROM components AS c, json_each(c.description, '$.labels') AS l;

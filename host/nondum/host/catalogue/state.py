@@ -1,0 +1,50 @@
+"""All that the component manager decides from, as one frozen value; the catalogue keeps it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from nondum.host.catalogue.records import (
+    ComponentRecord,
+    DeviceRecord,
+    DriveRecord,
+    MountPose,
+    PayloadRecord,
+    Snapshot,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Highwater:
+    """The newest release of a payload that was ever active here; kept for ever."""
+
+    release: int
+    digest: str
+
+
+@dataclass(frozen=True, slots=True)
+class HostState:
+    """A host at one moment. Mappings are by id (payloads by key) and are never changed in place."""
+
+    host: str
+    revision: int = 0
+    drives: Mapping[str, DriveRecord] = field(default_factory=dict)
+    payloads: Mapping[str, PayloadRecord] = field(default_factory=dict)
+    components: Mapping[str, ComponentRecord] = field(default_factory=dict)
+    devices: Mapping[str, DeviceRecord] = field(default_factory=dict)
+    mounts: Mapping[str, MountPose] = field(default_factory=dict)
+    highwater: Mapping[tuple[str, str], Highwater] = field(default_factory=dict)
+    """(fleet, payload id) → newest release."""
+
+    def snapshot(self) -> Snapshot:
+        """The state as readers get it."""
+        return Snapshot(
+            host=self.host,
+            revision=self.revision,
+            components=tuple(sorted(self.components.values(), key=lambda c: (c.rank, c.id))),
+            payloads=tuple(self.payloads.values()),
+            drives=tuple(self.drives.values()),
+            devices=tuple(self.devices.values()),
+            mounts=tuple(self.mounts.values()),
+        )

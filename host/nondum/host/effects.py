@@ -1,0 +1,107 @@
+"""What the component manager wants done: frozen values in the imperative, for the executor.
+
+Each is idempotent: after a crash it may be carried out again from the start.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """Anything to be done."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReadDrive(Effect):
+    """Mount the drive where it needs that, and look for payloads on it."""
+
+    drive: str
+    root: Path
+    node: Path | None = None
+    filesystem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ReleaseDrive(Effect):
+    """Let go of a drive: end its reader, unmount it."""
+
+    drive: str
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadEffect(Effect):
+    """Something to be done for one payload; one at a time for each."""
+
+    payload: str
+
+
+@dataclass(frozen=True, slots=True)
+class CopyPayload(PayloadEffect):
+    """Copy what this host needs into staging, hashing on the way."""
+
+    drive: str
+    folder: Path
+    digest: str
+
+
+@dataclass(frozen=True, slots=True)
+class VerifyPayload(PayloadEffect):
+    """Check the staged copy: manifest, locks, index, wheels, preflight."""
+
+
+@dataclass(frozen=True, slots=True)
+class StagePayload(PayloadEffect):
+    """Move the checked copy to its lasting place."""
+
+
+@dataclass(frozen=True, slots=True)
+class StoreWheels(PayloadEffect):
+    """Unpack each wheel that the store lacks into it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProbeComponents(PayloadEffect):
+    """Make the venvs, start the workers, compare what they say with the index."""
+
+
+@dataclass(frozen=True, slots=True)
+class ActivatePayload(PayloadEffect):
+    """Make the components' records for the catalogue."""
+
+
+@dataclass(frozen=True, slots=True)
+class DiscardPayload(PayloadEffect):
+    """Stop what runs of a refused or quarantined payload and drop staging and venvs."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClearPayload(PayloadEffect):
+    """Stop what runs of a payload and delete all of it but the wheels in the store."""
+
+
+@dataclass(frozen=True, slots=True)
+class RestartWorker(Effect):
+    """Start a quarantined component's worker once more."""
+
+    component: str
+
+
+@dataclass(frozen=True, slots=True)
+class AttachDevice(Effect):
+    """Give a device to a component."""
+
+    component: str
+    need: str
+    device: str
+
+
+@dataclass(frozen=True, slots=True)
+class DetachDevice(Effect):
+    """Take a device from a component."""
+
+    component: str
+    need: str
+    device: str

@@ -1,0 +1,67 @@
+"""The component manager's function: (state, event) → (state, effects, events to journal).
+
+Pure: it reads no clock and touches nothing. News that means nothing any more (of a payload that is
+gone, of a component that was withdrawn) gives the same state and no events.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from nondum.host import events
+from nondum.host.catalogue.records import Moment
+from nondum.host.catalogue.state import HostState
+from nondum.host.events import Event
+from nondum.host.lifecycle import claims, component_rules, drive_rules, payload_rules
+from nondum.host.lifecycle.turn import Outcome, Turn
+from nondum.host.transitions import TRANSITIONS
+
+_Rule = Callable[[Turn, Any], None]
+
+RULES: Mapping[type[Event], _Rule] = {
+    **{event: payload_rules.on_payload_step for _, event in TRANSITIONS},
+    events.DriveInserted: drive_rules.on_drive_inserted,
+    events.DriveRemoved: drive_rules.on_drive_removed,
+    events.DriveRead: drive_rules.on_drive_read,
+    events.DriveUnreadable: drive_rules.on_drive_unreadable,
+    events.DrivesScanned: drive_rules.on_drives_scanned,
+    events.PayloadFound: payload_rules.on_payload_found,
+    events.PayloadVerified: payload_rules.on_payload_verified,
+    events.RetryAsked: component_rules.on_retry_asked,
+    events.WorkerReady: component_rules.on_worker_news,
+    events.WorkerExited: component_rules.on_worker_news,
+    events.WorkerFailed: component_rules.on_worker_news,
+    events.DeviceAppeared: component_rules.on_device_appeared,
+    events.DeviceRemoved: component_rules.on_device_removed,
+    events.MountSet: component_rules.on_mount_set,
+}
+"""Event → rule. Other events change nothing here; the journal keeps those that ask for it."""
+
+
+def advance(state: HostState, event: Event, at: Moment) -> Outcome:
+    """Follow one event, and all that it entails, through the rules."""
+    turn = Turn(state, at, pending=[event])
+    while turn.pending:
+        follow(turn, turn.pending.pop(0))
+    return settle(turn, state)
+
+
+def follow(turn: Turn, event: Event) -> None:
+    """Apply the rule for one event; what follows from it is left pending."""
+    rule = RULES.get(type(event))
+    if rule is not None:
+        rule(turn, event)
+    elif event.JOURNALLED:
+        turn.events.append(event)
+
+
+def settle(turn: Turn, before: HostState) -> Outcome:
+    """End a turn: idle drives, claims of devices, and the revision if anything was recomposed."""
+    drive_rules.release_idle_drives(turn)
+    if turn.state.components != before.components or turn.state.devices != before.devices:
+        claims.settle(turn)
+    if turn.state.components != before.components or turn.state.mounts != before.mounts:
+        turn.change(revision=before.revision + 1)
+        turn.events.append(events.Recomposed(turn.state.revision, turn.events[0].name))
+    return turn.outcome()

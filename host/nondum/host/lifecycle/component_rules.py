@@ -1,0 +1,82 @@
+"""What news of workers, devices and people means for the components in the catalogue."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from nondum.host.catalogue.records import DeviceRecord, MountPose, Step
+from nondum.host.effects import RestartWorker
+from nondum.host.events import (
+    DeviceAppeared,
+    DeviceRemoved,
+    MountSet,
+    PayloadFailed,
+    RetryAsked,
+    WorkerExited,
+    WorkerFailed,
+    WorkerReady,
+)
+from nondum.host.lifecycle.payload_rules import on_payload_step
+from nondum.host.lifecycle.turn import Turn
+from nondum.host.transitions import COMPONENT_TRANSITIONS
+
+
+def on_worker_news(turn: Turn, event: WorkerReady | WorkerExited | WorkerFailed) -> None:
+    """Follow the table of components; one that is not active yet fails with its payload."""
+    component = turn.state.components.get(event.component)
+    if component is None:
+        _fail_probed(turn, event)
+        return
+    state = COMPONENT_TRANSITIONS.get((component.state, type(event)))
+    if state is None:
+        return
+    turn.events.append(event)
+    problems = event.problems if isinstance(event, WorkerFailed) else ()
+    turn.put_component(replace(component, state=state, problems=problems))
+
+
+def on_retry_asked(turn: Turn, event: RetryAsked) -> None:
+    """Try a refused or quarantined payload, or quarantined components of an active one, again."""
+    payload = turn.state.payloads.get(event.payload)
+    if payload is None or payload.step is not Step.ACTIVE:
+        on_payload_step(turn, event)
+        return
+    for component in turn.state.components.values():
+        state = COMPONENT_TRANSITIONS.get((component.state, RetryAsked))
+        if component.payload == payload.key and state is not None:
+            turn.put_component(replace(component, state=state, problems=()))
+            turn.effects.append(RestartWorker(component.id))
+    if turn.effects:
+        turn.events.append(event)
+
+
+def on_mount_set(turn: Turn, event: MountSet) -> None:
+    """Keep what a person said, over what any payload says."""
+    turn.events.append(event)
+    pose = MountPose(event.unit, event.xyz, event.rpy, "person")
+    turn.change(mounts={**turn.state.mounts, event.unit: pose})
+
+
+def on_device_appeared(turn: Turn, event: DeviceAppeared) -> None:
+    """Enter a device; who needs it gets it when the turn is settled."""
+    turn.events.append(event)
+    device = DeviceRecord(event.device, event.node, event.properties)
+    turn.change(devices={**turn.state.devices, event.device: device})
+
+
+def on_device_removed(turn: Turn, event: DeviceRemoved) -> None:
+    """Forget a device; who had it loses it when the turn is settled."""
+    if event.device not in turn.state.devices:
+        return
+    turn.events.append(event)
+    kept = {id: device for id, device in turn.state.devices.items() if id != event.device}
+    turn.change(devices=kept)
+
+
+def _fail_probed(turn: Turn, event: WorkerReady | WorkerExited | WorkerFailed) -> None:
+    if not isinstance(event, WorkerFailed):
+        return
+    for payload in turn.state.payloads.values():
+        if payload.step is Step.PROBED and event.component in payload.components:
+            turn.events.append(event)
+            turn.pending.append(PayloadFailed(payload.key, event.problems))

@@ -1,0 +1,124 @@
+"""What drives that come, are read and go mean for the payloads on them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from nondum.host.catalogue.records import DriveRecord, DriveState, PayloadRecord, Step
+from nondum.host.effects import CopyPayload, ReadDrive, ReleaseDrive
+from nondum.host.events import (
+    DriveInserted,
+    DriveRead,
+    DriveRemoved,
+    DrivesScanned,
+    DriveUnreadable,
+    PayloadWithdrawn,
+)
+from nondum.host.lifecycle.turn import Turn
+from nondum.sdk.errors import Problem
+
+
+def on_drive_inserted(turn: Turn, event: DriveInserted) -> None:
+    """Read it. A drive that was there before the daemon's restart is read again."""
+    turn.events.append(event)
+    drive = DriveRecord(
+        id=event.drive,
+        kind=event.kind,
+        root=event.root,
+        node=event.node,
+        filesystem=event.filesystem,
+        since=turn.at,
+    )
+    read(turn, drive)
+
+
+def on_drive_removed(turn: Turn, event: DriveRemoved) -> None:
+    """Withdraw what was on it and nowhere else."""
+    if event.drive not in turn.state.drives:
+        return
+    turn.events.append(event)
+    turn.drop_drive(event.drive)
+    turn.effects.append(ReleaseDrive(event.drive))
+    for payload in _on(turn, event.drive):
+        lose_source(turn, payload, event.drive, "its drive was pulled")
+
+
+def on_drive_read(turn: Turn, event: DriveRead) -> None:
+    """Withdraw what the drive carried before a restart and does not carry any more."""
+    drive = turn.state.drives.get(event.drive)
+    if drive is None:
+        return
+    turn.events.append(event)
+    nothing = Problem(
+        "DRIVE_NOT_PAYLOAD",
+        "carries no payload",
+        where=event.drive,
+        need="a folder nondum/<payload-id>",
+    )
+    problems = () if event.payloads else (nothing,)
+    turn.put_drive(replace(drive, state=DriveState.COPYING, problems=problems))
+    for payload in _on(turn, event.drive):
+        if payload.key not in event.payloads:
+            lose_source(turn, payload, event.drive, "it is not on its drive any more")
+
+
+def on_drive_unreadable(turn: Turn, event: DriveUnreadable) -> None:
+    """Give up copying from it. What was copied before stays until the drive is pulled."""
+    drive = turn.state.drives.get(event.drive)
+    if drive is None:
+        return
+    turn.events.append(event)
+    turn.put_drive(replace(drive, state=DriveState.COPYING, problems=event.problems))
+    for payload in _on(turn, event.drive):
+        if payload.step is Step.RECEIVED:
+            lose_source(turn, payload, event.drive, str(event.problems[0]))
+
+
+def on_drives_scanned(turn: Turn, event: DrivesScanned) -> None:
+    """Forget drives that were there before a restart and are not there any more."""
+    turn.events.append(event)
+    turn.pending.extend(
+        DriveRemoved(drive.id)
+        for drive in turn.state.drives.values()
+        if drive.kind == event.kind and drive.id not in event.drives
+    )
+
+
+def lose_source(turn: Turn, payload: PayloadRecord, drive: str, reason: str) -> None:
+    """Take a drive from a payload's sources; with the last one the payload is withdrawn."""
+    first = next(iter(payload.sources), None)
+    sources = {name: folder for name, folder in payload.sources.items() if name != drive}
+    turn.put_payload(replace(payload, sources=sources))
+    if not sources:
+        turn.pending.append(PayloadWithdrawn(payload.key, reason))
+    elif payload.step is Step.RECEIVED and first == drive:
+        turn.effects.append(copy_of(turn.state.payloads[payload.key]))
+
+
+def read(turn: Turn, drive: DriveRecord) -> None:
+    """Have a drive looked through."""
+    turn.put_drive(replace(drive, state=DriveState.READING, problems=()))
+    turn.effects.append(ReadDrive(drive.id, drive.root, drive.node, drive.filesystem))
+
+
+def copy_of(payload: PayloadRecord) -> CopyPayload:
+    """Copy a payload from its first source."""
+    drive, folder = next(iter(payload.sources.items()))
+    return CopyPayload(payload.key, drive, folder, payload.digest)
+
+
+def release_idle_drives(turn: Turn) -> None:
+    """Let go of drives that nothing is copied from any more, so that they are safe to pull."""
+    copying = {
+        next(iter(payload.sources), "")
+        for payload in turn.state.payloads.values()
+        if payload.step is Step.RECEIVED
+    }
+    for drive in turn.state.drives.values():
+        if drive.state is DriveState.COPYING and drive.id not in copying:
+            turn.put_drive(replace(drive, state=DriveState.IDLE))
+            turn.effects.append(ReleaseDrive(drive.id))
+
+
+def _on(turn: Turn, drive: str) -> list[PayloadRecord]:
+    return [payload for payload in turn.state.payloads.values() if drive in payload.sources]

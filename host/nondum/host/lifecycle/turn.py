@@ -1,0 +1,83 @@
+"""One event and all that follows from it, gathered before anything is written down or done."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple, TypeVar
+
+from nondum.host.catalogue.records import ComponentRecord, DriveRecord, Moment, PayloadRecord, Step
+from nondum.host.catalogue.state import HostState
+from nondum.host.effects import Effect
+from nondum.host.events import Event
+
+_V = TypeVar("_V")
+
+
+class Outcome(NamedTuple):
+    """What an event came to."""
+
+    state: HostState
+    effects: tuple[Effect, ...]
+    """What is to be done now."""
+    events: tuple[Event, ...]
+    """The event and its consequences; empty: it meant nothing any more."""
+
+
+@dataclass(slots=True)
+class Turn:
+    """What one event changes; lives only while `advance` runs."""
+
+    state: HostState
+    at: Moment
+    effects: list[Effect] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    """The event and its consequences, in order: what the journal is told."""
+    pending: list[Event] = field(default_factory=list)
+    """Consequences that were not looked at yet."""
+
+    def outcome(self) -> Outcome:
+        """What it came to."""
+        return Outcome(self.state, tuple(self.effects), tuple(self.events))
+
+    def change(self, **fields: Any) -> None:
+        """Replace fields of the state."""
+        self.state = replace(self.state, **fields)
+
+    def put_drive(self, drive: DriveRecord) -> None:
+        """Enter or replace a drive."""
+        self.change(drives=_with(self.state.drives, drive.id, drive))
+
+    def put_payload(self, payload: PayloadRecord) -> None:
+        """Enter or replace a payload; one that is gone is dropped."""
+        if payload.step is Step.GONE:
+            self.change(payloads=_without(self.state.payloads, payload.key))
+        else:
+            self.change(payloads=_with(self.state.payloads, payload.key, payload))
+
+    def put_component(self, component: ComponentRecord) -> None:
+        """Enter or replace a component."""
+        self.change(components=_with(self.state.components, component.id, component))
+
+    def drop_drive(self, drive: str) -> None:
+        """Forget a drive."""
+        self.change(drives=_without(self.state.drives, drive))
+
+    def drop_components(self, payload: str) -> None:
+        """Withdraw a payload's components, and the mounts that only it had said."""
+        gone = {c.id for c in self.state.components.values() if c.payload == payload}
+        mounts = {
+            unit: pose
+            for unit, pose in self.state.mounts.items()
+            if pose.origin == "person" or unit.split("__")[1] not in gone
+        }
+        kept = {id: c for id, c in self.state.components.items() if id not in gone}
+        self.change(components=kept, mounts=mounts)
+
+
+def _with(mapping: Mapping[str, _V], key: str, value: _V) -> dict[str, _V]:
+    return {**mapping, key: value}
+
+
+def _without(mapping: Mapping[str, _V], key: str) -> dict[str, _V]:
+    return {k: v for k, v in mapping.items() if k != key}

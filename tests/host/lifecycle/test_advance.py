@@ -1,0 +1,381 @@
+"""The component manager's function, without clock, disk or processes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nondum.host import effects, events
+from nondum.host.catalogue.records import (
+    ComponentRecord,
+    ComponentState,
+    DeviceClaim,
+    DriveState,
+    Moment,
+    MountPose,
+    Step,
+)
+from nondum.host.catalogue.state import HostState
+from nondum.host.effects import Effect
+from nondum.host.events import Event
+from nondum.host.lifecycle.advance import advance
+from nondum.host.lifecycle.recovery import ATTEMPTS, recover
+from nondum.host.transitions import COMPONENT_TRANSITIONS, RECOVERY, TRANSITIONS
+from nondum.sdk.description import PluginDescription
+from nondum.sdk.errors import Problem
+
+AT = Moment(1.0, 2.0)
+PROBLEM = Problem("TEST", "made up")
+
+
+def drive(name: str = "a", kind: str = "slot") -> events.DriveInserted:
+    return events.DriveInserted(name, Path("/drives") / name, kind)
+
+
+def found(
+    key: str = "k1", drive: str = "a", *, payload_id: str = "org.x", release: int = 1
+) -> events.PayloadFound:
+    folder = Path("/drives") / drive / "nondum" / payload_id
+    return events.PayloadFound(key, drive, folder, f"digest-{key}", payload_id, "1.0", release)
+
+
+def component(id: str = "eye", payload: str = "k1", need: str = "") -> ComponentRecord:
+    claims = (DeviceClaim("port", {"ID_MODEL": need}, False),) if need else ()
+    return ComponentRecord(
+        id=id,
+        payload=payload,
+        payload_id="org.x",
+        distribution=id,
+        entry_point=id,
+        version="1.0",
+        state=ComponentState.READY,
+        description=PluginDescription(name=id, version="1.0"),
+        venv=Path("/v"),
+        site_packages=Path("/v/s"),
+        scratch=Path("/s"),
+        rank=0,
+        devices=claims,
+    )
+
+
+def way_to_active(
+    key: str = "k1", drive: str = "a", id: str = "eye", need: str = "", payload_id: str = "org.x"
+) -> list[Event]:
+    mounts = (MountPose(f"spot__{id}__camera", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "payload"),)
+    return [
+        found(key, drive, payload_id=payload_id),
+        events.PayloadCopied(key),
+        events.PayloadVerified(key, (id,)),
+        events.PayloadStaged(key),
+        events.WheelsStored(key, 1),
+        events.ComponentsProbed(key),
+        events.PayloadActivated(key, (component(id, key, need),), mounts),
+    ]
+
+
+def after(*happened: Event, state: HostState | None = None) -> tuple[HostState, list[Effect]]:
+    state = state or HostState("spot")
+    done: list[Effect] = []
+    for event in happened:
+        outcome = advance(state, event, AT)
+        state = outcome.state
+        done.extend(outcome.effects)
+    return state, done
+
+
+def active(id: str = "eye", need: str = "") -> HostState:
+    return after(drive(), *way_to_active(id=id, need=need), events.DriveRead("a", ("k1",)))[0]
+
+
+def at_step(step: Step) -> HostState:
+    """A payload `k1` on drive `a`, at a step."""
+    way = way_to_active()
+    order = [s for s in Step if s not in (Step.REMOVING, Step.REFUSED, Step.QUARANTINED, Step.GONE)]
+    match step:
+        case Step.GONE:
+            return after(drive())[0]
+        case Step.REMOVING:
+            return after(drive(), *way, events.PayloadWithdrawn("k1", "test"))[0]
+        case Step.REFUSED:
+            return after(drive(), way[0], events.PayloadRefused("k1", (PROBLEM,)))[0]
+        case Step.QUARANTINED:
+            return after(drive(), *way[:5], events.PayloadFailed("k1", (PROBLEM,)))[0]
+        case _:
+            return after(drive(), *way[: order.index(step) + 1])[0]
+
+
+EVENTS: dict[type[Event], Event] = {
+    type(event): event
+    for event in (
+        *way_to_active(),
+        events.PayloadRefused("k1", (PROBLEM,)),
+        events.PayloadFailed("k1", (PROBLEM,)),
+        events.PayloadWithdrawn("k1", "test"),
+        events.PayloadCleared("k1"),
+        events.RetryAsked("k1"),
+    )
+}
+
+
+@pytest.mark.parametrize(
+    ("step", "kind"), TRANSITIONS, ids=lambda value: getattr(value, "__name__", str(value))
+)
+def test_each_row_leads_where_it_says(step: Step, kind: type[Event]) -> None:
+    row = TRANSITIONS[step, kind]
+    outcome = advance(at_step(step), EVENTS[kind], AT)
+    payload = outcome.state.payloads.get("k1")
+    assert (payload.step if payload else Step.GONE) is row.to
+    assert row.effect is None or row.effect in map(type, outcome.effects)
+    assert EVENTS[kind] in outcome.events
+
+
+@pytest.mark.parametrize("step", Step)
+@pytest.mark.parametrize("kind", EVENTS, ids=lambda kind: kind.__name__)
+def test_news_of_an_earlier_life_is_dropped(step: Step, kind: type[Event]) -> None:
+    if (step, kind) in TRANSITIONS or kind in (events.PayloadFound, events.RetryAsked):
+        return
+    state = at_step(step)
+    outcome = advance(state, EVENTS[kind], AT)
+    assert (outcome.state, outcome.effects, outcome.events) == (state, (), ())
+
+
+def test_recovery_knows_every_step() -> None:
+    assert set(RECOVERY) == set(Step) - {Step.GONE}
+
+
+def test_every_component_state_can_be_left() -> None:
+    assert {state for state, _ in COMPONENT_TRANSITIONS} == set(ComponentState)
+
+
+def test_insertion_reads_the_drive() -> None:
+    state, done = after(drive())
+    assert done == [effects.ReadDrive("a", Path("/drives/a"))]
+    assert state.drives["a"].state is DriveState.READING
+
+
+def test_activation_enters_components_in_one_turn() -> None:
+    state = active()
+    assert list(state.components) == ["eye"]
+    assert state.revision == 1
+    assert state.highwater["", "org.x"].release == 1
+    assert "spot__eye__camera" in state.mounts
+    assert set(state.payloads["k1"].phases) == {"seen", "verified", "installed", "ready"}
+
+
+def test_pulled_drive_withdraws_at_once() -> None:
+    state, done = after(events.DriveRemoved("a"), state=active())
+    assert not state.components
+    assert not state.mounts
+    assert state.revision == 2
+    assert state.payloads["k1"].step is Step.REMOVING
+    assert done == [effects.ReleaseDrive("a"), effects.ClearPayload("k1")]
+
+
+def test_second_source_keeps_the_payload() -> None:
+    both, _ = after(drive("b"), found(drive="b"), state=active())
+    state, done = after(events.DriveRemoved("a"), state=both)
+    assert "eye" in state.components
+    assert done == [effects.ReleaseDrive("a")]
+
+
+def test_copy_goes_on_from_the_other_drive() -> None:
+    state, _ = after(drive("a"), drive("b"), found(), found(drive="b"))
+    _, done = after(events.DriveRemoved("a"), state=state)
+    assert [e.drive for e in done if isinstance(e, effects.CopyPayload)] == ["b"]
+
+
+def test_replug_while_removing_reads_the_drive_again() -> None:
+    removing, _ = after(events.DriveRemoved("a"), drive("a"), found(), state=active())
+    state, done = after(events.PayloadCleared("k1"), state=removing)
+    assert not state.payloads
+    assert done == [effects.ReadDrive("a", Path("/drives/a"))]
+
+
+def test_older_release_is_refused() -> None:
+    gone, _ = after(events.DriveRemoved("a"), events.PayloadCleared("k1"), state=active())
+    state, done = after(drive(), found("k0", release=0), state=gone)
+    assert [p.code for p in state.payloads["k0"].problems] == ["ROLLBACK"]
+    assert not any(isinstance(effect, effects.CopyPayload) for effect in done)
+
+
+def test_same_release_with_other_content_is_refused() -> None:
+    gone, _ = after(events.DriveRemoved("a"), events.PayloadCleared("k1"), state=active())
+    state, _ = after(drive(), found("k2"), state=gone)
+    assert [p.code for p in state.payloads["k2"].problems] == ["RELEASE_CONFLICT"]
+
+
+def test_component_id_belongs_to_the_first() -> None:
+    rival = way_to_active("k2", "b", payload_id="org.y")[:3]
+    state, _ = after(drive("b"), *rival, state=active())
+    assert [p.code for p in state.payloads["k2"].problems] == ["COMPONENT_TAKEN"]
+    assert "eye" in state.components
+
+
+def test_component_id_is_waited_for_while_its_owner_leaves() -> None:
+    rival = way_to_active("k2", "b", payload_id="org.y")[:3]
+    waiting, _ = after(events.DriveRemoved("a"), drive("b"), *rival, state=active())
+    assert waiting.payloads["k2"].waits_for == "k1"
+    _, done = after(events.PayloadCleared("k1"), state=waiting)
+    assert effects.VerifyPayload("k2") in done
+
+
+def test_drive_is_released_when_all_is_copied() -> None:
+    reading, before = after(drive(), found(), events.DriveRead("a", ("k1",)))
+    assert effects.ReleaseDrive("a") not in before
+    state, done = after(events.PayloadCopied("k1"), state=reading)
+    assert effects.ReleaseDrive("a") in done
+    assert state.drives["a"].state is DriveState.IDLE
+
+
+def test_drive_without_payload_says_so() -> None:
+    state, done = after(drive(), events.DriveRead("a", ()))
+    assert [p.code for p in state.drives["a"].problems] == ["DRIVE_NOT_PAYLOAD"]
+    assert effects.ReleaseDrive("a") in done
+
+
+def test_unreadable_drive_gives_up_what_was_being_copied() -> None:
+    state, done = after(drive(), found(), events.DriveUnreadable("a", (PROBLEM,)))
+    assert state.drives["a"].problems == (PROBLEM,)
+    assert state.payloads["k1"].step is Step.REMOVING
+    assert effects.ClearPayload("k1") in done
+
+
+def test_worker_that_restarts_is_not_ready_meanwhile() -> None:
+    state, _ = after(events.WorkerExited("eye", "signal 9"), state=active())
+    assert state.components["eye"].state is ComponentState.RESTARTING
+    assert state.revision == 2
+    again = events.WorkerReady("eye", PluginDescription("eye", "1.0"))
+    assert after(again, state=state)[0].components["eye"].state is ComponentState.READY
+
+
+def test_failed_worker_is_quarantined_until_told() -> None:
+    state, _ = after(events.WorkerFailed("eye", (PROBLEM,)), state=active())
+    assert state.components["eye"].problems == (PROBLEM,)
+    told, done = after(events.RetryAsked("k1"), state=state)
+    assert done == [effects.RestartWorker("eye")]
+    assert told.components["eye"].state is ComponentState.RESTARTING
+
+
+def test_worker_that_fails_before_activation_takes_its_payload_along() -> None:
+    state, _ = after(events.WorkerFailed("eye", (PROBLEM,)), state=at_step(Step.PROBED))
+    assert state.payloads["k1"].step is Step.QUARANTINED
+    assert state.payloads["k1"].problems == (PROBLEM,)
+
+
+def test_device_goes_to_who_needs_it() -> None:
+    port = events.DeviceAppeared("usb1", Path("/dev/ttyUSB0"), {"ID_MODEL": "PTU"})
+    other = events.DeviceAppeared("usb2", Path("/dev/ttyUSB1"), {"ID_MODEL": "other"})
+    before = active(need="PT*")
+    assert not before.components["eye"].is_ready
+    state, done = after(other, port, state=before)
+    assert done == [effects.AttachDevice("eye", "port", "usb1")]
+    assert state.components["eye"].is_ready
+    state, done = after(events.DeviceRemoved("usb1"), state=state)
+    assert done == [effects.DetachDevice("eye", "port", "usb1")]
+    assert not state.components["eye"].is_ready
+
+
+def test_contested_device_stays_and_the_contest_is_told() -> None:
+    port = events.DeviceAppeared("usb1", Path("/dev/ttyUSB0"), {"ID_MODEL": "PTU"})
+    held, _ = after(port, state=active(id="zoom", need="PTU"))
+    rival = way_to_active("k2", "b", "arm", "PTU", payload_id="org.y")
+    state, _ = after(drive("b"), *rival, state=held)
+    assert state.components["zoom"].devices[0].device == "usb1"
+    assert state.components["zoom"].devices[0].contested_by == ("arm",)
+    assert state.components["arm"].devices[0].device is None
+
+
+def test_persons_mount_outlives_the_component() -> None:
+    unit = "spot__eye__camera"
+    said = events.MountSet(unit, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    state, _ = after(said, events.DriveRemoved("a"), state=active())
+    assert state.mounts[unit].origin == "person"
+
+
+def test_initial_components_come_first() -> None:
+    state = active()
+    installed = way_to_active("k2", "i", "base", payload_id="org.y")
+    state, _ = after(drive("i", "installed"), *installed, state=state)
+    assert [c.id for c in state.snapshot().components] == ["base", "eye"]
+
+
+@pytest.mark.parametrize("step", RECOVERY)
+def test_recovery_sends_back_or_forward(step: Step) -> None:
+    outcome = recover(at_step(step), AT)
+    payload = outcome.state.payloads.get("k1")
+    assert (payload.step if payload else Step.GONE) is RECOVERY[step].to
+    assert not outcome.state.components
+
+
+def test_drive_that_left_while_the_daemon_was_down_is_withdrawn() -> None:
+    recovered = recover(active(), AT).state
+    state, done = after(events.DrivesScanned("slot", ()), state=recovered)
+    assert state.payloads["k1"].step is Step.REMOVING
+    assert effects.ClearPayload("k1") in done
+
+
+def test_payload_swapped_while_the_daemon_was_down_is_withdrawn() -> None:
+    recovered = recover(active(), AT).state
+    state, _ = after(drive(), events.DriveRead("a", ()), state=recovered)
+    assert state.payloads["k1"].step is Step.REMOVING
+
+
+def test_payload_that_ends_the_daemon_is_quarantined() -> None:
+    state = active()
+    for _ in range(ATTEMPTS):
+        state = recover(state, AT).state
+        assert state.payloads["k1"].step is Step.STORED
+    outcome = recover(state, AT)
+    assert outcome.state.payloads["k1"].step is Step.QUARANTINED
+    assert outcome.effects == (effects.DiscardPayload("k1"),)
+
+
+HAPPENINGS: list[Event] = [
+    *(drive(name) for name in ("a", "b")),
+    *(events.DriveRemoved(name) for name in ("a", "b")),
+    *(events.DriveRead(name, keys) for name in ("a", "b") for keys in ((), ("k1",), ("k2",))),
+    events.DriveUnreadable("a", (PROBLEM,)),
+    events.DrivesScanned("slot", ("a",)),
+    *way_to_active("k1", "a"),
+    *way_to_active("k2", "b", "arm", "PTU", payload_id="org.y"),
+    *way_to_active("k3", "b", "eye"),
+    *(
+        kind(key, (PROBLEM,))
+        for kind in (events.PayloadRefused, events.PayloadFailed)
+        for key in ("k1", "k2")
+    ),
+    *(events.PayloadCleared(key) for key in ("k1", "k2", "k3")),
+    *(events.RetryAsked(key) for key in ("k1", "k2", "k3")),
+    events.WorkerExited("eye", "test"),
+    events.WorkerFailed("arm", (PROBLEM,)),
+    events.WorkerReady("eye", PluginDescription("eye", "1.0")),
+    events.DeviceAppeared("usb1", Path("/dev/x"), {"ID_MODEL": "PTU"}),
+    events.DeviceRemoved("usb1"),
+]
+
+
+@given(st.lists(st.sampled_from(HAPPENINGS), max_size=60), st.integers(0, 60))
+def test_whatever_happens_the_state_is_sound(happened: list[Event], restart: int) -> None:
+    state = HostState("spot")
+    for i, event in enumerate(happened):
+        outcome = recover(state, AT) if i == restart else advance(state, event, AT)
+        assert sound(outcome.state)
+        assert outcome.state == state or outcome.events
+        state = outcome.state
+
+
+def sound(state: HostState) -> bool:
+    for payload in state.payloads.values():
+        assert payload.step is not Step.GONE
+        assert set(payload.sources) <= set(state.drives)
+        assert payload.sources or payload.step is Step.REMOVING
+    for owned in state.components.values():
+        assert state.payloads[owned.payload].step is Step.ACTIVE
+        for claim in owned.devices:
+            assert claim.device is None or claim.device in state.devices
+    ids = [id for p in state.payloads.values() if p.step is Step.ACTIVE for id in p.components]
+    assert sorted(ids) == sorted(state.components)
+    return True
