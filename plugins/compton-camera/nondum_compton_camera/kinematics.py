@@ -63,6 +63,11 @@ class Cones:
     def __len__(self) -> int:
         return len(self.axes)
 
+    def thinned(self, count: int) -> Cones:
+        """At most `count` of them, spread evenly over the time they took."""
+        kept = np.unique(np.linspace(0, len(self) - 1, min(count, len(self))).astype(int))
+        return Cones(self.axes[kept], self.angles[kept], self.sigmas[kept], self.weights[kept])
+
 
 def cones(events: Sequence[Event], instrument: Instrument) -> Cones:
     """The cones of those events that absorbed the whole line far enough apart, in order.

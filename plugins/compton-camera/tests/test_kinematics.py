@@ -71,6 +71,15 @@ def test_orders_are_weighed_to_one() -> None:
     assert found.weights.sum(axis=1).tolist() == pytest.approx([1.0, 1.0])
 
 
+def test_thinning_keeps_some_of_all_times() -> None:
+    found = cones([event(200.0 + n / 10, LINE - 200.0 - n / 10) for n in range(500)], Instrument())
+    few = found.thinned(5)
+    assert len(few) == 5
+    assert few.angles[0, 0] == found.angles[0, 0]
+    assert few.angles[-1, 0] == found.angles[-1, 0]
+    assert len(found.thinned(10_000)) == len(found)
+
+
 def test_worse_resolution_makes_thicker_cones() -> None:
     pair = event(300.0, LINE - 300.0)
     fine, coarse = (
