@@ -1,0 +1,221 @@
+"""Building a payload folder from a plugin's source folder: what `nondum payload build` does.
+
+The source folder is an ordinary Python package with a `payload.toml` beside its `pyproject.toml`.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import time
+import tomllib
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from importlib_metadata import distributions
+
+from nondum.sdk.description import PluginDescription
+from nondum.sdk.errors import PayloadRefused, Problem
+from nondum.wheelhouse import capture, contents, index, lock, locking, manifest, resolve, wheel
+from nondum.wheelhouse.contents import Contents, Entry
+from nondum.wheelhouse.manifest import Manifest
+from nondum.wheelhouse.resolve import Sources
+from nondum.wheelhouse.target import Target
+
+ENTRY_POINT_GROUP = "nondum.plugins"
+DOWNLOADS = 4
+"""pip processes at once: they wait for the index most of the time."""
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """How a payload is built."""
+
+    targets: tuple[Target, ...]
+    sources: Sources = field(default_factory=Sources)
+    libraries: tuple[Path, ...] = ()
+    """Source folders of distributions that it depends on and that no index has."""
+    release: int | None = None
+    """None: the time of building, in seconds."""
+    fleet: str = ""
+
+
+def build(package: Path, drive: Path, options: Options, progress: Progress) -> Path:
+    """Build one payload folder on a drive and return it; replaces one of the same id.
+
+    `progress` gets what is being done, and steps done of all. Raises `PayloadRefused`,
+    `InstallFailed`; nothing is left on the drive then.
+    """
+    said, version, minimum = _source(package)
+    with tempfile.TemporaryDirectory(prefix="nondum-build-") as temporary:
+        work = Path(temporary)
+        steps = 4 + len(options.targets)
+        progress("making the wheels of the sources", 0, steps)
+        made = work / "made"
+        made.mkdir()
+        for library in options.libraries:
+            resolve.make_wheel(library, made, options.sources)
+        own = resolve.make_wheel(package, made, options.sources)
+        sources = replace(options.sources, wheel_folders=(made, *options.sources.wheel_folders))
+        chosen = _fetched(own, work, options, sources, progress)
+        progress("asking the plugin what it is", steps - 3, steps)
+        described = _described(said, chosen[Target.here()], work / "site-packages")
+        progress("writing the payload", steps - 2, steps)
+        locked = {target: chosen[target] for target in options.targets}
+        folder = work / said.id
+        _write(folder, package, said, locked, described)
+        _seal(folder, said, version, minimum, options)
+        progress("copying it to the drive", steps - 1, steps)
+        target = _delivered(folder, drive)
+        progress("done", steps, steps)
+        return target
+
+
+def _source(package: Path) -> tuple[Manifest, str, str]:
+    """Manifest, version and least nondum of a source folder."""
+    try:
+        text = (package / manifest.NAME).read_text(encoding="utf-8")
+        project = tomllib.loads((package / "pyproject.toml").read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise PayloadRefused(
+            Problem(
+                "SOURCE_INCOMPLETE",
+                f"there is no file {Path(str(error.filename)).name}",
+                where=str(package),
+                fix="`nondum payload new` makes a complete source folder",
+            )
+        ) from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        problem = Problem("SOURCE_INCOMPLETE", f"pyproject.toml: {error}", where=str(package))
+        raise PayloadRefused(problem) from error
+    said = manifest.parse(text, str(package / manifest.NAME))
+    version = str(project.get("project", {}).get("version", ""))
+    if not version:
+        text = "pyproject.toml has no [project] version"
+        raise PayloadRefused(Problem("SOURCE_INCOMPLETE", text, where=str(package)))
+    minimum = str(project.get("tool", {}).get("nondum", {}).get("minimum", "0.1"))
+    return said, version, minimum
+
+
+def _fetched(
+    own: Path, work: Path, options: Options, sources: Sources, progress: Progress
+) -> dict[Target, tuple[Path, ...]]:
+    """The wheels for every target, and for this machine, which must describe the plugin."""
+    targets = list(dict.fromkeys((*options.targets, Target.here())))
+    steps = 4 + len(options.targets)
+
+    def fetch(numbered: tuple[int, Target]) -> tuple[Target, tuple[Path, ...]]:
+        number, target = numbered
+        progress(f"wheels for {target.architecture}, Python {target.python}", 1, steps)
+        return target, resolve.fetch(own, target, work / f"fetched-{number}", sources)
+
+    with ThreadPoolExecutor(DOWNLOADS) as pool:
+        return dict(pool.map(fetch, enumerate(targets)))
+
+
+def _described(
+    said: Manifest, wheels: Sequence[Path], site_packages: Path
+) -> dict[str, PluginDescription]:
+    for path in wheels:
+        _unpack(path, site_packages)
+    described = {}
+    for component in said.components:
+        found = entry_point(site_packages, component.distribution, component.id)
+        described[component.id] = capture.describe(site_packages, found, component.distribution)
+    return described
+
+
+def entry_point(site_packages: Path, distribution: str, component: str) -> str:
+    """The entry point of a component's plugin: the one named like it, or the only one.
+
+    Read from the files, nothing is run. Raises `PayloadRefused` (ENTRY_POINT).
+    """
+    for found in distributions(name=distribution, path=[str(site_packages)]):
+        points = found.entry_points.select(group=ENTRY_POINT_GROUP)
+        named = {point.name: str(point.value) for point in points}
+        if component in named:
+            return named[component]
+        if len(named) == 1:
+            return next(iter(named.values()))
+        have = ", ".join(sorted(named)) or "none"
+        break
+    else:
+        have = "no such distribution"
+    raise PayloadRefused(
+        Problem(
+            "ENTRY_POINT",
+            f"{distribution} has no entry point for component {component!r}",
+            where=distribution,
+            need=f"{component} in group {ENTRY_POINT_GROUP}",
+            have=have,
+            fix=f'add [project.entry-points."{ENTRY_POINT_GROUP}"] to its pyproject.toml',
+        )
+    )
+
+
+def _unpack(path: Path, site_packages: Path) -> None:
+    with wheel.opened(path) as data:
+        layout = wheel.lay_out(data, path.name)
+        wheel.refuse_if_any(layout.problems)
+        names = {file.member.path: file.target for file in layout.files}
+    with zipfile.ZipFile(path) as archive:
+        for name, target in names.items():
+            place = site_packages / target
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(archive.read(name))
+
+
+def _write(
+    folder: Path,
+    package: Path,
+    said: Manifest,
+    locked: Mapping[Target, Sequence[Path]],
+    described: Mapping[str, PluginDescription],
+) -> None:
+    wheels = folder / "wheels"
+    wheels.mkdir(parents=True)
+    for path in (path for group in locked.values() for path in group):
+        if not (wheels / path.name).exists():
+            shutil.copyfile(path, wheels / path.name)
+    shutil.copyfile(package / manifest.NAME, folder / manifest.NAME)
+    for component in said.components:
+        text = locking.lock_text(locked)
+        (folder / lock.file_name(component.id)).write_text(text, encoding="utf-8")
+    (folder / index.NAME).write_bytes(index.to_bytes(described))
+
+
+def _seal(folder: Path, said: Manifest, version: str, minimum: str, options: Options) -> None:
+    """Write the contents list of what the folder holds."""
+    now = int(os.environ.get("SOURCE_DATE_EPOCH", time.time()))
+    paths = sorted(
+        (path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()),
+    )
+    listed = Contents(
+        payload_id=said.id,
+        version=version,
+        release=now if options.release is None else options.release,
+        fleet=options.fleet,
+        minimum_nondum=minimum,
+        built=time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(now)),
+        entries=tuple(
+            Entry(locking.sha256(folder / p), (folder / p).stat().st_size, p) for p in paths
+        ),
+    )
+    (folder / contents.NAME).write_bytes(listed.to_bytes())
+
+
+def _delivered(folder: Path, drive: Path) -> Path:
+    """Put the folder on the drive: copied beside, then renamed in."""
+    target = drive / "nondum" / folder.name
+    unfinished = target.with_name(f".{folder.name}.part")
+    shutil.rmtree(unfinished, ignore_errors=True)
+    shutil.copytree(folder, unfinished)
+    shutil.rmtree(target, ignore_errors=True)
+    unfinished.rename(target)
+    return target

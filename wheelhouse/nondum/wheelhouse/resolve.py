@@ -1,0 +1,79 @@
+"""Wheels for a payload, made and fetched by pip.
+
+pip runs as a process of its own from this interpreter, with the index and caches that its user has
+configured. What it chose is read from the wheels that it leaves.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from nondum.sdk.errors import InstallFailed, Problem
+from nondum.wheelhouse.target import Target
+
+TIMEOUT_S = 1800
+
+
+@dataclass(frozen=True, slots=True)
+class Sources:
+    """Where wheels come from."""
+
+    wheel_folders: tuple[Path, ...] = ()
+    """Folders of wheels, looked at before the index."""
+    offline: bool = False
+    """Only those folders, no index."""
+
+    def options(self) -> list[str]:
+        """The same for pip."""
+        options = [part for folder in self.wheel_folders for part in ("--find-links", str(folder))]
+        return [*options, "--no-index"] if self.offline else options
+
+
+def make_wheel(package: Path, folder: Path, sources: Sources) -> Path:
+    """Build a package's own wheel into `folder`. Raises `InstallFailed` (BUILD_FAILED)."""
+    before = set(folder.glob("*.whl"))
+    _pip(
+        ["wheel", "--no-deps", "--wheel-dir", str(folder), *sources.options(), str(package)],
+        "BUILD_FAILED",
+        str(package),
+    )
+    (made,) = set(folder.glob("*.whl")) - before
+    return made
+
+
+def fetch(wheel: Path, target: Target, folder: Path, sources: Sources) -> tuple[Path, ...]:
+    """A wheel and all that it depends on, for one target; by name.
+
+    Raises `InstallFailed` (WHEEL_MISSING) that says what has no wheel.
+    """
+    folder.mkdir(parents=True)
+    platforms = [part for p in target.platforms() for part in ("--platform", p)]
+    _pip(
+        [
+            *("download", "--only-binary", ":all:", "--dest", str(folder)),
+            *("--implementation", "cp", "--python-version", target.python),
+            *platforms,
+            *sources.options(),
+            str(wheel),
+        ],
+        "WHEEL_MISSING",
+        f"{wheel.name} for {target.architecture}, Python {target.python}",
+    )
+    return tuple(sorted(folder.glob("*.whl")))
+
+
+def _pip(arguments: Sequence[str], code: str, where: str) -> None:
+    command = [sys.executable, "-m", "pip", *arguments, "--quiet", "--disable-pip-version-check"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
+    if done.returncode:
+        errors = [
+            line.removeprefix("ERROR: ")
+            for line in done.stderr.splitlines()
+            if line.startswith("ERROR: ")
+        ]
+        said = (errors or done.stderr.strip().splitlines() or ["pip said nothing"])[0]
+        raise InstallFailed(Problem(code, said, where=where, fix="see what pip says"))
