@@ -12,8 +12,8 @@ from nondum.sdk.description import Behaviour, Fragment, Label, Phrase, PluginDes
 def object_name(host: str, component: str, local: str) -> str:
     """The planning object of a unit or an output slot.
 
-    >>> object_name("rover", "thermal-camera", "camera")
-    'rover__thermal-camera__camera'
+    >>> object_name("rover", "front-eye", "camera")
+    'rover__front-eye__camera'
     """
     return f"{host}__{component}__{local}"
 
