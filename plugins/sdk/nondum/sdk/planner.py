@@ -23,7 +23,7 @@ class GroundAction:
 
     @property
     def schema(self) -> str:
-        """The schema's name: `mobile-base.drive`."""
+        """The schema's name: `plugin.drive`."""
         return self.name.split(" ", 1)[0]
 
     @property
