@@ -65,7 +65,7 @@ class Mind:
         self._emit = emit
         self._news = asyncio.Event()
         self._viewers = asyncio.Condition()
-        self._composing: asyncio.Task[Composition] | None = None
+        self._composing: asyncio.Task[Composition | str] | None = None
         self._told_version: tuple[object, ...] = ()
         self.pursuit = Pursuit(
             queue=self.queue,
@@ -92,16 +92,16 @@ class Mind:
             self._composing.cancel()
             self._composing = None
         if len(snapshot.components) > SMALL:
-            self._composing = asyncio.create_task(asyncio.to_thread(compose, snapshot))
+            self._composing = asyncio.create_task(asyncio.to_thread(composed, snapshot))
             self._composing.add_done_callback(lambda _: self.wake())
         else:
-            self._adopt(compose(snapshot))
+            self._adopt(composed(snapshot))
         self.wake()
 
     def on_event(self, event: Event) -> None:
         """Take in what a worker or the component manager tells."""
-        was_run = self.runner.on_event(event)
-        if self.beliefs.on_event(event) or was_run:
+        was_belief = self.beliefs.on_event(event)  # first: the runner passes new values on
+        if self.runner.on_event(event) or was_belief:
             self.wake()
 
     def wake(self) -> None:
@@ -214,7 +214,10 @@ class Mind:
         revision = self.composition.revision if self.composition else 0
         return f"revision {revision}{', another is being merged' if self._composing else ''}"
 
-    def _adopt(self, composition: Composition) -> None:
+    def _adopt(self, composition: Composition | str) -> None:
+        if isinstance(composition, str):
+            self.people.tell(f"planning stays as it was: {composition}")
+            return
         old, self.composition = self.composition, composition
         self.beliefs.adopt(composition)
         self.runner.adopt(composition)
@@ -259,3 +262,13 @@ class Mind:
         self._told_version = seen
         self.version += 1
         return True
+
+
+def composed(snapshot: Snapshot) -> Composition | str:
+    """The composition of a snapshot, or the fault that merging ran into: strangers' words must not
+    stop the host."""
+    try:
+        return compose(snapshot)
+    except Exception as error:
+        log.exception("revision %d cannot be merged", snapshot.revision)
+        return f"merging failed with {type(error).__name__}: {error}"

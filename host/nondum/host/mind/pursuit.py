@@ -7,6 +7,7 @@ as it can by itself; it is replaced between two ticks, and what runs and is stil
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -26,6 +27,8 @@ from nondum.planning.task_control import Phase
 from nondum.planning.task_tree import TaskTree
 from nondum.sdk.errors import GoalRefused, Problem
 from nondum.sdk.planner import GroundTask, Plan
+
+log = logging.getLogger(__name__)
 
 COOL_DOWN_S = 30.0
 """How long an action that failed again and again is left out of plans."""
@@ -227,9 +230,9 @@ class Pursuit:
             self._search = self._searched_for = None
 
     def _take_found(self) -> None:
-        if self._search is None or not self._search.done():
+        if self._search is None or self._searched_for is None or not self._search.done():
             return
-        found = self._search.result()
+        found = self._outcome(self._search, self._searched_for)
         self._search = self._searched_for = None
         goal = found.situation.goal
         if self.queue[goal].state.is_final or not found.situation.is_like(self._situation(goal)):
@@ -241,6 +244,17 @@ class Pursuit:
             self._take_up(found)
         else:
             del self._tried[goal]  # the world has moved on; `step` searches again
+
+    def _outcome(
+        self, search: asyncio.Task[Planned | NoPlan], asked: Situation
+    ) -> Planned | NoPlan:
+        """What a search came to; a fault in planning is contained, and told like a missing plan."""
+        error = search.exception()
+        if error is None:
+            return search.result()
+        log.error("a search for a plan failed", exc_info=error)
+        problem = Problem("PLANNING_FAULT", f"planning failed: {type(error).__name__}: {error}")
+        return NoPlan(asked, (problem,))
 
     def _still_works(self, found: Planned) -> bool:
         assert self._composition is not None  # there was a search

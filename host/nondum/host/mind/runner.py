@@ -34,6 +34,16 @@ class Call(Protocol):
         """The `call_id` of its events; unique among its component's calls."""
         ...
 
+    @property
+    def state(self) -> RunState:
+        """How far it is: it may have ended by the time that it is handed over."""
+        ...
+
+    @property
+    def reason(self) -> str:
+        """Why it failed or was halted."""
+        ...
+
     def halt(self) -> None:
         """Ask it to end; bounded, whatever the plugin does. Returns at once."""
         ...
@@ -119,6 +129,8 @@ class BehaviourRunner:
             run.state, run.reason = RunState.FAILED, str(error)
             return run
         self._running[component, run.call.id] = run
+        if run.call.state.has_ended:
+            self._on_ended((component, run.call.id), run.call.state, run.call.reason)
         return run
 
     def on_event(self, event: Event) -> bool:

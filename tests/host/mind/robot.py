@@ -1,0 +1,197 @@
+"""A robot for a mind: components that come and go, and behaviours that do as they are told."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from nondum.host.catalogue.records import ComponentRecord, ComponentState, MountPose, Snapshot
+from nondum.host.events import (
+    BehaviourEnded,
+    BehaviourEstablished,
+    Event,
+    FactForgotten,
+    FactKnown,
+    StreamFlowing,
+)
+from nondum.host.mind.mind import Mind
+from nondum.host.mind.planners import Planners
+from nondum.host.mind.runner import FactValue
+from nondum.host.mind.system_tree import SystemTree, default_tree
+from nondum.planning.running import RunState
+from nondum.sdk.description import PluginDescription
+
+HOST = "rover"
+
+
+@dataclass(eq=False)
+class RobotCall:
+    """One behaviour that was asked for."""
+
+    robot: Robot
+    id: int
+    component: str
+    behaviour: str
+    arguments: Mapping[str, str]
+    values: tuple[FactValue, ...]
+    state: RunState = RunState.STARTING
+    reason: str = ""
+
+    def halt(self) -> None:
+        asyncio.get_running_loop().call_soon(self.end, RunState.HALTED)
+
+    def establish(self) -> None:
+        if self.state is RunState.STARTING:
+            self.state = RunState.ESTABLISHED
+            self.robot.mind.on_event(BehaviourEstablished(self.component, self.behaviour, self.id))
+
+    def end(self, state: RunState, reason: str = "") -> None:
+        if not self.state.has_ended:
+            self.state, self.reason = state, reason
+            ended = BehaviourEnded(self.component, self.behaviour, self.id, state.name, reason)
+            self.robot.mind.on_event(ended)
+
+
+@dataclass(eq=False)
+class Robot:
+    """Components, their calls, and the mind that makes them. Implements `Calls`."""
+
+    planners: Planners
+    system_tree: SystemTree = default_tree
+    components: dict[str, ComponentRecord] = field(default_factory=dict)
+    mounts: tuple[MountPose, ...] = ()
+    calls: list[RobotCall] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    told_values: list[tuple[str, FactValue]] = field(default_factory=list)
+    stubborn: set[str] = field(default_factory=set)
+    """Behaviours that never get anywhere."""
+    broken: set[str] = field(default_factory=set)
+    """Components whose behaviours fail."""
+    revision: int = 0
+    mind: Mind = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._ids = count(1)
+        self.mind = Mind(
+            HOST,
+            self,
+            self.planners,
+            emit=self.events.append,
+            deadline_s=10.0,
+            system_tree=self.system_tree,
+        )
+        self.see()
+
+    # Calls
+
+    def behave(
+        self,
+        component: str,
+        behaviour: str,
+        arguments: Mapping[str, str],
+        values: Sequence[FactValue],
+    ) -> RobotCall:
+        call = RobotCall(self, next(self._ids), component, behaviour, arguments, tuple(values))
+        self.calls.append(call)
+        declared = self.components[component].description.behaviours
+        lasting = next(b.lasting for b in declared if b.name == behaviour)
+        loop = asyncio.get_running_loop()
+        if component in self.broken:
+            loop.call_soon(call.end, RunState.FAILED, "no light")
+        elif behaviour in self.stubborn:
+            pass
+        elif lasting:
+            loop.call_soon(call.establish)
+        else:
+            loop.call_soon(call.end, RunState.SUCCEEDED)
+        return call
+
+    def tell_values(self, component: str, values: Sequence[FactValue]) -> None:
+        self.told_values += [(component, value) for value in values]
+
+    # Recomposition
+
+    def plug(self, *plugins: PluginDescription) -> None:
+        for plugin in plugins:
+            self.components[plugin.name] = ComponentRecord(
+                id=plugin.name,
+                payload=f"key-{plugin.name}",
+                payload_id=f"org.example.{plugin.name}",
+                distribution=plugin.name,
+                entry_point=plugin.name,
+                version=plugin.version,
+                state=ComponentState.READY,
+                description=plugin,
+                venv=Path("venv"),
+                site_packages=Path("venv/lib"),
+                scratch=Path("scratch"),
+                rank=len(self.components),
+            )
+        self.see()
+
+    def unplug(self, *names: str) -> None:
+        for name in names:
+            del self.components[name]
+        self.see()
+        for call in self.calls:
+            if call.component in names:
+                call.end(RunState.HALTED, "its component is gone")
+
+    def set_state(self, name: str, state: ComponentState) -> None:
+        self.components[name] = replace(self.components[name], state=state)
+        self.see()
+
+    def see(self) -> None:
+        self.revision += 1
+        snapshot = Snapshot(
+            HOST, self.revision, tuple(self.components.values()), mounts=self.mounts
+        )
+        self.mind.see(snapshot)
+
+    # News
+
+    def know(self, component: str, predicate: str, *arguments: str, value: Any = None) -> None:
+        self.mind.on_event(FactKnown(component, predicate, arguments, value))
+
+    def forget(self, component: str, predicate: str, *arguments: str) -> None:
+        self.mind.on_event(FactForgotten(component, predicate, arguments))
+
+    def flow(self, component: str, slot: str, *, flowing: bool) -> None:
+        self.mind.on_event(StreamFlowing(component, f"{HOST}__{component}__{slot}", flowing))
+
+    # Looking
+
+    async def until(self, holds: Callable[[], bool]) -> None:
+        """Wait, while the mind runs, until something is so."""
+        try:
+            async with asyncio.timeout(20.0):
+                while not holds():
+                    await self.mind.changed(self.mind.version)
+        except TimeoutError:
+            raise AssertionError(f"still not so; told: {self.told}") from None
+
+    async def until_goal(self, state: str, id: str = "1") -> None:
+        await self.until(lambda: self.mind.queue[id].state.value == state)
+
+    async def until_holding(self, id: str = "1") -> None:
+        await self.until(lambda: self.mind.queue[id].reason == "it holds and is kept so")
+
+    @property
+    def running(self) -> set[str]:
+        return {f"{c.component}.{c.behaviour}" for c in self.calls if not c.state.has_ended}
+
+    @property
+    def started(self) -> list[str]:
+        return [f"{call.component}.{call.behaviour}" for call in self.calls]
+
+    @property
+    def told(self) -> list[str]:
+        return [told.text for told in self.mind.people]
+
+    def call(self, behaviour: str) -> RobotCall:
+        """The last call of a behaviour."""
+        return next(call for call in reversed(self.calls) if call.behaviour == behaviour)

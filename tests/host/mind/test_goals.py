@@ -1,0 +1,92 @@
+"""The goal queue: who goes first, and who makes way."""
+
+from __future__ import annotations
+
+import pytest
+
+from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState
+from nondum.planning.goal import GoalKind
+from nondum.sdk.errors import GoalRefused
+
+
+def never(_: GivenGoal) -> bool:
+    return False
+
+
+def give(queue: GoalQueue, kind: GoalKind = "achieve", priority: int = 0) -> str:
+    return queue.give("words", "(goal)", kind, priority=priority).id
+
+
+@pytest.fixture
+def queue() -> GoalQueue:
+    return GoalQueue()
+
+
+def wanted(queue: GoalQueue) -> str | None:
+    goal = queue.wanted(never)
+    return goal.id if goal else None
+
+
+def test_higher_priority_goes_first(queue: GoalQueue) -> None:
+    give(queue)
+    assert wanted(queue) == "1"
+    give(queue, priority=1)
+    assert wanted(queue) == "2"
+
+
+def test_what_can_be_finished_goes_before_what_never_ends(queue: GoalQueue) -> None:
+    give(queue, "maintain")
+    give(queue)
+    give(queue)
+    assert wanted(queue) == "2"
+
+
+def test_newest_wish_to_maintain_wins(queue: GoalQueue) -> None:
+    give(queue, "maintain")
+    give(queue, "maintain")
+    assert wanted(queue) == "2"
+
+
+def test_suspended_goal_waits_for_something_new(queue: GoalQueue) -> None:
+    first = give(queue, priority=1)
+    give(queue)
+    queue.put(first, GoalState.SUSPENDED, "no way")
+    assert wanted(queue) == "2"
+    again = queue.wanted(lambda goal: goal.id == first)
+    assert again is not None
+    assert again.id == first
+
+
+def test_active_goal_replaces_an_older_one_to_maintain(queue: GoalQueue) -> None:
+    old, new = give(queue, "maintain"), give(queue, "maintain")
+    assert [goal.id for goal in queue.activate(new)] == [old]
+    assert queue[old].state is GoalState.HALTED
+    assert queue[old].reason == "replaced by goal 2"
+
+
+def test_interrupted_goal_waits_its_turn(queue: GoalQueue) -> None:
+    old = give(queue, "maintain")
+    queue.activate(old)
+    new = give(queue, priority=1)
+    assert queue.activate(new) == ()
+    assert (queue[old].state, queue[old].reason) == (GoalState.QUEUED, "waits for goal 2")
+
+
+def test_what_is_over_stays_over(queue: GoalQueue) -> None:
+    id = give(queue)
+    queue.put(id, GoalState.REACHED)
+    queue.put(id, GoalState.ACTIVE)
+    assert queue[id].state is GoalState.REACHED
+    assert wanted(queue) is None
+
+
+def test_unknown_goal_is_refused_with_those_known(queue: GoalQueue) -> None:
+    give(queue)
+    with pytest.raises(GoalRefused, match="goals: 1"):
+        queue["7"]
+
+
+def test_old_ends_are_forgotten(queue: GoalQueue) -> None:
+    for _ in range(200):
+        queue.put(give(queue), GoalState.REACHED)
+    assert len(list(queue)) < 60

@@ -1,0 +1,260 @@
+"""A host's mind: goals pursued through recompositions, failures and losses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from tests.host.mind.robot import HOST, Robot
+from tests.planning.strangers import (
+    COMPTON_CAMERA,
+    MOBILE_BASE,
+    PAN_TILT_UNIT,
+    PEOPLE_DETECTOR,
+    RECORDED_CAMERA,
+    SPEAKER,
+    THERMAL_CAMERA,
+    VISUAL_TRACKER,
+)
+
+from nondum.host.catalogue.records import ComponentState
+from nondum.host.events import GoalReached, PlanMade, PlanMissing
+from nondum.planning.running import RunState
+from nondum.sdk.description import Fragment
+from nondum.sdk.errors import GoalRefused
+
+pytestmark = pytest.mark.anyio
+
+FOLLOW = "(following self person)"
+POINT = "(pointing self radiation-source)"
+REPORT = "(reported person self)"
+CHAIN = {"people-detector.detect", "visual-tracker.track", "mobile-base.drive"}
+
+
+def plug_followers(robot: Robot) -> None:
+    robot.plug(RECORDED_CAMERA, PEOPLE_DETECTOR, VISUAL_TRACKER, MOBILE_BASE)
+
+
+async def follow(robot: Robot) -> None:
+    plug_followers(robot)
+    robot.mind.give(pddl=FOLLOW, kind="maintain")
+    await robot.until_holding()
+
+
+async def test_goal_is_maintained(robot: Robot) -> None:
+    await follow(robot)
+    assert robot.running == {"recorded-camera.stream", *CHAIN}
+
+
+async def test_wiring_is_the_plans(robot: Robot) -> None:
+    await follow(robot)
+    frames, found = f"{HOST}__recorded-camera__frames", f"{HOST}__people-detector__found"
+    assert dict(robot.call("detect").arguments) == {
+        "u": f"{HOST}__people-detector__hog",
+        "i": frames,
+        "o": found,
+        "h": HOST,
+        "c": "person",
+    }
+    rows = {row["stream"]: row["consumers"] for row in robot.mind.views.streams()}
+    assert rows[frames] == ["people-detector"]
+    assert rows[found] == ["visual-tracker"]
+
+
+async def test_achieved_goal_halts_everything(robot: Robot) -> None:
+    robot.plug(RECORDED_CAMERA, PEOPLE_DETECTOR, VISUAL_TRACKER, SPEAKER)
+    robot.mind.give(pddl=REPORT)
+    await robot.until_goal("reached")
+    await robot.until(lambda: not robot.running)
+    assert robot.started[-2:] == ["visual-tracker.watch", "speaker.report"]
+    assert GoalReached("1") in robot.events
+
+
+async def test_pulled_camera_halts_and_is_explained(robot: Robot) -> None:
+    await follow(robot)
+    robot.unplug("recorded-camera")
+    await robot.until_goal("suspended")
+    assert not robot.running
+    assert any(t.startswith("recorded-camera is gone: it can stream") for t in robot.told)
+    assert any("recorded-camera used to supply it" in text for text in robot.told)
+    assert any(isinstance(event, PlanMissing) for event in robot.events)
+
+
+async def test_other_camera_takes_over(robot: Robot) -> None:
+    await follow(robot)
+    robot.unplug("recorded-camera")
+    await robot.until_goal("suspended")
+    robot.plug(THERMAL_CAMERA)
+    await robot.until_holding()
+    assert robot.running == {"thermal-camera.stream", *CHAIN}
+
+
+async def test_spare_camera_fails_over_without_suspension(robot: Robot) -> None:
+    plug_followers(robot)
+    robot.plug(THERMAL_CAMERA)
+    robot.mind.give(pddl=FOLLOW, kind="maintain")
+    await robot.until_holding()
+    [used] = {name.split(".")[0] for name in robot.running if name.endswith(".stream")}
+    [spare] = {"recorded-camera", "thermal-camera"} - {used}
+    robot.unplug(used)
+    await robot.until(lambda: robot.running == {f"{spare}.stream", *CHAIN})
+    assert not any(isinstance(event, PlanMissing) for event in robot.events)
+
+
+async def test_unrelated_recomposition_keeps_plan_and_behaviours(robot: Robot) -> None:
+    await follow(robot)
+    started = list(robot.started)
+    tree = robot.mind.pursuit.tree
+    robot.plug(SPEAKER)
+    await robot.until(lambda: robot.mind.pursuit.tree is not tree)
+    await robot.until(lambda: "speaker is here: it can report" in robot.told)
+    assert robot.started == started
+    assert len([e for e in robot.events if isinstance(e, PlanMade)]) == 1
+
+
+async def test_restarting_component_is_waited_for(robot: Robot) -> None:
+    await follow(robot)
+    robot.set_state("visual-tracker", ComponentState.RESTARTING)
+    await robot.until_goal("suspended")
+    robot.set_state("visual-tracker", ComponentState.READY)
+    await robot.until_holding()
+
+
+async def test_died_behaviour_is_started_again(robot: Robot) -> None:
+    await follow(robot)
+    robot.call("track").end(RunState.FAILED, "lost the target")
+    await robot.until(lambda: robot.started.count("visual-tracker.track") == 2)
+    await robot.until(lambda: robot.mind.beliefs.world.holds(f"following {HOST} person"))
+    assert robot.started.count("recorded-camera.stream") == 1
+
+
+async def test_alternative_is_used_after_failures(robot: Robot) -> None:
+    plug_followers(robot)
+    robot.broken = {"recorded-camera"}
+    robot.mind.give(pddl=FOLLOW, kind="maintain")
+    await robot.until_goal("suspended")
+    assert "what failed again and again" in robot.mind.queue["1"].reason
+    assert robot.started == ["recorded-camera.stream"] * 3
+    robot.plug(THERMAL_CAMERA)
+    await robot.until_holding()
+    assert "thermal-camera.stream" in robot.running
+
+
+async def test_valued_preconditions_travel_along(robot: Robot) -> None:
+    robot.plug(COMPTON_CAMERA, PAN_TILT_UNIT)
+    robot.stubborn = {"localise"}
+    robot.mind.give(pddl=POINT, kind="maintain")
+    await robot.until(lambda: robot.started == ["compton-camera.localise"])
+    robot.know("compton-camera", "bearing-known", "radiation-source", "self", value=["bearing", 1])
+    robot.call("localise").end(RunState.SUCCEEDED)
+    await robot.until_holding()
+    bearing = ("bearing-known", ("radiation-source", HOST))
+    assert robot.call("point").values == ((*bearing, ["bearing", 1]),)
+    robot.know("compton-camera", "bearing-known", "radiation-source", "self", value=["bearing", 2])
+    assert robot.told_values == [("pan-tilt-unit", (*bearing, ["bearing", 2]))]
+
+
+async def test_stalled_stream_is_restarted(robot: Robot) -> None:
+    await follow(robot)
+    robot.flow("recorded-camera", "frames", flowing=False)
+    await robot.until(lambda: not robot.running & CHAIN)
+    await robot.until(lambda: robot.started.count("recorded-camera.stream") == 2)
+    await robot.until(lambda: robot.running == {"recorded-camera.stream", *CHAIN})
+
+
+async def test_stalled_stream_that_comes_back_is_left_running(robot: Robot) -> None:
+    await follow(robot)
+    robot.flow("recorded-camera", "frames", flowing=False)
+    await robot.until(lambda: not robot.running & CHAIN)
+    robot.flow("recorded-camera", "frames", flowing=True)
+    await robot.until(lambda: robot.running == {"recorded-camera.stream", *CHAIN})
+    assert robot.started.count("recorded-camera.stream") == 1
+
+
+async def test_more_urgent_goal_goes_first_and_the_other_returns(robot: Robot) -> None:
+    await follow(robot)
+    robot.plug(COMPTON_CAMERA, PAN_TILT_UNIT)
+    robot.mind.give(pddl=POINT, priority=5)
+    await robot.until_goal("reached", "2")
+    await robot.until_holding("1")
+    assert robot.running == {"recorded-camera.stream", *CHAIN}
+
+
+async def test_goal_without_plan_does_not_interrupt(robot: Robot) -> None:
+    await follow(robot)
+    robot.plug(PAN_TILT_UNIT, COMPTON_CAMERA)
+    robot.set_state("pan-tilt-unit", ComponentState.QUARANTINED)
+    started = list(robot.started)
+    robot.mind.give(pddl=POINT, priority=5)
+    await robot.until_goal("suspended", "2")
+    assert robot.started == started
+    assert robot.mind.queue["1"].state.value == "active"
+
+
+async def test_newer_goal_to_maintain_replaces_the_older(robot: Robot) -> None:
+    await follow(robot)
+    robot.plug(COMPTON_CAMERA, PAN_TILT_UNIT)
+    robot.mind.give(pddl=POINT, kind="maintain")
+    await robot.until_holding("2")
+    assert robot.mind.queue["1"].state.value == "halted"
+    await robot.until(lambda: robot.running == {"pan-tilt-unit.point"})
+
+
+async def test_halt_now_ends_everything_without_planner(robot: Robot) -> None:
+    await follow(robot)
+    names = robot.mind.halt(now=True)
+    assert len(names) == 4
+    await robot.until(lambda: not robot.running)
+    assert robot.mind.queue["1"].state.value == "halted"
+    assert robot.mind.pursuit.current is None
+
+
+async def test_one_goal_is_halted_alone(robot: Robot) -> None:
+    await follow(robot)
+    robot.plug(COMPTON_CAMERA, PAN_TILT_UNIT)
+    waiting = robot.mind.give(pddl=POINT, kind="maintain", priority=-1)
+    assert robot.mind.halt(id=waiting.id) == ()
+    assert robot.mind.queue["1"].state.value == "active"
+    with pytest.raises(GoalRefused, match="there is no goal '9'"):
+        robot.mind.halt(id="9")
+
+
+async def test_goal_about_removed_words_is_suspended(robot: Robot) -> None:
+    robot.plug(COMPTON_CAMERA, PAN_TILT_UNIT)
+    robot.mind.give(pddl=POINT, kind="maintain")
+    await robot.until_holding()
+    robot.unplug("compton-camera")
+    await robot.until_goal("suspended")
+    assert "radiation-source" in robot.mind.queue["1"].reason
+    robot.plug(COMPTON_CAMERA)
+    await robot.until_holding()
+
+
+async def test_unknown_goal_is_refused(robot: Robot) -> None:
+    with pytest.raises(GoalRefused, match="nobody declares"):
+        robot.mind.give(pddl=POINT)
+    with pytest.raises(GoalRefused, match="nothing here understands"):
+        robot.mind.give(words="make tea")
+
+
+async def test_goal_that_holds_is_reached_at_once(robot: Robot) -> None:
+    robot.plug(SPEAKER)
+    robot.mind.give(pddl=f"(on {HOST}__speaker__voice self)")
+    await robot.until_goal("reached")
+    assert not robot.started
+
+
+async def test_plugins_may_not_say_what_the_host_says(robot: Robot) -> None:
+    robot.plug(SPEAKER)
+    robot.forget("speaker", "ready", f"{HOST}__speaker__voice")
+    robot.know("speaker", "self", "mule")
+    facts = robot.mind.beliefs.world.facts
+    assert f"ready {HOST}__speaker__voice" in facts
+    assert "self mule" not in facts
+
+
+async def test_conflicting_component_is_named(robot: Robot) -> None:
+    broken = replace(SPEAKER, fragments=(Fragment("domain.pddl", "(define (domain"),))
+    robot.plug(MOBILE_BASE, broken)
+    await robot.until(lambda: any("speaker is kept out of planning" in t for t in robot.told))
+    assert robot.mind.views.why()["problems"]

@@ -1,0 +1,108 @@
+"""What the mind shows: plain data that JSON can carry."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+from tests.host.mind.robot import HOST, Robot
+from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT, RECORDED_CAMERA
+
+from nondum.host.catalogue.records import MountPose
+from nondum.sdk.description import Label, PluginDescription
+
+pytestmark = pytest.mark.anyio
+
+CRYSTAL, HEAD = f"{HOST}__compton-camera__crystal", f"{HOST}__pan-tilt-unit__head"
+POINTING: PluginDescription = replace(
+    PAN_TILT_UNIT,
+    behaviours=tuple(replace(b, phrases=("point at {t}",)) for b in PAN_TILT_UNIT.behaviours),
+)
+SENSING = replace(COMPTON_CAMERA, labels=(Label("radiation-source", "the radiation source"),))
+
+
+async def point(robot: Robot) -> None:
+    robot.plug(SENSING, POINTING)
+    robot.mind.give(words="point at the radiation source")
+    await robot.until_holding()
+
+
+async def test_goal_in_words_of_two_strangers(robot: Robot) -> None:
+    robot.plug(SENSING, POINTING)
+    can = robot.mind.views.goals()["can"]
+    goal = f"(pointing {HOST} radiation-source)"
+    assert can == [{"words": "point at the radiation source", "goal": goal, "kind": "maintain"}]
+    given = robot.mind.give(words="point at the radiation source")
+    assert (given.pddl, given.kind) == (goal, "maintain")
+    await robot.until_holding()
+
+
+async def test_plan_shows_steps_and_why(robot: Robot) -> None:
+    await point(robot)
+    plan = robot.mind.views.plan()
+    assert plan["goal"] == f"(pointing {HOST} radiation-source)"
+    rows = [(row["step"], row["state"], row["why"]) for row in plan["steps"]]
+    assert rows == [
+        (1, "done", "done: what the rest of the plan needs of it holds"),
+        (2, "established", "runs for the goal"),
+    ]
+
+
+async def test_no_plan_is_shown_as_none(robot: Robot) -> None:
+    assert robot.mind.views.plan() == {"goal": None, "kind": None, "steps": []}
+
+
+async def test_facts_are_explained(robot: Robot) -> None:
+    await point(robot)
+    rows = {row["fact"]: row["source"] for row in robot.mind.views.facts()}
+    assert rows[f"ready {HEAD}"] == "pan-tilt-unit is healthy and its devices are there"
+    assert rows[f"senses {CRYSTAL} radiation-source"] == "the fragment of compton-camera says so"
+    [verdict, reason, against] = robot.mind.views.facts(why=f"(idle {HEAD})")
+    assert verdict["source"] == f"(idle {HEAD}) does not hold"
+    assert reason["source"] == "for it: nobody uses it"
+    assert "is established" in against["source"]
+
+
+async def test_why_tells_what_is_missing(robot: Robot) -> None:
+    await point(robot)
+    robot.unplug("pan-tilt-unit")
+    await robot.until_goal("suspended")
+    view = robot.mind.views.why()
+    assert any("is suspended" in sentence for sentence in view["sentences"])
+    assert any("pan-tilt-unit used to supply it" in problem for problem in view["problems"])
+
+
+async def test_units_show_mounts_and_doubts(robot: Robot) -> None:
+    robot.mounts = (MountPose(HEAD, (0.0, 0.0, 50.0), (0.0, 0.0, 0.0), "person"),)
+    robot.plug(COMPTON_CAMERA, PAN_TILT_UNIT)
+    rows = {row["unit"]: row for row in robot.mind.views.units()}
+    assert rows[CRYSTAL]["mount"] == "unknown"
+    assert "metres are meant" in rows[HEAD]["warnings"][0]
+
+
+async def test_behaviours_show_what_runs(robot: Robot) -> None:
+    await point(robot)
+    rows = {row["behaviour"]: row for row in robot.mind.views.behaviours()}
+    assert rows["point"]["running"] is True
+    assert rows["localise"] == {
+        "behaviour": "localise",
+        "component": "compton-camera",
+        "kind": "finishing",
+        "running": False,
+        "phrases": [],
+    }
+
+
+async def test_streams_show_flow(robot: Robot) -> None:
+    robot.plug(RECORDED_CAMERA)
+    robot.flow("recorded-camera", "frames", flowing=True)
+    assert robot.mind.views.streams()[0]["flowing"] is True
+
+
+async def test_everything_is_plain_data(robot: Robot) -> None:
+    await point(robot)
+    views = robot.mind.views
+    shown = [views.plan(), views.tree(), views.facts(), views.goals(), views.why()]
+    shown += [views.behaviours(), views.units(), views.streams(), views.told()]
+    assert json.loads(json.dumps(shown)) == shown
