@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import deque
 from collections.abc import Callable
 
 from demo.emulators.axis import Axis
@@ -165,18 +166,18 @@ class PanTiltUnit:
 
     def _reset(self) -> str:
         """Find both ends of both axes, then go home; it is answered when that is done."""
-        ends = [
+        ends = deque(
             (axis, end) for axis in (self.tilt, self.pan) for end in (axis.minimum, axis.maximum, 0)
-        ]
+        )
 
         def progress() -> str | None:
-            while not ends[0][0].is_moving if ends else False:
-                ends.pop(0)
-                if ends:
-                    ends[0][0].target = ends[0][1]
-            return None if ends else "!T!T!P!P*"
+            while not (self.tilt.is_moving or self.pan.is_moving):
+                if not ends:
+                    return "!T!T!P!P*"
+                axis, end = ends.popleft()
+                axis.target = end
+            return None
 
-        ends[0][0].target = ends[0][1]
         self._awaited = progress
         return ""
 

@@ -81,6 +81,6 @@ def test_manifests_are_well_formed(plugin: str) -> None:
 @pytest.mark.parametrize(("plugin", "other"), [NAMES, NAMES[::-1]])
 def test_neither_names_the_other(plugin: str, other: str) -> None:
     told = re.compile(other.replace("-", "[-_ ]"), re.IGNORECASE)
-    for path in (PLUGINS / plugin).rglob("*"):
-        if path.is_file() and "__pycache__" not in path.parts and path.suffix != ".pyc":
+    for path in (PLUGINS / plugin).rglob("*.*"):
+        if path.suffix in {".py", ".pddl", ".toml", ".md"}:
             assert not told.search(path.read_text(encoding="utf-8")), path

@@ -6,66 +6,22 @@ import math
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from demo.emulators.pose import Mount
-from demo.pointing import HELD_S, Score, read_log, score
-from demo.scenario import Scenario, random_scenario
+from demo.instruments import EMULATORS, Instruments, switched_on
+from demo.pointing import HELD_S, Score
+from demo.scenario import random_scenario
 
 from nondum.sdk.bench import WorkerFactory
 
-EMULATORS = Path(__file__).parents[2] / "demo/emulators"
 TARGET = {"t": "radiation-source", "h": "robot"}
 STRONG_BQ = 4e10
 """Found at once, where finding it is not the point."""
 AT_HOME = Mount((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-
-
-@contextmanager
-def program(name: str, *arguments: object, paths: int) -> Iterator[list[str]]:
-    """A running emulator; the paths that it printed."""
-    command = [sys.executable, str(EMULATORS / f"{name}.py"), *map(str, arguments)]
-    running = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    try:
-        assert running.stdout is not None
-        yield [running.stdout.readline().strip() for _ in range(paths)]
-    finally:
-        running.kill()
-        said, _ = running.communicate()
-    assert said == ""
-
-
-class Instruments:
-    """The emulators of one scenario, switched on."""
-
-    def __init__(self, folder: Path, scenario: Scenario) -> None:
-        self.scenario = scenario
-        self._truth, self._log = folder / "truth.json", folder / "log.jsonl"
-        scenario.write(self._truth)
-        self._open = ExitStack()
-
-    def __enter__(self) -> Instruments:
-        camera = program("compton_emulator", "--scenario", self._truth, paths=1)
-        arguments = ("--scenario", self._truth, "--log", self._log)
-        unit = program("ptu_emulator", *arguments, paths=2)
-        (self.line,) = self._open.enter_context(camera)
-        self.head, self.relay = self._open.enter_context(unit)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._open.close()
-
-    def score(self, at_s: float) -> Score:
-        """Judge the second before; the log has to have come that far."""
-        deadline = time.monotonic() + 5
-        while (truths := read_log(self._log))[-1].at_s < at_s and time.monotonic() < deadline:
-            time.sleep(0.02)  # the log is a plain file
-        return score(self.scenario, truths, end_s=at_s)
 
 
 def run(
@@ -78,12 +34,12 @@ def run(
     """Localise and point with the mounts that a person entered; the score, and the call."""
     sensor = worker(
         "nondum_compton_camera.plugin",
-        devices={"list-mode": instruments.line},
+        devices={"list-mode": instruments.nodes["camera"]},
         component="rays",
     )
     head = worker(
         "nondum_pan_tilt_unit.plugin",
-        devices={"head": instruments.head, "laser-relay": instruments.relay},
+        devices={"head": instruments.nodes["head"], "laser-relay": instruments.nodes["relay"]},
         component="arrow",
         mounts={
             "laser-pointer": (pointer.xyz, pointer.rpy),
@@ -103,7 +59,7 @@ def test_the_laser_comes_to_rest_on_the_source(
     worker: WorkerFactory, tmp_path: Path, seed: int
 ) -> None:
     scenario = random_scenario(seed)
-    with Instruments(tmp_path, scenario) as instruments:
+    with switched_on(scenario, tmp_path) as instruments:
         found, call = run(worker, instruments, camera=scenario.camera, pointer=scenario.pointer)
         assert found.is_reached, str(found)
         call.halt()
@@ -116,7 +72,7 @@ def test_a_mount_left_out_fails(worker: WorkerFactory, tmp_path: Path, forgotten
     scenario = replace(random_scenario(2), activity_bq=STRONG_BQ)
     mounts = {"camera": scenario.camera, "pointer": scenario.pointer}
     mounts |= {name: AT_HOME for name in mounts if forgotten in (name, "both")}
-    with Instruments(tmp_path, scenario) as instruments:
+    with switched_on(scenario, tmp_path) as instruments:
         found, _ = run(worker, instruments, **mounts)
     assert found.lit
     assert found.angle_rad > math.radians(10)
@@ -126,10 +82,21 @@ def test_a_seized_head_fails_though_the_driver_cannot_know(
     worker: WorkerFactory, tmp_path: Path
 ) -> None:
     scenario = replace(random_scenario(1), seized=True, activity_bq=STRONG_BQ)
-    with Instruments(tmp_path, scenario) as instruments:
+    with switched_on(scenario, tmp_path) as instruments:
         found, call = run(worker, instruments, camera=scenario.camera, pointer=scenario.pointer)
         assert call.state == "established"
     assert not found.is_reached
+
+
+def test_instruments_are_plugged_in_and_out(tmp_path: Path) -> None:
+    folder = tmp_path / "slots"
+    folder.mkdir()
+    with switched_on(random_scenario(1), tmp_path) as instruments:
+        assert len(set(instruments.nodes.values())) == 3
+        instruments.plug(folder)
+        assert sorted(file.stem for file in folder.iterdir()) == ["camera", "head", "relay"]
+        instruments.unplug(folder)
+        assert not list(folder.iterdir())
 
 
 def test_emulators_end_with_who_started_them(tmp_path: Path) -> None:

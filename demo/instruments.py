@@ -1,0 +1,81 @@
+"""The instruments of one pointing run: emulators switched on, plugged in, and judged afterwards."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from demo import slots
+from demo.pointing import Score, Truth, read_log, score
+from demo.scenario import Scenario
+
+EMULATORS = Path(__file__).parent / "emulators"
+LOG_DEADLINE_S = 5.0
+_ADAPTERS = {
+    "camera": slots.COMPTON_CAMERA,
+    "head": slots.PAN_TILT_UNIT,
+    "relay": slots.LASER_RELAY,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Instruments:
+    """Emulators that run; made by `switched_on`, which also ends them."""
+
+    scenario: Scenario
+    nodes: dict[str, str]
+    """`camera`, `head` and `relay` → the terminal that each is on."""
+    log: Path
+
+    def plug(self, folder: Path) -> None:
+        """Plug all three into a folder of device slots."""
+        for name, node in self.nodes.items():
+            slots.plug(folder, name, node, _ADAPTERS[name])
+
+    def unplug(self, folder: Path) -> None:
+        """Pull them out again."""
+        for name in self.nodes:
+            slots.unplug(folder, name)
+
+    def score(self, end_s: float) -> Score:
+        """Judge the second before `end_s` (monotonic clock), once that time has come."""
+        return score(self.scenario, self._truths(end_s), end_s=end_s)
+
+    def _truths(self, until_s: float) -> list[Truth]:
+        """The log, when it reaches that time; a dead emulator's as it is."""
+        deadline = max(until_s, time.monotonic()) + LOG_DEADLINE_S
+        while True:
+            truths = read_log(self.log)
+            if (truths and truths[-1].at_s >= until_s) or time.monotonic() > deadline:
+                return truths
+            time.sleep(0.02)  # a plain file tells nobody that it has grown
+
+
+@contextmanager
+def switched_on(scenario: Scenario, folder: Path) -> Iterator[Instruments]:
+    """Start the emulators of a scenario; truth and log are kept in `folder`."""
+    truth, log = folder / "truth.json", folder / "truth-log.jsonl"
+    scenario.write(truth)
+    log.touch()
+    with ExitStack() as programs:
+        (camera,) = programs.enter_context(_program("compton_emulator", truth, paths=1))
+        unit = _program("ptu_emulator", truth, "--log", str(log), paths=2)
+        head, relay = programs.enter_context(unit)
+        yield Instruments(scenario, {"camera": camera, "head": head, "relay": relay}, log)
+
+
+@contextmanager
+def _program(name: str, truth: Path, *options: str, paths: int) -> Iterator[list[str]]:
+    """A running emulator; the paths that it printed."""
+    command = [sys.executable, str(EMULATORS / f"{name}.py"), "--scenario", str(truth), *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
+        try:
+            assert running.stdout is not None
+            yield [running.stdout.readline().strip() for _ in range(paths)]
+        finally:
+            running.terminate()
