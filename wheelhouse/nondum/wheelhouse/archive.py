@@ -12,6 +12,7 @@ import stat
 import struct
 import zipfile
 import zlib
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -27,6 +28,10 @@ MAX_NAME = 255
 _END = b"PK\x05\x06"
 _END_LENGTH = 22
 _LOCAL = struct.Struct("<4s5H3L2H")
+_ZIP64 = 0xFFFFFFFF
+"""In a size's place: the true size is in an extra field."""
+_DESCRIPTOR_MAX = 24
+"""Longest data descriptor that may follow a member; no header fits in it."""
 _CHUNK = 1024 * 1024
 
 
@@ -57,11 +62,12 @@ class Archive:
 def read(data: Bytes, where: str) -> Archive:
     """List the members of an archive, and everything that makes it unsafe to unpack."""
     try:
-        listed = zipfile.ZipFile(io.BufferedReader(_View(data))).infolist()
+        found = zipfile.ZipFile(io.BufferedReader(_View(data)))
     except (zipfile.BadZipFile, NotImplementedError, OSError, ValueError, struct.error) as error:
         return Archive((), (Problem("WHEEL_STRUCTURE", f"is no zip file ({error})", where=where),))
+    listed, flaws = found.infolist(), _outline_flaws(data, found)
     problems = [
-        *(Problem("WHEEL_STRUCTURE", text, where=where) for text in _outline_flaws(data, listed)),
+        *(Problem("WHEEL_STRUCTURE", text, where=where) for text in flaws),
         *(Problem("WHEEL_BOMB", text, where=where) for text in _bomb_flaws(listed)),
         *_path_problems(listed, where),
     ]
@@ -106,29 +112,45 @@ def _checked(pieces: Iterator[bytes], member: Member) -> Iterator[bytes]:
 
 
 def _member(data: Bytes, info: zipfile.ZipInfo) -> Member:
-    local = _LOCAL.unpack_from(data, info.header_offset)
-    start = info.header_offset + _LOCAL.size + local[9] + local[10]
+    start, end = _span(data, info)
     return Member(
         path=info.filename,
         size=info.file_size,
         is_packed=info.compress_type == zipfile.ZIP_DEFLATED,
         start=start,
-        end=start + info.compress_size,
+        end=end,
         crc=info.CRC,
         is_executable=bool(info.external_attr >> 16 & stat.S_IXUSR),
     )
 
 
-def _outline_flaws(data: Bytes, listed: list[zipfile.ZipInfo]) -> Iterator[str]:
+def _outline_flaws(data: Bytes, archive: zipfile.ZipFile) -> Iterator[str]:
+    listed = archive.infolist()
     if len(data) < _END_LENGTH or bytes(data[-_END_LENGTH:][:4]) != _END:
         yield "bytes follow the end of the archive"
     if listed and min(info.header_offset for info in listed) != 0:
         yield "bytes precede the archive"
-    names = [info.filename for info in listed]
-    for name in sorted({name for name in names if names.count(name) > 1})[:3]:
+    names = Counter(info.filename for info in listed)
+    for name in sorted(name for name, count in names.items() if count > 1)[:3]:
         yield f"{name!r} stands twice"
-    for info in listed:
-        yield from _entry_flaws(data, info)
+    flaws = [flaw for info in listed for flaw in _entry_flaws(data, info)]
+    yield from flaws or _hidden(data, listed, archive.start_dir)
+
+
+def _hidden(data: Bytes, listed: list[zipfile.ZipInfo], directory: int) -> Iterator[str]:
+    """Bytes between members that only a reader from front to back would see as members."""
+    starts = sorted([*(info.header_offset for info in listed), directory])
+    ends = sorted(_span(data, info)[1] for info in listed)
+    for end, start in zip(ends, starts[1:], strict=True):
+        if start - end > _DESCRIPTOR_MAX:
+            yield f"{start - end} bytes at {end} belong to no member"
+
+
+def _span(data: Bytes, info: zipfile.ZipInfo) -> tuple[int, int]:
+    """Where a member's packed bytes begin and end."""
+    local = _LOCAL.unpack_from(data, info.header_offset)
+    start = info.header_offset + _LOCAL.size + local[9] + local[10]
+    return start, start + info.compress_size
 
 
 def _entry_flaws(data: Bytes, info: zipfile.ZipInfo) -> Iterator[str]:
@@ -147,6 +169,9 @@ def _entry_flaws(data: Bytes, info: zipfile.ZipInfo) -> Iterator[str]:
         "utf-8" if info.flag_bits & 0x800 else "cp437"
     ):
         yield f"{info.filename!r} has another name in its own header"
+    is_told_later = info.flag_bits & 0x8 or _ZIP64 in local[7:9]
+    if not is_told_later and local[6:9] != (info.CRC, info.compress_size, info.file_size):
+        yield f"{info.filename!r} has another size or checksum in its own header"
     if start + local[9] + local[10] + info.compress_size > len(data):
         yield f"{info.filename!r} lies outside the file"
 
