@@ -1,0 +1,239 @@
+"""Which stream is wired to which input, and why: the host introduces, workers do the rest.
+
+An action's stream parameters are wired for as long as the action runs; the plan chose them.
+Optional inputs are in no plan: each gets the first stream by name that flows, is of its type, and
+comes from another component of this host, and is wired anew whenever that changes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import Counter
+from collections.abc import AsyncIterator, Iterable, Iterator, Mapping
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+
+from nondum.host.catalogue.records import object_name
+from nondum.sdk.description import PluginDescription
+from nondum.sdk.errors import NondumError, Problem, WorkerFailed
+from nondum.sdk.messages import MESSAGES
+from nondum.sdk.signature import parse_signature
+from nondum.transport import StreamBroker, Wire, WorkerLink
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Source:
+    """A stream that a component can produce."""
+
+    stream: str
+    """Object name."""
+    type: str
+    component: str
+
+
+@dataclass(frozen=True, slots=True)
+class Socket:
+    """An optional input."""
+
+    component: str
+    unit: str
+    slot: str
+    type: str
+
+
+@dataclass(frozen=True, slots=True)
+class StreamStatus:
+    """A stream as people see it."""
+
+    stream: str
+    type: str
+    component: str
+    is_flowing: bool
+    readers: tuple[str, ...]
+    """Components, or `component.unit.slot` for optional inputs."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Member:
+    """A component whose worker runs."""
+
+    link: WorkerLink
+    description: PluginDescription
+    sources: tuple[Source, ...]
+    sockets: tuple[Socket, ...]
+
+
+class Streams:
+    """All streams of a host and their wires. Its methods run on the loop."""
+
+    def __init__(self, host: str) -> None:
+        self._host = host
+        self._broker = StreamBroker()
+        self._members: dict[str, _Member] = {}
+        self._flowing: set[str] = set()
+        self._required: Counter[Wire] = Counter()
+        self._wires: dict[Wire, asyncio.Task[None]] = {}
+        self._disconnecting: set[asyncio.Task[None]] = set()
+
+    def join(self, component: str, link: WorkerLink, description: PluginDescription) -> None:
+        """A component's worker runs: its outputs and inputs are there."""
+        sources = tuple(_sources(self._host, component, description))
+        sockets = tuple(_sockets(component, description))
+        self._members[component] = _Member(link, description, sources, sockets)
+        self._settle()
+
+    def leave(self, component: str) -> None:
+        """A component's worker is gone, and all its streams with it."""
+        member = self._members.pop(component, None)
+        if member is not None:
+            self._flowing -= {source.stream for source in member.sources}
+            self._settle()
+
+    def set_flowing(self, stream: str, *, is_flowing: bool) -> None:
+        """Messages have begun, or have stopped, to arrive."""
+        if is_flowing:
+            self._flowing.add(stream)
+        else:
+            self._flowing.discard(stream)
+        self._settle()
+
+    @asynccontextmanager
+    async def wired(
+        self, component: str, behaviour: str, arguments: Mapping[str, str]
+    ) -> AsyncIterator[None]:
+        """Wire what a behaviour reads, for as long as the context lasts.
+
+        Raises `WorkerFailed` (STREAM_UNKNOWN, or why an end refused), `LinkClosed`.
+        """
+        wires = tuple(self._wires_of(component, behaviour, arguments))
+        self._required.update(wires)
+        self._settle()
+        try:
+            for connecting in [self._wires[wire] for wire in wires]:
+                await asyncio.shield(connecting)
+            yield
+        finally:
+            self._required -= Counter(wires)
+            self._settle()
+
+    def listing(self) -> tuple[StreamStatus, ...]:
+        """Every stream of every running component, by name."""
+        return tuple(
+            StreamStatus(
+                source.stream,
+                source.type,
+                source.component,
+                source.stream in self._flowing,
+                tuple(sorted(w.reader for w in self._wires if w.stream == source.stream)),
+            )
+            for source in self._sources()
+        )
+
+    async def close(self) -> None:
+        """Let go of everything; the workers' ends close with the workers."""
+        tasks = (*self._wires.values(), *self._disconnecting)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    def _sources(self) -> list[Source]:
+        return sorted(source for member in self._members.values() for source in member.sources)
+
+    def _wires_of(
+        self, component: str, behaviour: str, arguments: Mapping[str, str]
+    ) -> Iterator[Wire]:
+        sources = {source.stream: source for source in self._sources()}
+        types = _parameter_types(self._members[component].description, behaviour)
+        for parameter, argument in arguments.items():
+            source = sources.get(argument)
+            if source is None:
+                if types.get(parameter) in MESSAGES:
+                    raise WorkerFailed(_unknown(argument, component))
+            elif source.component != component:
+                yield Wire(source.stream, source.type, source.component, component)
+
+    def _settle(self) -> None:
+        """Bring the wires up to date with who is there, what flows and what is required."""
+        sources = self._sources()
+        flowing = [source for source in sources if source.stream in self._flowing]
+        sockets = [socket for member in self._members.values() for socket in member.sockets]
+        present = self._members.keys()
+        wanted = {w for w in self._required if {w.producer, w.consumer} <= present}
+        wanted.update(optional_wires(sockets, flowing))
+        for wire in sorted(self._wires.keys() - wanted):
+            self._disconnect(wire)
+        for wire in sorted(wanted - self._wires.keys()):
+            self._connect(wire)
+
+    def _connect(self, wire: Wire) -> None:
+        producer, consumer = self._members[wire.producer].link, self._members[wire.consumer].link
+        connecting = asyncio.create_task(self._broker.connect(wire, producer, consumer))
+        self._wires[wire] = connecting
+        connecting.add_done_callback(lambda done: self._on_connected(wire, done))
+
+    def _on_connected(self, wire: Wire, connecting: asyncio.Task[None]) -> None:
+        if connecting.cancelled() or (error := connecting.exception()) is None:
+            return
+        if self._wires.get(wire) is connecting:
+            del self._wires[wire]
+        is_loud = not isinstance(error, NondumError) or error.code != "LINK_CLOSED"
+        if is_loud:
+            log.warning("%s cannot be wired to %s: %s", wire.stream, wire.reader, error)
+
+    def _disconnect(self, wire: Wire) -> None:
+        del self._wires[wire]
+        links = (self._members.get(name) for name in (wire.producer, wire.consumer))
+        producer, consumer = (member.link if member else None for member in links)
+        # Whatever is still being connected was asked first, so it is also undone by this.
+        task = asyncio.create_task(self._broker.disconnect(wire, producer, consumer))
+        self._disconnecting.add(task)
+        task.add_done_callback(self._disconnecting.discard)
+
+
+def optional_wires(sockets: Iterable[Socket], flowing: Iterable[Source]) -> Iterator[Wire]:
+    """What feeds each optional input: the first source by name that fits."""
+    offered = sorted(flowing)
+    for socket in sockets:
+        fitting = (
+            source
+            for source in offered
+            if source.type == socket.type and source.component != socket.component
+        )
+        if (source := next(fitting, None)) is not None:
+            yield Wire(
+                source.stream,
+                source.type,
+                source.component,
+                socket.component,
+                socket.unit,
+                socket.slot,
+            )
+
+
+def _sources(host: str, component: str, description: PluginDescription) -> Iterator[Source]:
+    for unit in description.units:
+        for output in unit.outputs:
+            yield Source(object_name(host, component, output.name), output.type, component)
+
+
+def _sockets(component: str, description: PluginDescription) -> Iterator[Socket]:
+    for unit in description.units:
+        for slot in unit.inputs:
+            yield Socket(component, unit.name, slot.name, slot.type)
+
+
+def _parameter_types(description: PluginDescription, behaviour: str) -> dict[str, str]:
+    """Type of each parameter of a behaviour's action; of alternatives, the first."""
+    for described in description.behaviours:
+        if described.name == behaviour:
+            parameters = parse_signature(described.action).parameters
+            return {parameter.name: parameter.types[0] for parameter in parameters}
+    return {}
+
+
+def _unknown(stream: str, component: str) -> Problem:
+    message = f"no running component of this host has the stream {stream!r}"
+    return Problem("STREAM_UNKNOWN", message, where=component)

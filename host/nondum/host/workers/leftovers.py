@@ -1,0 +1,54 @@
+"""Finds what workers leave behind: processes that went out of their group, or outlived a daemon.
+
+Every worker's environment names its scratch folder, and what it starts inherits that
+(proc_pid_environ(5)). A process that clears its environment escapes; holding such ones takes a
+confinement of a higher level.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+from nondum.host.workers.launcher import MARK
+
+ROUNDS = 5
+"""Searches at most: a process may fork while it is being found."""
+
+
+def end_leftovers(folder: Path) -> int:
+    """SIGKILL every process of a worker whose scratch folder is `folder` or below it.
+
+    Blocks for some milliseconds; returns how many were found.
+    """
+    ended: set[int] = set()
+    for _ in range(ROUNDS):
+        found = set(_end_marked(f"{MARK}={folder}".encode()))
+        ended |= found
+        if not found:
+            break
+    return len(ended)
+
+
+def _end_marked(mark: bytes) -> Iterator[int]:
+    for pid in [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()]:
+        with contextlib.suppress(OSError):
+            # Taken before the look, so that what is ended is what was seen.
+            descriptor = os.pidfd_open(pid)
+            try:
+                if _is_marked(pid, mark):
+                    signal.pidfd_send_signal(descriptor, signal.SIGKILL)
+                    yield pid
+            finally:
+                os.close(descriptor)
+
+
+def _is_marked(pid: int, mark: bytes) -> bool:
+    try:
+        variables = Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
+    except OSError:  # not ours to look at, or it has just ended
+        return False
+    return any(v == mark or v.startswith(mark + b"/") for v in variables)

@@ -1,0 +1,68 @@
+"""What workers say: the newest lines of each component."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from nondum.host.catalogue.records import Moment
+
+LINES = 1000
+"""Lines that are kept of one component."""
+COMPONENTS = 256
+"""Components that lines are kept of."""
+MAX_LINE = 4096
+"""Characters that are kept of one line."""
+
+
+@dataclass(frozen=True, slots=True)
+class LogLine:
+    """One line."""
+
+    at: Moment
+    level: str
+    """`stdout`, `stderr`, or the level that the plugin logged it with."""
+    text: str
+    """Without control characters."""
+
+
+class Logs:
+    """A ring of lines per component."""
+
+    def __init__(self) -> None:
+        self._rings: dict[str, deque[LogLine]] = {}
+
+    def add(self, component: str, line: LogLine) -> None:
+        """Keep a line, in place of the oldest when there are many."""
+        if component not in self._rings:
+            while len(self._rings) >= COMPONENTS:
+                del self._rings[next(iter(self._rings))]
+            self._rings[component] = deque(maxlen=LINES)
+        self._rings[component].append(line)
+
+    def of(self, component: str) -> tuple[LogLine, ...]:
+        """The lines of a component, oldest first."""
+        return tuple(self._rings.get(component, ()))
+
+    def components(self) -> Iterator[str]:
+        """Who has said something."""
+        return iter(sorted(self._rings))
+
+
+def printable_text(text: str) -> str:
+    """Any lines, each made `printable`."""
+    return "\n".join(printable(line) for line in text.splitlines())
+
+
+def printable(text: str) -> str:
+    r"""One line for a terminal: what could control it is shown as an escape, and it is not endless.
+
+    >>> printable("done\x1b[2J\n")
+    'done\\x1b[2J'
+    """
+    kept = text.rstrip("\r\n")[:MAX_LINE]
+    if kept.isprintable():
+        return kept
+    shown = (c if c.isprintable() or c == "\t" else c.encode("unicode_escape") for c in kept)
+    return "".join(part if isinstance(part, str) else part.decode("ascii") for part in shown)

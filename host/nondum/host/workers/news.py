@@ -1,0 +1,101 @@
+"""What a worker's events mean, parsed: a stranger's words become the host's values here."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any, TypeAlias
+
+from nondum.host.events import FactForgotten, FactKnown, StreamFlowing, WorkerLogged
+from nondum.host.workers.logs import printable, printable_text
+from nondum.sdk.errors import MessageInvalid, Problem, ProtocolViolation
+from nondum.sdk.messages import value_from_wire
+
+MAX_WORD = 256
+"""Characters in a predicate, an object or a log level."""
+
+
+MAX_CLAIMS = 4096
+"""Facts that one worker may say at once."""
+
+News: TypeAlias = FactKnown | FactForgotten | StreamFlowing | WorkerLogged
+
+
+class Claims:
+    """What a worker says is so now: its facts, and which of its streams flow."""
+
+    def __init__(self) -> None:
+        self._facts: dict[tuple[str, ...], FactKnown] = {}
+        self._flows: dict[str, StreamFlowing] = {}
+
+    def __iter__(self) -> Iterator[FactKnown | StreamFlowing]:
+        """The news that still hold."""
+        yield from tuple(self._facts.values())
+        yield from tuple(self._flows.values())
+
+    def take(self, news: News) -> None:
+        """Take in one more. Raises `ProtocolViolation` (EVENT_INVALID) when there are too many."""
+        match news:
+            case FactKnown(_, predicate, arguments):
+                self._facts[predicate, *arguments] = news
+            case FactForgotten(_, predicate, arguments):
+                self._facts.pop((predicate, *arguments), None)
+            case StreamFlowing(_, stream, True):
+                self._flows[stream] = news
+            case StreamFlowing(_, stream, False):
+                self._flows.pop(stream, None)
+        if len(self._facts) + len(self._flows) > MAX_CLAIMS:
+            raise _violation("EVENT_INVALID", f"a worker says more than {MAX_CLAIMS} facts")
+
+
+def parse_news(
+    component: str, outputs: Collection[str], name: str, body: Mapping[str, Any]
+) -> News:
+    """Make the host's event of a worker's, whose own streams are `outputs`.
+
+    Raises `ProtocolViolation` (EVENT_UNKNOWN, EVENT_INVALID, RESULT_INVALID).
+    """
+    match name, body:
+        case "know", {"predicate": str(predicate), "arguments": list(arguments), **rest}:
+            objects = tuple(_word(argument) for argument in arguments)
+            return FactKnown(component, _word(predicate), objects, _value(rest))
+        case "forget", {"predicate": str(predicate), "arguments": list(arguments)}:
+            objects = tuple(_word(argument) for argument in arguments)
+            return FactForgotten(component, _word(predicate), objects)
+        case "flow", {"stream": str(stream), "flowing": bool(flowing)}:
+            if stream not in outputs:
+                raise _violation("RESULT_INVALID", f"{stream!r:.80} is no stream of its own")
+            return StreamFlowing(component, stream, flowing)
+        case "log", {"level": str(level), "message": str(message)}:
+            return WorkerLogged(component, _word(level), printable_text(message))
+        case (("know" | "forget" | "flow" | "log"), _):
+            raise _violation("EVENT_INVALID", f"event {name!r} lacks what it tells")
+    raise _violation("EVENT_UNKNOWN", f"no event of a worker is called {name!r}")
+
+
+def parse_progress(body: Mapping[str, Any]) -> tuple[float, str]:
+    """How far a behaviour is, 0..1, and in words. Raises `ProtocolViolation`."""
+    match body:
+        case {"fraction": (float() | int()) as fraction, "text": str(text)}:
+            return min(max(float(fraction), 0.0), 1.0), printable(text)
+    raise _violation("EVENT_INVALID", "event 'progress' lacks what it tells")
+
+
+def _word(value: object) -> str:
+    if not isinstance(value, str) or not 0 < len(value) <= MAX_WORD or not value.isprintable():
+        raise _violation("EVENT_INVALID", f"expected a name, found {value!r:.80}")
+    return value
+
+
+def _value(rest: Mapping[str, Any]) -> Any:
+    if "value" not in rest:
+        return None
+    try:
+        value_from_wire(rest["value"])
+    except MessageInvalid as error:
+        problems = (Problem("RESULT_INVALID", p.message) for p in error.problems)
+        raise ProtocolViolation(*problems) from error
+    return rest["value"]
+
+
+def _violation(code: str, message: str) -> ProtocolViolation:
+    return ProtocolViolation(Problem(code, message))

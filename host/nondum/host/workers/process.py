@@ -1,0 +1,72 @@
+"""A worker's process and its group: when it ends, and how it is ended."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import subprocess
+from typing import IO
+
+DETACH_S = 1.0
+"""How long a process that was killed is waited for; one in the kernel's hands may never end."""
+
+
+class WorkerProcess:
+    """A started process that leads a session of its own. Make it on the loop; it reaps itself."""
+
+    def __init__(self, popen: subprocess.Popen[bytes]) -> None:
+        self._popen = popen
+        self.pid = popen.pid
+        self.exited: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+        """Its exit status, negative for the signal that ended it."""
+        self._pidfd = os.pidfd_open(popen.pid)
+        asyncio.get_running_loop().add_reader(self._pidfd, self._on_exit)
+
+    @property
+    def outputs(self) -> tuple[IO[bytes], IO[bytes]]:
+        """Its standard output and standard error, to be read and closed by the caller."""
+        assert self._popen.stdout is not None and self._popen.stderr is not None
+        return self._popen.stdout, self._popen.stderr
+
+    def signal(self, number: signal.Signals) -> None:
+        """Send a signal to the whole group, if any of it is left."""
+        if not self.exited.done():  # from then on the id may be somebody else's
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self.pid, number)
+
+    async def wait(self, timeout_s: float) -> bool:
+        """Wait for the exit at most so long; answer whether it came."""
+        await asyncio.wait([self.exited], timeout=timeout_s)
+        return self.exited.done()
+
+    async def end(self, term_s: float) -> bool:
+        """SIGTERM, then after `term_s` SIGKILL, to the group; answer whether it is gone."""
+        if term_s > 0:
+            self.signal(signal.SIGTERM)
+            if await self.wait(term_s):
+                return True
+        self.signal(signal.SIGKILL)
+        return await self.wait(DETACH_S)
+
+    def _on_exit(self) -> None:
+        asyncio.get_running_loop().remove_reader(self._pidfd)
+        os.close(self._pidfd)
+        # Its children in the group go with it. It is not reaped yet, so the id is still its own.
+        self.signal(signal.SIGKILL)
+        self.exited.set_result(self._popen.wait())
+
+
+def exit_words(status: int) -> str:
+    """An exit status in words.
+
+    >>> exit_words(3), exit_words(-11)
+    ('exited with status 3', 'was ended by SIGSEGV')
+    """
+    if status >= 0:
+        return f"exited with status {status}"
+    try:
+        return f"was ended by {signal.Signals(-status).name}"
+    except ValueError:
+        return f"was ended by signal {-status}"

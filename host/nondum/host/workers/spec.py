@@ -1,0 +1,87 @@
+"""What a worker is started from: code, place, limits, and what it is expected to say."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from nondum.host.catalogue.records import object_name
+from nondum.sdk.description import PluginDescription
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What one worker may use."""
+
+    memory_mb: int = 2048
+    """Private writable memory."""
+    tasks: int = 256
+    """Processes and threads. Has no effect on a worker of root."""
+    descriptors: int = 1024
+    file_mb: int = 1024
+    """Size of one file that it writes."""
+    cpu_s: int | None = None
+    """Processor seconds in all; None: no limit, since workers live long."""
+    numeric_threads: int = 1
+    """Threads that each numeric library may start for itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """How long a worker is waited for, in seconds."""
+
+    startup_s: float = 30.0
+    """From launch until the plugin has started."""
+    heartbeat_s: float = 2.0
+    """Between two signs of life."""
+    missed: int = 3
+    """Heartbeats in a row that may be missed before the worker counts as hung."""
+    halt_s: float = 2.0
+    """From asking a behaviour to halt until its worker is ended for not obeying."""
+    term_s: float = 0.5
+    """From SIGTERM to SIGKILL."""
+
+    @property
+    def silence_s(self) -> float:
+        """Silence after which a worker counts as hung."""
+        return self.heartbeat_s * self.missed
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerSpec:
+    """One component's worker."""
+
+    component: str
+    payload: str
+    """Key of the payload."""
+    distribution: str
+    entry_point: str
+    """`module:attribute` or `module`."""
+    site_packages: tuple[Path, ...]
+    """Folders that are appended to the interpreter's own path."""
+    python: Path
+    """The base interpreter, never a venv's."""
+    scratch: Path
+    """A folder of the component's own; made at launch."""
+    index: PluginDescription
+    """What the payload's index says of the plugin."""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    permissions: tuple[str, ...] = ()
+    limits: Limits = Limits()
+
+    def units(self, host: str) -> dict[str, str]:
+        """Local name of each unit → its object."""
+        return {u.name: object_name(host, self.component, u.name) for u in self.index.units}
+
+    def outputs(self, host: str) -> dict[str, str]:
+        """Each output slot → its stream object."""
+        slots = (output.name for unit in self.index.units for output in unit.outputs)
+        return {slot: object_name(host, self.component, slot) for slot in slots}
+
+
+def base_interpreter() -> Path:
+    """The interpreter that this one's venv was made from, or this one."""
+    return Path(getattr(sys, "_base_executable", None) or sys.executable)

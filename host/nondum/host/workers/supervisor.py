@@ -1,0 +1,143 @@
+"""Keeps one component's worker alive: starts, restarts with growing patience, gives up, stops."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from nondum.host import events
+from nondum.host.events import Event
+from nondum.host.workers import problems, supervision
+from nondum.host.workers.launcher import Launcher
+from nondum.host.workers.spec import Timing, WorkerSpec
+from nondum.host.workers.supervision import Supervision
+from nondum.host.workers.worker import Worker, start_worker
+from nondum.sdk.errors import Problem, WorkerFailed
+
+log = logging.getLogger(__name__)
+
+
+class Household(Protocol):
+    """What a supervisor needs of those around it."""
+
+    launcher: Launcher
+    timing: Timing
+
+    def welcome(self, spec: WorkerSpec) -> Mapping[str, Any]:
+        """What a new worker of a component is told of its place."""
+        ...
+
+    def emit(self, event: Event) -> None:
+        """Hand on what has happened."""
+        ...
+
+    def on_ready(self, worker: Worker) -> None:
+        """A worker may be asked for things from now on."""
+        ...
+
+    def on_gone(self, worker: Worker) -> None:
+        """A worker that was ready is going or gone; may be told twice."""
+        ...
+
+
+class Supervisor:
+    """One component's worker and the ones that come after it."""
+
+    def __init__(self, spec: WorkerSpec, household: Household) -> None:
+        self.spec = spec
+        self.worker: Worker | None = None
+        """The one that runs and is ready, if any."""
+        self._household = household
+        self._supervision = Supervision()
+        self._task: asyncio.Task[None] | None = None
+        """Starts the first worker, then keeps one alive."""
+        self._is_stopping = False
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether there is a worker, or one will be started without being asked for."""
+        return self._task is not None and not self._task.done()
+
+    async def start(self) -> None:
+        """Start the first worker and keep one alive from then on.
+
+        Raises `WorkerFailed`; then there is none, and none will be. Cancelled, it leaves none.
+        """
+        self._is_stopping, self._supervision = False, Supervision()
+        self._task = asyncio.create_task(self._start_worker())
+        try:
+            await self._task
+        except asyncio.CancelledError:
+            if self._is_stopping:
+                raise WorkerFailed(problems.removed(self.spec.component)) from None
+            raise
+        self._task = asyncio.create_task(self._keep_alive())
+
+    async def stop(self, grace_s: float) -> None:
+        """End the worker, if there is one, and start no more. Stopping twice is allowed."""
+        self._is_stopping = True
+        if self.worker is not None:
+            self._household.on_gone(self.worker)  # nobody shall count on it any more
+            await self.worker.stop(grace_s, problems.removed(self.spec.component))
+        elif self._task is not None:
+            self._task.cancel()
+        if self._task is not None:
+            await asyncio.wait([self._task])
+
+    async def _keep_alive(self) -> None:
+        while True:
+            problem = await self._work()
+            if self._is_stopping:
+                return
+            self._emit(events.WorkerExited(self.spec.component, str(problem)))
+            if not await self._restart(problem):
+                return
+
+    async def _work(self) -> Problem:
+        """Wait for the end of the present worker; say why it ended."""
+        worker = self.worker
+        assert worker is not None, "only called after a start"
+        problem = await asyncio.shield(worker.gone)
+        self.worker = None
+        self._household.on_gone(worker)
+        return problem
+
+    async def _restart(self, problem: Problem) -> bool:
+        """Start another worker, trying as often as supervision allows; say whether one runs."""
+        while True:
+            self._supervision = self._supervision.crashed(time.monotonic())
+            if self._supervision.is_exhausted:
+                self._give_up(problem)
+                return False
+            await asyncio.sleep(self._supervision.delay_s)
+            try:
+                await self._start_worker()
+                return True
+            except WorkerFailed as error:
+                log.warning("%s could not be restarted: %s", self.spec.component, error)
+                problem = error.problems[0]
+
+    def _give_up(self, last: Problem) -> None:
+        problem = problems.crash_loop(
+            self.spec.component, supervision.RESTARTS, supervision.WINDOW_S, last
+        )
+        self._emit(events.WorkerFailed(self.spec.component, (problem, last)))
+
+    async def _start_worker(self) -> None:
+        household = self._household
+        self.worker = await start_worker(
+            self.spec,
+            household.welcome(self.spec),
+            launcher=household.launcher,
+            timing=household.timing,
+            emit=household.emit,
+        )
+        household.on_ready(self.worker)
+        self._emit(events.WorkerReady(self.spec.component, self.spec.index))
+
+    @property
+    def _emit(self) -> Callable[[Event], None]:
+        return self._household.emit

@@ -1,0 +1,236 @@
+"""One worker: a process and its link, from launch until both are gone."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from nondum.host.events import BehaviourProgressed, Event, WorkerLogged
+from nondum.host.workers import problems
+from nondum.host.workers.call import Call
+from nondum.host.workers.index import mismatches
+from nondum.host.workers.launcher import Launcher
+from nondum.host.workers.leftovers import end_leftovers
+from nondum.host.workers.logs import printable
+from nondum.host.workers.news import Claims, parse_news, parse_progress
+from nondum.host.workers.output import Output
+from nondum.host.workers.process import WorkerProcess
+from nondum.host.workers.spec import Timing, WorkerSpec
+from nondum.planning.running import RunState
+from nondum.sdk.description import PluginDescription
+from nondum.sdk.errors import LinkClosed, NondumError, Problem, ProtocolViolation, WorkerFailed
+from nondum.sdk.link import Pending
+from nondum.transport import WorkerLink, link_sockets
+
+TAIL_LINES = 12
+"""Lines of standard error that are told with an exit."""
+
+
+class Worker:
+    """A launched worker. `start_worker` sees it through its start."""
+
+    def __init__(
+        self, spec: WorkerSpec, launcher: Launcher, timing: Timing, emit: Callable[[Event], None]
+    ) -> None:
+        """Launch the process. Raises `WorkerFailed` (LAUNCH_FAILED)."""
+        self.spec, self._timing, self._emit = spec, timing, emit
+        self.claims = Claims()
+        """What it says is so."""
+        self._streams: frozenset[str] = frozenset()
+        self._loop = asyncio.get_running_loop()
+        self._calls: dict[int, Call] = {}
+        self._tail: deque[str] = deque(maxlen=TAIL_LINES)
+        self._ending: asyncio.Task[None] | None = None
+        self._watchdog: asyncio.TimerHandle | None = None
+        self.gone: asyncio.Future[Problem] = self._loop.create_future()
+        """Why the worker ended, once nothing of it is left."""
+        ours, theirs = link_sockets()
+        try:
+            with theirs:
+                self._process: WorkerProcess = launcher.launch(spec, theirs)
+        except WorkerFailed:
+            ours.close()
+            raise
+        self._outputs = [
+            Output(source, pipe, self._on_line)
+            for source, pipe in zip(("stdout", "stderr"), self._process.outputs, strict=True)
+        ]
+        self.link = WorkerLink(
+            ours, on_event=self._on_event, on_closed=self._on_hang_up, on_violation=self._on_foul
+        )
+        self._process.exited.add_done_callback(lambda _: self._on_hang_up())
+
+    @property
+    def pid(self) -> int:
+        """The process's id."""
+        return self._process.pid
+
+    async def introduce(self, welcome: Mapping[str, Any]) -> None:
+        """Greet it, hear what it is, compare that with the index, and have the plugin start.
+
+        Raises `WorkerFailed`, `ProtocolViolation`, `LinkClosed`.
+        """
+        self._streams = frozenset(welcome["outputs"].values())
+        await self.link.meet(welcome)
+        said = await self.link.request("describe", {})
+        description = PluginDescription.parse(said, where=self.spec.component)
+        if differences := mismatches(self.spec.index, description, self.spec.component):
+            raise WorkerFailed(*differences)
+        await self.link.request("start", {})
+        self._beat()
+
+    async def behave(self, call: Call, values: Sequence[Any]) -> None:
+        """Run a behaviour to its end, which the call is told."""
+        body = {"behaviour": call.behaviour, "arguments": call.arguments, "values": values}
+        try:
+            pending = self.link.begin("behave", body)
+        except NondumError as error:
+            call.end(RunState.FAILED, problems.words(error))
+            return
+        self._calls[pending.id] = call
+        call.when_halted(lambda: self._halt(pending.id, call))
+        try:
+            call.end(*await self._outcome(pending, call))
+        finally:
+            del self._calls[pending.id]
+
+    async def stop(self, grace_s: float, problem: Problem) -> None:
+        """Have the plugin leave everything safe, then end the process, all within `grace_s`."""
+        try:
+            async with asyncio.timeout(grace_s * 0.7):
+                await self.link.request("stop", {})
+        except (TimeoutError, NondumError):
+            pass  # it is ended all the same
+        self.end(problem, term_s=grace_s * 0.2)
+        await asyncio.shield(self.gone)
+
+    def end(self, problem: Problem, term_s: float = 0.0) -> None:
+        """End the whole group, by SIGTERM first if it has `term_s` for that.
+
+        Returns at once, see `gone`; the first problem told is why.
+        """
+        if self._ending is None:
+            self._ending = self._loop.create_task(self._end(problem, term_s))
+
+    async def _end(self, problem: Problem, term_s: float) -> None:
+        if self._watchdog is not None:
+            self._watchdog.cancel()
+        is_exited = await self._process.end(term_s)
+        self.link.close()
+        if is_exited:
+            self._close_outputs()
+        await asyncio.to_thread(end_leftovers, self.spec.scratch)
+        self._close_outputs()
+        self.gone.set_result(problem)
+
+    async def _end_by_itself(self) -> None:
+        """Its link or process has ended: the other one will, or is ended."""
+        await self._process.wait(self._timing.term_s)
+        if self._process.exited.done():
+            self._close_outputs()
+            status = self._process.exited.result()
+            await self._end(problems.exited(self.spec.component, status, self._tail), 0.0)
+        else:
+            await self._end(problems.hung_up(self.spec.component), 0.0)
+
+    def _close_outputs(self) -> None:
+        for output in self._outputs:
+            output.close()
+
+    async def _outcome(self, pending: Pending, call: Call) -> tuple[RunState, str]:
+        try:
+            await pending
+        except LinkClosed:
+            problem = await asyncio.shield(self.gone)
+            is_expected = call.is_halting or problem.code == problems.REMOVED
+            return RunState.HALTED if is_expected else RunState.FAILED, str(problem)
+        except WorkerFailed as error:
+            is_halted = error.code == "HALTED"
+            return RunState.HALTED if is_halted else RunState.FAILED, problems.words(error)
+        return RunState.SUCCEEDED, ""
+
+    def _halt(self, call_id: int, call: Call) -> None:
+        self.link.cancel(call_id)
+        self._loop.call_later(self._timing.halt_s, self._insist, call)
+
+    def _insist(self, call: Call) -> None:
+        if not call.state.has_ended:
+            problem = problems.unhalted(self.spec.component, call.behaviour, self._timing.halt_s)
+            self.end(problem, self._timing.term_s)
+
+    def _beat(self) -> None:
+        """It has just shown a sign of life."""
+        if self._watchdog is not None:
+            self._watchdog.cancel()
+        if self._ending is None:
+            self._watchdog = self._loop.call_later(self._timing.silence_s, self._on_silence)
+
+    def _on_silence(self) -> None:
+        self.end(problems.silent(self.spec.component, self._timing.silence_s))
+
+    def _on_event(self, name: str, body: dict[str, Any], call_id: int | None) -> None:
+        if self._watchdog is not None:  # until it has started, only the startup probe counts
+            self._beat()
+        call = self._calls.get(call_id) if call_id is not None else None
+        match name:
+            case "heartbeat" | "pong":
+                pass
+            case "established":
+                if call is not None:  # it may come from a thread whose call has just ended
+                    call.establish()
+            case "progress":
+                progress = parse_progress(body)
+                if call is not None:
+                    event = BehaviourProgressed(call.component, call.behaviour, call.id, *progress)
+                    self._emit(event)
+            case _:
+                news = parse_news(self.spec.component, self._streams, name, body)
+                self.claims.take(news)
+                self._emit(news)
+
+    def _on_line(self, source: str, line: str) -> None:
+        text = printable(line)
+        if source == "stderr":
+            self._tail.append(text)
+        self._emit(WorkerLogged(self.spec.component, source, text))
+
+    def _on_foul(self, violation: ProtocolViolation) -> None:
+        self.end(problems.foul(self.spec.component, violation))
+
+    def _on_hang_up(self) -> None:
+        if self._ending is None:
+            self._ending = self._loop.create_task(self._end_by_itself())
+
+
+async def start_worker(
+    spec: WorkerSpec,
+    welcome: Mapping[str, Any],
+    *,
+    launcher: Launcher,
+    timing: Timing,
+    emit: Callable[[Event], None],
+) -> Worker:
+    """Launch a worker and see it through its start.
+
+    Raises `WorkerFailed` with what went wrong; then, or when cancelled, nothing of it is left.
+    """
+    worker = Worker(spec, launcher, timing, emit)
+    try:
+        async with asyncio.timeout(timing.startup_s):
+            await worker.introduce(welcome)
+    except BaseException as error:
+        worker.end(Problem("WORKER_START_FAILED", "it did not start", where=spec.component))
+        problem = await asyncio.shield(worker.gone)
+        match error:
+            case LinkClosed():
+                raise WorkerFailed(problems.before_start(problem)) from None
+            case TimeoutError():
+                raise WorkerFailed(problems.overdue(spec.component, timing.startup_s)) from None
+            case ProtocolViolation():
+                raise WorkerFailed(problems.foul(spec.component, error)) from error
+            case WorkerFailed():
+                raise WorkerFailed(*problems.located(spec.component, error)) from error
+        raise
+    return worker

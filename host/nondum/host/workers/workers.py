@@ -1,0 +1,255 @@
+"""All workers of a host: who is asked for behaviours, hooks, devices and streams."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import logging
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, TypeAlias
+
+import pluggy
+
+from nondum.host.catalogue.records import Moment
+from nondum.host.events import Emit, Event, FactKnown, StreamFlowing, WorkerFailed, WorkerLogged
+from nondum.host.streams import Streams
+from nondum.host.workers import problems
+from nondum.host.workers.call import Call
+from nondum.host.workers.launcher import Launcher, RlimitLauncher
+from nondum.host.workers.logs import LogLine, Logs
+from nondum.host.workers.proxies import Proxy, plugin_manager
+from nondum.host.workers.spec import Timing, WorkerSpec
+from nondum.host.workers.supervisor import Supervisor
+from nondum.host.workers.worker import Worker
+from nondum.planning.running import RunState
+from nondum.sdk import errors
+from nondum.sdk.description import PluginDescription
+
+Granted: TypeAlias = dict[str, dict[str, Any]]
+"""Declared need → node and properties of the device that serves it."""
+FactValue: TypeAlias = tuple[str, Sequence[str], Any]
+"""Predicate, objects, and the value as it travels; None: it has none (any more)."""
+
+GRACE_S = 2.0
+"""What a worker has to end when its component is removed."""
+
+
+log = logging.getLogger(__name__)
+
+
+class Workers:
+    """Starts, asks and ends workers. Make and use it on the loop; `close` it.
+
+    What happens is told by `emit`, never from within a call of its methods but for the start of a
+    behaviour.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        emit: Emit,
+        *,
+        launcher: Launcher | None = None,
+        timing: Timing | None = None,
+    ) -> None:
+        self.launcher = launcher or RlimitLauncher()
+        self.timing = timing or Timing()
+        self.streams = Streams(host)
+        self.logs = Logs()
+        self._host, self._emit = host, emit
+        self._manager = plugin_manager()
+        self._supervisors: dict[str, Supervisor] = {}
+        self._devices: dict[str, Granted] = {}
+        self._mounts: Mapping[str, Any] = {}
+        self._call_ids = itertools.count(1)
+        self._calls: dict[asyncio.Task[None], Call] = {}
+
+    @property
+    def hook(self) -> pluggy.HookRelay:
+        """The hooks of all running plugins; acting ones give awaitables. Pass `ctx=None`."""
+        return self._manager.hook
+
+    async def start(self, spec: WorkerSpec) -> PluginDescription:
+        """Start a component's worker and keep one alive until `stop`.
+
+        Returns once its plugin has described itself as the index says and has started. Raises
+        `errors.WorkerFailed` with what went wrong, and `ValueError` when it has a worker already.
+        """
+        present = self._supervisors.get(spec.component)
+        if present is not None and present.is_alive:
+            raise ValueError(f"component {spec.component!r} has a worker already")
+        supervisor = self._supervisors[spec.component] = Supervisor(spec, self)
+        await supervisor.start()
+        return spec.index
+
+    async def restart(self, component: str) -> None:
+        """Try a component that was given up once more; `WorkerReady` or `WorkerFailed` tells.
+
+        Raises `KeyError` for a component that was never started, or has been stopped.
+        """
+        supervisor = self._supervisors[component]
+        if supervisor.is_alive:
+            return
+        try:
+            await supervisor.start()
+        except errors.WorkerFailed as error:
+            self.emit(WorkerFailed(component, error.problems))
+
+    async def stop(self, component: str, grace_s: float = GRACE_S) -> None:
+        """End a component's worker within `grace_s`: ask, then SIGTERM, then SIGKILL to the group.
+
+        It is withdrawn at once: no stream, hook or behaviour reaches it any more. Unknown
+        components are ignored; one that is being started is given up.
+        """
+        supervisor = self._supervisors.pop(component, None)
+        self._devices.pop(component, None)
+        if supervisor is not None:
+            await supervisor.stop(grace_s)
+
+    async def close(self, grace_s: float = GRACE_S) -> None:
+        """End all workers."""
+        await asyncio.gather(*(self.stop(name, grace_s) for name in tuple(self._supervisors)))
+        await asyncio.gather(*self._calls, return_exceptions=True)
+        await self.streams.close()
+
+    def behave(
+        self,
+        component: str,
+        behaviour: str,
+        arguments: Mapping[str, str],
+        values: Sequence[FactValue] = (),
+    ) -> Call:
+        """Ask a component for a behaviour, once the streams it reads are wired. Returns at once.
+
+        `arguments` are the action's parameters, without question marks → objects. Raises
+        `errors.WorkerFailed` (NOT_RUNNING).
+        """
+        worker = self._worker(component)
+        call = Call(next(self._call_ids), component, behaviour, dict(arguments), self._emit)
+        task = asyncio.create_task(self._carry_out(worker, call, values))
+        self._calls[task] = call
+        task.add_done_callback(self._calls.pop)
+        return call
+
+    def halt_all(self) -> None:
+        """Ask every behaviour to end. Returns at once; halting is bounded."""
+        for call in tuple(self._calls.values()):
+            call.halt()
+
+    def tell_values(self, component: str, values: Sequence[FactValue]) -> None:
+        """Tell a component new values of facts; one that does not run is told nothing."""
+        known = [[p, list(objects), value] for p, objects, value in values if value is not None]
+        gone = [[p, list(objects)] for p, objects, value in values if value is None]
+        self._tell([component], "values", {"set": known, "unset": gone})
+
+    def remount(self, mounts: Mapping[str, Any]) -> None:
+        """Tell every component, now and later, where all units sit: `{frame: [parent, …]}`."""
+        self._mounts = mounts
+        self._tell(self._supervisors, "mounts", mounts)
+
+    async def attach(
+        self, component: str, need: str, node: str, properties: Mapping[str, str]
+    ) -> None:
+        """Grant a device for a declared need, to this worker and those after it."""
+        device = {"node": node, "properties": dict(properties)}
+        self._devices.setdefault(component, {})[need] = device
+        await self._ask_if_running(component, "attach", {"device": need, **device})
+
+    async def detach(self, component: str, need: str) -> None:
+        """Withdraw a device."""
+        self._devices.get(component, {}).pop(need, None)
+        await self._ask_if_running(component, "detach", {"device": need})
+
+    def claims(self, component: str) -> tuple[FactKnown | StreamFlowing, ...]:
+        """What a component's worker says is so now: the news of it that still hold.
+
+        For those who begin to listen to a component after its worker has started.
+        """
+        supervisor = self._supervisors.get(component)
+        if supervisor is None or supervisor.worker is None:
+            return ()
+        return tuple(supervisor.worker.claims)
+
+    def pids(self) -> dict[str, int]:
+        """The process of each running worker, by component."""
+        workers = ((name, s.worker) for name, s in sorted(self._supervisors.items()))
+        return {name: worker.pid for name, worker in workers if worker is not None}
+
+    # What supervisors need
+
+    def welcome(self, spec: WorkerSpec) -> Mapping[str, Any]:
+        """What a new worker is told of its place."""
+        return {
+            "host": self._host,
+            "component": spec.component,
+            "units": spec.units(self._host),
+            "outputs": spec.outputs(self._host),
+            "settings": spec.settings,
+            "scratch": str(spec.scratch),
+            "devices": self._devices.get(spec.component, {}),
+            "mounts": self._mounts,
+            "limits": {"memory_mb": spec.limits.memory_mb, "tasks": spec.limits.tasks},
+        }
+
+    def emit(self, event: Event) -> None:
+        """Keep what a worker logs, wire what begins to flow, and hand all of it on."""
+        match event:
+            case WorkerLogged(component, level, message):
+                now = Moment(time.monotonic(), time.time())
+                for line in message.splitlines():
+                    self.logs.add(component, LogLine(now, level, line))
+            case StreamFlowing(_, stream, flowing):
+                self.streams.set_flowing(stream, is_flowing=flowing)
+        self._emit(event)
+
+    def on_ready(self, worker: Worker) -> None:
+        """A worker may be asked for things from now on."""
+        spec = worker.spec
+        self.streams.join(spec.component, worker.link, spec.index)
+        for claim in worker.claims:
+            if isinstance(claim, StreamFlowing):
+                self.streams.set_flowing(claim.stream, is_flowing=True)
+        proxy = Proxy(spec.component, spec.index, worker.link.request)
+        self._manager.register(proxy, spec.component)
+
+    def on_gone(self, worker: Worker) -> None:
+        """A worker is going or gone."""
+        component = worker.spec.component
+        if self._manager.has_plugin(component):
+            self._manager.unregister(name=component)
+        self.streams.leave(component)
+
+    def _worker(self, component: str) -> Worker:
+        supervisor = self._supervisors.get(component)
+        if supervisor is None or supervisor.worker is None:
+            raise errors.WorkerFailed(problems.not_running(component))
+        return supervisor.worker
+
+    async def _carry_out(self, worker: Worker, call: Call, values: Sequence[FactValue]) -> None:
+        sent = [[p, list(objects), value] for p, objects, value in values if value is not None]
+        try:
+            async with self.streams.wired(call.component, call.behaviour, call.arguments):
+                if call.is_halting:
+                    call.end(RunState.HALTED, "halted before it began")
+                else:
+                    await worker.behave(call, sent)
+        except errors.NondumError as error:
+            call.end(RunState.FAILED, problems.words(error))
+        finally:
+            call.end(RunState.FAILED, "it could not be asked")  # counts only if nothing else did
+
+    def _tell(self, components: Iterable[str], event: str, body: Mapping[str, Any]) -> None:
+        for component in components:
+            supervisor = self._supervisors.get(component)
+            if supervisor is not None and supervisor.worker is not None:
+                try:
+                    supervisor.worker.link.tell(event, body)
+                except errors.ProtocolViolation as error:
+                    log.warning("%s cannot be told %s: %s", component, event, error)
+
+    async def _ask_if_running(self, component: str, verb: str, body: Mapping[str, Any]) -> None:
+        try:
+            await self._worker(component).link.request(verb, body)
+        except (errors.WorkerFailed, errors.LinkClosed):
+            return  # the next worker is told in its welcome
