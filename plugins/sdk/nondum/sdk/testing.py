@@ -17,7 +17,7 @@ def worker(tmp_path: Path) -> Iterator[WorkerFactory]:
     """Run plugins in this process, without a host, over the host's own protocol.
 
         def test_points_at_the_source(worker):
-            head = worker("nondum_pan_tilt_unit", mounts={"head": ((0, 0, 1), (0, 0, 0))})
+            head = worker("my_pointer", mounts={"head": ((0, 0, 1), (0, 0, 0))})
             head.set_value("bearing-known", "source", "robot", value=Bearing(…))
             call = head.behave("point", u="head", t="source", h="robot")
             call.wait_established()
