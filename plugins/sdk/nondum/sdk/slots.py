@@ -55,6 +55,14 @@ class SlotRing:
         self._slots: dict[int, Slot] = {}
         self._next_id = 1
 
+    def __len__(self) -> int:
+        return len(self._slots)
+
+    @property
+    def held(self) -> int:
+        """Slots with readers."""
+        return sum(1 for slot in self._slots.values() if slot.readers)
+
     def write(self, data: Buffer, length: int) -> Slot | None:
         """Copy `length` bytes into a slot that nobody reads; None when all are being read.
 

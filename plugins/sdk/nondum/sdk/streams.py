@@ -48,9 +48,15 @@ class _Frame:
 class Producer:
     """The sending end of a stream. Its methods run on the loop."""
 
-    def __init__(self, kind: str) -> None:
+    def __init__(self, kind: str, on_lost: Callable[[str], None] = lambda consumer: None) -> None:
+        """Begin without consumers.
+
+        `on_lost` is called when a consumer is gone, or was cut off because it broke the protocol;
+        not after `disconnect`.
+        """
         self.kind = kind
         """The stream's type."""
+        self._on_lost = on_lost
         self._outlets: dict[str, _Outlet] = {}
         self._ring = SlotRing()
         self._seq = 0
@@ -58,7 +64,17 @@ class Producer:
     def connect(self, consumer: str, packets: Packets) -> None:
         """Feed one more consumer, from the next message on; owns `packets`."""
         self.disconnect(consumer)
-        self._outlets[consumer] = _Outlet(packets, lambda: self.disconnect(consumer))
+        self._outlets[consumer] = _Outlet(packets, lambda: self._lose(consumer))
+
+    @property
+    def consumers(self) -> tuple[str, ...]:
+        """Names of those who are fed."""
+        return tuple(self._outlets)
+
+    @property
+    def slots_held(self) -> int:
+        """Slots that a consumer reads, or will."""
+        return self._ring.held
 
     def disconnect(self, consumer: str) -> None:
         """Stop feeding a consumer; unknown ones are ignored."""
@@ -92,6 +108,10 @@ class Producer:
         for consumer in list(self._outlets):
             self.disconnect(consumer)
         self._ring.close()
+
+    def _lose(self, consumer: str) -> None:
+        self.disconnect(consumer)
+        self._on_lost(consumer)
 
     def _inline(self, header: dict[str, Any], buffer: Buffer | None, limit: int) -> _Frame:
         return _Frame(self._seq, _packed([_INLINE, self._seq, header, buffer], limit))

@@ -1,0 +1,350 @@
+"""Streams between real processes: newest wins, and nobody can hurt the producer."""
+
+from __future__ import annotations
+
+import asyncio
+import fcntl
+import mmap
+import os
+import signal
+import socket
+import sys
+from collections.abc import AsyncIterator, Callable
+from typing import Any
+
+import pytest
+
+from nondum.sdk import Header, Image, MessageInvalid, ProtocolViolation, Text
+from nondum.sdk.packets import SocketPackets
+from nondum.sdk.slots import MAX_SLOTS, SEALS, MappedSlots, Slot, SlotRing
+from nondum.sdk.streams import OUTSTANDING, Consumer, Producer
+from nondum.sdk.wire import MAX_PACKET, pack
+
+pytestmark = pytest.mark.anyio
+
+SIDE = 200  # 40,000 bytes: in a slot
+
+READER = """
+import asyncio, socket, sys
+from nondum.sdk.packets import SocketPackets
+from nondum.sdk.streams import Consumer
+
+async def main(descriptor):
+    over = asyncio.Event()
+    def take():
+        message = consumer.take()
+        same = len(set(bytes(message.data))) == 1
+        print(message.header.seq, message.data[0], same, flush=True)
+    packets = SocketPackets(socket.socket(fileno=descriptor), 65536)
+    consumer = Consumer("image", packets, take, lambda violation: over.set())
+    print("ready", flush=True)
+    await over.wait()
+    print("over", flush=True)
+
+asyncio.run(main(int(sys.argv[1])))
+"""
+
+
+def image(seq: int, side: int = SIDE) -> Image:
+    data = bytes([seq % 256]) * (side * side)
+    return Image(Header(frame_id="camera", seq=seq), side, side, "mono8", side, data)
+
+
+def pair() -> tuple[SocketPackets, socket.socket]:
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    return SocketPackets(ours, MAX_PACKET), theirs
+
+
+class Reader:
+    """A consumer in a process of its own, which prints what it reads."""
+
+    def __init__(self, process: asyncio.subprocess.Process) -> None:
+        self._process = process
+
+    @classmethod
+    async def start(cls, producer: Producer, name: str = "reader") -> Reader:
+        ours, theirs = pair()
+        process = await asyncio.create_subprocess_exec(
+            sys.executable,
+            "-c",
+            READER,
+            str(theirs.fileno()),
+            pass_fds=[theirs.fileno()],
+            stdout=asyncio.subprocess.PIPE,
+        )
+        theirs.close()
+        producer.connect(name, ours)
+        reader = cls(process)
+        assert await reader.line() == ["ready"]
+        return reader
+
+    async def line(self) -> list[str]:
+        assert self._process.stdout is not None
+        return (await asyncio.wait_for(self._process.stdout.readline(), 10)).decode().split()
+
+    def signal(self, number: int) -> None:
+        self._process.send_signal(number)
+
+    async def end(self) -> None:
+        if self._process.returncode is None:
+            self._process.kill()
+        await self._process.communicate()
+
+
+class Source(Producer):
+    """A producer of images that can be waited on."""
+
+    def __init__(self) -> None:
+        super().__init__("image", on_lost=lambda consumer: self.lost.put_nowait(consumer))
+        self.lost: asyncio.Queue[str] = asyncio.Queue()
+
+
+@pytest.fixture
+async def producer() -> AsyncIterator[Source]:
+    producer = Source()
+    yield producer
+    producer.close()
+
+
+@pytest.fixture
+async def reader(producer: Source) -> AsyncIterator[Reader]:
+    reader = await Reader.start(producer)
+    yield reader
+    await reader.end()
+
+
+async def test_frames_cross_processes_unchanged(producer: Source, reader: Reader) -> None:
+    for seq in range(20):
+        producer.send(image(seq))
+        assert await reader.line() == [str(seq), str(seq), "True"]
+
+
+async def test_producer_that_closes_ends_the_stream(producer: Source, reader: Reader) -> None:
+    producer.close()
+    assert await reader.line() == ["over"]
+
+
+async def test_stopped_consumer_costs_the_producer_nothing(
+    producer: Source, reader: Reader
+) -> None:
+    other = await Reader.start(producer, "other")
+    try:
+        reader.signal(signal.SIGSTOP)
+        for seq in range(1, 101):
+            producer.send(image(seq))
+            assert await other.line() == [str(seq), str(seq), "True"]
+        assert slots_of(producer) <= 2 * OUTSTANDING + 2
+        reader.signal(signal.SIGCONT)
+        seen = [int((await reader.line())[0])]
+        while seen[-1] != 100:
+            await asyncio.sleep(0)
+            seen.append(int((await reader.line())[0]))
+        assert seen == sorted(set(seen))
+        assert len(seen) <= OUTSTANDING + 1, "old frames were dropped, the newest came"
+    finally:
+        await other.end()
+
+
+async def test_killed_consumer_gives_its_slots_back(producer: Source, reader: Reader) -> None:
+    other = await Reader.start(producer, "other")
+    try:
+        reader.signal(signal.SIGSTOP)
+        for seq in range(10):
+            producer.send(image(seq))
+            await other.line()
+        assert producer.slots_held >= OUTSTANDING
+        reader.signal(signal.SIGKILL)
+        assert await producer.lost.get() == "reader"
+        assert producer.consumers == ("other",)
+        producer.send(image(99))
+        assert await other.line() == ["99", "99", "True"]
+        assert producer.slots_held <= 1, "the living reader's release may be under way"
+    finally:
+        await other.end()
+
+
+async def test_frames_may_change_their_size(producer: Source, reader: Reader) -> None:
+    for seq, side in enumerate([200, 300, 150, 500, 200, 10, 400] * 4):
+        producer.send(image(seq, side))
+        assert await reader.line() == [str(seq), str(seq), "True"]
+    assert slots_of(producer) <= OUTSTANDING + 2
+
+
+async def test_nobody_listening_costs_nothing(producer: Source) -> None:
+    producer.send(image(1))
+    assert slots_of(producer) == 0
+
+
+async def test_wrong_messages_never_leave(producer: Source) -> None:
+    with pytest.raises(MessageInvalid, match="expected 4 bytes"):
+        producer.send(Image(Header(), 2, 2, "mono8", 2, b"abc"))
+
+
+async def test_headers_that_fit_no_packet_never_leave() -> None:
+    producer, packets = Producer("text"), pair()
+    producer.connect("reader", packets[0])
+    with pytest.raises(MessageInvalid, match="MESSAGE_TOO_LONG"):
+        producer.send(Text(Header(), "x" * MAX_PACKET))
+    producer.close()
+    packets[1].close()
+
+
+@pytest.mark.parametrize(
+    "packet",
+    [b"garbage", pack([99]), pack([]), pack(["1"]), pack([1, 1])],
+    ids=["garbage", "not outstanding", "empty", "text", "too many"],
+)
+async def test_producer_cuts_hostile_consumers_off(producer: Source, packet: bytes) -> None:
+    ours, theirs = pair()
+    producer.connect("hostile", ours)
+    producer.send(image(1))
+    theirs.send(packet)
+    assert await producer.lost.get() == "hostile"
+    assert producer.slots_held == 0
+    theirs.close()
+
+
+async def test_releasing_twice_is_cut_off(producer: Source) -> None:
+    ours, theirs = pair()
+    producer.connect("hostile", ours)
+    for seq in range(3):
+        producer.send(image(seq))
+    theirs.send(pack([1]))
+    theirs.send(pack([1]))
+    assert await producer.lost.get() == "hostile"
+    theirs.close()
+
+
+def slots_of(producer: Producer) -> int:
+    return len(producer._ring)
+
+
+class Listener:
+    """A consumer in this process, for producers that lie."""
+
+    def __init__(self, kind: str = "image") -> None:
+        packets, self.raw = pair()
+        self.lost: asyncio.Future[ProtocolViolation | None]
+        self.lost = asyncio.get_running_loop().create_future()
+        self.arrived = asyncio.Event()
+        self.consumer = Consumer(kind, packets, self.arrived.set, self.lost.set_result)
+
+    async def verdict(self) -> str:
+        violation = await asyncio.wait_for(self.lost, 5)
+        self.raw.close()
+        return violation.code if violation else "closed"
+
+
+def header(side: int = SIDE) -> dict[str, Any]:
+    return image(1, side).to_wire()[0]
+
+
+def memory(size: int, seals: int = SEALS) -> int:
+    descriptor = os.memfd_create("test", os.MFD_ALLOW_SEALING)
+    os.ftruncate(descriptor, size)
+    fcntl.fcntl(descriptor, fcntl.F_ADD_SEALS, seals)
+    return descriptor
+
+
+def a_pipe() -> int:
+    reading, writing = os.pipe()
+    os.close(writing)
+    return reading
+
+
+LIES: dict[str, tuple[Any, Callable[[], int] | None, str]] = {
+    "no packet": ([7], None, "STREAM_PACKET"),
+    "no list": ({"a": 1}, None, "STREAM_PACKET"),
+    "unknown slot": ([1, 1, 5, 10, {}], None, "SLOT_UNKNOWN"),
+    "length beyond slot": ([1, 1, 5, 5000, {}], lambda: memory(4096), "SLOT_LENGTH"),
+    "negative length": ([1, 1, 5, -1, {}], lambda: memory(4096), "SLOT_LENGTH"),
+    "no seals": ([1, 1, 5, 10, {}], lambda: memory(4096, 0), "SLOT_SEALS"),
+    "may shrink": ([1, 1, 5, 10, {}], lambda: memory(4096, fcntl.F_SEAL_GROW), "SLOT_SEALS"),
+    "empty memory": ([1, 1, 5, 0, {}], lambda: memory(0), "SLOT_SIZE"),
+    "a pipe": ([1, 1, 5, 10, {}], a_pipe, "SLOT_SEALS"),
+    "a file": ([1, 1, 5, 10, {}], lambda: os.open(__file__, os.O_RDONLY), "SLOT_SEALS"),
+    "memory with inline": ([0, 1, {}, b"x"], lambda: memory(4096), "PACKET_DESCRIPTORS"),
+}
+
+
+@pytest.mark.parametrize(("packet", "make", "code"), LIES.values(), ids=LIES)
+async def test_lying_producer_is_cut_off(
+    packet: Any, make: Callable[[], int] | None, code: str
+) -> None:
+    listener = Listener()
+    descriptors = [make()] if make else []
+    socket.send_fds(listener.raw, [pack(packet)], descriptors)
+    for descriptor in descriptors:
+        os.close(descriptor)
+    assert await listener.verdict() == code
+
+
+async def test_too_many_slots_are_cut_off() -> None:
+    listener = Listener()
+    descriptor = memory(4096)
+    loop = asyncio.get_running_loop()
+    listener.raw.setblocking(False)
+    for slot in range(MAX_SLOTS + 1):
+        socket.send_fds(listener.raw, [pack([1, slot, slot, 1, {}])], [descriptor])
+        if slot:
+            await loop.sock_recv(listener.raw, 100)  # the release of the one before
+    os.close(descriptor)
+    assert await listener.verdict() == "SLOT_UNKNOWN"
+
+
+async def test_message_that_is_none_is_refused_when_taken() -> None:
+    listener = Listener()
+    listener.raw.send(pack([0, 1, header(), b"short"]))
+    await listener.arrived.wait()
+    with pytest.raises(MessageInvalid):
+        listener.consumer.take()
+    listener.consumer.close()
+    listener.raw.close()
+
+
+async def test_slot_taken_away_is_refused_when_taken() -> None:
+    listener = Listener()
+    descriptor = memory(SIDE * SIDE)
+    socket.send_fds(listener.raw, [pack([1, 1, 1, SIDE * SIDE, header()])], [descriptor])
+    listener.raw.send(pack([2, 1]))
+    os.close(descriptor)
+    await listener.arrived.wait()
+    await asyncio.sleep(0)
+    with pytest.raises(ProtocolViolation, match="SLOT_UNKNOWN"):
+        listener.consumer.take()
+    listener.consumer.close()
+    listener.raw.close()
+
+
+def test_slots_are_sealed_before_they_are_handed_over() -> None:
+    slot = Slot(1, mmap.PAGESIZE)
+    slot.memory[:5] = b"first"
+    with pytest.raises(PermissionError):
+        os.ftruncate(slot.descriptor, 0)
+    with pytest.raises(PermissionError):
+        os.ftruncate(slot.descriptor, 2 * mmap.PAGESIZE)
+    with pytest.raises(PermissionError):
+        os.pwrite(slot.descriptor, b"x", 0)
+    with pytest.raises(PermissionError):
+        mmap.mmap(slot.descriptor, mmap.PAGESIZE)
+    with pytest.raises(PermissionError):
+        fcntl.fcntl(slot.descriptor, fcntl.F_ADD_SEALS, fcntl.F_SEAL_WRITE)
+    reader = MappedSlots()
+    reader.add(1, os.dup(slot.descriptor))
+    slot.memory[:5] = b"later"
+    assert reader.read(1, 5) == b"later"
+    reader.close()
+    slot.close()
+
+
+def test_ring_uses_no_slot_that_is_read() -> None:
+    ring = SlotRing()
+    first = ring.write(b"a" * 100, 100)
+    assert first is not None
+    first.readers = 1
+    second = ring.write(b"b" * 100, 100)
+    assert second is not None and second is not first
+    assert first.memory[:1] == b"a"
+    first.readers = 0
+    assert list(ring.retire(keep=1)) == [first.id]
+    ring.close()
