@@ -79,6 +79,7 @@ async def test_units_show_mounts_and_doubts(robot: Robot) -> None:
     rows = {row["unit"]: row for row in robot.mind.views.units()}
     assert rows[CRYSTAL]["mount"] == "unknown"
     assert "metres are meant" in rows[HEAD]["warnings"][0]
+    assert sum("metres are meant" in text for text in robot.told) == 1
 
 
 async def test_behaviours_show_what_runs(robot: Robot) -> None:

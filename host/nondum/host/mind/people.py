@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from nondum.host.catalogue.records import ComponentRecord
 from nondum.host.mind.composition import Composition
+from nondum.host.mind.frames import mount_warnings
 from nondum.planning.merge import quarantine_key
 
 MAX_SENTENCES = 1000
@@ -62,7 +63,12 @@ def recomposed(old: Composition | None, new: Composition) -> list[str]:
             sentences.append(f"{id} is here: {_offers(component)}")
         elif earlier.is_ready != component.is_ready:
             sentences.append(f"{id} is {_health(component)}")
-    return sentences + _kept_out(old, new)
+    return sentences + _doubts(old, new) + _kept_out(old, new)
+
+
+def _doubts(old: Composition | None, new: Composition) -> list[str]:
+    known = set(old.snapshot.mounts) if old else set()
+    return list(mount_warnings(mount for mount in new.snapshot.mounts if mount not in known))
 
 
 def _kept_out(old: Composition | None, new: Composition) -> list[str]:

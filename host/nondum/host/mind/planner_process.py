@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import signal
 import sys
 from asyncio.subprocess import DEVNULL, PIPE, Process
 from collections.abc import Mapping
@@ -65,8 +66,7 @@ class PlannerProcess:
     async def close(self) -> None:
         """End the child, and with it a search that is under way."""
         if self._process is not None:
-            with contextlib.suppress(ProcessLookupError):
-                self._process.kill()
+            _end(self._process)
         async with self._lock:
             await self._kill()
 
@@ -118,10 +118,16 @@ class PlannerProcess:
         process, self._process, self._is_ready = self._process, None, False
         if process is None:
             return
-        with contextlib.suppress(ProcessLookupError):
-            process.kill()
+        _end(process)
         # Also takes both pipes off the loop; shielded, since the caller may be being cancelled.
         await asyncio.shield(process.communicate())
 
     def _failure(self, code: str, message: str) -> PlannerFailed:
         return PlannerFailed(Problem(code, message, where=f"planner {self.name}"))
+
+
+def _end(process: Process) -> None:
+    """Kill a child and all that it started; `Process.kill` might reap it behind asyncio's back."""
+    if process.returncode is None:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
