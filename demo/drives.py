@@ -1,0 +1,52 @@
+"""Payload drives for the demonstration, built from plugin folders by `nondum payload build`."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from demo.robot import nondum
+
+PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
+
+
+def build(plugins: Sequence[Path], *, libraries: Sequence[Path], cache: Path) -> dict[str, Path]:
+    """Build one drive per plugin folder, or take it from the cache while its sources are the same.
+
+    `libraries` are folders of distributions that plugins depend on and no index has. Returns the
+    drive of each plugin by the folder's name.
+    """
+    drives = {}
+    for plugin in plugins:
+        digest = _digest([plugin, *libraries])
+        drive = cache / f"{plugin.name}-{digest[:12]}"
+        if not drive.exists():
+            unfinished = drive.with_suffix(".part")
+            shutil.rmtree(unfinished, ignore_errors=True)
+            command = ["payload", "build", plugin, "-o", unfinished, "--python", PYTHON]
+            for library in libraries:
+                command += ["--library", library]
+            nondum(*command, "--quiet")
+            unfinished.rename(drive)
+        drives[plugin.name] = drive
+    return drives
+
+
+def payload_id(drive: Path) -> str:
+    """The id of the one payload on a drive."""
+    (payload,) = json.loads(nondum("payload", "inspect", drive, "--json"))["payloads"]
+    return str(payload["id"])
+
+
+def _digest(folders: Sequence[Path]) -> str:
+    total = hashlib.sha256(PYTHON.encode())
+    for folder in folders:
+        for path in sorted(folder.rglob("*")):
+            if path.is_file() and "__pycache__" not in path.parts:
+                total.update(str(path.relative_to(folder)).encode())
+                total.update(path.read_bytes())
+    return total.hexdigest()

@@ -1,0 +1,157 @@
+"""One host as a person meets it: a daemon with slots for drives and devices, and views of it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+from nondum.host.control.client import ControlClient
+from nondum.sdk.errors import HostUnreachable, NondumError
+
+_T = TypeVar("_T")
+View = Mapping[str, Any]
+NONDUM = [sys.executable, "-m", "nondum.host.cli"]
+
+
+class TooLate(Exception):
+    """Something awaited did not come in time; says what, and what the host said last."""
+
+
+class Robot:
+    """A running host. Make one with `running`."""
+
+    def __init__(self, work: Path, *, name: str) -> None:
+        self.work = work
+        self.name = name
+        self.slots = work / "slots"
+        self.devices = work / "device-slots"
+        self.control = work / "control.sock"
+        self._view: View = {}
+        self._changed = threading.Condition()
+        self._watching = True
+
+    def plug(self, drive: Path) -> str:
+        """Insert a drive; returns its name, to pull it by."""
+        (self.slots / drive.name).symlink_to(drive)
+        return drive.name
+
+    def pull(self, name: str) -> None:
+        """Yank a drive."""
+        (self.slots / name).unlink()
+
+    def ask(self, verb: str, **arguments: Any) -> Any:
+        """Ask the daemon. Raises `NondumError` with its refusal."""
+        with ControlClient(self.control) as client:
+            return client.ask(verb, **arguments)
+
+    @property
+    def view(self) -> View:
+        """The latest view."""
+        with self._changed:
+            return self._view
+
+    def until(self, what: str, found: Callable[[View], _T | None], *, timeout_s: float) -> _T:
+        """Wait until a view satisfies `found`, and return what it found. Raises `TooLate`."""
+        result: list[_T] = []
+
+        def look() -> bool:
+            answer = found(self._view) if self._view else None
+            if answer is not None and answer is not False:
+                result.append(answer)
+            return bool(result) or not self._watching
+
+        with self._changed:
+            self._changed.wait_for(look, timeout=timeout_s)
+        if not result:
+            raise TooLate(f"{what}: not within {timeout_s:.0f} s\n{self._last_words()}")
+        return result[0]
+
+    def watch(self) -> None:
+        """Keep `view` fresh until the daemon leaves; runs in a thread of its own."""
+        try:
+            with ControlClient(self.control, timeout_s=None) as client:
+                for view in client.follow("watch"):
+                    with self._changed:
+                        self._view = view
+                        self._changed.notify_all()
+        except HostUnreachable:
+            pass  # the daemon was stopped: `until` says so
+        finally:
+            with self._changed:
+                self._watching = False
+                self._changed.notify_all()
+
+    def _last_words(self) -> str:
+        try:
+            why = self.ask("why")
+        except NondumError as error:
+            return str(error)
+        return "\n".join([*why["sentences"], *map(str, why["problems"])])
+
+
+def nondum(*arguments: str | Path) -> str:
+    """Run the command line, and return what it printed. Its refusals are shown as they are."""
+    done = subprocess.run([*NONDUM, *map(str, arguments)], stdout=subprocess.PIPE, text=True)
+    if done.returncode:
+        raise SystemExit(done.returncode)
+    return done.stdout
+
+
+@contextmanager
+def running(work: Path, *, name: str, initial: Mapping[str, Path]) -> Iterator[Robot]:
+    """A host with initial components, started and at last stopped."""
+    robot = Robot(work, name=name)
+    for folder in (robot.slots, robot.devices):
+        folder.mkdir(parents=True)
+    config = work / "host.toml"
+    config.write_text(_config(robot), encoding="utf-8")
+    for drive in initial.values():
+        nondum("payload", "install", drive, "--config", config)
+    with (work / "daemon.log").open("wb") as log:
+        daemon = subprocess.Popen(
+            [*NONDUM, "host", "run", "--user", "--config", str(config)], stdout=log, stderr=log
+        )
+        try:
+            _await_socket(robot, daemon)
+            watcher = threading.Thread(target=robot.watch, daemon=True)
+            watcher.start()
+            yield robot
+        finally:
+            daemon.terminate()
+            daemon.wait(timeout=20)
+
+
+def _config(robot: Robot) -> str:
+    return f"""\
+[host]
+name = "{robot.name}"
+state = "{robot.work / "state"}"
+control = "{robot.control}"
+
+[drives]
+slots = ["{robot.slots}"]
+block_devices = false
+allow_unsigned = true
+
+[devices]
+slots = ["{robot.devices}"]
+udev = false
+"""
+
+
+def _await_socket(robot: Robot, daemon: subprocess.Popen[bytes]) -> None:
+    done = threading.Event()
+    for _ in range(300):
+        if daemon.poll() is not None:
+            break
+        try:
+            robot.ask("status")
+            return
+        except HostUnreachable:
+            done.wait(0.1)
+    raise TooLate("the daemon did not answer:\n" + (robot.work / "daemon.log").read_text())

@@ -1,0 +1,67 @@
+"""What the demonstration reports: phases of every stage, and whether its goal was reached."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+PHASES = ("seen", "verified", "installed", "ready", "in plan", "goal")
+NOTE = (
+    "Seconds after the first drive of the stage went in, until the phase was complete for all of "
+    "its payloads. The published times are for a person with real instruments: they include hands "
+    "that fetch, plug and mount; ours do not, and drives here are folders on a disk."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class StageResult:
+    """How one stage went."""
+
+    name: str
+    goal: str
+    phases_s: Mapping[str, float]
+    """Phase → seconds after the first drive went in."""
+    published_s: float
+    """Time of the published system for the same stage, with hands."""
+    reached: bool
+    measure: str
+    """What was measured, and the bound that it was held to."""
+    plan: Sequence[str] = ()
+    told: Sequence[str] = field(default_factory=tuple)
+    """What the host said of its own accord during the stage."""
+
+
+def as_text(results: Sequence[StageResult]) -> str:
+    """The table that people read."""
+    head = ["stage", *PHASES, "published", "reached"]
+    rows = [
+        [
+            result.name,
+            *(_seconds(result.phases_s.get(phase)) for phase in PHASES),
+            f"{result.published_s:.0f} s *",
+            "yes" if result.reached else "NO",
+        ]
+        for result in results
+    ]
+    widths = [max(len(line[i]) for line in [head, *rows]) for i in range(len(head))]
+    lines = [
+        "  ".join(f"{v:<{w}}" for v, w in zip(line, widths, strict=True)).rstrip()
+        for line in [head, *rows]
+    ]
+    lines.insert(1, "-" * len(lines[0]))
+    measures = [f"{result.name}: {result.measure}" for result in results]
+    return "\n".join([*lines, "", *measures, "", f"* {NOTE}"])
+
+
+def as_data(results: Sequence[StageResult]) -> dict[str, Any]:
+    """The same as one JSON document."""
+    return {
+        "reached": all(result.reached for result in results),
+        "note": NOTE,
+        "stages": [asdict(result) for result in results],
+    }
+
+
+def _seconds(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f} s"

@@ -1,0 +1,64 @@
+"""Whether a payload's planning knowledge stands by itself, and speaks words that strangers share.
+
+What `nondum payload check` asks beyond the payload's own form: its fragments are merged with
+nothing but the core vocabulary, as they would be on a host that has nothing else.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+
+from nondum.planning.contribution import Contribution
+from nondum.planning.core import core_graph, core_predicates
+from nondum.planning.domain import Merged
+from nondum.planning.merge import merge
+from nondum.sdk.description import PluginDescription
+from nondum.sdk.errors import Problem
+
+HOST = "host"
+"""Any host: names of hosts mean nothing to a fragment."""
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What merging a payload alone shows."""
+
+    problems: tuple[Problem, ...]
+    """Why a host would keep its components out of the plan."""
+    warnings: tuple[Problem, ...]
+
+
+def judge(index: Mapping[str, PluginDescription]) -> Judged:
+    """Merge what a payload's components say with the core vocabulary only."""
+    merged = merge(
+        [
+            Contribution.from_description(description, host=HOST, component=component)
+            for component, description in index.items()
+        ],
+        HOST,
+    )
+    problems = tuple(p for found in merged.quarantined.values() for p in found)
+    return Judged(problems, (*merged.warnings, *_own_words(merged)))
+
+
+def _own_words(merged: Merged) -> Iterator[Problem]:
+    """Types and predicates that only this payload knows: nobody else can plan with them."""
+    types = core_graph().parents.keys()
+    own_types = {name for name in merged.domain.type_origins if name not in types}
+    predicates = core_predicates()
+    own_predicates = merged.domain.predicates.keys() - predicates.keys()
+    yield from _warned("type", own_types, types)
+    yield from _warned("predicate", own_predicates, predicates.keys())
+
+
+def _warned(kind: str, own: Collection[str], core: Collection[str]) -> Iterator[Problem]:
+    for name in sorted(own):
+        near = difflib.get_close_matches(name, core, n=1, cutoff=0.0)
+        yield Problem(
+            "W-OWN-WORD",
+            f"{kind} {name!r} is in no other fragment that is known here",
+            where=name,
+            fix=f"the nearest word of nondum-core is {near[0]!r}" if near else "",
+        )
