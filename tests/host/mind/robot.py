@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
 from pathlib import Path
@@ -71,6 +71,8 @@ class Robot:
     """Behaviours that never get anywhere."""
     broken: set[str] = field(default_factory=set)
     """Components whose behaviours fail."""
+    early_news: dict[str, list[Event]] = field(default_factory=dict)
+    """What components say before they are in the catalogue."""
     revision: int = 0
     mind: Mind = field(init=False)
 
@@ -112,6 +114,9 @@ class Robot:
 
     def tell_values(self, component: str, values: Sequence[FactValue]) -> None:
         self.told_values += [(component, value) for value in values]
+
+    def claims(self, component: str) -> Iterable[Event]:
+        return self.early_news.get(component, ())
 
     # Recomposition
 

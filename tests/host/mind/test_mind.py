@@ -18,9 +18,9 @@ from tests.planning.strangers import (
 )
 
 from nondum.host.catalogue.records import ComponentState
-from nondum.host.events import GoalReached, PlanMade, PlanMissing
+from nondum.host.events import FactKnown, GoalReached, PlanMade, PlanMissing
 from nondum.planning.running import RunState
-from nondum.sdk.description import Fragment
+from nondum.sdk.description import Fragment, Output, Unit
 from nondum.sdk.errors import GoalRefused
 
 pytestmark = pytest.mark.anyio
@@ -242,6 +242,27 @@ async def test_goal_that_holds_is_reached_at_once(robot: Robot) -> None:
     robot.mind.give(pddl=f"(on {HOST}__speaker__voice self)")
     await robot.until_goal("reached")
     assert not robot.started
+
+
+async def test_what_was_said_before_activation_counts(robot: Robot) -> None:
+    robot.early_news["speaker"] = [FactKnown("speaker", "found", ("person", "self"))]
+    robot.know("speaker", "reported", "person", "self")
+    robot.plug(SPEAKER, PEOPLE_DETECTOR)
+    assert robot.mind.beliefs.world.holds(f"found person {HOST}")
+    assert not robot.mind.beliefs.world.holds(f"reported person {HOST}")
+
+
+async def test_always_produced_stream_flows_without_behaviour(robot: Robot) -> None:
+    unit = Unit("wheels", "base", outputs=(Output("odometry", "pose", always=True),))
+    robot.plug(replace(MOBILE_BASE, units=(unit,)))
+    stream = f"{HOST}__mobile-base__odometry"
+    world = robot.mind.beliefs.world
+    assert world.holds(f"from {stream} {HOST}")
+    assert not world.holds(f"free {stream}")
+    robot.flow("mobile-base", "odometry", flowing=True)
+    assert world.holds(f"flowing {stream}")
+    robot.flow("mobile-base", "odometry", flowing=False)
+    assert not world.holds(f"flowing {stream}")
 
 
 async def test_plugins_may_not_say_what_the_host_says(robot: Robot) -> None:

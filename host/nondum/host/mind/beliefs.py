@@ -29,12 +29,15 @@ class Beliefs:
         self._names: dict[str, Mapping[str, str]] = {}
         self._always: frozenset[str] = frozenset()
 
-    def see(self, snapshot: Snapshot) -> tuple[str, ...]:
-        """Take over a snapshot; what is gone from it is withdrawn at once. Gives the components
-        that are gone."""
+    def see(self, snapshot: Snapshot) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Take over a snapshot; what is gone from it is withdrawn at once.
+
+        Gives the ids of the components that are gone, and of those that are new.
+        """
         old, self.snapshot = self.snapshot, snapshot
-        present = {component.id: component.payload for component in snapshot.components}
-        gone = [c for c in old.components if present.get(c.id) != c.payload]
+        before = {(component.id, component.payload) for component in old.components}
+        now = {(component.id, component.payload) for component in snapshot.components}
+        gone = [c for c in old.components if (c.id, c.payload) not in now]
         for component in gone:
             objects = own_objects(old.host, component).values()
             self.world.remove_component(component.id, set(objects))
@@ -42,7 +45,8 @@ class Beliefs:
         self._names = {c.id: own_objects(snapshot.host, c) for c in snapshot.components}
         self._always = always_produced(snapshot)
         self.world.set_host_facts(snapshot.host, body_facts(snapshot), self._now_s())
-        return tuple(component.id for component in gone)
+        new = (c.id for c in snapshot.components if (c.id, c.payload) not in before)
+        return tuple(component.id for component in gone), tuple(new)
 
     def adopt(self, composition: Composition) -> None:
         """Take over what merging made of the snapshot: objects, and what fragments say."""

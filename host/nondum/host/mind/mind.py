@@ -61,6 +61,7 @@ class Mind:
         self.composition: Composition | None = None
         self.version = 0
         """Rises whenever a view may look different."""
+        self._calls = calls
         self._planners = planners
         self._emit = emit
         self._news = asyncio.Event()
@@ -86,8 +87,12 @@ class Mind:
     def see(self, snapshot: Snapshot) -> None:
         """Take over a new revision of the catalogue: what is gone is withdrawn at once, what is new
         is planned with from the next tick on."""
-        for component in self.beliefs.see(snapshot):
+        gone, new = self.beliefs.see(snapshot)
+        for component in gone:
             self.runner.lose(component, "its component is gone")
+        for component in new:
+            for claim in self._calls.claims(component):
+                self.on_event(claim)
         if self._composing is not None:
             self._composing.cancel()
             self._composing = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeAlias
 
@@ -65,6 +65,10 @@ class Calls(Protocol):
 
     def tell_values(self, component: str, values: Sequence[FactValue]) -> None:
         """Tell a component new values of facts that its behaviours run on."""
+        ...
+
+    def claims(self, component: str) -> Iterable[Event]:
+        """The news that a component told before it was in the catalogue, and that still hold."""
         ...
 
 
