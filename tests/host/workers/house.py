@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -115,10 +116,18 @@ def is_alive(pid: int) -> bool:
 
 
 async def until_gone(pid: int, timeout_s: float = 5.0) -> None:
-    """Wait for a process that is no child of this one to end."""
-    async with asyncio.timeout(timeout_s):
-        while is_alive(pid):
-            await asyncio.sleep(0.02)  # nobody tells of the end of somebody else's child
+    """Wait for a process to end, whosever child it is."""
+    try:
+        descriptor = os.pidfd_open(pid)
+    except ProcessLookupError:
+        return
+    ended = asyncio.Event()
+    asyncio.get_running_loop().add_reader(descriptor, ended.set)
+    try:
+        await asyncio.wait_for(ended.wait(), timeout_s)
+    finally:
+        asyncio.get_running_loop().remove_reader(descriptor)
+        os.close(descriptor)
 
 
 def camera(name: str = "camera", *, always: bool = False) -> Unit:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from tests.host.workers.house import HOST, House, is_alive
 
 from nondum.host.events import (
     BehaviourEnded,
@@ -14,9 +15,8 @@ from nondum.host.events import (
     WorkerReady,
 )
 from nondum.planning.running import RunState
-from nondum.sdk.description import Behaviour
+from nondum.sdk.description import Behaviour, Unit
 from nondum.sdk.errors import WorkerFailed
-from tests.host.workers.house import HOST, House, is_alive
 
 pytestmark = pytest.mark.anyio
 
@@ -60,8 +60,6 @@ BEHAVIOURS = (
 
 
 async def greeter(house: House) -> None:
-    from nondum.sdk.description import Unit
-
     await house.start(
         "greeter",
         GREETER,

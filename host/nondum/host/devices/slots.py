@@ -1,0 +1,97 @@
+"""Device slots: folders of TOML files, each of which stands for a device (inotify(7)).
+
+    [device]
+    node = "/dev/pts/3"
+    [device.properties]
+    SUBSYSTEM = "tty"
+    ID_MODEL = "PTU-D46-17"
+
+A file appears: the device is plugged in. It goes: the device is pulled. Files whose names begin
+with a dot, or end in anything but `.toml`, mean nothing.
+"""
+
+from __future__ import annotations
+
+import logging
+import tomllib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from nondum.host.devices.source import Found, Sightings
+from nondum.host.events import Emit
+from nondum.host.inotify import folders_watched
+from nondum.sdk.errors import ConfigRefused, Problem
+
+MAX_BYTES = 64 * 1024
+
+log = logging.getLogger(__name__)
+
+
+class DeviceSlotSource:
+    """Watches folders of slot files; folders that are not there are made."""
+
+    def __init__(self, folders: Sequence[Path]) -> None:
+        self._folders = tuple(folders)
+        self._refused: dict[Path, str] = {}
+
+    async def watch(self, emit: Emit) -> None:
+        """Tell what is there, then what comes and goes (see `DeviceSource`)."""
+        sightings = Sightings(emit)
+        with folders_watched(self._folders) as changed:
+            while True:
+                changed.clear()
+                sightings.see_all(dict(self._present()))
+                await changed.wait()
+
+    def _present(self) -> Iterator[tuple[str, Found]]:
+        for folder in self._folders:
+            for path in sorted(folder.glob("[!.]*.toml")):
+                try:
+                    found = parse_slot(_read(path), str(path))
+                except ConfigRefused as refused:
+                    self._refuse(path, str(refused))
+                    continue
+                except OSError:  # it has just gone
+                    continue
+                self._refused.pop(path, None)
+                yield path.stem if len(self._folders) == 1 else f"{folder.name}/{path.stem}", found
+
+    def _refuse(self, path: Path, why: str) -> None:
+        """Say it once: a file that is being written is looked at several times."""
+        if self._refused.get(path) != why:
+            self._refused[path] = why
+            log.warning("%s", why)
+
+
+def parse_slot(text: str, where: str) -> Found:
+    """Read a slot file. Raises `ConfigRefused` (DEVICE_SLOT).
+
+    >>> parse_slot('[device]\\nnode = "/dev/null"\\nproperties = { ID_BUS = "usb" }', "a.toml")
+    Found(node=PosixPath('/dev/null'), properties={'ID_BUS': 'usb'})
+    """
+    try:
+        data: dict[str, Any] = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise _refused(where, str(error)) from error
+    match data:
+        case {"device": {"node": str(node), **rest}, **others} if not others and node:
+            properties = rest.pop("properties", {})
+            if rest:
+                raise _refused(where, f"unknown key {next(iter(rest))!r}")
+            if not isinstance(properties, dict) or not all(
+                isinstance(value, str) for value in properties.values()
+            ):
+                raise _refused(where, "properties are a table of strings")
+            return Found(Path(node), properties)
+    raise _refused(where, "there is one table, [device], with node and properties")
+
+
+def _read(path: Path) -> str:
+    with path.open("rb") as file:
+        return file.read(MAX_BYTES).decode("utf-8", "replace")
+
+
+def _refused(where: str, message: str) -> ConfigRefused:
+    example = '[device]\nnode = "/dev/…"\nproperties = { ID_MODEL = "…" }'.replace("\n", "; ")
+    return ConfigRefused(Problem("DEVICE_SLOT", message, where=where, fix=f"write {example}"))

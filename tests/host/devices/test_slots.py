@@ -1,0 +1,119 @@
+"""Device slots: files appear, change and go, and devices with them."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nondum.host.devices import DeviceSlotSource
+from nondum.host.devices.slots import parse_slot
+from nondum.host.events import DeviceAppeared, DeviceRemoved, Event
+from nondum.sdk.errors import ConfigRefused
+
+CAMERA = '[device]\nnode = "/dev/video0"\n[device.properties]\nID_BUS = "usb"\n'
+
+
+@asynccontextmanager
+async def watching(*folders: Path) -> AsyncIterator[asyncio.Queue[Event]]:
+    """What a source tells while the context lasts."""
+    told: asyncio.Queue[Event] = asyncio.Queue()
+    task = asyncio.create_task(DeviceSlotSource(folders).watch(told.put_nowait))
+    try:
+        yield told
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+async def heard(told: asyncio.Queue[Event]) -> Event:
+    return await asyncio.wait_for(told.get(), 5.0)
+
+
+@pytest.mark.anyio
+async def test_devices_that_are_there_are_told(tmp_path: Path) -> None:
+    (tmp_path / "front.toml").write_text(CAMERA)
+    async with watching(tmp_path) as told:
+        event = await heard(told)
+    assert event == DeviceAppeared("front", Path("/dev/video0"), {"ID_BUS": "usb"})
+
+
+@pytest.mark.anyio
+async def test_devices_come_and_go(tmp_path: Path) -> None:
+    async with watching(tmp_path / "made") as told:
+        await asyncio.sleep(0)
+        file = tmp_path / "made/front.toml"
+        unfinished = tmp_path / "made/.front.part"
+        unfinished.write_text(CAMERA)
+        unfinished.rename(file)
+        assert isinstance(await heard(told), DeviceAppeared)
+        file.unlink()
+        assert await heard(told) == DeviceRemoved("front")
+
+
+@pytest.mark.anyio
+async def test_device_that_changes_is_replugged(tmp_path: Path) -> None:
+    file = tmp_path / "front.toml"
+    file.write_text(CAMERA)
+    async with watching(tmp_path) as told:
+        await heard(told)
+        file.write_text(CAMERA.replace("video0", "video1"))
+        # Written in place, it may also be seen empty in between: that is no device.
+        assert await heard(told) == DeviceRemoved("front")
+        event = await heard(told)
+        assert isinstance(event, DeviceAppeared)
+        assert event.node == Path("/dev/video1")
+
+
+@pytest.mark.anyio
+async def test_broken_file_hurts_no_other(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (tmp_path / "a.toml").write_text("[device\n")
+    (tmp_path / "b.toml").write_text(CAMERA)
+    (tmp_path / "notes.txt").write_text("no device")
+    async with watching(tmp_path) as told:
+        event = await heard(told)
+    assert isinstance(event, DeviceAppeared)
+    assert event.device == "b"
+    assert "DEVICE_SLOT" in caplog.text
+    assert told.empty()
+
+
+@pytest.mark.anyio
+async def test_two_folders_keep_their_devices_apart(tmp_path: Path) -> None:
+    for folder in ("left", "right"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "eye.toml").write_text(CAMERA)
+    async with watching(tmp_path / "left", tmp_path / "right") as told:
+        names = {getattr(await heard(told), "device", "") for _ in range(2)}
+    assert names == {"left/eye", "right/eye"}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param("", id="empty"),
+        pytest.param("[device]", id="no node"),
+        pytest.param('[device]\nnode = ""', id="empty node"),
+        pytest.param("[device]\nnode = 3", id="node is no text"),
+        pytest.param('[device]\nnode = "/dev/a"\nnodes = []', id="unknown key"),
+        pytest.param('[device]\nnode = "/dev/a"\n[other]', id="unknown table"),
+        pytest.param('[device]\nnode = "/dev/a"\nproperties = 1', id="properties are no table"),
+        pytest.param('[device]\nnode = "/dev/a"\nproperties = { A = 1 }', id="no string"),
+    ],
+)
+def test_slot_file_is_refused(text: str) -> None:
+    with pytest.raises(ConfigRefused, match="DEVICE_SLOT"):
+        parse_slot(text, "x.toml")
+
+
+@given(st.text())
+def test_any_text_is_read_or_refused(text: str) -> None:
+    try:
+        parse_slot(text, "x.toml")
+    except ConfigRefused as refused:
+        assert refused.code == "DEVICE_SLOT"

@@ -1,0 +1,115 @@
+"""The machine's own devices, whatever they are here."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from nondum.host.devices import UdevSource
+from nondum.host.devices.source import Found, Sightings
+from nondum.host.devices.udev import UDEV_RUNS, _look, _present
+from nondum.host.events import DeviceAppeared, DeviceRemoved, Event
+
+pytestmark = pytest.mark.anyio
+
+
+class Device:
+    """What pyudev would give."""
+
+    def __init__(self, path: str, action: str | None, subsystem: str = "tty", **properties: str):
+        self.device_path, self.action, self.subsystem = path, action, subsystem
+        self.device_node = properties.get("DEVNAME")
+        self.properties = {**properties, "SEQNUM": "7"}
+
+
+def told_of(*devices: Any) -> list[Event]:
+    told: list[Event] = []
+    sightings = Sightings(told.append)
+    for device in devices:
+        _look(device, sightings)
+    return told
+
+
+def have_told(device: str, action: str) -> None:
+    """Have the kernel tell of a device once more (`uevent` in sysfs)."""
+    Path(f"/sys{device}/uevent").write_text(action)
+
+
+PORT = "/devices/pci0/usb1/1-1/ttyUSB0/tty/ttyUSB0"
+
+
+async def test_only_real_devices_with_nodes_are_told() -> None:
+    expected = len(_present())
+    told: asyncio.Queue[Event] = asyncio.Queue()
+    task = asyncio.create_task(UdevSource().watch(told.put_nowait))
+    try:
+        for _ in range(expected):
+            event = await asyncio.wait_for(told.get(), 10.0)
+            assert isinstance(event, DeviceAppeared)
+            assert "/virtual/" not in event.device
+            assert event.properties["SUBSYSTEM"] != "block"
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root makes the kernel tell of a device")
+@pytest.mark.skipif(UDEV_RUNS.exists(), reason="udevd would act on what the test says")
+async def test_kernel_tells_of_removal_and_return() -> None:
+    device = next(iter(_present()), None)
+    if device is None:
+        pytest.skip("this machine has no device on a bus")
+    told: asyncio.Queue[Event] = asyncio.Queue()
+    task = asyncio.create_task(UdevSource().watch(told.put_nowait))
+    try:
+        while getattr(await asyncio.wait_for(told.get(), 10.0), "device", "") != device:
+            pass
+        for action, kind in (("remove", DeviceRemoved), ("add", DeviceAppeared)):
+            have_told(device, action)
+            while (event := await asyncio.wait_for(told.get(), 10.0)).to_dict()["device"] != device:
+                pass
+            assert type(event) is kind
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+async def test_device_appears_once_and_goes() -> None:
+    told = told_of(
+        Device(PORT, "add", DEVNAME="/dev/ttyUSB0", ID_MODEL="a"),
+        Device(PORT, "bind", DEVNAME="/dev/ttyUSB0", ID_MODEL="a"),
+        Device(PORT, "remove", DEVNAME="/dev/ttyUSB0"),
+        Device(PORT, "remove", DEVNAME="/dev/ttyUSB0"),
+    )
+    properties = {"DEVNAME": "/dev/ttyUSB0", "ID_MODEL": "a"}
+    assert told == [DeviceAppeared(PORT, Path("/dev/ttyUSB0"), properties), DeviceRemoved(PORT)]
+
+
+async def test_terminals_and_drives_are_left_alone() -> None:
+    assert not told_of(
+        Device("/devices/virtual/tty/tty1", "add", DEVNAME="/dev/tty1"),
+        Device("/devices/pci0/usb1/1-2/block/sda", "add", "block", DEVNAME="/dev/sda"),
+        Device("/devices/pci0/usb1/1-2", "add", "usb"),
+    )
+
+
+async def test_change_is_told_as_replug() -> None:
+    told = told_of(
+        Device(PORT, "add", DEVNAME="/dev/ttyUSB0", ID_MODEL="a"),
+        Device(PORT, "change", DEVNAME="/dev/ttyUSB0", ID_MODEL="b"),
+    )
+    assert [type(event) for event in told] == [DeviceAppeared, DeviceRemoved, DeviceAppeared]
+
+
+def test_sightings_tell_differences_only() -> None:
+    told: list[Event] = []
+    sightings = Sightings(told.append)
+    found = Found(Path("/dev/a"), {})
+    sightings.see_all({"a": found})
+    sightings.see_all({"a": found})
+    sightings.see_all({})
+    assert told == [DeviceAppeared("a", Path("/dev/a"), {}), DeviceRemoved("a")]
