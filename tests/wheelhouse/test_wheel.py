@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import stat
 import sys
+import time
 import zlib
 from pathlib import Path
 

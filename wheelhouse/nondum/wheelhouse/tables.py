@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 import re
 import tomllib
 from collections import Counter
@@ -119,36 +120,41 @@ class Table:
         if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
             self.wrong(key, f"expected a list of strings, found {_shown(value)}")
             return ()
+        for item in value:
+            if not PLAIN.pattern.fullmatch(item):
+                self.wrong(key, f"{item[:60]!r} is not {PLAIN.words}")
         return tuple(value)
 
     def numbers(self, key: str, count: int) -> tuple[float, ...]:
         """A list of `count` numbers; zeros when it is left out."""
         value = self._take(key, [0.0] * count)
-        is_number = [type(item) in (int, float) for item in value] if _is_list(value) else []
+        is_number = [_is_number(item) for item in value] if isinstance(value, list) else []
         if len(is_number) != count or not all(is_number):
-            self.wrong(key, f"expected a list of {count} numbers, found {_shown(value)}")
+            self.wrong(key, f"expected a list of {count} finite numbers, found {_shown(value)}")
             return (0.0,) * count
         return tuple(float(item) for item in value)
 
     def strings(self, key: str) -> dict[str, str]:
-        """A table of strings, for example udev properties."""
+        """A table of at least one string, for example udev properties."""
         value = self._take(key, {})
         if not isinstance(value, dict) or not all(isinstance(v, str) for v in value.values()):
             self.wrong(key, f"expected a table of strings, found {_shown(value)}")
             return {}
+        if not value:
+            self.wrong(key, "expected a table of at least one string")
         return dict(value)
 
     def free(self, key: str) -> dict[str, Any]:
-        """A table whose keys are somebody else's affair."""
-        value = self._take(key, {})
-        if not isinstance(value, dict):
-            self.wrong(key, f"expected a table, found {_shown(value)}")
+        """A table whose keys are somebody else's affair; its values can stand in any message."""
+        value = self._dict(key)
+        if not _is_plain(value):
+            self.wrong(key, "has a value other than text, true, false, 64-bit and finite numbers")
             return {}
         return value
 
     def table(self, key: str) -> Table:
         """A table of its own; empty when it is left out."""
-        return Table(self.free(key), self._report, self._full(key))
+        return Table(self._dict(key), self._report, self._full(key))
 
     def tables(self, key: str, *, required: bool = False) -> Sequence[Table]:
         """An array of tables."""
@@ -182,6 +188,13 @@ class Table:
             self._report.add("KEY", f"key {key!r} is missing{place}", self._line(key))
         return self._data.get(key, default)
 
+    def _dict(self, key: str) -> dict[str, Any]:
+        value = self._take(key, {})
+        if not isinstance(value, dict):
+            self.wrong(key, f"expected a table, found {_shown(value)}")
+            return {}
+        return value
+
     def _line(self, key: str) -> int | None:
         return self._report.line_of(self._name, self._index, key)
 
@@ -205,8 +218,19 @@ def read(text: str, code: str, where: str) -> tuple[Table, Report]:
     return Table(data, report), report
 
 
-def _is_list(value: Any) -> bool:
-    return isinstance(value, list)
+def _is_number(value: Any) -> bool:
+    """Whether it is a number that fits a message and a float."""
+    return (type(value) is int and -(2**63) <= value < 2**63) or (
+        type(value) is float and math.isfinite(value)
+    )
+
+
+def _is_plain(value: Any) -> bool:
+    if isinstance(value, dict):
+        return all(_is_plain(item) for item in value.values())
+    if isinstance(value, list):
+        return all(_is_plain(item) for item in value)
+    return type(value) in (str, bool) or _is_number(value)
 
 
 def _kind(value: Any) -> str:

@@ -1,0 +1,144 @@
+"""The contents list: the same value through its bytes, and everything wrong told at once."""
+
+from __future__ import annotations
+
+import hashlib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nondum.sdk.errors import PayloadRefused
+from nondum.wheelhouse import contents, names
+from nondum.wheelhouse.contents import Contents, Entry
+
+SHA = "a" * 64
+PLAIN = (
+    "nondum-payload 1\nid: org.example.blinker\nversion: 1.0\nrelease: 7\nfleet:\n"
+    "minimum-nondum: 0.1\nbuilt: 2026-01-01T00:00:00Z\n\n"
+    f"{SHA}  12  index.json\n{SHA}  3  wheels/a-1-py3-none-any.whl\n"
+)
+
+
+def codes(data: bytes | str) -> list[str]:
+    raw = data.encode() if isinstance(data, str) else data
+    with pytest.raises(PayloadRefused) as refused:
+        contents.parse(raw, "CONTENTS")
+    return [problem.code for problem in refused.value.problems]
+
+
+LISTS = st.builds(
+    Contents,
+    payload_id=st.from_regex(names.PAYLOAD_ID, fullmatch=True),
+    version=st.sampled_from(["1", "1.0", "2.0rc1", "1!3.post4+local"]),
+    release=st.integers(0, contents.MAX_RELEASE),
+    fleet=st.from_regex(r"\A[a-z0-9.-]{0,64}\Z"),
+    minimum_nondum=st.just("0.1"),
+    built=st.just("2026-01-01T00:00:00Z"),
+    entries=st.lists(
+        st.builds(
+            Entry,
+            sha256=st.from_regex(r"\A[0-9a-f]{64}\Z"),
+            size=st.integers(0, contents.MAX_FILE_BYTES),
+            path=st.from_regex(r"\A[a-z0-9]{1,8}(/[a-z0-9]{1,8}){0,3}\Z"),
+        ),
+        unique_by=lambda entry: entry.path,
+    ).map(lambda entries: tuple(sorted(entries, key=lambda entry: entry.path))),
+)
+
+
+@given(LISTS)
+def test_a_list_survives_its_bytes(listed: Contents) -> None:
+    assert contents.parse(listed.to_bytes(), "CONTENTS") == listed
+    assert listed.digest == hashlib.sha256(listed.to_bytes()).hexdigest()
+
+
+@given(st.binary(max_size=600))
+def test_noise_is_refused_and_nothing_else_raised(noise: bytes) -> None:
+    for data in (noise, PLAIN.encode() + noise):
+        try:
+            listed = contents.parse(data, "CONTENTS")
+        except PayloadRefused:
+            continue
+        assert contents.parse(listed.to_bytes(), "again") == listed
+
+
+@given(st.integers(0, len(PLAIN) - 1), st.characters(codec="latin-1"))
+def test_a_changed_byte_never_passes_unnoticed(at: int, byte: str) -> None:
+    changed = PLAIN[:at] + byte + PLAIN[at + 1 :]
+    try:
+        listed = contents.parse(changed.encode("latin-1"), "CONTENTS")
+    except PayloadRefused:
+        return
+    assert (listed.to_bytes() == PLAIN.encode()) == (changed == PLAIN)
+
+
+def test_a_plain_list_is_read() -> None:
+    listed = contents.parse(PLAIN.encode(), "CONTENTS")
+    assert (listed.payload_id, listed.release, listed.fleet) == ("org.example.blinker", 7, "")
+    assert listed.total_bytes == 15
+    assert listed.to_bytes() == PLAIN.encode()
+
+
+REFUSED = {
+    "not-ascii": ("CONTENTS_ENCODING", PLAIN.replace("index", "indéx")),
+    "empty": ("SCHEMA_VERSION", ""),
+    "byte-order-mark": ("CONTENTS_ENCODING", "\ufeff" + PLAIN),
+    "other-format": ("SCHEMA_VERSION", PLAIN.replace("payload 1", "payload 2")),
+    "unknown-header": ("CONTENTS_HEADER", PLAIN.replace("fleet:", "fleet:\ncolour: red")),
+    "header-twice": ("CONTENTS_HEADER", PLAIN.replace("fleet:", "fleet:\nfleet: other")),
+    "header-missing": ("CONTENTS_HEADER", PLAIN.replace("release: 7\n", "")),
+    "no-colon": ("CONTENTS_HEADER", PLAIN.replace("fleet:", "fleet:\nfleet")),
+    "id-upper-case": ("CONTENTS_HEADER", PLAIN.replace("blinker\n", "Blinker\n")),
+    "id-not-reverse-dns": ("CONTENTS_HEADER", PLAIN.replace("org.example.", "")),
+    "version": ("CONTENTS_HEADER", PLAIN.replace("version: 1.0", "version: newest")),
+    "release-negative": ("CONTENTS_HEADER", PLAIN.replace("release: 7", "release: -7")),
+    "release-jump": ("CONTENTS_HEADER", PLAIN.replace("release: 7", f"release: {2**62}")),
+    "release-leading-zero": ("CONTENTS_HEADER", PLAIN.replace("release: 7", "release: 07")),
+    "release-digits-elsewhere": ("CONTENTS_ENCODING", PLAIN.replace("release: 7", "release: ٧")),
+    "fleet": ("CONTENTS_HEADER", PLAIN.replace("fleet:", "fleet: a b")),
+    "built": ("CONTENTS_HEADER", PLAIN.replace("00Z", "00")),
+    "entry-short-hash": ("CONTENTS_ENTRY", PLAIN.replace(f"{SHA}  12", f"{SHA[1:]}  12")),
+    "entry-upper-hash": ("CONTENTS_ENTRY", PLAIN.replace(f"{SHA}  12", f"{SHA.upper()}  12")),
+    "entry-size": ("CONTENTS_ENTRY", PLAIN.replace("  12  ", "  012  ")),
+    "entry-one-space": ("CONTENTS_ENTRY", PLAIN.replace("  12  ", " 12 ")),
+    "entry-cut-off": ("CONTENTS_ENTRY", PLAIN.removesuffix("\n")),
+    "entry-carriage-return": ("CONTENTS_ENTRY", PLAIN.replace(".json\n", ".json\r\n")),
+    "entries-unsorted": ("CONTENTS_ENTRY", PLAIN.replace("index.json", "z.json")),
+    "lists-itself": ("CONTENTS_ENTRY", PLAIN.replace("index.json", "CONTENTS")),
+    "lists-signature": ("CONTENTS_ENTRY", PLAIN.replace("index.json", "CONTENTS.sig")),
+    "path-up": ("PATH_UNSAFE", PLAIN.replace("index.json", "../index.json")),
+    "path-inner-up": ("PATH_UNSAFE", PLAIN.replace("index.json", "a/../../index.json")),
+    "path-absolute": ("PATH_UNSAFE", PLAIN.replace("index.json", "/etc/passwd")),
+    "path-backslash": ("PATH_UNSAFE", PLAIN.replace("index.json", "a\\b")),
+    "path-doubled-slash": ("PATH_UNSAFE", PLAIN.replace("index.json", "a//b")),
+    "path-dot": ("PATH_UNSAFE", PLAIN.replace("index.json", "./a")),
+    "path-long": ("PATH_UNSAFE", PLAIN.replace("index.json", "a" * 256)),
+    "path-control": ("PATH_UNSAFE", PLAIN.replace("index.json", "a\x07b")),
+    "path-case-pair": (
+        "PATH_UNSAFE",
+        PLAIN.replace(f"{SHA}  12  index", f"{SHA}  12  INDEX.json\n{SHA}  12  index"),
+    ),
+    "path-twice": (
+        "PATH_UNSAFE",
+        PLAIN.replace(f"{SHA}  12  index", f"{SHA}  12  index.json\n{SHA}  12  index"),
+    ),
+    "file-huge": ("TOO_LARGE", PLAIN.replace("  12  ", f"  {9 * 1024**3}  ")),
+    "list-huge": ("TOO_LARGE", PLAIN + "a" * contents.MAX_BYTES),
+    "files-many": ("TOO_MANY_FILES", PLAIN + "x\n" * contents.MAX_FILES),
+}
+
+
+@pytest.mark.parametrize(("code", "text"), REFUSED.values(), ids=REFUSED)
+def test_a_wrong_list_is_refused(code: str, text: str) -> None:
+    assert codes(text) == [code]
+
+
+def test_everything_wrong_is_told_with_its_line() -> None:
+    text = PLAIN.replace("release: 7", "release: x").replace("index.json", "../up")
+    with pytest.raises(PayloadRefused) as refused:
+        contents.parse(text.encode(), "CONTENTS")
+    assert [(p.code, p.where) for p in refused.value.problems] == [
+        ("CONTENTS_HEADER", "CONTENTS:4"),
+        ("PATH_UNSAFE", "CONTENTS:9"),
+    ]
