@@ -9,7 +9,7 @@ import importlib
 import inspect
 import re
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from typing import Any
@@ -87,19 +87,18 @@ def describe(plugin: Plugin) -> PluginDescription:
     Raises `WorkerFailed` (HOOK_FAILED, DESCRIPTION_INVALID, ACTION_SIGNATURE, BEHAVIOUR_PARAMETERS)
     with everything that is wrong.
     """
-    about = plugin.answer("describe", {})
     behaviours = tuple(behaviours_of(plugin).values())
     described = PluginDescription(
         name=plugin.distribution,
         version=plugin.version,
-        summary=about.get("summary", (inspect.getdoc(plugin.subject) or "").partition("\n")[0]),
+        summary=_summary(plugin),
         behaviours=tuple(_marks(behaviours, behaviour_of)),
         conditions=tuple(_marks(conditions_of(plugin).values(), condition_of)),
-        fragments=tuple(plugin.answer("fragments", ())),
-        units=tuple(plugin.answer("units", ())),
-        devices=tuple(plugin.answer("devices", ())),
-        phrases=tuple(plugin.answer("phrases", ())),
-        labels=tuple(plugin.answer("labels", ())),
+        fragments=_listed(plugin, "fragments"),
+        units=_listed(plugin, "units"),
+        devices=_listed(plugin, "devices"),
+        phrases=_listed(plugin, "phrases"),
+        labels=_listed(plugin, "labels"),
     )
     problems = [
         *(problem for function in behaviours for problem in _parameter_problems(function)),
@@ -121,10 +120,25 @@ def conditions_of(plugin: Plugin) -> dict[str, Callable[..., Any]]:
     return _collected(plugin, "conditions", condition_of)
 
 
+def _summary(plugin: Plugin) -> str:
+    about = plugin.answer("describe", {})
+    if not isinstance(about, Mapping) or not isinstance(about.get("summary", ""), str):
+        raise _invalid("hook 'describe' gives no table of texts")
+    docstring = (inspect.getdoc(plugin.subject) or "").partition("\n")[0]
+    return str(about.get("summary", docstring))
+
+
+def _listed(plugin: Plugin, hook: str) -> tuple[Any, ...]:
+    answer = plugin.answer(hook, ())
+    if not isinstance(answer, Sequence):
+        raise _invalid(f"hook {hook!r} gives no list")
+    return tuple(answer)
+
+
 def _collected(
     plugin: Plugin, hook: str, mark_of: Callable[[object], Behaviour | Condition | None]
 ) -> dict[str, Callable[..., Any]]:
-    found = plugin.answer(hook, None)
+    found = _listed(plugin, hook) if plugin.implements(hook) else None
     members = list(_members(plugin.subject)) if found is None else list(found)
     marked = {id(member): (mark_of(member), member) for member in members}
     named: dict[str, Callable[..., Any]] = {}
