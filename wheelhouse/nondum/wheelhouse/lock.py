@@ -6,6 +6,7 @@ that do not lie inside the payload, and wheels without size or SHA-256.
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from nondum.sdk.errors import PayloadRefused, Problem
 from nondum.wheelhouse import names
 
 MAX_BYTES = 1024 * 1024
+_SHA256 = re.compile(r"[0-9a-f]{64}")
 
 Environment = Mapping[str, str]
 """Environment markers (PEP 508) of the host that is installed on."""
@@ -130,8 +132,8 @@ def _flaws(package: Package, where: str) -> Iterator[Problem]:
             yield _flaw("LOCK_PATH", f"path {wheel.path[:80]!r}: {flaw}", place)
         else:
             yield from _wheel_flaws(wheel.path, package, place)
-        if "sha256" not in wheel.hashes:
-            yield _flaw("LOCK_HASH", f"{wheel.path} has no sha256", place)
+        if not _SHA256.fullmatch(wheel.hashes.get("sha256", "")):
+            yield _flaw("LOCK_HASH", f"{wheel.path} has no sha256 of 64 hex digits", place)
         if wheel.size is None:
             yield _flaw("LOCK_HASH", f"{wheel.path} has no size", place)
 

@@ -1,0 +1,203 @@
+"""Locks: only wheels, only inside the payload, only with hashes; the right wheel for each host."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from packaging.tags import Tag, compatible_tags, cpython_tags
+
+from nondum.sdk.errors import PayloadRefused
+from nondum.wheelhouse import lock
+
+SHA = "b" * 64
+HEAD = 'lock-version = "1.0"\ncreated-by = "test"\n'
+
+
+def wheel(name: str, *, path: str | None = None, rest: str | None = None) -> str:
+    place = f'path = "{path or f"wheels/{name}"}"'
+    hashes = rest if rest is not None else f'size = 3\nhashes = {{ sha256 = "{SHA}" }}'
+    return f'[[packages.wheels]]\nname = "{name}"\n{place}\n{hashes}\n'
+
+
+def package(name: str, version: str, *wheels: str, more: str = "") -> str:
+    return f'[[packages]]\nname = "{name}"\nversion = "{version}"\n{more}' + "".join(wheels)
+
+
+PLAIN = HEAD + package("a", "1.0", wheel("a-1.0-py3-none-any.whl"))
+
+
+def host(python: tuple[int, int], machine: str) -> tuple[dict[str, str], list[Tag]]:
+    platforms = [f"manylinux_2_28_{machine}", f"manylinux_2_17_{machine}", f"linux_{machine}"]
+    text = ".".join(map(str, python))
+    environment = {
+        "implementation_name": "cpython",
+        "implementation_version": f"{text}.0",
+        "os_name": "posix",
+        "platform_machine": machine,
+        "platform_python_implementation": "CPython",
+        "platform_release": "6.1",
+        "platform_system": "Linux",
+        "platform_version": "1",
+        "python_full_version": f"{text}.0",
+        "python_version": text,
+        "sys_platform": "linux",
+    }
+    tags = [
+        *cpython_tags(python, platforms=platforms),
+        *compatible_tags(python, f"cp{python[0]}{python[1]}", platforms),
+    ]
+    return environment, tags
+
+
+def refused(text: str) -> list[str]:
+    with pytest.raises(PayloadRefused) as found:
+        lock.parse(text, "pylock.a.toml")
+    return [problem.code for problem in found.value.problems]
+
+
+NATIVE = HEAD + package(
+    "n",
+    "1.0",
+    *(
+        wheel(f"n-1.0-cp{python}-cp{python}-manylinux_2_28_{machine}.whl")
+        for python in (311, 312)
+        for machine in ("x86_64", "aarch64")
+    ),
+    wheel("n-1.0-py3-none-any.whl"),
+)
+
+
+@pytest.mark.parametrize("machine", ["x86_64", "aarch64"])
+@pytest.mark.parametrize("minor", [11, 12])
+def test_each_host_gets_its_own_wheel(minor: int, machine: str) -> None:
+    (chosen,) = lock.select(lock.parse(NATIVE, "n"), *host((3, minor), machine))
+    assert chosen.filename == f"n-1.0-cp3{minor}-cp3{minor}-manylinux_2_28_{machine}.whl"
+    assert (chosen.name, chosen.version, chosen.sha256, chosen.size) == ("n", "1.0", SHA, 3)
+    assert chosen.path == f"wheels/{chosen.filename}"
+
+
+def test_a_pure_wheel_serves_where_no_native_one_does() -> None:
+    (chosen,) = lock.select(lock.parse(NATIVE, "n"), *host((3, 13), "riscv64"))
+    assert chosen.filename == "n-1.0-py3-none-any.whl"
+
+
+def test_versions_may_differ_between_pythons() -> None:
+    text = HEAD + "".join(
+        package(
+            "n",
+            version,
+            wheel(f"n-{version}-cp3{minor}-cp3{minor}-manylinux_2_17_x86_64.whl"),
+            more=f"marker = \"python_version == '3.{minor}'\"\n",
+        )
+        for version, minor in (("1.0", 11), ("2.0", 12))
+    )
+    parsed = lock.parse(text, "n")
+    assert {w.version for w in lock.select(parsed, *host((3, 11), "x86_64"))} == {"1.0"}
+    assert {w.version for w in lock.select(parsed, *host((3, 12), "x86_64"))} == {"2.0"}
+    assert lock.select(parsed, *host((3, 13), "x86_64")) == ()
+    assert parsed.packages == {"n"}
+
+
+def test_a_missing_architecture_is_told_with_what_there_is() -> None:
+    text = HEAD + package("n", "1.0", wheel("n-1.0-cp311-cp311-manylinux_2_28_aarch64.whl"))
+    with pytest.raises(PayloadRefused) as found:
+        lock.select(lock.parse(text, "pylock.n.toml"), *host((3, 11), "x86_64"))
+    (problem,) = found.value.problems
+    assert problem.code == "WHEEL_INCOMPATIBLE"
+    assert problem.need == "wheels for x86_64, Python 3.11"
+    assert problem.have == "cp311 on manylinux_2_28_aarch64"
+    assert problem.where == "pylock.n.toml"
+
+
+A = "a-1.0-py3-none-any.whl"
+REFUSED = {
+    "not-toml": ("LOCK_TOML", "a = = b"),
+    "depth-bomb": ("LOCK_TOML", HEAD + "x = " + "[" * 100_000),
+    "too-long": ("TOO_LARGE", HEAD + "#" * lock.MAX_BYTES),
+    "no-version": ("LOCK_INVALID", 'created-by = "test"\npackages = []\n'),
+    "newer-format": ("LOCK_INVALID", PLAIN.replace("1.0", "2.0", 1)),
+    "packages-is-text": ("LOCK_INVALID", HEAD + 'packages = "a"\n'),
+    "url": (
+        "LOCK_PATH",
+        PLAIN.replace("path = ", 'url = "https://example.org/a.whl"\n#'),
+    ),
+    "url-and-path": (
+        "LOCK_PATH",
+        PLAIN.replace("path = ", 'url = "https://example.org/a.whl"\npath = '),
+    ),
+    "path-up": ("LOCK_PATH", HEAD + package("a", "1.0", wheel(A, path=f"../{A}"))),
+    "path-absolute": ("LOCK_PATH", HEAD + package("a", "1.0", wheel(A, path=f"/opt/{A}"))),
+    "path-odd": ("LOCK_PATH", HEAD + package("a", "1.0", wheel(A, path=f"a b/{A}"))),
+    "no-hash": ("LOCK_INVALID", HEAD + package("a", "1.0", wheel(A, rest="size = 3"))),
+    "weak-hash": (
+        "LOCK_HASH",
+        HEAD + package("a", "1.0", wheel(A, rest='size = 3\nhashes = { md5 = "00" }')),
+    ),
+    "short-hash": (
+        "LOCK_HASH",
+        HEAD + package("a", "1.0", wheel(A, rest='size = 3\nhashes = { sha256 = "00" }')),
+    ),
+    "no-size": (
+        "LOCK_HASH",
+        HEAD + package("a", "1.0", wheel(A, rest=f'hashes = {{ sha256 = "{SHA}" }}')),
+    ),
+    "no-wheels": ("LOCK_INVALID", HEAD + package("a", "1.0", "wheels = []\n")),
+    "sdist": (
+        "LOCK_NOT_WHEEL",
+        PLAIN + f'[packages.sdist]\npath = "a-1.0.tar.gz"\nsize = 1\nhashes.sha256 = "{SHA}"\n',
+    ),
+    "vcs": (
+        "LOCK_NOT_WHEEL",
+        HEAD
+        + '[[packages]]\nname = "a"\nversion = "1.0"\n[packages.vcs]\ntype = "git"\n'
+        + 'url = "https://example.org/a.git"\ncommit-id = "abc"\n',
+    ),
+    "directory": (
+        "LOCK_NOT_WHEEL",
+        HEAD + '[[packages]]\nname = "a"\nversion = "1.0"\n[packages.directory]\npath = "src"\n',
+    ),
+    "archive": (
+        "LOCK_NOT_WHEEL",
+        HEAD
+        + '[[packages]]\nname = "a"\nversion = "1.0"\n[packages.archive]\npath = "a.zip"\n'
+        + f'hashes.sha256 = "{SHA}"\n',
+    ),
+    "wheel-of-another-name": (
+        "LOCK_INVALID",
+        HEAD + package("a", "1.0", wheel("b-1.0-py3-none-any.whl")),
+    ),
+    "wheel-of-another-version": (
+        "LOCK_INVALID",
+        HEAD + package("a", "1.0", wheel("a-2.0-py3-none-any.whl")),
+    ),
+    "no-wheel-name": ("LOCK_INVALID", HEAD + package("a", "1.0", wheel("a-1.0.zip"))),
+    "no-package-version": ("LOCK_INVALID", PLAIN.replace('version = "1.0"\n[[', "[[")),
+}
+
+
+@pytest.mark.parametrize(("code", "text"), REFUSED.values(), ids=REFUSED)
+def test_a_wrong_lock_is_refused(code: str, text: str) -> None:
+    assert code in refused(text)
+    assert {found.partition("_")[0] for found in refused(text)} <= {"LOCK", "TOO"}
+
+
+def test_everything_wrong_is_told_at_once() -> None:
+    text = HEAD + package("a", "1.0", wheel(A, path=f"../{A}"))
+    text += package("b", "1.0", wheel("b-1.0-py3-none-any.whl", rest='hashes = { md5 = "0" }'))
+    assert refused(text) == ["LOCK_PATH", "LOCK_HASH", "LOCK_HASH"]
+
+
+def test_wheel_and_package_names_are_compared_normalised() -> None:
+    text = HEAD + package("ruamel-yaml", "1.0", wheel("ruamel_yaml-1.0-py3-none-any.whl"))
+    assert lock.parse(text, "x").wheels[0].name == "ruamel-yaml"
+
+
+@given(st.text(max_size=100), st.integers(0, len(PLAIN)))
+def test_noise_is_refused_and_nothing_else_raised(noise: str, at: int) -> None:
+    for text in (noise, PLAIN[:at] + noise + PLAIN[at:], PLAIN[:at] + PLAIN[at + len(noise) :]):
+        try:
+            parsed = lock.parse(text, "x")
+            lock.select(parsed, *host((3, 11), "x86_64"))
+        except PayloadRefused:
+            continue
