@@ -38,6 +38,8 @@ def find_payloads(root: Path) -> tuple[Path, ...]:
 
     Raises `DriveGone` when the drive cannot be read.
     """
+    if (root / FOLDER).is_symlink():
+        return ()
     try:
         listed = sorted((root / FOLDER).iterdir())
     except (FileNotFoundError, NotADirectoryError) as error:
@@ -86,15 +88,15 @@ def copy(
 ) -> int:
     """Copy the wanted listed files to `staging`, hashing on the way; returns bytes copied.
 
-    `staging` is made, and holds afterwards what the list says, or an error is raised:
-    `PayloadRefused` (FILE_MISSING, HASH_MISMATCH, PATH_UNSAFE) with every file that is wrong,
-    `DriveGone`, `InstallFailed` (DISK_FULL, IO_ERROR).
+    `staging` is made if it is not there, and holds afterwards what the list says, or an error is
+    raised: `PayloadRefused` (FILE_MISSING, HASH_MISMATCH, PATH_UNSAFE) with every file that is
+    wrong, `DriveGone`, `InstallFailed` (DISK_FULL, IO_ERROR).
     """
     entries = [entry for entry in listed.entries if wanted(entry)]
     total = sum(entry.size for entry in entries)
     problems: list[Problem] = []
     done = 0
-    staging.mkdir(parents=True)
+    staging.mkdir(parents=True, exist_ok=True)
     with _folder(folder) as source:
         for entry in entries:
             problem = _copy(source, folder, entry, staging / entry.path)
