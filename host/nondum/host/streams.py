@@ -8,11 +8,13 @@ comes from another component of this host, and is wired anew whenever that chang
 from __future__ import annotations
 
 import asyncio
+import itertools
 import logging
 from collections import Counter
 from collections.abc import AsyncIterator, Iterable, Iterator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from socket import socket as Connection
 
 from nondum.host.catalogue.records import object_name
 from nondum.sdk.description import PluginDescription
@@ -77,6 +79,7 @@ class Streams:
         self._required: Counter[Wire] = Counter()
         self._wires: dict[Wire, asyncio.Task[None]] = {}
         self._disconnecting: set[asyncio.Task[None]] = set()
+        self._taps = itertools.count(1)
 
     def join(self, component: str, link: WorkerLink, description: PluginDescription) -> None:
         """A component's worker runs: its outputs and inputs are there."""
@@ -131,6 +134,18 @@ class Streams:
             )
             for source in self._sources()
         )
+
+    async def tap(self, stream: str, connection: Connection) -> None:
+        """Give a stream's producer one more consumer, from outside the host.
+
+        `connection` stays the caller's to close. Raises `WorkerFailed` (STREAM_UNKNOWN, or why the
+        producer refused), `LinkClosed`.
+        """
+        source = next((source for source in self._sources() if source.stream == stream), None)
+        if source is None:
+            raise WorkerFailed(_unknown(stream, "tap"))
+        body = {"stream": stream, "type": source.type, "consumer": f"tap-{next(self._taps)}"}
+        await self._members[source.component].link.request("produce", body, (connection.fileno(),))
 
     async def close(self) -> None:
         """Let go of everything; the workers' ends close with the workers."""

@@ -233,5 +233,5 @@ def store(ctx: click.Context, as_json: bool) -> None:
 
     Example: nondum store
     """
-    columns = ["wheel", "bytes", "used_by", "sha256"]
+    columns = ["wheel", "bytes", "files", "sha256"]
     _show_rows(ctx, "store", columns, "the store is empty", as_json=as_json)

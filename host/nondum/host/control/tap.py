@@ -13,6 +13,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 from nondum.host.control.client import ControlClient
+from nondum.sdk.errors import NondumError
 from nondum.sdk.messages import Message
 from nondum.sdk.packets import SocketPackets
 from nondum.sdk.streams import Consumer
@@ -25,16 +26,16 @@ async def messages(client: ControlClient, stream: str) -> AsyncIterator[Message]
     Raises `NondumError` when the host knows no such stream, or the producer breaks the protocol.
     """
     kind, connection = await asyncio.to_thread(_connect, client, stream)
-    news: asyncio.Queue[Exception | bool] = asyncio.Queue()
+    news: asyncio.Queue[NondumError | str] = asyncio.Queue()
     consumer = Consumer(
         kind,
         SocketPackets(connection, MAX_PACKET),
-        lambda: news.put_nowait(True),
-        lambda violation: news.put_nowait(violation or False),
+        lambda: news.put_nowait("message"),
+        lambda violation: news.put_nowait(violation or "end"),
     )
     try:
-        while (item := await news.get()) is not False:
-            if isinstance(item, Exception):
+        while (item := await news.get()) != "end":
+            if isinstance(item, NondumError):
                 raise item
             if (message := consumer.take()) is not None:
                 yield message

@@ -1,0 +1,162 @@
+"""The composition root: every part of a running host is made and tied together here.
+
+Events go one way, over the bus: sources, workers and people emit; the component manager commits
+what changes the catalogue; the mind listens.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import signal
+from collections.abc import Coroutine
+from typing import Any
+
+from nondum.host.catalogue.catalogue import Catalogue
+from nondum.host.config import HostConfig
+from nondum.host.control.server import ControlServer
+from nondum.host.devices.slots import DeviceSlotSource
+from nondum.host.devices.source import DeviceSource
+from nondum.host.devices.udev import UdevSource
+from nondum.host.drives.blocks import BlockSource
+from nondum.host.drives.slots import SlotSource
+from nondum.host.drives.source import DriveSource
+from nondum.host.events import Event, Recomposed
+from nondum.host.lifecycle.bus import Bus
+from nondum.host.lifecycle.component_manager import ComponentManager
+from nondum.host.lifecycle.executor import Executor, InstallOptions
+from nondum.host.lifecycle.folders import Folders, claim
+from nondum.host.mind.frames import mounts_to_wire
+from nondum.host.mind.mind import Mind
+from nondum.host.mind.planners import Planners
+from nondum.host.mind.system_tree import load_system_tree
+from nondum.host.verbs import Verbs
+from nondum.host.workers.spec import Limits
+from nondum.host.workers.workers import Workers
+from nondum.wheelhouse.signatures import UnsignedAllowed
+from nondum.wheelhouse.store import Store
+
+log = logging.getLogger(__name__)
+
+
+async def run_host(config: HostConfig) -> None:
+    """Run a host until SIGTERM or SIGINT.
+
+    Raises `ConfigRefused` (ALREADY_RUNNING, SYSTEM_TREE, …) before anything has begun.
+    """
+    folders = Folders(config.host.state)
+    held = claim(folders)
+    try:
+        catalogue = await Catalogue.open(folders.catalogue, config.host.name)
+        try:
+            await _run(config, folders, catalogue)
+        finally:
+            await catalogue.close()
+    finally:
+        os.close(held)
+
+
+async def _run(config: HostConfig, folders: Folders, catalogue: Catalogue) -> None:
+    bus = Bus()
+    workers = Workers(config.host.name, bus.emit)
+    executor = Executor(config.host.name, folders, workers, bus.emit, _install_options(config))
+    manager = ComponentManager(catalogue, executor, bus)
+    for source in drive_sources(config, folders):
+        manager.add_source(source)
+    mind = Mind(
+        config.host.name,
+        workers,
+        Planners.installed(memory_mb=config.planning.memory_mb),
+        emit=bus.emit,
+        deadline_s=config.planning.deadline_s,
+        system_tree=load_system_tree(config.host.system_tree),
+    )
+    bus.subscribe(_Listener(catalogue, mind, workers).on_event)
+    verbs = Verbs(
+        catalogue, mind, workers, Store(folders.store), bus.emit, tuple(_warnings(config))
+    )
+    control = ControlServer(config.host.control, verbs.answering(), verbs.following())
+    await control.open()
+    log.info("host %s listens at %s", config.host.name, config.host.control)
+    try:
+        await _until_told(
+            manager.run(),
+            mind.run(),
+            *(source.watch(bus.emit) for source in device_sources(config)),
+        )
+    finally:
+        await control.close()
+        await mind.close()
+        await workers.close()
+
+
+def drive_sources(config: HostConfig, folders: Folders) -> list[DriveSource]:
+    """Where this host's drives come from."""
+    sources: list[DriveSource] = []
+    if config.drives.slots:
+        sources.append(SlotSource(config.drives.slots))
+    if config.drives.block_devices:
+        sources.append(BlockSource(folders.mounts))
+    return sources
+
+
+def device_sources(config: HostConfig) -> list[DeviceSource]:
+    """Where this host's devices come from."""
+    sources: list[DeviceSource] = []
+    if config.devices.slots:
+        sources.append(DeviceSlotSource(config.devices.slots))
+    if config.devices.udev:
+        sources.append(UdevSource())
+    return sources
+
+
+class _Listener:
+    """Tells mind and workers what the bus tells."""
+
+    def __init__(self, catalogue: Catalogue, mind: Mind, workers: Workers) -> None:
+        self._catalogue, self._mind, self._workers = catalogue, mind, workers
+
+    def on_event(self, event: Event) -> None:
+        """A recomposition is a new snapshot; everything else is news."""
+        if isinstance(event, Recomposed):
+            snapshot = self._catalogue.snapshot()
+            self._workers.remount(mounts_to_wire(snapshot.host, snapshot.mounts))
+            self._mind.see(snapshot)
+        else:
+            self._mind.on_event(event)
+
+
+def _install_options(config: HostConfig) -> InstallOptions:
+    return InstallOptions(
+        allow_unsigned=config.drives.allow_unsigned,
+        method=config.install.method,
+        reserve_mb=config.install.reserve_mb,
+        quota_mb=config.install.quota_mb,
+        limits=Limits(
+            memory_mb=config.workers.memory_mb,
+            tasks=config.workers.tasks,
+            descriptors=config.workers.descriptors,
+        ),
+    )
+
+
+def _warnings(config: HostConfig) -> list[str]:
+    return [UnsignedAllowed.warning] if config.drives.allow_unsigned else []
+
+
+async def _until_told(*parts: Coroutine[Any, Any, None]) -> None:
+    """Run all parts until one fails or a signal asks to stop; then let all of them end."""
+    stop = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, stop.set)
+    async with asyncio.TaskGroup() as group:
+        tasks = [group.create_task(part) for part in parts]
+        group.create_task(_cancel_when(stop, tasks))
+
+
+async def _cancel_when(stop: asyncio.Event, tasks: list[asyncio.Task[None]]) -> None:
+    await stop.wait()
+    for task in tasks:
+        task.cancel()

@@ -1,0 +1,5 @@
+"""`python -m nondum.host.cli` is `nondum`."""
+
+from nondum.host.cli.main import main
+
+main()

@@ -1,0 +1,56 @@
+"""Commands that run the daemon."""
+
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+import logging
+from pathlib import Path
+
+import click
+
+from nondum.host import config as host_config
+from nondum.host.config import HostConfig
+
+
+@click.group()
+def host() -> None:
+    """Run the daemon."""
+
+
+@host.command()
+@click.option("--user", is_flag=True, help="As this user: no root, no systemd, own state.")
+@click.option(
+    "--config",
+    "config_file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help=f"Configuration file [default: {host_config.SYSTEM_FILE}, none with --user].",
+)
+@click.option("--name", help="The host's name, over the configuration's.")
+@click.option("--verbose", "-v", is_flag=True, help="Log more.")
+def run(user: bool, config_file: Path | None, name: str | None, verbose: bool) -> None:
+    """Run a host until it is told to stop (SIGTERM, or Ctrl-C).
+
+    \b
+    Examples: nondum host run --user
+              nondum host run --config /etc/nondum/host.toml
+    """
+    logging.basicConfig(
+        level=logging.DEBUG if verbose else logging.INFO,
+        format="%(levelname)s %(name)s: %(message)s",
+    )
+    chosen = _config(config_file, is_user=user)
+    if name is not None:
+        chosen = dataclasses.replace(chosen, host=dataclasses.replace(chosen.host, name=name))
+    from nondum.host.app import run_host
+
+    asyncio.run(run_host(chosen))
+
+
+def _config(config_file: Path | None, *, is_user: bool) -> HostConfig:
+    defaults = host_config.user_config() if is_user else HostConfig()
+    if config_file is not None:
+        return host_config.load(config_file, defaults)
+    if not is_user and host_config.SYSTEM_FILE.exists():
+        return host_config.load(host_config.SYSTEM_FILE, defaults)
+    return defaults
