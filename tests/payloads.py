@@ -14,13 +14,15 @@ import hashlib
 import importlib.metadata
 import json
 import tempfile
+import types
 import zipfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from nondum.sdk.description import PluginDescription
+from nondum.sdk.plugin import describe, load
 from nondum.wheelhouse.contents import Contents, Entry
 
 SDK = Path(__file__).parent.parent / "plugins/sdk"
@@ -35,7 +37,7 @@ class Part:
     source: str
     """Source of the plugin's only module."""
     description: PluginDescription | None = None
-    """What `index.json` says; None: only name and version."""
+    """What `index.json` says; None: what the plugin says."""
     version: str = "1.0"
     wheels: Sequence[Path] = ()
     """Further wheels in its lock."""
@@ -59,7 +61,14 @@ class Part:
     @property
     def index(self) -> PluginDescription:
         """What the plugin says about itself."""
-        return self.description or PluginDescription(name=self.distribution, version=self.version)
+        return self.description or self._described()
+
+    def _described(self) -> PluginDescription:
+        """What the plugin answers, asked in this process."""
+        module = types.ModuleType(self.module)
+        exec(compile(self.source, f"{self.module}.py", "exec"), module.__dict__)
+        described = describe(load(module, self.distribution))
+        return replace(described, version=self.version)
 
 
 def make_payload(

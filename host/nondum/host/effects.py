@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from nondum.host.catalogue.records import DeviceRecord
+
 
 @dataclass(frozen=True, slots=True)
 class Effect:
@@ -19,6 +21,7 @@ class ReadDrive(Effect):
     """Mount the drive where it needs that, and look for payloads on it."""
 
     drive: str
+    kind: str
     root: Path
     node: Path | None = None
     filesystem: str = ""
@@ -73,8 +76,8 @@ class ActivatePayload(PayloadEffect):
 
 
 @dataclass(frozen=True, slots=True)
-class DiscardPayload(PayloadEffect):
-    """Stop what runs of a refused or quarantined payload and drop staging and venvs."""
+class SuspendPayload(PayloadEffect):
+    """Stop what runs of a quarantined payload and drop its venvs; it may be tried again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +98,7 @@ class AttachDevice(Effect):
 
     component: str
     need: str
-    device: str
+    device: DeviceRecord
 
 
 @dataclass(frozen=True, slots=True)

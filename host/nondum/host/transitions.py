@@ -37,11 +37,11 @@ TRANSITIONS: _Rows = {
     (Step.STORED, events.ComponentsProbed): Transition(Step.PROBED, effects.ActivatePayload),
     (Step.PROBED, events.PayloadActivated): Transition(Step.ACTIVE),
     **{
-        (step, events.PayloadRefused): Transition(Step.REFUSED, effects.DiscardPayload)
+        (step, events.PayloadRefused): Transition(Step.REFUSED, effects.ClearPayload)
         for step in _INSTALLING
     },
     **{
-        (step, events.PayloadFailed): Transition(Step.QUARANTINED, effects.DiscardPayload)
+        (step, events.PayloadFailed): Transition(Step.QUARANTINED, effects.SuspendPayload)
         for step in (Step.STORED, Step.PROBED)
     },
     (Step.REFUSED, events.RetryAsked): Transition(Step.REMOVING, effects.ClearPayload),
@@ -63,8 +63,8 @@ RECOVERY: Mapping[Step, Transition] = {
     Step.PROBED: Transition(Step.STORED, effects.ProbeComponents),
     Step.ACTIVE: Transition(Step.STORED, effects.ProbeComponents),
     Step.REMOVING: Transition(Step.REMOVING, effects.ClearPayload),
-    Step.REFUSED: Transition(Step.REFUSED, effects.DiscardPayload),
-    Step.QUARANTINED: Transition(Step.QUARANTINED, effects.DiscardPayload),
+    Step.REFUSED: Transition(Step.REFUSED),
+    Step.QUARANTINED: Transition(Step.QUARANTINED),
 }
 """Where a payload goes that a starting daemon finds at a step: back before STORED, else forward."""
 

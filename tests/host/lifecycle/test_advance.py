@@ -152,7 +152,7 @@ def test_every_component_state_can_be_left() -> None:
 
 def test_insertion_reads_the_drive() -> None:
     state, done = after(drive())
-    assert done == [effects.ReadDrive("a", Path("/drives/a"))]
+    assert done == [effects.ReadDrive("a", "slot", Path("/drives/a"))]
     assert state.drives["a"].state is DriveState.READING
 
 
@@ -191,7 +191,7 @@ def test_replug_while_removing_reads_the_drive_again() -> None:
     removing, _ = after(events.DriveRemoved("a"), drive("a"), found(), state=active())
     state, done = after(events.PayloadCleared("k1"), state=removing)
     assert not state.payloads
-    assert done == [effects.ReadDrive("a", Path("/drives/a"))]
+    assert done == [effects.ReadDrive("a", "slot", Path("/drives/a"))]
 
 
 def test_older_release_is_refused() -> None:
@@ -271,7 +271,7 @@ def test_device_goes_to_who_needs_it() -> None:
     before = active(need="PT*")
     assert not before.components["eye"].is_ready
     state, done = after(other, port, state=before)
-    assert done == [effects.AttachDevice("eye", "port", "usb1")]
+    assert done == [effects.AttachDevice("eye", "port", state.devices["usb1"])]
     assert state.components["eye"].is_ready
     state, done = after(events.DeviceRemoved("usb1"), state=state)
     assert done == [effects.DetachDevice("eye", "port", "usb1")]
@@ -330,7 +330,7 @@ def test_payload_that_ends_the_daemon_is_quarantined() -> None:
         assert state.payloads["k1"].step is Step.STORED
     outcome = recover(state, AT)
     assert outcome.state.payloads["k1"].step is Step.QUARANTINED
-    assert outcome.effects == (effects.DiscardPayload("k1"),)
+    assert outcome.effects == (effects.SuspendPayload("k1"),)
 
 
 HAPPENINGS: list[Event] = [

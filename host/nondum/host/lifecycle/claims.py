@@ -52,18 +52,19 @@ def settle(turn: Turn) -> None:
         if claims == component.devices:
             continue
         for before, after in zip(component.devices, claims, strict=True):
-            _move(turn, id, before, after)
+            _move(turn, id, before.device, after)
         turn.put_component(replace(component, devices=claims))
 
 
-def _move(turn: Turn, component: str, before: DeviceClaim, after: DeviceClaim) -> None:
-    if before.device == after.device:
+def _move(turn: Turn, component: str, before: str | None, after: DeviceClaim) -> None:
+    if before == after.device:
         return
-    if before.device is not None:
-        turn.effects.append(DetachDevice(component, before.name, before.device))
-        turn.events.append(DeviceReleased(before.device, component, before.name))
+    if before is not None:
+        turn.effects.append(DetachDevice(component, after.name, before))
+        turn.events.append(DeviceReleased(before, component, after.name))
     if after.device is not None:
-        turn.effects.append(AttachDevice(component, after.name, after.device))
+        device = turn.state.devices[after.device]
+        turn.effects.append(AttachDevice(component, after.name, device))
         turn.events.append(DeviceClaimed(after.device, component, after.name))
 
 

@@ -98,7 +98,7 @@ def lose_source(turn: Turn, payload: PayloadRecord, drive: str, reason: str) -> 
 def read(turn: Turn, drive: DriveRecord) -> None:
     """Have a drive looked through."""
     turn.put_drive(replace(drive, state=DriveState.READING, problems=()))
-    turn.effects.append(ReadDrive(drive.id, drive.root, drive.node, drive.filesystem))
+    turn.effects.append(ReadDrive(drive.id, drive.kind, drive.root, drive.node, drive.filesystem))
 
 
 def copy_of(payload: PayloadRecord) -> CopyPayload:
@@ -110,9 +110,10 @@ def copy_of(payload: PayloadRecord) -> CopyPayload:
 def release_idle_drives(turn: Turn) -> None:
     """Let go of drives that nothing is copied from any more, so that they are safe to pull."""
     copying = {
-        next(iter(payload.sources), "")
+        name
         for payload in turn.state.payloads.values()
         if payload.step is Step.RECEIVED
+        for name in payload.sources
     }
     for drive in turn.state.drives.values():
         if drive.state is DriveState.COPYING and drive.id not in copying:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import os
 import shutil
@@ -39,6 +40,11 @@ class Folders:
         """Mount points of block devices."""
         return self.root / "mounts"
 
+    @property
+    def scratches(self) -> Path:
+        """The scratch folders of all components."""
+        return self.root / "scratch"
+
     def staging(self, payload: str) -> Path:
         """A payload while it is copied and checked."""
         return self.root / "staging" / payload
@@ -53,7 +59,12 @@ class Folders:
 
     def scratch(self, component: str) -> Path:
         """What a component may write to while it is here."""
-        return self.root / "scratch" / component
+        return self.scratches / component
+
+    def all_payloads(self) -> tuple[Path, ...]:
+        """The folders of all payloads that are here."""
+        folder = self.root / "payloads"
+        return tuple(sorted(folder.iterdir())) if folder.is_dir() else ()
 
     def of(self, payload: str) -> tuple[Path, ...]:
         """All folders that are a payload's own, but for its components' scratch."""
@@ -95,11 +106,11 @@ def remove(folder: Path) -> None:
     if folder.is_symlink() or folder.is_file():
         folder.unlink()
         return
-    for path, _, _ in os.walk(folder):
-        Path(path).chmod(0o700)
+    for path, inner, _ in os.walk(folder):
+        for name in inner:
+            with contextlib.suppress(OSError):  # a link that leads nowhere
+                Path(path, name).chmod(0o700)
     shutil.rmtree(folder, ignore_errors=True)
-    if folder.exists():
-        shutil.rmtree(folder)
 
 
 def _orphans(folders: Folders, state: HostState) -> Iterator[Path]:

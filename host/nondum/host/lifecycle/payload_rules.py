@@ -133,7 +133,8 @@ def _activate(turn: Turn, payload: PayloadRecord, event: PayloadActivated) -> No
     ranks = [c.rank for c in turn.state.components.values() if (c.rank >= GUEST_RANK) != initial]
     for offset, component in enumerate(event.components):
         rank = max(ranks, default=base) + 1 + offset
-        turn.put_component(replace(component, rank=rank))
+        entered = replace(component, payload_id=payload.payload_id, rank=rank)
+        turn.put_component(entered)
     turn.change(
         mounts={**_by_unit(event.mounts), **turn.state.mounts},
         highwater={

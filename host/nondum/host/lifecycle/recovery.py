@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from nondum.host.catalogue.records import Moment, PayloadRecord, Step
 from nondum.host.catalogue.state import HostState
-from nondum.host.effects import DiscardPayload
+from nondum.host.effects import SuspendPayload
 from nondum.host.events import HostStarted, Recovered
 from nondum.host.lifecycle.turn import Outcome, Turn
 from nondum.host.transitions import RECOVERY
@@ -47,7 +47,7 @@ def _recover(turn: Turn, payload: PayloadRecord) -> None:
             fix="pull it and plug it in again, or ask for another try",
         )
         recovered = replace(recovered, step=Step.QUARANTINED, problems=(problem,))
-        turn.effects.append(DiscardPayload(payload.key))
+        turn.effects.append(SuspendPayload(payload.key))
     elif row.effect is not None:
         turn.effects.append(row.effect(payload.key))
     turn.put_payload(recovered)

@@ -1,0 +1,184 @@
+"""Reading a drive, in a child process: look for payloads, copy one to staging, check the copy.
+
+Only the contents list is believed, and only the staged copy is parsed. What the store has already
+is not copied again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Mapping
+from importlib.metadata import distributions, version
+from pathlib import Path
+from typing import Any
+
+from packaging.version import Version
+
+from nondum.host.drives import filesystems, mounting
+from nondum.sdk.errors import PayloadRefused, Problem
+from nondum.wheelhouse import contents, drive, lock, payload, preflight, wheel
+from nondum.wheelhouse.contents import Contents
+from nondum.wheelhouse.lock import LockedWheel
+from nondum.wheelhouse.payload import StagedPayload
+from nondum.wheelhouse.preflight import HostFacts
+from nondum.wheelhouse.signatures import SignatureDemanded, UnsignedAllowed, Verifier
+from nondum.wheelhouse.store import Store, StoredWheel
+
+Report = Callable[[str, int, int], None]
+"""Phase, done, total."""
+Arguments = Mapping[str, Any]
+
+KEY_DIGITS = 16
+"""Hex digits of a contents list's digest that name a payload on a host."""
+
+
+def look(arguments: Arguments, report: Report) -> list[dict[str, Any]]:
+    """Mount the drive if it is a device, and tell the payloads on it.
+
+    Raises `DriveGone`, `PayloadRefused` (FS_UNSUPPORTED, FS_ERROR).
+    """
+    root = Path(arguments["root"])
+    if arguments["node"] is not None:
+        node = Path(arguments["node"])
+        filesystem = arguments["filesystem"] or filesystems.probe(node)
+        mounting.mount(node, root, filesystem)
+    is_payload = arguments["kind"] == "installed"
+    folders = (root,) if is_payload else drive.find_payloads(root)
+    verifier = UnsignedAllowed() if arguments["allow_unsigned"] else SignatureDemanded()
+    return [_found(folder, verifier) for folder in folders]
+
+
+def copy(arguments: Arguments, report: Report) -> dict[str, int]:
+    """Copy to staging what this host needs, once the metadata says that it fits.
+
+    Raises `PayloadRefused`, `DriveGone`, `InstallFailed`.
+    """
+    folder, staging = Path(arguments["folder"]), Path(arguments["staging"])
+    data = drive.read_contents(folder)
+    if hashlib.sha256(data).hexdigest() != arguments["digest"]:
+        text = "the contents list is not the one that was read before"
+        raise PayloadRefused(Problem("HASH_MISMATCH", text, where=str(folder)))
+    listed = contents.parse(data, f"{folder.name}/{contents.NAME}")
+    drive.copy(folder, listed, staging, wanted=lambda e: payload.is_metadata(e.path))
+    (staging / contents.NAME).write_bytes(data)
+    staged = payload.load(staging, listed)
+    facts = facts_of(arguments)
+    _refuse_if_any(preflight.preflight(staged.manifest, staged.locks, facts))
+    needed = chosen(staged, facts)
+    known = known_wheels(arguments, staged, facts)
+    missing = {locked.path for locked in needed if locked.sha256 not in known}
+    copied = drive.copy(folder, listed, staging, report, wanted=lambda e: e.path in missing)
+    known_bytes = sum(locked.size for locked in needed if locked.sha256 in known)
+    return {"copied": copied, "known": known_bytes}
+
+
+def verify(arguments: Arguments, report: Report) -> list[str]:
+    """Check the staged wheels and that nothing is missing; tell the ids of the components.
+
+    Raises `PayloadRefused`.
+    """
+    facts = facts_of(arguments)
+    staged = load_staged(Path(arguments["staging"]))
+    known = known_wheels(arguments, staged, facts)
+    problems: list[Problem] = []
+    for component, wheels in staged.wheels(facts).items():
+        requirements: dict[str, tuple[str, ...]] = {}
+        for locked in wheels:
+            path = staged.folder / locked.path
+            if not path.exists() and locked.sha256 in known:
+                requirements[locked.name] = _stored_requirements(known[locked.sha256])
+                continue
+            with wheel.opened(path) as data:
+                layout = wheel.lay_out(data, locked.filename)
+                problems.extend(p for p in layout.problems if p not in problems)
+                if not layout.problems:
+                    requirements[locked.name] = wheel.requirements(data, layout)
+        where = lock.file_name(component)
+        problems.extend(preflight.unmet(requirements, wheels, facts, where))
+    _refuse_if_any(problems)
+    return [component.id for component in staged.manifest.components]
+
+
+def load_staged(folder: Path) -> StagedPayload:
+    """A payload that `copy` has staged. Raises `PayloadRefused`."""
+    return payload.load(
+        folder, contents.parse((folder / contents.NAME).read_bytes(), contents.NAME)
+    )
+
+
+def facts_of(arguments: Arguments) -> HostFacts:
+    """This host, as preflight looks at it."""
+    return preflight.probe(
+        Path(arguments["store"]),
+        reserve_mb=arguments["reserve_mb"],
+        confinement=arguments["confinement"],
+    )
+
+
+def chosen(staged: StagedPayload, facts: HostFacts) -> tuple[LockedWheel, ...]:
+    """Every wheel that this host needs of a payload, each once, largest first."""
+    wheels = {w.sha256: w for group in staged.wheels(facts).values() for w in group}
+    return tuple(sorted(wheels.values(), key=lambda w: -w.size))
+
+
+def known_wheels(
+    arguments: Arguments, staged: StagedPayload, facts: HostFacts
+) -> dict[str, StoredWheel]:
+    """What the store has of them, by hash; pip does not read from the store."""
+    if arguments["method"] == "pip":
+        return {}
+    store = Store(Path(arguments["store"]))
+    found = {wheel.sha256: store.get(wheel.sha256) for wheel in chosen(staged, facts)}
+    return {sha256: stored for sha256, stored in found.items() if stored is not None}
+
+
+def _found(folder: Path, verifier: Verifier) -> dict[str, Any]:
+    """What a `PayloadFound` says of a folder."""
+    digest = ""
+    listed: Contents | None = None
+    problems: tuple[Problem, ...] = ()
+    try:
+        data = drive.read_contents(folder)
+        digest = hashlib.sha256(data).hexdigest()
+        verdict = verifier.verify(data, drive.read_signature(folder))
+        problems = verdict.problems
+        if not problems:
+            listed = contents.parse(data, f"{folder.name}/{contents.NAME}")
+            problems = tuple(_version_problems(listed))
+    except PayloadRefused as error:
+        problems = error.problems
+    # Two folders without a readable list are two payloads, wherever they are.
+    name = digest or hashlib.sha256(str(folder).encode()).hexdigest()
+    return {
+        "payload": name[:KEY_DIGITS],
+        "folder": str(folder),
+        "digest": digest,
+        "payload_id": listed.payload_id if listed else folder.name,
+        "version": listed.version if listed else "",
+        "release": listed.release if listed else 0,
+        "fleet": listed.fleet if listed else "",
+        "problems": [problem.to_dict() for problem in problems],
+    }
+
+
+def _version_problems(listed: Contents) -> Iterator[Problem]:
+    have = version("nondum")
+    if Version(listed.minimum_nondum) > Version(have):
+        yield Problem(
+            "NONDUM_VERSION",
+            "the payload needs a newer nondum",
+            where=listed.payload_id,
+            need=listed.minimum_nondum,
+            have=have,
+            fix="update this host",
+        )
+
+
+def _stored_requirements(stored: StoredWheel) -> tuple[str, ...]:
+    found = distributions(path=[str(stored.root)])
+    return tuple(line for distribution in found for line in distribution.requires or ())
+
+
+def _refuse_if_any(problems: tuple[Problem, ...] | list[Problem]) -> None:
+    if problems:
+        raise PayloadRefused(*problems)

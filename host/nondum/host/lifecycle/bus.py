@@ -1,0 +1,55 @@
+"""The one way that events go: from whoever emits them to the manager and all listeners."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+
+from nondum.host.catalogue.catalogue import now
+from nondum.host.catalogue.records import Moment
+from nondum.host.events import Emit, Event
+from nondum.host.lifecycle.advance import RULES
+
+Stamped = tuple[Event, Moment]
+
+
+class Bus:
+    """Takes events in; hands them to the manager in order, and to listeners."""
+
+    def __init__(self, clock: Callable[[], Moment] = now) -> None:
+        self.clock = clock
+        self._queue: asyncio.Queue[Stamped] = asyncio.Queue()
+        self._listeners: list[Emit] = []
+
+    def emit(self, event: Event) -> None:
+        """Take an event in. Call it on the loop's thread; it never blocks."""
+        if is_told_early(event):
+            self.tell((event,))
+        if event.JOURNALLED or type(event) in RULES:
+            self._queue.put_nowait((event, self.clock()))
+
+    def subscribe(self, listener: Emit) -> Callable[[], None]:
+        """Have every event told to `listener`, on the loop's thread; returns how to end that.
+
+        What changes the catalogue is told when it has been committed, everything else at once.
+        """
+        self._listeners.append(listener)
+        return lambda: self._listeners.remove(listener)
+
+    async def batch(self) -> list[Stamped]:
+        """Wait for events; all that are there then."""
+        batch = [await self._queue.get()]
+        while not self._queue.empty():
+            batch.append(self._queue.get_nowait())
+        return batch
+
+    def tell(self, events: Sequence[Event]) -> None:
+        """Tell listeners what has happened."""
+        for event in events:
+            for listener in tuple(self._listeners):
+                listener(event)
+
+
+def is_told_early(event: Event) -> bool:
+    """Whether listeners hear of an event before (or without) its being journalled."""
+    return type(event) not in RULES

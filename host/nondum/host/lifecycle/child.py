@@ -1,0 +1,87 @@
+"""The other end of `children.py`: a process that does jobs, one after the other.
+
+It dies with the daemon, and its memory is bounded: what it reads was written by strangers.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import resource
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from typing import Any, TextIO
+
+from nondum.host.lifecycle.jobs import JOBS
+from nondum.sdk.errors import NondumError, Problem
+
+MEMORY_BYTES = 2 * 1024**3
+DESCRIPTORS = 512
+PROGRESS_S = 0.1
+"""Between two reports of one phase."""
+
+PR_SET_PDEATHSIG = 1
+
+
+def main(daemon: int) -> None:
+    """Do jobs from stdin until it ends."""
+    _bind_to(daemon)
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(DESCRIPTORS, hard), hard))
+    # Whatever prints goes to stderr: stdout belongs to the conversation.
+    with os.fdopen(os.dup(1), "w", buffering=1) as answers:
+        os.dup2(2, 1)
+        for line in sys.stdin:
+            request = json.loads(line)
+            _say(answers, _do(request["job"], request["arguments"], answers))
+
+
+def _bind_to(daemon: int) -> None:
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != daemon:  # it died before this was asked for
+        sys.exit(1)
+
+
+def _do(job: str, arguments: dict[str, Any], answers: TextIO) -> dict[str, Any]:
+    try:
+        return {"result": JOBS[job](arguments, _reporter(answers))}
+    except NondumError as error:
+        return _failure(type(error).__name__, *error.problems)
+    except MemoryError:
+        return _failure("InstallFailed", Problem("NO_MEMORY", f"{job} needs more memory"))
+    except OSError as error:
+        message = f"{job}: {error.strerror} ({error.filename})"
+        return _failure("InstallFailed", Problem("IO_ERROR", message))
+    except Exception as error:
+        traceback.print_exc()
+        message = f"{job}: {type(error).__name__}: {error}"
+        return _failure("InstallFailed", Problem("INTERNAL", message))
+
+
+def _failure(kind: str, *problems: Problem) -> dict[str, Any]:
+    return {"error": kind, "problems": [problem.to_dict() for problem in problems]}
+
+
+def _reporter(answers: TextIO) -> Callable[[str, int, int], None]:
+    told: dict[str, float] = {}
+
+    def report(phase: str, done: int, total: int) -> None:
+        now = time.monotonic()
+        if done >= total or now - told.get(phase, 0.0) >= PROGRESS_S:
+            told[phase] = now
+            _say(answers, {"progress": [phase, done, total]})
+
+    return report
+
+
+def _say(answers: TextIO, answer: dict[str, Any]) -> None:
+    answers.write(json.dumps(answer, separators=(",", ":")) + "\n")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

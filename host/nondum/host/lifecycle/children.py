@@ -1,0 +1,147 @@
+"""Child processes that do what may block, hang or choke on hostile bytes: the daemon's end.
+
+Requests go down a child's stdin and answers come up its stdout, one JSON object a line. A spare
+child is kept warm, since starting an interpreter costs more than most jobs.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+import os
+import sys
+from asyncio.subprocess import PIPE, Process
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from nondum.sdk import errors
+from nondum.sdk.errors import InstallFailed, NondumError, Problem
+
+LINE_LIMIT = 16 * 1024 * 1024
+"""Bytes of one answer: it may hold the descriptions of many components."""
+
+END_S = 1.0
+"""How long a killed child is waited for: one that hangs in its disk cannot even die."""
+
+OnProgress = Callable[[str, int, int], None]
+
+log = logging.getLogger(__name__)
+
+
+class Children:
+    """A pool that grows as jobs need it and shrinks to its spare. `close` it."""
+
+    def __init__(self) -> None:
+        self._idle: list[Process] = []
+        self._busy: set[Process] = set()
+        self._warming: asyncio.Task[None] | None = None
+
+    async def run(
+        self,
+        job: str,
+        arguments: Mapping[str, Any],
+        *,
+        on_progress: OnProgress | None = None,
+        stall_s: float = 60.0,
+    ) -> Any:
+        """Have a child do a job, and give what it answers. Cancelling kills the child.
+
+        Raises the `NondumError` that the job did, or `InstallFailed`: CHILD_STALLED when nothing
+        was heard for `stall_s`, CHILD_DIED when it ended without an answer.
+        """
+        child = self._idle.pop() if self._idle else await _spawn()
+        self._busy.add(child)
+        self.warm()
+        try:
+            async with asyncio.timeout(None) as deadline:
+                answer = await _converse(child, job, arguments, on_progress, deadline, stall_s)
+        except TimeoutError as error:
+            await self._end(child)
+            message = f"{job}: nothing was heard for {stall_s:g} s"
+            raise InstallFailed(Problem("CHILD_STALLED", message)) from error
+        except BaseException:
+            await self._end(child)
+            raise
+        self._busy.discard(child)
+        await self._keep(child)
+        if "problems" in answer:
+            raise _error(answer)
+        return answer["result"]
+
+    def warm(self) -> None:
+        """Start a spare, if there is none."""
+        if not self._idle and (self._warming is None or self._warming.done()):
+            self._warming = asyncio.create_task(self._warm())
+
+    async def close(self) -> None:
+        """Kill all children."""
+        if self._warming is not None:
+            self._warming.cancel()
+            await asyncio.gather(self._warming, return_exceptions=True)
+        await asyncio.gather(*(self._end(child) for child in (*self._idle, *self._busy)))
+        self._idle.clear()
+
+    async def _warm(self) -> None:
+        self._idle.append(await _spawn())
+
+    async def _keep(self, child: Process) -> None:
+        if self._idle:
+            await self._end(child)
+        else:
+            self._idle.append(child)
+
+    async def _end(self, child: Process) -> None:
+        self._busy.discard(child)
+        with contextlib.suppress(ProcessLookupError):
+            child.kill()
+        try:
+            await asyncio.wait_for(child.wait(), END_S)
+        except TimeoutError:
+            log.warning("child %d hangs in its disk and is left behind", child.pid)
+
+
+async def _spawn() -> Process:
+    return await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "nondum.host.lifecycle.child", str(os.getpid())),
+        stdin=PIPE,
+        stdout=PIPE,
+        limit=LINE_LIMIT,
+        start_new_session=True,
+    )
+
+
+async def _converse(
+    child: Process,
+    job: str,
+    arguments: Mapping[str, Any],
+    on_progress: OnProgress | None,
+    deadline: asyncio.Timeout,
+    stall_s: float,
+) -> dict[str, Any]:
+    assert child.stdin is not None  # both are pipes
+    assert child.stdout is not None
+    loop = asyncio.get_running_loop()
+    line = json.dumps({"job": job, "arguments": dict(arguments)}) + "\n"
+    with contextlib.suppress(ConnectionError):  # it died: the answer below is missing
+        child.stdin.write(line.encode())
+        await child.stdin.drain()
+    while True:
+        deadline.reschedule(loop.time() + stall_s)
+        heard = await child.stdout.readline()
+        if not heard:
+            code = await child.wait()
+            message = f"{job}: the child ended with {code} before it answered"
+            raise InstallFailed(Problem("CHILD_DIED", message))
+        answer: dict[str, Any] = json.loads(heard)
+        if "progress" not in answer:
+            return answer
+        if on_progress is not None:
+            on_progress(*answer["progress"])
+
+
+def _error(answer: Mapping[str, Any]) -> NondumError:
+    kind = getattr(errors, answer["error"], InstallFailed)
+    error: NondumError = kind(*(Problem(**problem) for problem in answer["problems"]))
+    return error

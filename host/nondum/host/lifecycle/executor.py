@@ -1,0 +1,159 @@
+"""Carries effects out, one at a time for each payload and drive, and reports by events.
+
+What fails is reported as a refusal or failure with its problems: the component manager never waits
+for an effect that says nothing.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any
+
+from nondum.host import effects
+from nondum.host.catalogue.state import HostState
+from nondum.host.drives.reading import DriveReading
+from nondum.host.effects import Effect
+from nondum.host.events import (
+    DriveUnreadable,
+    Emit,
+    Event,
+    PayloadCleared,
+    PayloadFailed,
+    PayloadRefused,
+)
+from nondum.host.lifecycle.children import Children
+from nondum.host.lifecycle.folders import Folders
+from nondum.host.lifecycle.installation import Installation, InstallOptions
+from nondum.host.lifecycle.lanes import Lanes
+from nondum.host.workers import Workers
+from nondum.sdk.errors import DriveGone, NondumError, Problem
+
+_Hand = Callable[[Any], Awaitable[tuple[Event, ...]]]
+
+_INSTEAD = (
+    effects.CopyPayload,
+    effects.SuspendPayload,
+    effects.ClearPayload,
+    effects.ReleaseDrive,
+)
+"""Effects that make what is being done for the same payload or drive pointless."""
+
+log = logging.getLogger(__name__)
+
+
+class Executor:
+    """The component manager's hands. `close` it, before the workers."""
+
+    def __init__(
+        self,
+        host: str,
+        folders: Folders,
+        workers: Workers,
+        emit: Emit,
+        options: InstallOptions | None = None,
+    ) -> None:
+        options = options or InstallOptions()
+        self._workers, self._emit = workers, emit
+        self._children = Children()
+        self._lanes = Lanes()
+        self._drives = DriveReading(self._children, allow_unsigned=options.allow_unsigned)
+        self.installation = Installation(host, folders, workers, self._children, emit, options)
+        self._hands: Mapping[type[Effect], _Hand] = {
+            effects.ReadDrive: self._drives.read,
+            effects.ReleaseDrive: self._drives.release,
+            effects.CopyPayload: self.installation.copy,
+            effects.VerifyPayload: self.installation.verify,
+            effects.StagePayload: self.installation.stage,
+            effects.StoreWheels: self.installation.store,
+            effects.ProbeComponents: self.installation.probe,
+            effects.ActivatePayload: self.installation.activate,
+            effects.SuspendPayload: self.installation.suspend,
+            effects.ClearPayload: self.installation.clear,
+            effects.RestartWorker: self._restart,
+            effects.AttachDevice: self._attach,
+            effects.DetachDevice: self._detach,
+        }
+
+    async def prepare(self, state: HostState) -> None:
+        """Clear away what a recovered state does not account for; start a spare child."""
+        await self.installation.prepare(state)
+
+    def start(self, effect: Effect) -> None:
+        """Set an effect going."""
+        instead = isinstance(effect, _INSTEAD)
+        self._lanes.add(_lane(effect), self._carry_out(effect), instead=instead)
+        if isinstance(effect, effects.ClearPayload):
+            self._lanes.add("store", self._prune())
+
+    async def close(self) -> None:
+        """Give up what is being done, unmount drives, end children. Workers are their owner's."""
+        await self._lanes.close()
+        await self._drives.close()
+        await self._children.close()
+
+    async def _carry_out(self, effect: Effect) -> None:
+        try:
+            reported = await self._hands[type(effect)](effect)
+        except NondumError as error:
+            reported = _failure(effect, error)
+        except Exception as error:
+            log.exception("%r", effect)
+            internal = Problem("INTERNAL", f"{type(effect).__name__}: {error!r}")
+            reported = _failure(effect, NondumError(internal))
+        for event in reported:
+            self._emit(event)
+
+    async def _prune(self) -> None:
+        with contextlib.suppress(NondumError):  # tried again when the next payload goes
+            await self.installation.prune()
+
+    async def _restart(self, effect: effects.RestartWorker) -> tuple[Event, ...]:
+        await self._workers.restart(effect.component)
+        return ()
+
+    async def _attach(self, effect: effects.AttachDevice) -> tuple[Event, ...]:
+        device = effect.device
+        await self._workers.attach(
+            effect.component, effect.need, str(device.node), device.properties
+        )
+        return ()
+
+    async def _detach(self, effect: effects.DetachDevice) -> tuple[Event, ...]:
+        await self._workers.detach(effect.component, effect.need)
+        return ()
+
+
+def _lane(effect: Effect) -> str:
+    match effect:
+        case effects.PayloadEffect():
+            return f"payload {effect.payload}"
+        case effects.ReadDrive() | effects.ReleaseDrive():
+            return f"drive {effect.drive}"
+        case effects.RestartWorker() | effects.AttachDevice() | effects.DetachDevice():
+            return f"component {effect.component}"
+        case _:
+            raise TypeError(f"no lane for {effect!r}")
+
+
+def _failure(effect: Effect, error: NondumError) -> tuple[Event, ...]:
+    """What an effect that failed reports."""
+    match effect:
+        case effects.ReadDrive():
+            return (DriveUnreadable(effect.drive, error.problems),)
+        case effects.CopyPayload() if isinstance(error, DriveGone):
+            return (DriveUnreadable(effect.drive, error.problems),)
+        case effects.ProbeComponents() | effects.ActivatePayload():
+            return (PayloadFailed(effect.payload, error.problems),)
+        case effects.ClearPayload():
+            log.error("%s is not cleared away whole: %s", effect.payload, error)
+            return (PayloadCleared(effect.payload),)
+        case effects.SuspendPayload():
+            log.error("%s is not suspended whole: %s", effect.payload, error)
+            return ()
+        case effects.PayloadEffect():
+            return (PayloadRefused(effect.payload, error.problems),)
+        case _:
+            log.warning("%r failed: %s", effect, error)
+            return ()

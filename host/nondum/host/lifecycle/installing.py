@@ -1,0 +1,144 @@
+"""Installing a staged payload, in a child process: wheels into the store, venvs of links to it."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from nondum.host.drives import reader
+from nondum.host.drives.reader import Arguments, Report
+from nondum.host.events import plain
+from nondum.sdk.errors import InstallFailed, Problem
+from nondum.wheelhouse import build, venvs
+from nondum.wheelhouse.lock import LockedWheel
+from nondum.wheelhouse.manifest import ComponentManifest
+from nondum.wheelhouse.payload import StagedPayload
+from nondum.wheelhouse.store import Store, StoredWheel
+
+
+def install(arguments: Arguments, report: Report) -> dict[str, Any]:
+    """Make a payload's venvs and tell what its workers are started from. Idempotent.
+
+    Raises `InstallFailed` (DISK_FULL, STORE_DAMAGED, …) and `PayloadRefused`.
+    """
+    folder = Path(arguments["folder"])
+    staged = reader.load_staged(folder)
+    facts = reader.facts_of(arguments)
+    python, root = Path(arguments["python"]), Path(arguments["venvs"])
+    wheels = staged.wheels(facts)
+    root.mkdir(parents=True, exist_ok=True)
+    fresh = 0
+    if arguments["method"] == "pip":
+        for component, chosen in wheels.items():
+            venvs.make_with_pip(root / component, python, folder, chosen)
+    else:
+        stored, fresh = _stored(arguments, folder, reader.chosen(staged, facts), report)
+        for component, chosen in wheels.items():
+            linked = [stored[locked.sha256] for locked in chosen]
+            venvs.make(root / component, python, linked)
+        shutil.rmtree(folder / "wheels", ignore_errors=True)  # the store has them now
+    components = [_told(staged, component, root) for component in staged.manifest.components]
+    return {"fresh": fresh, "wheels": sorted(stored_names(wheels)), "components": components}
+
+
+def stored_names(wheels: dict[str, tuple[LockedWheel, ...]]) -> set[str]:
+    """Hashes of all wheels that components are made of."""
+    return {locked.sha256 for group in wheels.values() for locked in group}
+
+
+def wheels_in_use(arguments: Arguments, report: Report) -> dict[str, list[str]]:
+    """Payload key → hashes of the wheels that it needs, of the payload folders given."""
+    facts = reader.facts_of(arguments)
+    folders = [Path(folder) for folder in arguments["folders"]]
+    return {
+        folder.name: sorted(stored_names(reader.load_staged(folder).wheels(facts)))
+        for folder in folders
+        if folder.exists()
+    }
+
+
+def prune(arguments: Arguments, report: Report) -> list[str]:
+    """Delete wheels that no payload needs, least recently used first, down to the quota."""
+    used = {sha256 for group in wheels_in_use(arguments, report).values() for sha256 in group}
+    gone = Store(Path(arguments["store"])).prune(used, arguments["quota_mb"] * 1024 * 1024)
+    return [stored.filename for stored in gone]
+
+
+def listing(arguments: Arguments, report: Report) -> list[dict[str, Any]]:
+    """What the store holds, and which payloads need it."""
+    used = wheels_in_use(arguments, report)
+    return [
+        {
+            "wheel": stored.filename,
+            "bytes": stored.size,
+            "used_by": sorted(key for key, group in used.items() if stored.sha256 in group),
+            "sha256": stored.sha256,
+        }
+        for stored in Store(Path(arguments["store"])).listing()
+    ]
+
+
+def sweep(arguments: Arguments, report: Report) -> list[str]:
+    """Delete what an interrupted run left half done in the store."""
+    return [path.name for path in Store(Path(arguments["store"])).sweep()]
+
+
+def _stored(
+    arguments: Arguments, folder: Path, wheels: Sequence[LockedWheel], report: Report
+) -> tuple[dict[str, StoredWheel], int]:
+    """The wheels in the store, and how many were not there before."""
+    store = Store(Path(arguments["store"]))
+    total, done, fresh = sum(locked.size for locked in wheels), 0, 0
+    stored: dict[str, StoredWheel] = {}
+    for locked in wheels:
+        path = folder / locked.path
+        fresh += store.get(locked.sha256) is None
+        stored[locked.sha256] = (
+            store.add(path, locked.sha256) if path.exists() else _checked(store, locked)
+        )
+        done += locked.size
+        report("install", done, total)
+    return stored, fresh
+
+
+def _checked(store: Store, locked: LockedWheel) -> StoredWheel:
+    """A wheel that was not copied because the store had it."""
+    problems = store.verify(locked.sha256)
+    found = store.get(locked.sha256)
+    if found is not None and not problems:
+        return found
+    store.remove(locked.sha256)  # so that it is copied the next time
+    raise InstallFailed(
+        Problem(
+            "STORE_DAMAGED",
+            f"{locked.filename} in the store is not what was stored",
+            where=str(store.root),
+            fix="pull the payload and plug it in again",
+        )
+    )
+
+
+def _told(staged: StagedPayload, component: ComponentManifest, root: Path) -> dict[str, Any]:
+    """A component as `Prepared.parse` reads it."""
+    venv = root / component.id
+    site_packages = venvs.site_packages(venv)
+    described = staged.index[component.id]
+    return {
+        "id": component.id,
+        "distribution": component.distribution,
+        "entry_point": build.entry_point(site_packages, component.distribution, component.id),
+        "description": described.to_dict(),
+        "venv": str(venv),
+        "site_packages": str(site_packages),
+        "permissions": list(component.permissions),
+        "settings": plain(component.settings),
+        "devices": [plain(need) for need in component.devices],
+        "mounts": list(_mounts(component)),
+    }
+
+
+def _mounts(component: ComponentManifest) -> Iterator[dict[str, Any]]:
+    for unit in component.units:
+        yield {"unit": unit.name, "xyz": list(unit.xyz), "rpy": list(unit.rpy)}

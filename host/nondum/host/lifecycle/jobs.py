@@ -1,0 +1,22 @@
+"""What a child process can be asked to do: name → blocking function of plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from nondum.host.drives import reader
+from nondum.host.drives.reader import Arguments, Report
+from nondum.host.lifecycle import installing
+
+Job = Callable[[Arguments, Report], Any]
+
+JOBS: Mapping[str, Job] = {
+    "look": reader.look,
+    "copy": reader.copy,
+    "verify": reader.verify,
+    "install": installing.install,
+    "prune": installing.prune,
+    "listing": installing.listing,
+    "sweep": installing.sweep,
+}
