@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from nondum.sdk import Header, Image, MessageInvalid, ProtocolViolation, Text
-from nondum.sdk.packets import SocketPackets
+from nondum.sdk.packets import MemoryPackets, SocketPackets
 from nondum.sdk.slots import MAX_SLOTS, SEALS, MappedSlots, Slot, SlotRing
 from nondum.sdk.streams import OUTSTANDING, Consumer, Producer
 from nondum.sdk.wire import MAX_PACKET, pack
@@ -26,7 +26,7 @@ SIDE = 200  # 40,000 bytes: in a slot
 
 READER = """
 import asyncio, socket, sys
-from nondum.sdk.packets import SocketPackets
+from nondum.sdk.packets import MemoryPackets, SocketPackets
 from nondum.sdk.streams import Consumer
 
 async def main(descriptor):
@@ -314,6 +314,19 @@ async def test_slot_taken_away_is_refused_when_taken() -> None:
         listener.consumer.take()
     listener.consumer.close()
     listener.raw.close()
+
+
+async def test_long_frame_crosses_where_no_memory_is_shared(producer: Source) -> None:
+    ours, theirs = MemoryPackets.pair()
+    arrived = asyncio.Event()
+    consumer = Consumer("image", theirs, arrived.set, lambda violation: None)
+    producer.connect("bench", ours)
+    producer.send(image(7, side=300))  # longer than a packet of a socket
+    await asyncio.wait_for(arrived.wait(), 5)
+    message = consumer.take()
+    assert isinstance(message, Image)
+    assert message.header.seq == 7
+    consumer.close()
 
 
 def test_slots_are_sealed_before_they_are_handed_over() -> None:

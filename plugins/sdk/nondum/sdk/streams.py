@@ -98,7 +98,7 @@ class Producer:
         length = 0 if buffer is None else memoryview(buffer).nbytes
         if buffer is not None and length > INLINE_BYTES and shared:
             self._offer_slot(shared, header, buffer, length)
-        else:
+        elif shared:
             self._offer(shared, self._inline(header, buffer, MAX_PACKET))
         if apart:
             self._offer(apart, self._inline(header, buffer, UNLIMITED))
