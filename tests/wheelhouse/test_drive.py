@@ -252,6 +252,15 @@ def test_a_full_disk_is_told_apart_from_a_bad_drive(folder: Path, tmp_path: Path
 
 
 @needs_mount
+def test_a_disk_that_fills_in_the_last_piece_is_told(folder: Path, tmp_path: Path) -> None:
+    (folder / "wheels/a.whl").write_bytes(b"w" * 1_040_000)
+    listed = listing(entry("wheels/a.whl", b"w" * 1_040_000))
+    with file_system(tmp_path / "small", 1) as small, pytest.raises(InstallFailed) as failed:
+        drive.copy(folder, listed, small / "staging")
+    assert failed.value.code == "DISK_FULL"
+
+
+@needs_mount
 def test_a_drive_pulled_while_it_is_read_is_told(folder: Path, tmp_path: Path) -> None:
     with file_system(tmp_path / "stick", 16) as stick:
         payload = stick / "nondum/org.example.test"

@@ -83,10 +83,12 @@ def read(data: Bytes, where: str) -> Archive:
 def unpack(data: Bytes, member: Member) -> Iterator[bytes]:
     """The member's bytes in pieces. Raises `zlib.error` or `ValueError` when they are not whole."""
     raw = data[member.start : member.end]
-    if not member.is_packed:
-        yield from _checked(iter([bytes(raw)]), member)
-        return
-    yield from _checked(_inflated(raw), member)
+    yield from _checked(_inflated(raw) if member.is_packed else _cut(raw), member)
+
+
+def _cut(raw: Bytes) -> Iterator[bytes]:
+    for start in range(0, len(raw), _CHUNK):
+        yield bytes(raw[start : start + _CHUNK])
 
 
 def _inflated(raw: Bytes) -> Iterator[bytes]:

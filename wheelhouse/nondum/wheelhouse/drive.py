@@ -141,7 +141,8 @@ def _copy_bytes(descriptor: int, entry: Entry, target: Path, folder: Path) -> tu
     """Digest and size of what was read; at most one byte more than listed."""
     digest, size = hashlib.sha256(), 0
     try:
-        with target.open("xb", buffering=0) as out:
+        # Buffered: a raw file on a full disk writes less than it was given, and does not raise.
+        with target.open("xb") as out:
             for piece in _pieces(descriptor, entry.size + 1, folder):
                 digest.update(piece)
                 size += len(piece)

@@ -11,6 +11,7 @@ is whole. Before files are used again they are hashed again. Venvs are hard link
 from __future__ import annotations
 
 import ctypes
+import errno
 import hashlib
 import json
 import os
@@ -110,10 +111,10 @@ class Store:
         folder = self.root / sha256
         try:
             said = json.loads((folder / MANIFEST).read_bytes())
-        except (OSError, ValueError):
+            files = tuple(StoredFile(*row) for row in said["files"])
+            return StoredWheel(sha256, said["wheel"], folder, files, tuple(said["left_out"]))
+        except (OSError, ValueError, LookupError, TypeError):
             return None
-        files = tuple(StoredFile(*row) for row in said["files"])
-        return StoredWheel(sha256, said["wheel"], folder, files, tuple(said["left_out"]))
 
     def verify(self, sha256: str) -> tuple[Problem, ...]:
         """Hash a stored wheel's files again; what is not as it was."""
@@ -228,7 +229,8 @@ def _written(
 
 def _write(data: Bytes, file: PlannedFile, target: Path) -> StoredFile:
     digest = hashlib.sha256()
-    with target.open("xb", buffering=0) as out:
+    # Buffered: a raw file on a full disk writes less than it was given, and does not raise.
+    with target.open("xb") as out:
         for piece in archive.unpack(data, file.member):
             digest.update(piece)
             out.write(piece)
@@ -277,5 +279,7 @@ def _sync_folder(folder: Path) -> None:
 
 
 def _failed(error: OSError, what: str) -> InstallFailed:
-    code = "DISK_FULL" if error.errno in (28, 122) else "IO_ERROR"  # ENOSPC, EDQUOT
-    return InstallFailed(Problem(code, f"cannot be stored: {error.strerror}", where=what))
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        fix = "free some disk, or lower the store's quota"
+        return InstallFailed(Problem("DISK_FULL", "there is no room to store it", what, fix=fix))
+    return InstallFailed(Problem("IO_ERROR", f"cannot be stored: {error.strerror}", where=what))
