@@ -46,7 +46,13 @@ def _digest(folders: Sequence[Path]) -> str:
     total = hashlib.sha256(PYTHON.encode())
     for folder in folders:
         for path in sorted(folder.rglob("*")):
-            if path.is_file() and "__pycache__" not in path.parts:
-                total.update(str(path.relative_to(folder)).encode())
+            inside = path.relative_to(folder)
+            if path.is_file() and not _is_left_out(inside):
+                total.update(str(inside).encode())
                 total.update(path.read_bytes())
     return total.hexdigest()
+
+
+def _is_left_out(path: Path) -> bool:
+    """Whether a file has no part in what is built: tests and caches."""
+    return any(part.startswith(".") or part in ("__pycache__", "tests") for part in path.parts)

@@ -55,6 +55,15 @@ class Robot:
         with self._changed:
             return self._view
 
+    def told_number(self) -> int:
+        """Number of the last sentence that the host told."""
+        return max((row["number"] for row in self.view.get("told", ())), default=0)
+
+    def told_since(self, number: int) -> tuple[str, ...]:
+        """What it has told after the sentence of that number."""
+        told = self.view.get("told", ())
+        return tuple(row["text"] for row in told if row["number"] > number)
+
     def until(self, what: str, found: Callable[[View], _T | None], *, timeout_s: float) -> _T:
         """Wait until a view satisfies `found`, and return what it found. Raises `TooLate`."""
         result: list[_T] = []

@@ -23,6 +23,7 @@ Row = dict[str, Any]
 
 TAP_TIMEOUT_S = 5.0
 TOLD_IN_STATUS = 20
+TOLD_IN_WATCH = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,6 +255,7 @@ class Verbs:
                 "streams": await self.streams(arguments),
                 "plan": self.mind.views.plan(),
                 "tree": self.mind.views.tree(),
+                "told": self.mind.views.told(self.mind.people.last_number - TOLD_IN_WATCH),
             }
 
 

@@ -1,0 +1,69 @@
+"""Listening in on streams of the host while a stage runs: what the scorer is given of it."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from nondum.host.control.client import ControlClient
+from nondum.host.control.tap import messages
+from nondum.sdk.errors import NondumError
+from nondum.sdk.messages import Image, Message, Pose
+
+
+@dataclass
+class Heard:
+    """Headings of the body and numbers of the frames shown, each with its stamp (monotonic)."""
+
+    headings: list[tuple[float, float]] = field(default_factory=list)
+    """Stamp, yaw in radians, unwrapped."""
+    frames: list[tuple[float, int]] = field(default_factory=list)
+
+    def on_message(self, message: Message) -> None:
+        """Keep what the scorer needs of a message."""
+        if isinstance(message, Image):
+            self.frames.append((message.header.stamp_s, message.header.seq))
+        elif isinstance(message, Pose):
+            before = self.headings[-1][1] if self.headings else 0.0
+            turn = (_yaw(message) - before + math.pi) % math.tau - math.pi
+            self.headings.append((message.header.stamp_s, before + turn))
+
+
+@contextmanager
+def listening(control: Path, *streams: str) -> Iterator[Heard]:
+    """Hear streams from now until the context ends."""
+    heard, stop = Heard(), threading.Event()
+    threads = [
+        threading.Thread(
+            target=lambda stream=stream: asyncio.run(_listen(control, stream, heard, stop)),
+            daemon=True,
+        )
+        for stream in streams
+    ]
+    for thread in threads:
+        thread.start()
+    try:
+        yield heard
+    finally:
+        stop.set()
+
+
+async def _listen(control: Path, stream: str, heard: Heard, stop: threading.Event) -> None:
+    try:
+        with ControlClient(control) as client:
+            async for message in messages(client, stream):
+                if stop.is_set():
+                    return
+                heard.on_message(message)
+    except NondumError:
+        pass  # the stream or the host is gone: there is no more to hear
+
+
+def _yaw(pose: Pose) -> float:
+    x, y, z, w = pose.orientation
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
