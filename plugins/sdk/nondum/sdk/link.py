@@ -55,21 +55,22 @@ class Pending:
     def __init__(self, call_id: int) -> None:
         self.id = call_id
         """The call's id: the `call_id` of the events that belong to it."""
-        self._outcome: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
+        self.outcome: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
+        """The reply or the error, for one waiter only; awaiting the call itself allows more."""
 
     def __await__(self) -> Generator[Any, None, dict[str, Any]]:
-        return asyncio.shield(self._outcome).__await__()
+        return asyncio.shield(self.outcome).__await__()
 
     def succeed(self, body: dict[str, Any]) -> None:
         """Settle it with a reply."""
-        if not self._outcome.done():
-            self._outcome.set_result(body)
+        if not self.outcome.done():
+            self.outcome.set_result(body)
 
     def fail(self, error: NondumError) -> None:
         """Settle it with an error, which need not be fetched."""
-        if not self._outcome.done():
-            self._outcome.set_exception(error)
-            self._outcome.exception()  # mark as seen: nobody may be waiting
+        if not self.outcome.done():
+            self.outcome.set_exception(error)
+            self.outcome.exception()  # mark as seen: nobody may be waiting
 
 
 class Link:
@@ -100,7 +101,7 @@ class Link:
         self._credit_waiters: deque[asyncio.Future[None]] = deque()
         self._ids = itertools.count(1)
         self._pending: dict[int, Pending] = {}
-        self._running: dict[int, asyncio.Task[dict[str, Any]]] = {}
+        self._running: dict[int, asyncio.Task[None]] = {}
         self._waiting: deque[tuple[bytes, tuple[Handle, ...]]] = deque()
         self._greeting: asyncio.Future[Hello | Welcome] = asyncio.get_running_loop().create_future()
         self.is_closed = False
@@ -118,7 +119,7 @@ class Link:
             await self._turn()
         call = self.begin(verb, body, fds)
         try:
-            return await call
+            return await call.outcome
         except asyncio.CancelledError:
             self.cancel(call.id)
             raise
@@ -280,30 +281,41 @@ class Link:
             raise ProtocolViolation(
                 Problem("NO_CREDIT", f"more than {self._credit} requests at once")
             )
-        work = self._on_request(request.verb, dict(request.body), handles, request.id)
-        task = asyncio.ensure_future(work)
+        task = asyncio.get_running_loop().create_task(self._work(request, handles))
         self._running[request.id] = task
-        task.add_done_callback(lambda done: self._answer(request.id, done))
+        task.add_done_callback(lambda _: self._give_up(request.id, handles))
 
-    def _answer(self, call_id: int, task: asyncio.Task[dict[str, Any]]) -> None:
-        del self._running[call_id]
+    async def _work(self, request: Request, handles: tuple[Handle, ...]) -> None:
+        """Carry a request out and answer it."""
         answer: Reply | Failure
-        if task.cancelled():
-            answer = Failure(call_id, (Problem("HALTED", "halted as asked"),))
-        elif (error := task.exception()) is None:
-            answer = Reply(call_id, task.result())
-        elif isinstance(error, NondumError):
-            answer = Failure(call_id, error.problems)
-        else:
-            log.error("a request's handler failed", exc_info=error)
-            answer = Failure(call_id, (Problem("INTERNAL", f"{type(error).__name__}: {error}"),))
+        try:
+            body = await self._on_request(request.verb, dict(request.body), handles, request.id)
+            answer = Reply(request.id, body)
+        except asyncio.CancelledError:
+            answer = _halted(request.id)
+        except NondumError as error:
+            answer = Failure(request.id, error.problems)
+        except Exception as error:
+            log.exception("a request's handler failed")
+            told = f"{type(error).__name__}: {error}"[:1000]
+            answer = Failure(request.id, (Problem("INTERNAL", told),))
+        self._answer(answer)
+
+    def _give_up(self, call_id: int, handles: tuple[Handle, ...]) -> None:
+        """Answer a request that was cancelled before its first step."""
+        if call_id in self._running:
+            discard(handles)
+            self._answer(_halted(call_id))
+
+    def _answer(self, answer: Reply | Failure) -> None:
+        del self._running[answer.id]
         if self.is_closed:
             return
         try:
             self._send(answer)
         except (ProtocolViolation, TypeError) as unsendable:
             told = f"the answer cannot be sent: {unsendable}"[:1000]
-            self._send(Failure(call_id, (Problem("ANSWER_UNSENDABLE", told),)))
+            self._send(Failure(answer.id, (Problem("ANSWER_UNSENDABLE", told),)))
 
     def _violate(self, *problems: Problem) -> None:
         if not self.is_closed:
@@ -317,6 +329,10 @@ class Link:
         elif not self.is_closed:
             self.close()
             self._on_closed()
+
+
+def _halted(call_id: int) -> Failure:
+    return Failure(call_id, (Problem("HALTED", "halted as asked"),))
 
 
 def _closed() -> LinkClosed:

@@ -20,6 +20,10 @@ MAX_HANDLES = 4
 BATCH = 64
 """Packets read before the loop gets its turn: a flood cannot starve the rest."""
 
+# Plain numbers: on every packet, the socket module's enums would cost as much as the system call.
+_CUT_SHORT = int(socket.MSG_TRUNC | socket.MSG_CTRUNC)
+_CLOSE_ON_EXEC = int(socket.MSG_CMSG_CLOEXEC)
+
 Handle: TypeAlias = Union[int, "Packets"]
 """What a packet can carry to a new connection: a descriptor, or an end in memory."""
 OnPacket: TypeAlias = Callable[[bytes, tuple[Handle, ...]], None]
@@ -118,7 +122,7 @@ class SocketPackets:
                 return  # closed by what a packet led to
             try:
                 data, ancillary, flags, _ = self._sock.recvmsg(
-                    self._limit + 1, self._ancillary, socket.MSG_CMSG_CLOEXEC
+                    self._limit + 1, self._ancillary, _CLOSE_ON_EXEC
                 )
             except (BlockingIOError, InterruptedError):
                 return
@@ -137,13 +141,13 @@ class SocketPackets:
             self._on_packet(data, handles)
 
     def _broken(self, flags: int, handles: int) -> Problem | None:
+        if not flags & _CUT_SHORT and handles <= self._max_handles:
+            return None
         if flags & socket.MSG_TRUNC:
             return Problem("PACKET_TOO_LONG", f"a packet is longer than {self._limit} bytes")
-        if flags & socket.MSG_CTRUNC or handles > self._max_handles:
-            return Problem(
-                "PACKET_DESCRIPTORS", f"a packet carries more than {self._max_handles} descriptors"
-            )
-        return None
+        return Problem(
+            "PACKET_DESCRIPTORS", f"a packet carries more than {self._max_handles} descriptors"
+        )
 
     def _lose(self, violation: ProtocolViolation | None) -> None:
         if self._sock.fileno() >= 0:

@@ -176,30 +176,31 @@ def _table(pairs: Iterable[tuple[Any, Any]]) -> dict[str, Any]:
     return table
 
 
-_PLAIN = frozenset({str, int, bool, type(None)})
-_BYTES = frozenset({bytes, bytearray, memoryview})
+_LEAVES = frozenset({str, int, bool, type(None), bytes, bytearray, memoryview})
 
 
 def _check(value: Any, depth: int) -> None:
-    """Refuse what is too deep, too long, not finite, or not plain data."""
-    kind = type(value)
-    if kind in _PLAIN or kind in _BYTES:
-        return
-    if isinstance(value, float):
-        if not math.isfinite(value):
-            raise _violation("PACKET_VALUE", f"{value} is no finite number")
+    """Refuse what is too deep, too long, not finite, or not plain data.
+
+    Both ends run it on every packet, so leaves are passed over without a call.
+    """
+    if isinstance(value, list | tuple):
+        _check_size(value, depth)
+        for item in value:
+            if type(item) not in _LEAVES:
+                _check(item, depth - 1)
     elif isinstance(value, Mapping):
         _check_size(value, depth)
         for key, item in value.items():
             if type(key) is not str:
                 raise _violation("PACKET_MALFORMED", f"a key is of type {type(key).__name__}")
-            _check(item, depth - 1)
-    elif isinstance(value, list | tuple):
-        _check_size(value, depth)
-        for item in value:
-            _check(item, depth - 1)
-    elif not isinstance(value, str | int):  # their subclasses, enums for example, are packed
-        raise TypeError(f"{kind.__name__} is no plain data for a packet")
+            if type(item) not in _LEAVES:
+                _check(item, depth - 1)
+    elif isinstance(value, float):
+        if not math.isfinite(value):
+            raise _violation("PACKET_VALUE", f"{value} is no finite number")
+    elif type(value) not in _LEAVES and not isinstance(value, str | int):  # enums are packed
+        raise TypeError(f"{type(value).__name__} is no plain data for a packet")
 
 
 def _check_size(value: Mapping[str, Any] | Sequence[Any], depth: int) -> None:
