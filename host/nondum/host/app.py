@@ -26,8 +26,8 @@ from nondum.host.events import Event, Recomposed
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
-from nondum.host.lifecycle.installation import InstallOptions
 from nondum.host.lifecycle.folders import Folders, claim
+from nondum.host.lifecycle.installation import InstallOptions
 from nondum.host.mind.frames import mounts_to_wire
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.planners import Planners
