@@ -6,6 +6,7 @@ configured. What it chose is read from the wheels that it leaves.
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -16,6 +17,8 @@ from nondum.sdk.errors import InstallFailed, Problem
 from nondum.wheelhouse.target import Target
 
 TIMEOUT_S = 1800
+
+_RAISED = re.compile(r"\w+(Error|Exception)\b: .")
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,10 +73,20 @@ def _pip(arguments: Sequence[str], code: str, where: str) -> None:
     command = [sys.executable, "-m", "pip", *arguments, "--quiet", "--disable-pip-version-check"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
     if done.returncode:
-        errors = [
-            line.removeprefix("ERROR: ")
-            for line in done.stderr.splitlines()
-            if line.startswith("ERROR: ")
-        ]
-        said = (errors or done.stderr.strip().splitlines() or ["pip said nothing"])[0]
-        raise InstallFailed(Problem(code, said, where=where, fix="see what pip says"))
+        raise InstallFailed(
+            Problem(code, telling_line(done.stderr), where=where, fix="run pip by hand to see more")
+        )
+
+
+def telling_line(said: str) -> str:
+    """The line of pip's errors that says most: what a build raised, else its own first error.
+
+    >>> telling_line("ERROR: No matching distribution found for x\\n")
+    'No matching distribution found for x'
+    >>> telling_line("  error: exit code 1\\n      OSError: Readme is missing\\nnote: not pip\\n")
+    'OSError: Readme is missing'
+    """
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    raised = [line for line in lines if _RAISED.match(line)]
+    own = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
+    return next(iter([*raised[-1:], *own, *lines, "pip said nothing"]))
