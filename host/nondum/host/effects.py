@@ -79,10 +79,14 @@ class ActivatePayload(PayloadEffect):
 class SuspendPayload(PayloadEffect):
     """Stop what runs of a quarantined payload and drop its venvs; it may be tried again."""
 
+    components: tuple[str, ...] = ()
+
 
 @dataclass(frozen=True, slots=True)
 class ClearPayload(PayloadEffect):
     """Stop what runs of a payload and delete all of it but the wheels in the store."""
+
+    components: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -171,7 +171,7 @@ def test_pulled_drive_withdraws_at_once() -> None:
     assert not state.mounts
     assert state.revision == 2
     assert state.payloads["k1"].step is Step.REMOVING
-    assert done == [effects.ReleaseDrive("a"), effects.ClearPayload("k1")]
+    assert done == [effects.ReleaseDrive("a"), effects.ClearPayload("k1", ("eye",))]
 
 
 def test_second_source_keeps_the_payload() -> None:
@@ -314,7 +314,7 @@ def test_drive_that_left_while_the_daemon_was_down_is_withdrawn() -> None:
     recovered = recover(active(), AT).state
     state, done = after(events.DrivesScanned("slot", ()), state=recovered)
     assert state.payloads["k1"].step is Step.REMOVING
-    assert effects.ClearPayload("k1") in done
+    assert effects.ClearPayload("k1", ("eye",)) in done
 
 
 def test_payload_swapped_while_the_daemon_was_down_is_withdrawn() -> None:
@@ -330,7 +330,7 @@ def test_payload_that_ends_the_daemon_is_quarantined() -> None:
         assert state.payloads["k1"].step is Step.STORED
     outcome = recover(state, AT)
     assert outcome.state.payloads["k1"].step is Step.QUARANTINED
-    assert outcome.effects == (effects.SuspendPayload("k1"),)
+    assert outcome.effects == (effects.SuspendPayload("k1", ("eye",)),)
 
 
 HAPPENINGS: list[Event] = [

@@ -32,7 +32,8 @@ class Catalogue:
     ) -> None:
         self._connection = connection
         self._state = state
-        self._snapshot = state.snapshot()
+        # What the last daemon left is for recovery only: nobody else sees it.
+        self._snapshot = Snapshot(state.host, state.revision)
         self._thread = thread
         self.boot = f"{os.getpid()}-{time.time_ns()}"
         """Names this run of the daemon in the journal."""
@@ -61,7 +62,7 @@ class Catalogue:
         return self._state.revision
 
     def snapshot(self) -> Snapshot:
-        """The state last committed, as readers get it."""
+        """The state last committed, as readers get it; empty until this daemon has recovered."""
         return self._snapshot
 
     async def commit(self, after: HostState, entries: Sequence[JournalEntry]) -> None:

@@ -1,7 +1,7 @@
 """Child processes that do what may block, hang or choke on hostile bytes: the daemon's end.
 
-Requests go down a child's stdin and answers come up its stdout, one JSON object a line. A spare
-child is kept warm, since starting an interpreter costs more than most jobs.
+Requests go down a child's stdin and answers come up its stdout, one JSON object a line. Spare
+children are kept warm, since starting an interpreter costs more than most jobs.
 """
 
 from __future__ import annotations
@@ -22,6 +22,9 @@ from nondum.sdk.errors import InstallFailed, NondumError, Problem
 LINE_LIMIT = 16 * 1024 * 1024
 """Bytes of one answer: it may hold the descriptions of many components."""
 
+SPARES = 2
+"""Idle children that are kept. The one used last is used first: the other's memory is swappable."""
+
 END_S = 1.0
 """How long a killed child is waited for: one that hangs in its disk cannot even die."""
 
@@ -31,7 +34,7 @@ log = logging.getLogger(__name__)
 
 
 class Children:
-    """A pool that grows as jobs need it and shrinks to its spare. `close` it."""
+    """A pool that grows as jobs need it and shrinks to its spares. `close` it."""
 
     def __init__(self) -> None:
         self._idle: list[Process] = []
@@ -53,16 +56,17 @@ class Children:
         """
         child = self._idle.pop() if self._idle else await _spawn()
         self._busy.add(child)
-        self.warm()
         try:
             async with asyncio.timeout(None) as deadline:
                 answer = await _converse(child, job, arguments, on_progress, deadline, stall_s)
         except TimeoutError as error:
             await self._end(child)
+            self.warm()
             message = f"{job}: nothing was heard for {stall_s:g} s"
             raise InstallFailed(Problem("CHILD_STALLED", message)) from error
         except BaseException:
             await self._end(child)
+            self.warm()
             raise
         self._busy.discard(child)
         await self._keep(child)
@@ -71,15 +75,14 @@ class Children:
         return answer["result"]
 
     def warm(self) -> None:
-        """Start a spare, if there is none."""
+        """Have a spare, soon, if there is none."""
         if not self._idle and (self._warming is None or self._warming.done()):
             self._warming = asyncio.create_task(self._warm())
 
     async def close(self) -> None:
         """Kill all children."""
         if self._warming is not None:
-            self._warming.cancel()
-            await asyncio.gather(self._warming, return_exceptions=True)
+            await asyncio.wait([self._warming])
         await asyncio.gather(*(self._end(child) for child in (*self._idle, *self._busy)))
         self._idle.clear()
 
@@ -87,10 +90,10 @@ class Children:
         self._idle.append(await _spawn())
 
     async def _keep(self, child: Process) -> None:
-        if self._idle:
-            await self._end(child)
-        else:
+        if len(self._idle) < SPARES:
             self._idle.append(child)
+        else:
+            await self._end(child)
 
     async def _end(self, child: Process) -> None:
         self._busy.discard(child)

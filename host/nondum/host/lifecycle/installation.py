@@ -124,7 +124,7 @@ class Installation:
         )
         failed = [error for error in started if isinstance(error, BaseException)]
         if failed:
-            await self._stop(key)
+            await self._stop(tuple(component.id for component in self._prepared[key]))
             known = [error for error in failed if isinstance(error, NondumError)]
             if len(known) < len(failed):
                 raise next(error for error in failed if not isinstance(error, NondumError))
@@ -144,14 +144,14 @@ class Installation:
 
     async def suspend(self, effect: effects.SuspendPayload) -> tuple[Event, ...]:
         """Keep of a payload only what another try needs."""
-        await self._stop(effect.payload)
-        await self._delete(effect.payload, self._folders.venvs(effect.payload))
+        await self._stop(effect.components)
+        await self._delete(effect, self._folders.venvs(effect.payload))
         return ()
 
     async def clear(self, effect: effects.ClearPayload) -> tuple[Event, ...]:
         """Keep nothing of a payload but its wheels in the store, as far as the quota goes."""
-        await self._stop(effect.payload)
-        await self._delete(effect.payload, *self._folders.of(effect.payload))
+        await self._stop(effect.components)
+        await self._delete(effect, *self._folders.of(effect.payload))
         return (PayloadCleared(effect.payload),)
 
     async def prune(self) -> None:
@@ -189,12 +189,14 @@ class Installation:
 
         return await self._children.run(job, arguments, on_progress=on_progress)
 
-    async def _stop(self, key: str) -> None:
-        components = self._prepared.get(key, ())
-        await asyncio.gather(*(self._workers.stop(c.id, STOP_S) for c in components))
+    async def _stop(self, components: tuple[str, ...]) -> None:
+        await asyncio.gather(*(self._workers.stop(id, STOP_S) for id in components))
 
-    async def _delete(self, key: str, *folders: Path) -> None:
-        scratches = [component.scratch for component in self._prepared.pop(key, ())]
+    async def _delete(
+        self, effect: effects.ClearPayload | effects.SuspendPayload, *folders: Path
+    ) -> None:
+        self._prepared.pop(effect.payload, None)
+        scratches = [self._folders.scratch(component) for component in effect.components]
         for scratch in scratches:
             await in_thread(end_leftovers, scratch)
         await in_thread(_remove_all, (*folders, *scratches))

@@ -8,7 +8,13 @@ from typing import Any
 
 from nondum.host.catalogue.records import MountPose, PayloadRecord, Step
 from nondum.host.catalogue.state import Highwater
-from nondum.host.effects import CopyPayload, PayloadEffect, VerifyPayload
+from nondum.host.effects import (
+    ClearPayload,
+    CopyPayload,
+    PayloadEffect,
+    SuspendPayload,
+    VerifyPayload,
+)
 from nondum.host.events import (
     Event,
     PayloadActivated,
@@ -105,7 +111,7 @@ def enter(
     if row.to is Step.GONE:
         _leave(turn, payload)
     if row.effect is not None and with_effect:
-        turn.effects.append(_effect(row.effect, payload))
+        turn.effects.append(effect_for(row.effect, payload))
 
 
 def _told(payload: PayloadRecord, event: Event) -> PayloadRecord:
@@ -123,8 +129,13 @@ def _told(payload: PayloadRecord, event: Event) -> PayloadRecord:
             return payload
 
 
-def _effect(kind: type[PayloadEffect], payload: PayloadRecord) -> PayloadEffect:
-    return copy_of(payload) if kind is CopyPayload else kind(payload.key)
+def effect_for(kind: type[PayloadEffect], payload: PayloadRecord) -> PayloadEffect:
+    """An effect of a row of a table, for one payload."""
+    if kind is CopyPayload:
+        return copy_of(payload)
+    if issubclass(kind, ClearPayload | SuspendPayload):
+        return kind(payload.key, payload.components)
+    return kind(payload.key)
 
 
 def _activate(turn: Turn, payload: PayloadRecord, event: PayloadActivated) -> None:

@@ -11,6 +11,7 @@ from nondum.host.catalogue.records import Moment, PayloadRecord, Step
 from nondum.host.catalogue.state import HostState
 from nondum.host.effects import SuspendPayload
 from nondum.host.events import HostStarted, Recovered
+from nondum.host.lifecycle.payload_rules import effect_for
 from nondum.host.lifecycle.turn import Outcome, Turn
 from nondum.host.transitions import RECOVERY
 from nondum.sdk.errors import Problem
@@ -47,9 +48,9 @@ def _recover(turn: Turn, payload: PayloadRecord) -> None:
             fix="pull it and plug it in again, or ask for another try",
         )
         recovered = replace(recovered, step=Step.QUARANTINED, problems=(problem,))
-        turn.effects.append(SuspendPayload(payload.key))
+        turn.effects.append(SuspendPayload(payload.key, payload.components))
     elif row.effect is not None:
-        turn.effects.append(row.effect(payload.key))
+        turn.effects.append(effect_for(row.effect, payload))
     turn.put_payload(recovered)
     if recovered.step is not payload.step or row.to is Step.REMOVING:
         turn.events.append(Recovered(payload.key, payload.step.name))

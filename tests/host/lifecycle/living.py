@@ -1,0 +1,138 @@
+"""A whole host's lifecycle in a test: catalogue, workers, executor and a folder of slots."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from nondum.host.catalogue.catalogue import Catalogue
+from nondum.host.catalogue.records import JournalEntry, PayloadRecord, Snapshot, Step
+from nondum.host.drives.slots import SlotSource
+from nondum.host.events import Event, HostStarted
+from nondum.host.lifecycle.bus import Bus
+from nondum.host.lifecycle.component_manager import ComponentManager
+from nondum.host.lifecycle.executor import Executor
+from nondum.host.lifecycle.folders import Folders
+from nondum.host.lifecycle.installation import InstallOptions
+from nondum.host.workers import Timing, Workers
+
+HOST = "spot"
+PATIENCE_S = 30.0
+
+LAMP = '''"""A lamp that does nothing, well."""
+from nondum.sdk import Output, Unit, behaviour, hookimpl
+
+@hookimpl
+def units():
+    return [Unit("lamp", "light")]
+
+@behaviour("shine", action="(shine ?u - light)", lasting=True)
+async def shine(ctx, u):
+    await ctx.established()
+    await ctx.sleep(3600)
+'''
+
+
+@dataclass
+class Living:
+    """A running host, without its mind."""
+
+    catalogue: Catalogue
+    manager: ComponentManager
+    executor: Executor
+    workers: Workers
+    bus: Bus
+    folders: Folders
+    slots: Path
+    drives: Path
+    heard: list[Event] = field(default_factory=list)
+
+    def plug(self, drive: Path, name: str = "a") -> None:
+        """Put a drive into a slot."""
+        (self.slots / name).symlink_to(drive)
+
+    def pull(self, name: str = "a") -> None:
+        """Take a drive out of its slot."""
+        (self.slots / name).unlink()
+
+    @property
+    def snapshot(self) -> Snapshot:
+        return self.catalogue.snapshot()
+
+    def payload(self, payload_id: str) -> PayloadRecord | None:
+        return next((p for p in self.snapshot.payloads if p.payload_id == payload_id), None)
+
+    async def until(self, holds: Callable[[], bool]) -> None:
+        """Wait until something holds; looked at again after each event."""
+        changed = asyncio.Event()
+        end = self.bus.subscribe(lambda event: changed.set())
+        try:
+            async with asyncio.timeout(PATIENCE_S):
+                while not holds():
+                    changed.clear()
+                    await changed.wait()
+        finally:
+            end()
+
+    async def until_step(self, payload_id: str, step: Step) -> PayloadRecord:
+        """Wait for a payload to come to a step."""
+
+        def holds() -> bool:
+            record = self.payload(payload_id)
+            if record is not None and record.step in (Step.REFUSED, Step.QUARANTINED):
+                assert record.step is step, [str(problem) for problem in record.problems]
+            return record is not None and record.step is step
+
+        await self.until(holds)
+        record = self.payload(payload_id)
+        assert record is not None
+        return record
+
+    async def until_gone(self, payload_id: str) -> None:
+        """Wait until nothing of a payload is left."""
+        await self.until(lambda: self.payload(payload_id) is None)
+
+    async def journal(self) -> tuple[JournalEntry, ...]:
+        return await self.catalogue.journal(limit=1000)
+
+
+@contextlib.asynccontextmanager
+async def living(
+    root: Path,
+    *,
+    options: InstallOptions | None = None,
+    timing: Timing | None = None,
+) -> AsyncIterator[Living]:
+    """Run a host's lifecycle under `root`; its state stays there for the next one."""
+    folders, slots = Folders(root / "state"), root / "slots"
+    bus = Bus()
+    catalogue = await Catalogue.open(folders.catalogue, HOST)
+    workers = Workers(HOST, bus.emit, timing=timing)
+    options = options or InstallOptions(allow_unsigned=True)
+    executor = Executor(HOST, folders, workers, bus.emit, options)
+    manager = ComponentManager(catalogue, executor, bus)
+    manager.add_source(SlotSource([slots]))
+    host = Living(catalogue, manager, executor, workers, bus, folders, slots, root / "drives")
+    slots.mkdir(parents=True, exist_ok=True)
+    bus.subscribe(host.heard.append)
+    running = asyncio.create_task(manager.run())
+    try:
+        await host.until(lambda: any(isinstance(event, HostStarted) for event in host.heard))
+        yield host
+        if running.done():
+            running.result()
+    finally:
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+        await workers.close()
+        await catalogue.close()
+
+
+def left_over(folders: Folders) -> list[Path]:
+    """Every file of payloads that lies in a state folder, but for the store's."""
+    names = ("staging", "payloads", "venvs", "scratch", "mounts")
+    roots = [folders.root / name for name in names]
+    return [path for root in roots if root.is_dir() for path in root.iterdir()]

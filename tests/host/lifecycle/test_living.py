@@ -1,0 +1,226 @@
+"""Payloads that come and go on a real store, with real workers."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from tests.host.lifecycle.living import LAMP, Living, left_over, living
+from tests.payloads import Part, make_payload
+
+from nondum.host.catalogue.records import ComponentState, Step
+from nondum.host.events import MountSet, Recomposed
+from nondum.host.lifecycle import views
+from nondum.host.lifecycle.installation import InstallOptions
+from nondum.host.lifecycle.installed import install, uninstall
+from nondum.sdk.errors import PayloadRefused
+
+pytestmark = pytest.mark.anyio
+
+LAMP_ID = "org.example.lamp"
+
+
+def lamp(drive: Path, id: str = "lamp", payload_id: str = LAMP_ID, manifest: str = "") -> Path:
+    return make_payload(drive, Part(id, LAMP, manifest=manifest), payload_id=payload_id)
+
+
+async def test_payload_comes_alive_and_leaves_nothing(tmp_path: Path) -> None:
+    lamp(tmp_path / "drive")
+    async with living(tmp_path) as host:
+        host.plug(tmp_path / "drive")
+        record = await host.until_step(LAMP_ID, Step.ACTIVE)
+        assert list(record.phases) == ["seen", "verified", "installed", "ready"]
+        component = host.snapshot.component("lamp")
+        assert component is not None
+        assert component.is_ready
+        assert component.description.units[0].name == "lamp"
+        pid = host.workers.pids()["lamp"]
+        host.pull()
+        await host.until_gone(LAMP_ID)
+        assert not host.snapshot.components
+        assert not host.snapshot.mounts
+        assert not left_over(host.folders)
+        assert not is_running(pid)
+        assert len(await host.executor.installation.listing()) == 4
+
+
+async def test_pulled_payload_is_withdrawn_within_the_promised_time(tmp_path: Path) -> None:
+    lamp(tmp_path / "drive")
+    async with living(tmp_path) as host:
+        host.plug(tmp_path / "drive")
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+        pulled = time.monotonic()
+        host.pull()
+        await host.until(lambda: not host.snapshot.components)
+        withdrawn = time.monotonic() - pulled
+        await host.until_gone(LAMP_ID)
+        assert withdrawn <= 0.2
+        assert time.monotonic() - pulled <= 2.0
+
+
+async def test_known_payload_is_not_copied_again(tmp_path: Path) -> None:
+    lamp(tmp_path / "drive")
+    async with living(tmp_path) as host:
+        for _ in range(2):
+            host.plug(tmp_path / "drive")
+            await host.until_step(LAMP_ID, Step.ACTIVE)
+            host.pull()
+            await host.until_gone(LAMP_ID)
+        copied = [e.detail for e in await host.journal() if e.event == "PayloadCopied"]
+        assert copied[0]["bytes_copied"] > 0
+        assert copied[0]["bytes_known"] == 0
+        assert copied[1]["bytes_copied"] == 0
+        assert copied[1]["bytes_known"] == copied[0]["bytes_copied"]
+
+
+async def test_two_payloads_on_one_drive_are_two(tmp_path: Path) -> None:
+    lamp(tmp_path / "drive")
+    lamp(tmp_path / "drive", "torch", "org.example.torch")
+    async with living(tmp_path) as host:
+        host.plug(tmp_path / "drive")
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+        await host.until_step("org.example.torch", Step.ACTIVE)
+        host.pull()
+        await host.until_gone(LAMP_ID)
+        await host.until_gone("org.example.torch")
+        assert not left_over(host.folders)
+
+
+async def test_one_payload_on_two_drives_leaves_with_the_last(tmp_path: Path) -> None:
+    lamp(tmp_path / "drive")
+    async with living(tmp_path) as host:
+        host.plug(tmp_path / "drive", "a")
+        host.plug(tmp_path / "drive", "b")
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+        await host.until(lambda: _drives(host) == ("a", "b"))
+        host.pull("a")
+        await host.until(lambda: _drives(host) == ("b",))
+        assert host.snapshot.component("lamp") is not None
+        host.pull("b")
+        await host.until_gone(LAMP_ID)
+
+
+async def test_replug_in_a_hurry_ends_alive(tmp_path: Path) -> None:
+    lamp(tmp_path / "drive")
+    async with living(tmp_path) as host:
+        for _ in range(5):
+            host.plug(tmp_path / "drive")
+            await host.until(lambda: host.payload(LAMP_ID) is not None)
+            host.pull()
+        host.plug(tmp_path / "drive")
+        await host.until(lambda: host.snapshot.component("lamp") is not None)
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+
+
+async def test_restarted_daemon_brings_back_what_was_active(tmp_path: Path) -> None:
+    lamp(tmp_path / "drive")
+    async with living(tmp_path) as host:
+        host.plug(tmp_path / "drive")
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+    async with living(tmp_path) as host:
+        await host.until(lambda: host.snapshot.component("lamp") is not None)
+        record = await host.until_step(LAMP_ID, Step.ACTIVE)
+        assert record.attempts == 0
+        assert "Recovered" in [entry.event for entry in await host.journal()]
+
+
+async def test_drive_pulled_while_the_daemon_is_down_is_withdrawn(tmp_path: Path) -> None:
+    lamp(tmp_path / "drive")
+    async with living(tmp_path) as host:
+        host.plug(tmp_path / "drive")
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+    (host.slots / "a").unlink()
+    async with living(tmp_path) as host:
+        await host.until_gone(LAMP_ID)
+        assert not left_over(host.folders)
+
+
+async def test_installed_payload_needs_no_drive(tmp_path: Path) -> None:
+    folder = lamp(tmp_path / "drive")
+    async with living(tmp_path) as host:
+        await install(folder, host.catalogue, host.bus)
+    async with living(tmp_path) as host:
+        await host.until(lambda: host.snapshot.component("lamp") is not None)
+        assert host.snapshot.components[0].rank < 1_000_000
+        await uninstall(LAMP_ID, host.catalogue, host.bus)
+        assert not left_over(host.folders)
+        assert not host.snapshot.drives
+
+
+async def test_refused_install_leaves_nothing(tmp_path: Path) -> None:
+    folder = lamp(tmp_path / "drive", manifest="colour = 3")
+    async with living(tmp_path) as host:
+        with pytest.raises(PayloadRefused) as refused:
+            await install(folder, host.catalogue, host.bus)
+        assert refused.value.code == "MANIFEST_KEY"
+        await host.until(lambda: not host.snapshot.drives and not host.snapshot.payloads)
+        assert not left_over(host.folders)
+
+
+async def test_pip_installs_the_same_payload(tmp_path: Path) -> None:
+    lamp(tmp_path / "drive")
+    options = InstallOptions(allow_unsigned=True, method="pip")
+    async with living(tmp_path, options=options) as host:
+        host.plug(tmp_path / "drive")
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+        assert not await host.executor.installation.listing()
+
+
+async def test_unsigned_payload_needs_leave(tmp_path: Path) -> None:
+    lamp(tmp_path / "drive")
+    async with living(tmp_path, options=InstallOptions()) as host:
+        host.plug(tmp_path / "drive")
+        record = await host.until_step(LAMP_ID, Step.REFUSED)
+        assert [problem.code for problem in record.problems] == ["SIG_MISSING"]
+
+
+async def test_worker_that_dies_is_started_again(tmp_path: Path) -> None:
+    lamp(tmp_path / "drive")
+    async with living(tmp_path) as host:
+        host.plug(tmp_path / "drive")
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+
+        os.kill(host.workers.pids()["lamp"], signal.SIGKILL)
+        await host.until(lambda: _state(host) is ComponentState.RESTARTING)
+        await host.until(lambda: _state(host) is ComponentState.READY)
+
+
+async def test_views_tell_what_is_there(tmp_path: Path) -> None:
+    lamp(tmp_path / "drive", manifest='[[component.unit]]\nname = "lamp"\nxyz = [0, 0, 1]\n')
+    async with living(tmp_path) as host:
+        host.plug(tmp_path / "drive")
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+        (payload,) = views.payloads(host.snapshot)
+        assert payload["state"] == "active"
+        assert payload["drive"] == "a"
+        assert 0 < payload["phases"]["ready"]["after_s"] < 30
+        (component,) = views.components(host.snapshot)
+        assert component["units"] == ["spot__lamp__lamp"]
+        pose = host.snapshot.mount("spot__lamp__lamp")
+        assert pose is not None
+        assert pose.xyz == (0.0, 0.0, 1.0)
+        host.bus.emit(MountSet("spot__lamp__lamp", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+        before = host.snapshot.revision
+        await host.until(lambda: host.snapshot.revision > before)
+        assert any(isinstance(event, Recomposed) for event in host.heard)
+        told = views.journal(await host.catalogue.journal(subject=LAMP_ID))
+        assert [row["step"] for row in told if row["step"]] == [
+            *("received", "copied", "verified", "staged", "stored", "probed", "active"),
+        ]
+
+
+def is_running(pid: int) -> bool:
+    return Path(f"/proc/{pid}").exists()
+
+
+def _drives(host: Living) -> tuple[str, ...]:
+    record = host.payload(LAMP_ID)
+    return record.drives if record else ()
+
+
+def _state(host: Living) -> ComponentState | None:
+    component = host.snapshot.component("lamp")
+    return component.state if component else None
