@@ -14,12 +14,14 @@ import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 from importlib_metadata import distributions
 
 from nondum.sdk.description import PluginDescription
-from nondum.sdk.errors import PayloadRefused, Problem
+from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem, problems_of
 from nondum.wheelhouse import capture, contents, index, lock, locking, manifest, resolve, wheel
 from nondum.wheelhouse.contents import Contents, Entry
 from nondum.wheelhouse.manifest import Manifest
@@ -27,10 +29,11 @@ from nondum.wheelhouse.resolve import Sources
 from nondum.wheelhouse.target import Target
 
 ENTRY_POINT_GROUP = "nondum.plugins"
-DOWNLOADS = 4
-"""pip processes at once: they wait for the index most of the time."""
+PROCESSES = 4
+"""pips at once: they wait for the index most of the time."""
 
 Progress = Callable[[str, int, int], None]
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,12 +60,9 @@ def build(package: Path, drive: Path, options: Options, progress: Progress) -> P
         work = Path(temporary)
         steps = 4 + len(options.targets)
         progress("making the wheels of the sources", 0, steps)
-        made = work / "made"
-        made.mkdir()
-        for library in options.libraries:
-            resolve.make_wheel(library, made, options.sources)
-        own = resolve.make_wheel(package, made, options.sources)
-        sources = replace(options.sources, wheel_folders=(made, *options.sources.wheel_folders))
+        own, *libraries = _made((package, *options.libraries), work / "made", options.sources)
+        folders = (*(path.parent for path in libraries), *options.sources.wheel_folders)
+        sources = replace(options.sources, wheel_folders=folders)
         chosen = _fetched(own, work, options, sources, progress)
         progress("asking the plugin what it is", steps - 3, steps)
         described = _described(said, chosen[Target.here()], work / "site-packages")
@@ -70,6 +70,7 @@ def build(package: Path, drive: Path, options: Options, progress: Progress) -> P
         locked = {target: chosen[target] for target in options.targets}
         folder = work / said.id
         _write(folder, package, said, locked, described)
+        _judge(folder / "wheels")
         _seal(folder, said, version, minimum, options)
         progress("copying it to the drive", steps - 1, steps)
         target = _delivered(folder, drive)
@@ -103,20 +104,41 @@ def _source(package: Path) -> tuple[Manifest, str, str]:
     return said, version, minimum
 
 
+def _made(packages: Sequence[Path], work: Path, sources: Sources) -> list[Path]:
+    """The wheel of each source folder, in order, each in a folder of its own."""
+    return _all_of(
+        [
+            partial(resolve.make_wheel, package, work / str(number), sources)
+            for number, package in enumerate(packages)
+        ]
+    )
+
+
+def _all_of(tasks: Sequence[Callable[[], _T]]) -> list[_T]:
+    """Do all side by side. Raises `InstallFailed` with the problems of all."""
+    with ThreadPoolExecutor(PROCESSES) as pool:
+        futures = [pool.submit(task) for task in tasks]
+    errors = [error for future in futures if (error := future.exception()) is not None]
+    failures = [error for error in errors if isinstance(error, InstallFailed)]
+    if errors and len(failures) == len(errors):
+        raise InstallFailed(*dict.fromkeys(problems_of(failures)))
+    return [future.result() for future in futures]
+
+
 def _fetched(
     own: Path, work: Path, options: Options, sources: Sources, progress: Progress
 ) -> dict[Target, tuple[Path, ...]]:
     """The wheels for every target, and for this machine, which must describe the plugin."""
     targets = list(dict.fromkeys((*options.targets, Target.here())))
     steps = 4 + len(options.targets)
-
-    def fetch(numbered: tuple[int, Target]) -> tuple[Target, tuple[Path, ...]]:
-        number, target = numbered
-        progress(f"wheels for {target.architecture}, Python {target.python}", 1, steps)
-        return target, resolve.fetch(own, target, work / f"fetched-{number}", sources)
-
-    with ThreadPoolExecutor(DOWNLOADS) as pool:
-        return dict(pool.map(fetch, enumerate(targets)))
+    progress("fetching the wheels that it depends on", 1, steps)
+    fetched = _all_of(
+        [
+            partial(resolve.fetch, own, target, work / f"fetched-{number}", sources)
+            for number, target in enumerate(targets)
+        ]
+    )
+    return dict(zip(targets, fetched, strict=True))
 
 
 def _described(
@@ -188,6 +210,15 @@ def _write(
         text = locking.lock_text(locked)
         (folder / lock.file_name(component.id)).write_text(text, encoding="utf-8")
     (folder / index.NAME).write_bytes(index.to_bytes(described))
+
+
+def _judge(wheels: Path) -> None:
+    """Refuse wheels that every host would refuse."""
+    problems: list[Problem] = []
+    for path in sorted(wheels.glob("*.whl")):
+        with wheel.opened(path) as data:
+            problems.extend(wheel.lay_out(data, path.name).problems)
+    wheel.refuse_if_any(tuple(problems))
 
 
 def _seal(folder: Path, said: Manifest, version: str, minimum: str, options: Options) -> None:

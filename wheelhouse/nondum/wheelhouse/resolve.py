@@ -37,14 +37,15 @@ class Sources:
 
 
 def make_wheel(package: Path, folder: Path, sources: Sources) -> Path:
-    """Build a package's own wheel into `folder`. Raises `InstallFailed` (BUILD_FAILED)."""
-    before = set(folder.glob("*.whl"))
+    """Build a package's own wheel into `folder`, which is made. Raises `InstallFailed`
+    (BUILD_FAILED)."""
+    folder.mkdir(parents=True)
     _pip(
         ["wheel", "--no-deps", "--wheel-dir", str(folder), *sources.options(), str(package)],
         "BUILD_FAILED",
         str(package),
     )
-    (made,) = set(folder.glob("*.whl")) - before
+    (made,) = folder.glob("*.whl")
     return made
 
 
@@ -71,7 +72,13 @@ def fetch(wheel: Path, target: Target, folder: Path, sources: Sources) -> tuple[
 
 def _pip(arguments: Sequence[str], code: str, where: str) -> None:
     command = [sys.executable, "-m", "pip", *arguments, "--quiet", "--disable-pip-version-check"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False
+        )
+    except subprocess.TimeoutExpired as error:
+        problem = Problem(code, f"pip took longer than {TIMEOUT_S} s", where=where)
+        raise InstallFailed(problem) from error
     if done.returncode:
         raise InstallFailed(
             Problem(code, telling_line(done.stderr), where=where, fix="run pip by hand to see more")
