@@ -1,0 +1,158 @@
+"""Plugins that cannot start: each is one clear error, and nothing of it is left."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tests.host.workers.house import House, is_alive
+
+from nondum.host.events import WorkerLogged, WorkerReady
+from nondum.sdk.description import Label, PluginDescription
+from nondum.sdk.errors import WorkerFailed
+
+pytestmark = pytest.mark.anyio
+
+HOOKED = "from nondum.sdk import hookimpl\n@hookimpl\n{}"
+
+
+async def failure(house: House, source: str) -> WorkerFailed:
+    with pytest.raises(WorkerFailed) as caught:
+        await house.start("guest", source)
+    assert not house.workers.pids()
+    assert not house.told(WorkerReady)
+    return caught.value
+
+
+@pytest.mark.parametrize(
+    ("source", "code", "words"),
+    [
+        pytest.param("import nowhere_at_all", "IMPORT_FAILED", "nowhere_at_all", id="import"),
+        pytest.param("def f(:", "IMPORT_FAILED", "SyntaxError", id="syntax"),
+        pytest.param(
+            HOOKED.format("def units():\n    raise ValueError('no units')"),
+            "HOOK_FAILED",
+            "no units",
+            id="raises when described",
+        ),
+        pytest.param(
+            HOOKED.format("async def start(ctx):\n    raise ValueError('no luck')"),
+            "HOOK_FAILED",
+            "no luck",
+            id="raises when started",
+        ),
+        pytest.param(
+            HOOKED.format("def starts(ctx): ..."), "HOOK_UNKNOWN", "starts", id="unknown hook"
+        ),
+        pytest.param(
+            "import os, sys\nsys.stderr.write('out of paper\\n')\nos._exit(3)",
+            "WORKER_START_FAILED",
+            "exited with status 3 and said: out of paper",
+            id="exits at once",
+        ),
+        pytest.param(
+            "import os\nos.kill(os.getpid(), 11)",
+            "WORKER_START_FAILED",
+            "was ended by SIGSEGV",
+            id="crashes",
+        ),
+    ],
+)
+async def test_start_fails_with_its_code(house: House, source: str, code: str, words: str) -> None:
+    error = await failure(house, source)
+    assert error.code == code
+    assert words in str(error)
+    assert "guest" in error.problems[0].where
+
+
+async def test_nothing_importable_tells_what_is_missing(house: House, tmp_path: Path) -> None:
+    spec = replace(house.spec("guest", ""), site_packages=(tmp_path,))
+    with pytest.raises(WorkerFailed, match=r"WORKER_START_FAILED .*No module named 'nondum'"):
+        await house.workers.start(spec)
+
+
+async def test_missing_interpreter_is_told(house: House, tmp_path: Path) -> None:
+    spec = replace(house.spec("guest", ""), python=tmp_path / "python")
+    with pytest.raises(WorkerFailed, match="LAUNCH_FAILED"):
+        await house.workers.start(spec)
+
+
+@pytest.mark.parametrize(
+    "hang",
+    [
+        pytest.param("await asyncio.Event().wait()", id="waits for ever"),
+        pytest.param("time.sleep(3600)", id="blocks its loop"),
+        pytest.param(
+            "signal.signal(signal.SIGTERM, signal.SIG_IGN)\n    time.sleep(3600)",
+            id="ignores SIGTERM",
+        ),
+    ],
+)
+async def test_hang_in_start_is_ended(house: House, hang: str) -> None:
+    house.workers.timing = replace(house.timing, startup_s=1.5)
+    error = await failure(
+        house,
+        "import asyncio, signal, time\n" + HOOKED.format(f"async def start(ctx):\n    {hang}"),
+    )
+    assert error.code == "WORKER_HUNG"
+
+
+async def test_hang_while_imported_is_ended(house: House) -> None:
+    house.workers.timing = replace(house.timing, startup_s=1.5)
+    error = await failure(house, "import time\ntime.sleep(3600)")
+    assert error.code == "WORKER_HUNG"
+
+
+async def test_lie_in_the_index_is_told_by_place(house: House) -> None:
+    honest = house.spec("guest", "'''Honest.'''")
+    index = PluginDescription("guest", "0", summary="Bold.", labels=(Label("a", "an a"),))
+    with pytest.raises(WorkerFailed) as caught:
+        await house.workers.start(replace(honest, index=index))
+    assert {p.code for p in caught.value.problems} == {"INDEX_MISMATCH"}
+    told = str(caught.value)
+    assert "index.summary" in told and "'Bold.'" in told and "'Honest.'" in told
+    assert "index.labels[0]" in told
+
+
+async def test_failed_start_can_be_tried_again(house: House) -> None:
+    spec = house.spec("guest", "import nowhere_at_all")
+    for _ in range(2):
+        with pytest.raises(WorkerFailed):
+            await house.workers.start(spec)
+    (spec.site_packages[0] / "guest_plugin.py").write_text("")
+    await house.workers.start(spec)
+    assert list(house.workers.pids()) == ["guest"]
+
+
+async def test_component_removed_while_it_starts(house: House) -> None:
+    source = "import asyncio\n" + HOOKED.format(
+        "async def start(ctx):\n    print('here', __import__('os').getpid())\n"
+        "    await asyncio.Event().wait()"
+    )
+    starting = asyncio.create_task(house.start("guest", source))
+    said = await house.until(WorkerLogged, lambda line: line.message.startswith("here"))
+    await house.workers.stop("guest")
+    with pytest.raises(WorkerFailed, match="COMPONENT_REMOVED"):
+        await starting
+    assert not is_alive(int(said.message.split()[1]))
+
+
+async def test_cancelled_start_leaves_no_process(house: House) -> None:
+    source = "import asyncio\n" + HOOKED.format(
+        "async def start(ctx):\n    print('here', __import__('os').getpid())\n"
+        "    await asyncio.Event().wait()"
+    )
+    starting = asyncio.create_task(house.start("guest", source))
+    said = await house.until(WorkerLogged, lambda line: line.message.startswith("here"))
+    starting.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await starting
+    assert not is_alive(int(said.message.split()[1]))
+
+
+async def test_second_worker_of_a_component_is_a_mistake(house: House) -> None:
+    spec = await house.start("guest", "")
+    with pytest.raises(ValueError, match="has a worker already"):
+        await house.workers.start(spec)

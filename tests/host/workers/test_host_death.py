@@ -1,0 +1,97 @@
+"""The daemon is killed: its workers leave everything safe, and then end, whatever they do."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+from tests.host.workers.house import House, is_alive, until_gone
+
+from nondum.host.workers import end_leftovers
+
+pytestmark = pytest.mark.anyio
+
+ROOT = Path(__file__).parents[3]
+DAEMON = """
+import asyncio, sys
+from pathlib import Path
+from tests.host.workers.house import House
+
+async def main():
+    house = House(Path(sys.argv[1]))
+    await house.start("guest", Path(sys.argv[2]).read_text())
+    print(house.workers.pids()["guest"], flush=True)
+    await asyncio.Event().wait()
+
+asyncio.run(main())
+"""
+POLITE = """
+from nondum.sdk import hookimpl
+@hookimpl
+async def stop(ctx):
+    (ctx.scratch / "safe").touch()
+"""
+STUCK = """
+import ctypes, threading
+from nondum.sdk import hookimpl
+
+def hold():
+    ctypes.PyDLL(None).sleep(3600)  # a call that keeps the interpreter's lock
+
+@hookimpl
+async def start(ctx):
+    threading.Timer(0.3, hold).start()
+"""
+
+
+async def daemon_with(folder: Path, plugin: str) -> tuple[asyncio.subprocess.Process, int]:
+    """A daemon in a process of its own, and the id of its worker."""
+    source = folder / "source.py"
+    source.write_text(plugin)
+    paths = [ROOT, *(ROOT / room for room in ("host", "planning", "transport", "wheelhouse"))]
+    daemon = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-c", DAEMON, str(folder), str(source)),
+        stdout=asyncio.subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": ":".join(map(str, [*paths, ROOT / "plugins/sdk"]))},
+    )
+    assert daemon.stdout is not None
+    async with asyncio.timeout(15.0):
+        return daemon, int(await daemon.stdout.readline())
+
+
+async def kill(daemon: asyncio.subprocess.Process) -> None:
+    daemon.send_signal(signal.SIGKILL)
+    await daemon.communicate()
+
+
+async def test_worker_leaves_things_safe_and_ends(tmp_path: Path) -> None:
+    daemon, worker = await daemon_with(tmp_path, POLITE)
+    await kill(daemon)
+    await until_gone(worker)
+    assert (tmp_path / "guest/scratch/safe").exists()
+
+
+async def test_stuck_interpreter_ends_too(tmp_path: Path) -> None:
+    daemon, worker = await daemon_with(tmp_path, STUCK)
+    await asyncio.sleep(0.5)  # until the lock is held; nothing could tell
+    await kill(daemon)
+    assert is_alive(worker)
+    await until_gone(worker, timeout_s=4.0)
+
+
+async def test_next_daemon_ends_what_was_left(house: House) -> None:
+    orphan = await asyncio.create_subprocess_exec(
+        *("sleep", "3600"), env={"NONDUM_WORKER": str(house.folder / "guest/scratch")}
+    )
+    stranger = await asyncio.create_subprocess_exec(
+        *("sleep", "3600"), env={"NONDUM_WORKER": f"{house.folder}-other/guest/scratch"}
+    )
+    assert await asyncio.to_thread(end_leftovers, house.folder) == 1
+    assert await orphan.wait() == -signal.SIGKILL
+    assert stranger.returncode is None
+    stranger.kill()
+    await stranger.wait()

@@ -1,0 +1,328 @@
+"""Workers that crash, hang, disobey, flood and lie: each ends itself only, with its code."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import time
+
+import pytest
+from tests.host.workers.house import HOST, House, is_alive, until_gone
+
+from nondum.host.events import (
+    BehaviourEstablished,
+    WorkerExited,
+    WorkerFailed,
+    WorkerLogged,
+    WorkerReady,
+)
+from nondum.host.workers import Limits, supervision
+from nondum.planning.running import RunState
+from nondum.sdk.description import Behaviour, Unit
+
+pytestmark = pytest.mark.anyio
+
+UNIT = f"{HOST}__guest__it"
+DO = Behaviour("do", "(do ?u - sensor)")
+PLUGIN = '''
+import asyncio, os, signal, socket, subprocess, sys, time
+from nondum.sdk import Unit, behaviour, hookimpl
+
+@hookimpl
+def units():
+    return (Unit("it", "sensor"),)
+
+def link():
+    """What a hostile plugin does not get by its context."""
+    for name in os.listdir("/proc/self/fd"):
+        try:
+            found = socket.socket(fileno=os.dup(int(name)))
+        except OSError:
+            continue
+        if found.family == socket.AF_UNIX and found.type == socket.SOCK_SEQPACKET:
+            return found
+
+{more}
+
+@behaviour("do", action="(do ?u - sensor)")
+async def do(ctx, u):
+    {body}
+'''
+
+
+@pytest.fixture(autouse=True)
+def short_backoff(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(supervision, "BACKOFF_S", 0.02)
+
+
+async def guest(house: House, body: str, more: str = "", limits: Limits | None = None) -> None:
+    source = PLUGIN.replace("{more}", more).replace("{body}", body.replace("\n", "\n    "))
+    await house.start(
+        "guest", source, behaviours=(DO,), units=(Unit("it", "sensor"),), limits=limits
+    )
+
+
+async def exits_with(house: House, body: str, code: str) -> None:
+    """The worker ends for this reason, its call fails, and another worker takes its place."""
+    await guest(house, body)
+    call = house.behave("guest", "do", u=UNIT)
+    exited = await house.until(WorkerExited)
+    assert exited.reason.startswith(code), exited.reason
+    assert await call.ended() is RunState.FAILED
+    assert code in call.reason
+    await house.until(WorkerReady, lambda _: len(house.told(WorkerReady)) == 2)
+
+
+async def test_exit_fails_the_call_and_is_repaired(house: House) -> None:
+    await exits_with(house, "os._exit(7)", "WORKER_EXITED")
+
+
+async def test_killed_worker_is_replaced(house: House) -> None:
+    await guest(house, "await asyncio.Event().wait()")
+    os.kill(house.workers.pids()["guest"], signal.SIGKILL)
+    exited = await house.until(WorkerExited)
+    assert "was ended by SIGKILL" in exited.reason
+
+
+async def test_blocked_loop_is_a_hang(house: House) -> None:
+    await exits_with(house, "time.sleep(3600)", "WORKER_HUNG")
+
+
+async def test_stopped_process_is_a_hang(house: House) -> None:
+    await guest(house, "pass")
+    pid = house.workers.pids()["guest"]
+    os.kill(pid, signal.SIGSTOP)
+    exited = await house.until(WorkerExited)
+    assert exited.reason.startswith("WORKER_HUNG")
+    assert not is_alive(pid)
+
+
+async def test_closed_link_ends_the_worker(house: House) -> None:
+    body = "link().shutdown(socket.SHUT_RDWR)\nawait asyncio.to_thread(time.sleep, 3600)"
+    await guest(house, body)
+    house.behave("guest", "do", u=UNIT)
+    await house.until(WorkerExited)
+
+
+async def test_crash_loop_ends_in_quarantine(house: House) -> None:
+    await guest(house, "pass", "import threading; threading.Timer(0.1, os._exit, [9]).start()")
+    failed = await house.until(WorkerFailed)
+    assert [p.code for p in failed.problems] == ["WORKER_CRASH_LOOP", "WORKER_EXITED"]
+    assert len(house.told(WorkerReady)) == 1 + supervision.RESTARTS
+    assert not house.workers.pids()
+
+
+async def test_quarantined_component_may_try_again(house: House) -> None:
+    crash = "import pathlib\nif pathlib.Path('bad').exists(): os._exit(9)"
+    await guest(house, "open('bad', 'w').close(); os._exit(9)", crash)
+    house.behave("guest", "do", u=UNIT)
+    await house.until(WorkerFailed)
+    await house.workers.restart("guest")
+    assert len(house.told(WorkerFailed)) == 2
+    (house.folder / "guest/scratch/bad").unlink()
+    await house.workers.restart("guest")
+    assert list(house.workers.pids()) == ["guest"]
+
+
+async def test_behaviour_that_does_not_halt_costs_its_worker(house: House) -> None:
+    body = (
+        "await ctx.established()\n"
+        "while True:\n"
+        "    try:\n"
+        "        await asyncio.sleep(60)\n"
+        "    except asyncio.CancelledError:\n"
+        "        pass"
+    )
+    await guest(house, body)
+    pid = house.workers.pids()["guest"]
+    call = house.behave("guest", "do", u=UNIT)
+    await house.until(BehaviourEstablished)
+    asked_s = time.monotonic()
+    call.halt()
+    assert await call.ended() is RunState.HALTED
+    assert time.monotonic() - asked_s < 3.0
+    assert not is_alive(pid)
+    assert (await house.until(WorkerExited)).reason.startswith("HALT_OVERDUE")
+    await house.until(WorkerReady, lambda _: len(house.told(WorkerReady)) == 2)
+
+
+async def test_stop_ends_what_ignores_everything(house: House) -> None:
+    stubborn = (
+        "@hookimpl\n"
+        "async def start(ctx):\n"
+        "    signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
+        "@hookimpl\n"
+        "async def stop(ctx):\n"
+        "    time.sleep(3600)"
+    )
+    await guest(house, "pass", stubborn)
+    pid = house.workers.pids()["guest"]
+    asked_s = time.monotonic()
+    await house.workers.stop("guest", grace_s=1.0)
+    assert not is_alive(pid)
+    assert time.monotonic() - asked_s < 2.0
+    assert not house.told(WorkerExited), "an expected end is no crash"
+
+
+async def test_stop_hook_leaves_things_safe(house: House) -> None:
+    await guest(house, "pass", "@hookimpl\nasync def stop(ctx):\n    open('safe', 'w').close()")
+    await house.workers.stop("guest")
+    assert (house.folder / "guest/scratch/safe").exists()
+
+
+CHILD = "import os, time; print('child', os.getpid(), flush=True); time.sleep(3600)"
+DOUBLE_FORK = f"""
+if os.fork() == 0:
+    os.setsid()
+    if os.fork() == 0:
+        os.execv(sys.executable, [sys.executable, "-c", {CHILD!r}])
+    os._exit(0)
+await asyncio.Event().wait()
+"""
+
+
+@pytest.mark.parametrize("end", ["stop", "crash"])
+@pytest.mark.parametrize(
+    "body",
+    [
+        pytest.param(
+            f"subprocess.Popen([sys.executable, '-c', {CHILD!r}])\nawait asyncio.Event().wait()",
+            id="child",
+        ),
+        pytest.param(DOUBLE_FORK, id="double fork"),
+    ],
+)
+async def test_children_go_with_their_worker(house: House, body: str, end: str) -> None:
+    await guest(house, body)
+    pid = house.workers.pids()["guest"]
+    house.behave("guest", "do", u=UNIT)
+    said = await house.until(WorkerLogged, lambda line: line.message.startswith("child"))
+    child = int(said.message.split()[1])
+    assert is_alive(child)
+    if end == "stop":
+        await house.workers.stop("guest")
+    else:
+        os.kill(pid, signal.SIGKILL)
+        await house.until(WorkerExited)
+    await until_gone(child)
+
+
+async def test_flood_of_output_is_bounded(house: House) -> None:
+    body = (
+        "for _ in range(40):\n    os.write(1, b'x' * 60_000 + b'\\n')\n    await asyncio.sleep(0)"
+    )
+    await guest(house, body)
+    call = house.behave("guest", "do", u=UNIT)
+    assert await call.ended() is RunState.SUCCEEDED
+    await house.workers.stop("guest")
+    assert any(line.startswith("LOG_DROPPED") for line in house.lines("guest"))
+    assert sum(map(len, house.lines("guest"))) < 1_000_000
+    assert not house.told(WorkerExited)
+
+
+async def test_control_characters_do_not_reach_terminals(house: House) -> None:
+    await guest(house, r"print('\x1b[2Jhello')")
+    await house.behave("guest", "do", u=UNIT).ended()
+    await house.until(WorkerLogged, lambda line: "hello" in line.message)
+    assert r"\x1b[2Jhello" in house.lines("guest")
+
+
+@pytest.mark.parametrize(
+    ("body", "code"),
+    [
+        pytest.param("link().send(os.urandom(200))", "PROTO_VIOLATION", id="garbage"),
+        pytest.param(
+            "s = link(); s.setblocking(True)\ns.send(b'x' * 100_000)", "PROTO_VIOLATION", id="long"
+        ),
+        pytest.param(
+            "from nondum.sdk import wire\nlink().send(wire.encode(wire.Reply(9999, {})))",
+            "PROTO_VIOLATION",
+            id="answer nobody waits for",
+        ),
+        pytest.param(
+            "from nondum.sdk import wire\nlink().send(wire.encode(wire.Request(1, 'mount', {})))",
+            "PROTO_VIOLATION",
+            id="request",
+        ),
+        pytest.param(
+            "ctx._workplace.tell('boast', {}, None)", "PROTO_VIOLATION", id="unknown event"
+        ),
+        pytest.param(
+            "ctx._workplace.tell('know', {'predicate': 3}, None)", "PROTO_VIOLATION", id="no fact"
+        ),
+        pytest.param(
+            "body = {'predicate': 'p', 'arguments': [], 'value': ['bearing', {}]}\n"
+            "ctx._workplace.tell('know', body, None)",
+            "RESULT_INVALID",
+            id="value of a wrong shape",
+        ),
+        pytest.param(
+            "body = {'stream': 'rover__other__frames', 'flowing': True}\n"
+            "ctx._workplace.tell('flow', body, None)",
+            "RESULT_INVALID",
+            id="stream of somebody else",
+        ),
+        pytest.param(
+            "s = link(); s.setblocking(True)\n"
+            "from nondum.sdk import wire\n"
+            "packet = wire.encode(wire.Cancel(1))\n"
+            "for _ in range(100_000): s.send(packet)",
+            "BACKPRESSURE",
+            id="flood",
+        ),
+    ],
+)
+async def test_protocol_is_enforced(house: House, body: str, code: str) -> None:
+    await exits_with(house, f"{body}\nawait asyncio.sleep(60)", code)
+
+
+async def test_others_never_notice(house: House) -> None:
+    await house.start(
+        "good",
+        PLUGIN.replace("{more}", "").replace("{body}", "pass"),
+        behaviours=(DO,),
+        units=(Unit("it", "sensor"),),
+    )
+    await guest(house, "while True: os.write(1, b'y' * 4096)")
+    house.behave("guest", "do", u=UNIT)
+    for _ in range(20):
+        async with asyncio.timeout(1.0):
+            call = house.behave("good", "do", u=f"{HOST}__good__it")
+            assert await call.ended() is RunState.SUCCEEDED
+    assert "good" in house.workers.pids()
+
+
+async def test_memory_hog_hurts_itself_only(house: House) -> None:
+    await guest(house, "bytearray(1 << 30)", limits=Limits(memory_mb=256))
+    call = house.behave("guest", "do", u=UNIT)
+    assert await call.ended() is RunState.FAILED
+    assert "MemoryError" in call.reason
+
+
+async def test_descriptors_run_out_for_the_leaker_only(house: House) -> None:
+    await guest(house, "kept = [open('/dev/null') for _ in range(500)]", "", Limits(descriptors=64))
+    call = house.behave("guest", "do", u=UNIT)
+    assert await call.ended() is RunState.FAILED
+    assert "Too many open files" in call.reason
+
+
+async def test_nothing_is_inherited(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SECRET", "of the host")
+    body = (
+        "assert 'SECRET' not in os.environ, os.environ\n"
+        "assert os.environ['OMP_NUM_THREADS'] == '1'\n"
+        "assert os.readlink('/proc/self/fd/0') == '/dev/null'\n"
+        "assert os.getsid(0) == os.getpid() == os.getpgid(0)\n"
+        "assert os.getcwd() == str(ctx.scratch)\n"
+        "assert 'NoNewPrivs:\\t1' in open('/proc/self/status').read()\n"
+        "assert sys.flags.isolated and sys.flags.no_site and 'site' not in sys.modules\n"
+        "paths = [f'/proc/self/fd/{n}' for n in os.listdir('/proc/self/fd')]\n"
+        "kinds = sorted(os.readlink(p).split(':')[0] for p in paths if os.path.exists(p))\n"
+        # Its three standard files; the link; two sockets and the poller of its own loop.
+        "own = ['/dev/null', 'anon_inode', 'pipe', 'pipe', 'socket', 'socket', 'socket']\n"
+        "assert kinds == own, kinds"
+    )
+    await guest(house, body)
+    call = house.behave("guest", "do", u=UNIT)
+    assert await call.ended() is RunState.SUCCEEDED, call.reason

@@ -1,0 +1,68 @@
+"""A stranger's events become the host's values, or end the stranger."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nondum.host.events import FactForgotten, FactKnown, StreamFlowing, WorkerLogged
+from nondum.host.workers.news import MAX_CLAIMS, Claims, parse_news, parse_progress
+from nondum.sdk.errors import ProtocolViolation
+
+PLAIN = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner),
+    max_leaves=8,
+)
+KEYS = st.sampled_from(["predicate", "arguments", "value", "stream", "flowing", "level", "message"])
+NAMES = st.sampled_from(["know", "forget", "flow", "log", "boast"])
+
+
+@given(NAMES, st.dictionaries(KEYS, PLAIN))
+def test_anything_is_parsed_or_a_violation(name: str, body: dict[str, Any]) -> None:
+    try:
+        news = parse_news("guest", {"s"}, name, body)
+    except ProtocolViolation:
+        return
+    assert news.component == "guest"
+
+
+@given(st.dictionaries(st.sampled_from(["fraction", "text"]), PLAIN))
+def test_progress_is_between_nothing_and_all(body: dict[str, Any]) -> None:
+    try:
+        fraction, _ = parse_progress(body)
+    except ProtocolViolation:
+        return
+    assert 0.0 <= fraction <= 1.0
+
+
+def test_each_kind_is_read() -> None:
+    fact = {"predicate": "p", "arguments": ["a"]}
+    assert parse_news("g", (), "know", fact) == FactKnown("g", "p", ("a",))
+    assert parse_news("g", (), "forget", fact) == FactForgotten("g", "p", ("a",))
+    assert parse_news("g", {"s"}, "flow", {"stream": "s", "flowing": True}) == StreamFlowing(
+        "g", "s", True
+    )
+    log = parse_news("g", (), "log", {"level": "info", "message": "a\x1b\nb"})
+    assert log == WorkerLogged("g", "info", "a\\x1b\nb")
+
+
+def test_claims_follow_the_news() -> None:
+    claims = Claims()
+    claims.take(FactKnown("g", "p", ("a",)))
+    claims.take(FactKnown("g", "p", ("b",)))
+    claims.take(StreamFlowing("g", "s", True))
+    claims.take(FactForgotten("g", "p", ("a",)))
+    assert list(claims) == [FactKnown("g", "p", ("b",)), StreamFlowing("g", "s", True)]
+    claims.take(StreamFlowing("g", "s", False))
+    assert list(claims) == [FactKnown("g", "p", ("b",))]
+
+
+def test_claims_are_bounded() -> None:
+    claims = Claims()
+    with pytest.raises(ProtocolViolation, match=str(MAX_CLAIMS)):
+        for number in range(MAX_CLAIMS + 1):
+            claims.take(FactKnown("g", "p", (str(number),)))

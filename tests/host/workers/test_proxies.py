@@ -1,0 +1,66 @@
+"""The host's pluggy manager knows running plugins by proxies that answer and never raise."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+from tests.host.workers.house import House
+
+from nondum.sdk.description import Unit
+
+pytestmark = pytest.mark.anyio
+
+TALKER = '''
+"""Talks."""
+from nondum.sdk import Unit, hookimpl
+
+@hookimpl
+def units():
+    return (Unit("mouth", "speaker"),)
+
+@hookimpl
+async def translate_goal(ctx, words):
+    return {"pddl": f"(said {words})"} if words != "boom" else 1 / 0
+'''
+
+
+async def talker(house: House) -> None:
+    await house.start("talker", TALKER, units=(Unit("mouth", "speaker"),), summary="Talks.")
+
+
+async def test_describing_hooks_answer_at_once(house: House) -> None:
+    await talker(house)
+    await house.start("quiet", "'''Says nothing.'''", summary="Says nothing.")
+    summaries = {answer["summary"] for answer in house.workers.hook.describe()}
+    assert summaries == {"Talks.", "Says nothing."}
+    assert (Unit("mouth", "speaker"),) in house.workers.hook.units()
+    for name in ("behaviours", "conditions", "fragments", "devices", "phrases", "labels"):
+        assert getattr(house.workers.hook, name)() == [(), ()]
+
+
+async def test_acting_hooks_are_gathered(house: House) -> None:
+    await talker(house)
+    await house.start("quiet", "'''Says nothing.'''", summary="Says nothing.")
+    answers = await asyncio.gather(*house.workers.hook.translate_goal(ctx=None, words="hello"))
+    assert sorted(answers, key=str) == [{"pddl": "(said hello)"}, {}]
+    assert await asyncio.gather(*house.workers.hook.speak(ctx=None, text="hi")) == [{}, {}]
+
+
+async def test_failing_hook_comes_to_nothing(house: House) -> None:
+    await talker(house)
+    (answer,) = house.workers.hook.translate_goal(ctx=None, words="boom")
+    assert await answer is None
+
+
+async def test_hook_of_a_worker_that_goes_comes_to_nothing(house: House) -> None:
+    await talker(house)
+    (answer,) = house.workers.hook.translate_goal(ctx=None, words="hello")
+    await house.workers.stop("talker")
+    assert await answer is None
+
+
+async def test_proxy_goes_with_its_worker(house: House) -> None:
+    await talker(house)
+    await house.workers.stop("talker")
+    assert house.workers.hook.describe() == []
