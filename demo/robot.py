@@ -119,14 +119,14 @@ def running(work: Path, *, name: str, initial: Mapping[str, Path]) -> Iterator[R
         folder.mkdir(parents=True)
     config = work / "host.toml"
     config.write_text(_config(robot), encoding="utf-8")
-    for drive in initial.values():
-        nondum("payload", "install", drive, "--config", config)
     with (work / "daemon.log").open("wb") as log:
         daemon = subprocess.Popen(
             [*NONDUM, "host", "run", "--user", "--config", str(config)], stdout=log, stderr=log
         )
         try:
             _await_socket(robot, daemon)
+            for drive in initial.values():
+                nondum("--control", robot.control, "payload", "install", drive)
             watcher = threading.Thread(target=robot.watch, daemon=True)
             watcher.start()
             yield robot

@@ -74,9 +74,7 @@ async def _run(config: HostConfig, folders: Folders, catalogue: Catalogue) -> No
         system_tree=load_system_tree(config.host.system_tree),
     )
     bus.subscribe(_Listener(catalogue, mind, workers).on_event)
-    verbs = Verbs(
-        catalogue, mind, workers, Store(folders.store), bus.emit, tuple(_warnings(config))
-    )
+    verbs = Verbs(catalogue, mind, workers, Store(folders.store), bus, tuple(_warnings(config)))
     control = ControlServer(config.host.control, verbs.answering(), verbs.following())
     await control.open()
     log.info("host %s listens at %s", config.host.name, config.host.control)

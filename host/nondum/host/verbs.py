@@ -6,12 +6,15 @@ import asyncio
 import socket
 from collections.abc import AsyncIterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import JournalEntry, MountPose, PayloadRecord, Snapshot
 from nondum.host.control.server import Follow, Verb
-from nondum.host.events import Emit, MountSet
+from nondum.host.events import MountSet
+from nondum.host.lifecycle import installed
+from nondum.host.lifecycle.bus import Bus
 from nondum.host.mind.frames import implausible
 from nondum.host.mind.mind import Mind
 from nondum.host.workers.workers import Workers
@@ -34,7 +37,7 @@ class Verbs:
     mind: Mind
     workers: Workers
     store: Store
-    emit: Emit
+    bus: Bus
     warnings: tuple[str, ...]
     """What every status says of this host."""
 
@@ -47,6 +50,7 @@ class Verbs:
             "goal": self.goal,
             "goals": self.goals,
             "halt": self.halt,
+            "install": self.install,
             "journal": self.journal,
             "logs": self.logs,
             "mount": self.mount,
@@ -56,6 +60,7 @@ class Verbs:
             "streams": self.streams,
             "tap": self.tap,
             "tree": self.tree,
+            "uninstall": self.uninstall,
             "units": self.units,
             "why": self.why,
         }
@@ -194,6 +199,17 @@ class Verbs:
             self.workers.halt_all()
         return {"halted": list(halted)}
 
+    async def install(self, arguments: Arguments) -> Row:
+        """Install a payload folder for good. Raises `PayloadRefused`."""
+        folder = Path(str(arguments.get("folder")))
+        return _payload(await installed.install(folder, self.catalogue, self.bus))
+
+    async def uninstall(self, arguments: Arguments) -> Row:
+        """Remove an installed payload. Raises `PayloadRefused` (NOT_INSTALLED)."""
+        payload_id = str(arguments.get("payload"))
+        await installed.uninstall(payload_id, self.catalogue, self.bus)
+        return {"payload": payload_id}
+
     async def mount(self, arguments: Arguments) -> Row:
         """Tell where a unit is mounted. Raises `ConfigRefused` (UNIT_UNKNOWN)."""
         unit = str(arguments.get("unit"))
@@ -203,7 +219,7 @@ class Verbs:
             text = f"there is no unit {unit!r}"
             raise ConfigRefused(Problem("UNIT_UNKNOWN", text, where="mount", fix=fix))
         pose = MountPose(unit, _triple(arguments, "xyz"), _triple(arguments, "rpy"), "person")
-        self.emit(MountSet(pose.unit, pose.xyz, pose.rpy))
+        self.bus.emit(MountSet(pose.unit, pose.xyz, pose.rpy))
         row = {"unit": unit, "xyz": list(pose.xyz), "rpy": list(pose.rpy)}
         return {**row, "warnings": list(implausible(pose))}
 

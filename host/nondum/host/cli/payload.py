@@ -9,12 +9,12 @@ from typing import Any
 
 import click
 
-from nondum.host import config as host_config
 from nondum.host.cli import render
-from nondum.host.cli.connection import json_option
+from nondum.host.cli.connection import connect, json_option
 from nondum.host.cli.failure import EXIT_PROBLEMS
 from nondum.sdk.errors import PayloadRefused, Problem
 
+INSTALL_TIMEOUT_S = 600.0
 FOLDER = click.Path(path_type=Path, exists=True, file_okay=False)
 
 
@@ -177,31 +177,37 @@ def check(drive: Path, anywhere: bool, as_json: bool) -> int:
 
 @payload.command()
 @click.argument("drive", type=FOLDER)
-@click.option(
-    "--config",
-    "config_file",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="The host's configuration [default: this user's host].",
-)
 @json_option
-def install(drive: Path, config_file: Path | None, as_json: bool) -> None:
-    """Install a drive's payloads for good, as initial components of a host.
-
-    The host takes them in when it starts, or at once when it runs.
+@click.pass_context
+def install(ctx: click.Context, drive: Path, as_json: bool) -> None:
+    """Install a drive's payloads for good, as initial components of the running host.
 
     Example: nondum payload install /media/usb
     """
-    from nondum.host.lifecycle import installed
-    from nondum.host.lifecycle.folders import Folders
-
-    defaults = host_config.user_config()
-    chosen = host_config.load(config_file, defaults) if config_file else defaults
-    done = [installed.install(folder, Folders(chosen.host.state)) for folder in _payloads(drive)]
+    with connect(ctx.obj, timeout_s=INSTALL_TIMEOUT_S) as client:
+        done = [client.ask("install", folder=str(f.resolve())) for f in _payloads(drive)]
     if as_json:
-        render.as_json({"installed": [folder.name for folder in done]})
+        render.as_json({"installed": done})
     else:
-        for folder in done:
-            click.echo(f"installed {folder.name}")
+        for row in done:
+            click.echo(f"installed {row['payload']} {row['version']}")
+
+
+@payload.command()
+@click.argument("payload_id")
+@json_option
+@click.pass_context
+def uninstall(ctx: click.Context, payload_id: str, as_json: bool) -> None:
+    """Remove an installed payload from the running host.
+
+    Example: nondum payload uninstall org.example.window-opener
+    """
+    with connect(ctx.obj) as client:
+        done = client.ask("uninstall", payload=payload_id)
+    if as_json:
+        render.as_json(done)
+    else:
+        click.echo(f"uninstalled {payload_id}")
 
 
 class _Progress:
