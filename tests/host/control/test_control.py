@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
 import stat
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,14 @@ from hypothesis import strategies as st
 from nondum.host.control import protocol
 from nondum.host.control.client import ControlClient
 from nondum.host.control.server import ControlServer
-from nondum.sdk.errors import GoalRefused, HostUnreachable, NondumError, Problem, ProtocolViolation
+from nondum.sdk.errors import (
+    ConfigRefused,
+    GoalRefused,
+    HostUnreachable,
+    NondumError,
+    Problem,
+    ProtocolViolation,
+)
 
 pytestmark = pytest.mark.anyio
 
@@ -40,17 +48,36 @@ async def crash(arguments: Mapping[str, Any]) -> Any:
     raise RuntimeError("a fault of the daemon")
 
 
+async def never(arguments: Mapping[str, Any]) -> AsyncIterator[Any]:
+    try:
+        yield "begun"
+        await asyncio.Event().wait()
+    finally:
+        arguments["ended"]()
+
+
+async def stumble(arguments: Mapping[str, Any]) -> AsyncIterator[Any]:
+    yield "begun"
+    raise GoalRefused(Problem("GOAL_UNKNOWN", "there is no such goal"))
+
+
 async def count(arguments: Mapping[str, Any]) -> AsyncIterator[Any]:
     for i in range(arguments["to"]):
         yield i
 
 
 @asynccontextmanager
-async def serving(path: Path) -> AsyncIterator[None]:
-    server = ControlServer(path, {"echo": echo, "refuse": refuse, "crash": crash}, {"count": count})
+async def serving(
+    path: Path, on_end: Callable[[], None] = lambda: None
+) -> AsyncIterator[ControlServer]:
+    server = ControlServer(
+        path,
+        {"echo": echo, "refuse": refuse, "crash": crash},
+        {"count": count, "stumble": stumble, "never": lambda _: never({"ended": on_end})},
+    )
     await server.open()
     try:
-        yield
+        yield server
     finally:
         await server.close()
 
@@ -97,6 +124,101 @@ async def test_following_yields_until_the_end(tmp_path: Path) -> None:
         assert await asyncio.to_thread(collect) == [0, 1, 2]
 
 
+async def test_following_ends_when_the_client_leaves(tmp_path: Path) -> None:
+    ended = asyncio.Event()
+
+    def glance() -> Any:
+        with ControlClient(tmp_path / "control.sock") as client:
+            return next(client.follow("never"))
+
+    async with serving(tmp_path / "control.sock", ended.set):
+        assert await asyncio.to_thread(glance) == "begun"
+        async with asyncio.timeout(10):
+            await ended.wait()
+
+
+async def test_the_next_question_ends_following(tmp_path: Path) -> None:
+    def talk() -> list[Any]:
+        with ControlClient(tmp_path / "control.sock") as client:
+            return [next(client.follow("never")), client.ask("echo", words="enough")]
+
+    async with serving(tmp_path / "control.sock"):
+        assert await asyncio.to_thread(talk) == ["begun", {"words": "enough"}]
+
+
+async def test_a_refusal_ends_following_and_the_next_question_is_answered(tmp_path: Path) -> None:
+    def talk() -> Any:
+        with ControlClient(tmp_path / "control.sock") as client:
+            with pytest.raises(GoalRefused, match="GOAL_UNKNOWN"):
+                list(client.follow("stumble"))
+            return client.ask("echo")
+
+    async with serving(tmp_path / "control.sock"):
+        assert await asyncio.to_thread(talk) == {}
+
+
+async def test_a_daemon_that_goes_is_told_to_followers(tmp_path: Path) -> None:
+    begun = asyncio.Event()
+    loop = asyncio.get_running_loop()
+
+    def follow() -> None:
+        with ControlClient(tmp_path / "control.sock") as client:
+            for _ in client.follow("never"):
+                loop.call_soon_threadsafe(begun.set)
+
+    async with serving(tmp_path / "control.sock") as server:
+        following = asyncio.create_task(asyncio.to_thread(follow))
+        await begun.wait()
+        await server.close()
+        with pytest.raises(HostUnreachable, match="hung up"):
+            await following
+
+
+async def test_a_client_that_never_reads_harms_nobody(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as deaf:
+        async with serving(tmp_path / "control.sock"):
+            deaf.connect(str(tmp_path / "control.sock"))
+            flood = protocol.Request("count", {"to": 10_000_000})
+            deaf.sendall(protocol.encode_request(flood))
+            answer = await asyncio.to_thread(ask, tmp_path / "control.sock", "echo", still="here")
+    assert answer == {"still": "here"}
+
+
+async def test_an_endless_line_is_refused(tmp_path: Path) -> None:
+    def talk() -> bytes:
+        with socket.socket(socket.AF_UNIX) as raw:
+            raw.connect(str(tmp_path / "control.sock"))
+            with contextlib.suppress(OSError):  # it may hang up while we are still talking
+                for _ in range(2 * protocol.LINE_LIMIT // 2**20 + 2):
+                    raw.sendall(b"x" * 2**20)
+            return raw.makefile("rb").readline()
+
+    async with serving(tmp_path / "control.sock"):
+        assert b"CONTROL_REQUEST" in await asyncio.to_thread(talk)
+        assert await asyncio.to_thread(ask, tmp_path / "control.sock", "echo") == {}
+
+
+async def test_the_socket_of_a_dead_daemon_is_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "control.sock"
+    with socket.socket(socket.AF_UNIX) as dead:
+        dead.bind(str(path))
+    async with serving(path):
+        assert await asyncio.to_thread(ask, path, "echo") == {}
+
+
+async def test_the_socket_of_a_living_daemon_is_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "control.sock"
+    async with serving(path):
+        with pytest.raises(ConfigRefused, match="CONTROL_IN_USE"):
+            await ControlServer(path, {}, {}).open()
+        assert await asyncio.to_thread(ask, path, "echo") == {}
+
+
+async def test_a_path_that_is_no_place_for_a_socket_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigRefused, match=r"CONTROL_SOCKET .*too long"):
+        await ControlServer(tmp_path / ("x" * 200), {}, {}).open()
+
+
 async def test_garbage_is_refused_and_the_next_line_answered(tmp_path: Path) -> None:
     def talk() -> list[bytes]:
         with socket.socket(socket.AF_UNIX) as raw:
@@ -133,3 +255,13 @@ def test_any_bytes_are_a_request_or_a_violation(line: bytes) -> None:
         protocol.decode_request(line)
     except ProtocolViolation as error:
         assert error.code == "CONTROL_REQUEST"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [b"", b"hello\n", b"[]\n", b'{"problems":[{"no":"code"}]}\n', b'{"problems":[1]}\n'],
+    ids=["nothing", "words", "list", "problem without code", "number"],
+)
+def test_answers_that_are_none_are_violations(line: bytes) -> None:
+    with pytest.raises(ProtocolViolation, match="CONTROL_ANSWER"):
+        protocol.decode_answer(line)

@@ -28,18 +28,20 @@ class ControlClient:
         self._lines = self._socket.makefile("rb")
 
     def ask(self, verb: str, **arguments: Any) -> Any:
-        """Send one request and return its result. Raises `NondumError` with what the host says."""
+        """Send one request and return its result.
+
+        Raises `NondumError` with what the host says, `HostUnreachable` when it goes away or does
+        not answer in time.
+        """
         self._send(verb, arguments)
         return self._receive()
 
     def follow(self, verb: str, **arguments: Any) -> Iterator[Any]:
-        """Send one request and yield results until the daemon or the caller leaves."""
+        """Send one request and yield results until the caller has enough: it then hangs up, or
+        asks something else. Raises `HostUnreachable` when the daemon goes away meanwhile."""
         self._send(verb, arguments)
         while True:
-            try:
-                yield self._receive()
-            except HostUnreachable:
-                return
+            yield self._receive()
 
     def close(self) -> None:
         """Hang up."""
@@ -68,7 +70,7 @@ class ControlClient:
             line = self._lines.readline()
         except OSError as error:
             raise _unreachable(self._path, error) from error
-        if not line:
+        if not line.endswith(b"\n"):  # nothing, or what was left of an answer
             raise _unreachable(self._path, ConnectionResetError("the daemon hung up"))
         result, problems = protocol.decode_answer(line)
         if problems:

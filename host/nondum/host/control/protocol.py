@@ -2,7 +2,7 @@
 
 A request is `{"verb": …, "arguments": {…}}`; each answer line is `{"result": …}` or
 `{"problems": [{code, message, …}]}`. A verb that follows (`watch`) sends result lines until the
-asking side closes.
+asking side closes, or sends its next line, which is answered then.
 """
 
 from __future__ import annotations
@@ -56,9 +56,22 @@ def encode_problems(problems: Sequence[Problem]) -> bytes:
 
 
 def decode_answer(line: bytes) -> tuple[Any, tuple[Problem, ...]]:
-    """The result of an answer line, and its problems: one of them is empty."""
-    data = json.loads(line)
-    return data.get("result"), tuple(Problem(**p) for p in data.get("problems", ()))
+    """The result of an answer line, and its problems: one of them is empty.
+
+    Raises `ProtocolViolation` (CONTROL_ANSWER) for anything else.
+
+    >>> decode_answer(b'{"result":{"halted":[]}}')
+    ({'halted': []}, ())
+    """
+    try:
+        data = json.loads(line)
+        problems = tuple(Problem(**problem) for problem in data.get("problems", ()))
+    except (ValueError, RecursionError, TypeError, AttributeError) as error:
+        text = f"the answer is not one of a nondum daemon ({error})"
+        fix = "is command and daemon of one version?"
+        problem = Problem("CONTROL_ANSWER", text, where="control socket", fix=fix)
+        raise ProtocolViolation(problem) from error
+    return data.get("result"), problems
 
 
 def _line(data: Mapping[str, Any]) -> bytes:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.control import protocol
-from nondum.sdk.errors import NondumError, Problem, ProtocolViolation
+from nondum.sdk.errors import ConfigRefused, NondumError, Problem, ProtocolViolation
 
 Verb = Callable[[Mapping[str, Any]], Awaitable[Any]]
 """Answers once."""
@@ -34,14 +34,18 @@ class ControlServer:
         self._clients: set[asyncio.Task[None]] = set()
 
     async def open(self) -> None:
-        """Start to listen. A socket left by a daemon that died is replaced."""
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        with contextlib.suppress(FileNotFoundError):
-            self._path.unlink()
-        self._server = await asyncio.start_unix_server(
-            self._serve, path=self._path, limit=protocol.LINE_LIMIT
-        )
-        self._path.chmod(0o660)
+        """Start to listen. A socket left by a daemon that died is replaced.
+
+        Raises `ConfigRefused` (CONTROL_IN_USE, CONTROL_SOCKET) where that cannot be.
+        """
+        try:
+            await self._replace_dead_socket()
+            self._server = await asyncio.start_unix_server(
+                self._serve, path=self._path, limit=protocol.LINE_LIMIT
+            )
+            self._path.chmod(0o660)
+        except OSError as error:
+            raise _refused("CONTROL_SOCKET", self._path, f"cannot listen ({error})") from error
 
     async def close(self) -> None:
         """Stop listening and let every client go."""
@@ -53,27 +57,43 @@ class ControlServer:
         with contextlib.suppress(FileNotFoundError):
             self._path.unlink()
 
+    async def _replace_dead_socket(self) -> None:
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            _, writer = await asyncio.open_unix_connection(self._path)
+        except FileNotFoundError:
+            return
+        except ConnectionRefusedError:
+            self._path.unlink()
+            return
+        writer.close()
+        raise _refused("CONTROL_IN_USE", self._path, "another daemon listens there")
+
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
         assert task is not None  # asyncio runs each connection in a task
         self._clients.add(task)
         try:
-            while line := await reader.readline():
-                await self._answer(line, writer)
-        except (ConnectionError, ValueError, asyncio.CancelledError):
-            pass  # the client left, or sent a line past the limit: nothing to tell it
+            line = await reader.readline()
+            while line:
+                line = await self._answer(line, reader, writer)
+        except ValueError:  # how a StreamReader tells of a line past its limit
+            writer.write(protocol.encode_problems((_TOO_LONG,)))
+        except (ConnectionError, asyncio.CancelledError):
+            pass  # the client has left, or the daemon is going
         finally:
             self._clients.discard(task)
             writer.close()
 
-    async def _answer(self, line: bytes, writer: asyncio.StreamWriter) -> None:
+    async def _answer(
+        self, line: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> bytes:
+        """Answer one line; gives the next, empty when the client has left."""
         try:
             request = protocol.decode_request(line)
             if request.verb in self._follows:
-                async for item in self._follows[request.verb](request.arguments):
-                    writer.write(protocol.encode_result(item))
-                    await writer.drain()
-                return
+                items = self._follows[request.verb](request.arguments)
+                return await _follow(items, reader, writer)
             answer = protocol.encode_result(await self._verb(request.verb)(request.arguments))
         except NondumError as error:
             answer = protocol.encode_problems(error.problems)
@@ -86,6 +106,7 @@ class ControlServer:
             answer = protocol.encode_problems((fault,))
         writer.write(answer)
         await writer.drain()
+        return await reader.readline()
 
     def _verb(self, name: str) -> Verb:
         if name in self._verbs:
@@ -95,3 +116,38 @@ class ControlServer:
         raise ProtocolViolation(
             Problem("CONTROL_VERB", f"unknown verb {name!r}", where="control socket", fix=fix)
         )
+
+
+async def _follow(
+    items: AsyncIterator[Any], reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+) -> bytes:
+    """Send items until there are no more or the client sends a line, which is given back."""
+    leaving = asyncio.create_task(reader.readline())
+    sending = asyncio.create_task(_send_all(items, writer))
+    try:
+        await asyncio.wait({leaving, sending}, return_when=asyncio.FIRST_COMPLETED)
+        if sending.done():
+            sending.result()  # raises what went wrong
+        return await leaving
+    finally:
+        for task in (leaving, sending):
+            task.cancel()
+        await asyncio.gather(leaving, sending, return_exceptions=True)
+
+
+async def _send_all(items: AsyncIterator[Any], writer: asyncio.StreamWriter) -> None:
+    async for item in items:
+        writer.write(protocol.encode_result(item))
+        await writer.drain()
+
+
+_TOO_LONG = Problem(
+    "CONTROL_REQUEST",
+    f"the line is longer than {protocol.LINE_LIMIT} bytes",
+    where="control socket",
+)
+
+
+def _refused(code: str, path: Path, message: str) -> ConfigRefused:
+    fix = "name another with `control` under [host]"
+    return ConfigRefused(Problem(code, message, where=str(path), fix=fix))
