@@ -1,0 +1,1 @@
+"""A simulated mobile base: a unicycle with limits, for robots without wheels."""

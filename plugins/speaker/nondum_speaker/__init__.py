@@ -1,0 +1,1 @@
+"""Says things: aloud where it can, in print where it cannot."""

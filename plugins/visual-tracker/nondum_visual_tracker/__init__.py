@@ -1,0 +1,1 @@
+"""Follow one person: detections in, velocities out."""
