@@ -12,8 +12,7 @@ from tests.host.lifecycle.living import LAMP, Living, left_over, living
 from tests.payloads import Part, make_payload
 
 from nondum.host.catalogue.records import ComponentState, Step
-from nondum.host.events import MountSet, Recomposed
-from nondum.host.lifecycle import views
+from nondum.host.events import MountSet
 from nondum.host.lifecycle.installation import InstallOptions
 from nondum.host.lifecycle.installed import install, uninstall
 from nondum.sdk.errors import PayloadRefused
@@ -188,28 +187,29 @@ async def test_worker_that_dies_is_started_again(tmp_path: Path) -> None:
         await host.until(lambda: _state(host) is ComponentState.READY)
 
 
-async def test_views_tell_what_is_there(tmp_path: Path) -> None:
+async def test_journal_tells_the_way_of_a_payload(tmp_path: Path) -> None:
+    lamp(tmp_path / "drive")
+    async with living(tmp_path) as host:
+        host.plug(tmp_path / "drive")
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+        told = await host.catalogue.journal(subject=LAMP_ID)
+        assert [entry.step for entry in told if entry.step] == [
+            *("received", "copied", "verified", "staged", "stored", "probed", "active"),
+        ]
+
+
+async def test_mounts_come_with_the_payload_and_a_person_overrules_them(tmp_path: Path) -> None:
+    unit = "spot__lamp__lamp"
     lamp(tmp_path / "drive", manifest='[[component.unit]]\nname = "lamp"\nxyz = [0, 0, 1]\n')
     async with living(tmp_path) as host:
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
-        (payload,) = views.payloads(host.snapshot)
-        assert payload["state"] == "active"
-        assert payload["drive"] == "a"
-        assert 0 < payload["phases"]["ready"]["after_s"] < 30
-        (component,) = views.components(host.snapshot)
-        assert component["units"] == ["spot__lamp__lamp"]
-        pose = host.snapshot.mount("spot__lamp__lamp")
-        assert pose is not None
-        assert pose.xyz == (0.0, 0.0, 1.0)
-        host.bus.emit(MountSet("spot__lamp__lamp", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-        before = host.snapshot.revision
-        await host.until(lambda: host.snapshot.revision > before)
-        assert any(isinstance(event, Recomposed) for event in host.heard)
-        told = views.journal(await host.catalogue.journal(subject=LAMP_ID))
-        assert [row["step"] for row in told if row["step"]] == [
-            *("received", "copied", "verified", "staged", "stored", "probed", "active"),
-        ]
+        assert _height(host, unit) == 1.0
+        host.bus.emit(MountSet(unit, (0.0, 0.0, 2.0), (0.0, 0.0, 0.0)))
+        await host.until(lambda: _height(host, unit) == 2.0)
+        host.pull()
+        await host.until_gone(LAMP_ID)
+        assert _height(host, unit) == 2.0
 
 
 def is_running(pid: int) -> bool:
@@ -224,3 +224,8 @@ def _drives(host: Living) -> tuple[str, ...]:
 def _state(host: Living) -> ComponentState | None:
     component = host.snapshot.component("lamp")
     return component.state if component else None
+
+
+def _height(host: Living, unit: str) -> float | None:
+    pose = host.snapshot.mount(unit)
+    return pose.xyz[2] if pose else None

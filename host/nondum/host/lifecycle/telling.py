@@ -24,7 +24,9 @@ def entries_of(
     found = {e.payload: e.payload_id for e, _ in told if isinstance(e, PayloadFound)}
     for event, at in told:
         detail = event.to_dict()
-        problems = getattr(event, "problems", ())
+        # What is wrong with a payload as it is found is told by the refusal that follows.
+        is_found = isinstance(event, PayloadFound)
+        problems = () if is_found else getattr(event, "problems", ())
         detail.pop("problems", None)
         detail.pop("description", None)
         yield JournalEntry(
