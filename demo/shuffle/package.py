@@ -14,11 +14,7 @@ from pathlib import Path
 from typing import Any
 
 ENTRY_POINT_GROUP = "nondum.plugins"
-_CHILD = """
-import json, sys
-from nondum.sdk.plugin import describe, load
-json.dump(describe(load(sys.argv[1], sys.argv[2])).to_dict(), sys.stdout)
-"""
+DESCRIBE = Path(__file__).with_name("describe.py")
 
 Table = dict[str, Any]
 
@@ -70,7 +66,7 @@ class Package:
         `beside` are the folders of packages that it may import.
         """
         paths = os.pathsep.join(map(str, [self.folder, *beside]))
-        command = [sys.executable, "-B", "-c", _CHILD]
+        command = [sys.executable, "-B", "-P", str(DESCRIBE)]
         return [
             json.loads(
                 subprocess.run(

@@ -62,9 +62,13 @@ PROBLEM = """\
 """
 PLUGIN = '''\
 """Night: finds stars."""
+import nowhere_installed.optics as optics
+from nowhere_installed import Lens
 from nondum.sdk import (DeviceNeed, Fragment, Input, Label, Output, Phrase, Unit, behaviour,
                         condition, hookimpl)
 from sky_tables.reading import slot
+
+WIDE: list[Lens] = [optics.WIDE * 2]
 
 class Night:
     """Finds stars."""
