@@ -157,7 +157,8 @@ def _followed(heard: Heard, reference: Reference, stage: Stage) -> float:
     best, deadline = 0.0, time.monotonic() + FOLLOW_S
     pause = threading.Event()
     while time.monotonic() < deadline:
-        share = score_following(tuple(heard.headings), tuple(heard.frames), reference)
+        headings, frames = tuple(heard.headings), tuple(heard.frames)
+        share = score_following(headings, frames, reference) if headings and frames else 0.0
         best = max(best, share)
         if share >= WANTED_FRACTION:
             stage.phase("goal")
