@@ -9,7 +9,6 @@ import os
 import shutil
 import tempfile
 import time
-import tomllib
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -19,6 +18,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from importlib_metadata import distributions
+from packaging.utils import parse_wheel_filename
 
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem, problems_of
@@ -28,6 +28,8 @@ from nondum.wheelhouse.manifest import Manifest
 from nondum.wheelhouse.resolve import Sources
 from nondum.wheelhouse.target import Target
 
+MINIMUM_NONDUM = "0.1"
+"""The oldest nondum that reads what is written here."""
 ENTRY_POINT_GROUP = "nondum.plugins"
 PROCESSES = 4
 """pips at once: they wait for the index most of the time."""
@@ -55,7 +57,7 @@ def build(package: Path, drive: Path, options: Options, progress: Progress) -> P
     `progress` gets what is being done, and steps done of all. Raises `PayloadRefused`,
     `InstallFailed`; nothing is left on the drive then.
     """
-    said, version, minimum = _source(package)
+    said = _source(package)
     with tempfile.TemporaryDirectory(prefix="nondum-build-") as temporary:
         work = Path(temporary)
         steps = 4 + len(options.targets)
@@ -71,37 +73,33 @@ def build(package: Path, drive: Path, options: Options, progress: Progress) -> P
         folder = work / said.id
         _write(folder, package, said, locked, described)
         _judge(folder / "wheels")
-        _seal(folder, said, version, minimum, options)
+        _seal(folder, said.id, _version(own), options)
         progress("copying it to the drive", steps - 1, steps)
         target = _delivered(folder, drive)
         progress("done", steps, steps)
         return target
 
 
-def _source(package: Path) -> tuple[Manifest, str, str]:
-    """Manifest, version and least nondum of a source folder."""
-    try:
-        text = (package / manifest.NAME).read_text(encoding="utf-8")
-        project = tomllib.loads((package / "pyproject.toml").read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
+def _source(package: Path) -> Manifest:
+    """The manifest of a source folder."""
+    missing = [n for n in (manifest.NAME, "pyproject.toml") if not (package / n).is_file()]
+    if missing:
         raise PayloadRefused(
             Problem(
                 "SOURCE_INCOMPLETE",
-                f"there is no file {Path(str(error.filename)).name}",
+                f"there is no file {' nor '.join(missing)}",
                 where=str(package),
                 fix="`nondum payload new` makes a complete source folder",
             )
+        )
+    try:
+        text = (package / manifest.NAME).read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        place = str(package / manifest.NAME)
+        raise PayloadRefused(
+            Problem("NOT_UTF8", f"byte {error.start} is not UTF-8", where=place)
         ) from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        problem = Problem("SOURCE_INCOMPLETE", f"pyproject.toml: {error}", where=str(package))
-        raise PayloadRefused(problem) from error
-    said = manifest.parse(text, str(package / manifest.NAME))
-    version = str(project.get("project", {}).get("version", ""))
-    if not version:
-        text = "pyproject.toml has no [project] version"
-        raise PayloadRefused(Problem("SOURCE_INCOMPLETE", text, where=str(package)))
-    minimum = str(project.get("tool", {}).get("nondum", {}).get("minimum", "0.1"))
-    return said, version, minimum
+    return manifest.parse(text, str(package / manifest.NAME))
 
 
 def _made(packages: Sequence[Path], work: Path, sources: Sources) -> list[Path]:
@@ -212,6 +210,10 @@ def _write(
     (folder / index.NAME).write_bytes(index.to_bytes(described))
 
 
+def _version(own: Path) -> str:
+    return str(parse_wheel_filename(own.name)[1])
+
+
 def _judge(wheels: Path) -> None:
     """Refuse wheels that every host would refuse."""
     problems: list[Problem] = []
@@ -221,18 +223,18 @@ def _judge(wheels: Path) -> None:
     wheel.refuse_if_any(tuple(problems))
 
 
-def _seal(folder: Path, said: Manifest, version: str, minimum: str, options: Options) -> None:
+def _seal(folder: Path, payload_id: str, version: str, options: Options) -> None:
     """Write the contents list of what the folder holds."""
     now = int(os.environ.get("SOURCE_DATE_EPOCH", time.time()))
     paths = sorted(
         (path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()),
     )
     listed = Contents(
-        payload_id=said.id,
+        payload_id=payload_id,
         version=version,
         release=now if options.release is None else options.release,
         fleet=options.fleet,
-        minimum_nondum=minimum,
+        minimum_nondum=MINIMUM_NONDUM,
         built=time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(now)),
         entries=tuple(
             Entry(locking.sha256(folder / p), (folder / p).stat().st_size, p) for p in paths

@@ -13,8 +13,11 @@ from nondum.sdk.errors import PayloadRefused, Problem, WorkerFailed
 TIMEOUT_S = 60
 
 # Like a worker: no site, no environment; `.pth` files are not read, since `site` is not loaded.
+# What a plugin prints goes to standard error: standard output is the answer's alone.
 _CHILD = """
-import json, sys
+import json, os, sys
+answer = os.fdopen(os.dup(1), "w")
+os.dup2(2, 1)
 sys.path.append(sys.argv[1])
 from nondum.sdk.errors import NondumError
 from nondum.sdk.plugin import describe, load
@@ -22,7 +25,8 @@ try:
     said = {"description": describe(load(sys.argv[2], sys.argv[3])).to_dict()}
 except NondumError as error:
     said = {"problems": [problem.to_dict() for problem in error.problems]}
-sys.stdout.write("\\n" + json.dumps(said))
+json.dump(said, answer)
+answer.flush()
 """
 
 
@@ -47,7 +51,7 @@ def describe(site_packages: Path, entry_point: str, distribution: str) -> Plugin
         text = f"the plugin did not describe itself in {TIMEOUT_S} s"
         raise PayloadRefused(Problem("DESCRIBE_HANGS", text, where=distribution)) from error
     try:
-        said = json.loads(done.stdout.rpartition("\n")[2])
+        said = json.loads(done.stdout)
     except ValueError as error:
         last = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
         text = f"the plugin ended while it described itself: {last}"
