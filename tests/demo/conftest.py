@@ -6,4 +6,13 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-sys.path += [str(ROOT / "plugins" / name) for name in ("compton-camera", "pan-tilt-unit")]
+PLUGINS = (
+    "compton-camera",
+    "mobile-base",
+    "pan-tilt-unit",
+    "panorama",
+    "people-detector",
+    "thermal-camera",
+    "visual-tracker",
+)
+sys.path += [str(ROOT / "plugins" / name) for name in PLUGINS]

@@ -36,7 +36,7 @@ class HogDetector:
         self._enlarge = enlarge
         self._overlap = overlap
         self._hog: Any = cv2.HOGDescriptor()
-        self._hog.setSVMDetector(cv2.HOGDescriptor.getDefaultPeopleDetector())
+        self._hog.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector()))
 
     def find(self, image: npt.NDArray[np.uint8]) -> tuple[Found, ...]:
         """People in a grey or blue-green-red image, best first, boxes trimmed to the body."""

@@ -1,0 +1,43 @@
+"""Following, closed loop, on real images: who follows passes the check, who does not fails it."""
+
+from __future__ import annotations
+
+import pytest
+from demo.following import WANTED_FRACTION, Reference, score_following
+from tests.demo.robot_in_simulated_time import CLIP, Obedience, Robot
+
+SECONDS = 21.0
+"""Three of standing still, and more than one whole walk to and fro."""
+
+
+@pytest.fixture(scope="module")
+def reference() -> Reference:
+    return Reference.read(CLIP.video.with_suffix(".toml"))
+
+
+def score(robot: Robot, reference: Reference) -> float:
+    robot.run(SECONDS)
+    return score_following(robot.headings, robot.frames, reference)
+
+
+@pytest.mark.parametrize("kind", ["colour", "thermal"])
+@pytest.mark.parametrize("latency_s", [0.1, 0.25, 0.4])
+def test_follower_passes(kind: str, latency_s: float, reference: Reference) -> None:
+    assert score(Robot(kind, latency_s), reference) >= WANTED_FRACTION
+
+
+def test_follower_passes_without_odometry(reference: Reference) -> None:
+    assert score(Robot(has_odometry=False), reference) >= WANTED_FRACTION
+
+
+def test_follower_passes_when_it_begins_late(reference: Reference) -> None:
+    assert score(Robot(begins_s=3.0), reference) >= WANTED_FRACTION
+
+
+@pytest.mark.parametrize(
+    "obedience",
+    [lambda turn: 0.0, lambda turn: -turn, lambda turn: 0.4],
+    ids=["frozen", "inverted", "spinning"],
+)
+def test_body_that_does_not_follow_fails(obedience: Obedience, reference: Reference) -> None:
+    assert score(Robot(obedience=obedience), reference) < WANTED_FRACTION
