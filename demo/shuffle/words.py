@@ -8,6 +8,7 @@ from random import Random
 
 _CONSONANTS = "bdfghjklmnprstvwz"
 _VOWELS = "aeiou"
+_SYLLABLES = 4  # of three, some are words: rename, module
 
 
 class Words:
@@ -18,11 +19,11 @@ class Words:
         self._taken = {*taken, *keyword.kwlist, *keyword.softkwlist}
 
     def word(self) -> str:
-        """Three to four syllables of small letters, never given before."""
+        """Four syllables of small letters, never given before."""
         while True:
-            count = self.random.choice((3, 4))
             made = "".join(
-                self.random.choice(_CONSONANTS) + self.random.choice(_VOWELS) for _ in range(count)
+                self.random.choice(_CONSONANTS) + self.random.choice(_VOWELS)
+                for _ in range(_SYLLABLES)
             )
             if made not in self._taken:
                 self._taken.add(made)
