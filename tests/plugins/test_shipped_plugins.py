@@ -1,0 +1,91 @@
+"""The shipped plugins plan together with nondum-core alone, and know nothing of each other."""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from tests.planning.strangers import ROVER, components, planner, task
+
+from nondum.planning.goal import goal_text
+from nondum.planning.merge import merge
+from nondum.planning.phrases import phrasebook
+from nondum.sdk.description import PluginDescription
+from nondum.sdk.planner import Plan
+from nondum.sdk.plugin import describe, load
+from nondum.wheelhouse import manifest
+
+PLUGINS = Path(__file__).parents[2] / "plugins"
+FOLDERS = sorted(path.parent for path in PLUGINS.glob("*/payload.toml"))
+SOURCES = (".py", ".pddl", ".toml")
+
+
+def entry_point(folder: Path) -> str:
+    project = tomllib.loads((folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    (target,) = project["entry-points"]["nondum.plugins"].values()
+    return str(target)
+
+
+@pytest.fixture(scope="module")
+def shipped() -> dict[str, PluginDescription]:
+    sys.path += [str(folder) for folder in (*FOLDERS, PLUGINS / "panorama")]
+    return {folder.name: describe(load(entry_point(folder), folder.name)) for folder in FOLDERS}
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_no_plugin_names_another(folder: Path) -> None:
+    others = {other.name for other in FOLDERS} - {folder.name}
+    spelt = others | {other.replace("-", "_") for other in others}
+    for path in folder.rglob("*"):
+        if path.suffix in SOURCES and "tests" not in path.parts:
+            text = path.read_text(encoding="utf-8")
+            assert not [name for name in spelt if name in text], path
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_manifest_says_what_the_plugin_says(
+    folder: Path, shipped: dict[str, PluginDescription]
+) -> None:
+    text = (folder / "payload.toml").read_text(encoding="utf-8")
+    (component,) = manifest.parse(text, "payload.toml").components
+    said = shipped[folder.name]
+    assert component.distribution == folder.name
+    assert component.devices == said.devices
+    assert {unit.name for unit in component.units} <= {unit.name for unit in said.units}
+
+
+@pytest.mark.parametrize(
+    ("names", "words", "schemas"),
+    [
+        (
+            ("recorded-camera", "people-detector", "visual-tracker", "mobile-base"),
+            "follow me through the facility",
+            ["stream", "detect", "track", "drive"],
+        ),
+        (
+            ("thermal-camera", "people-detector", "visual-tracker", "mobile-base"),
+            "follow people",
+            ["stream", "detect", "track", "drive"],
+        ),
+        (
+            ("recorded-camera", "people-detector", "visual-tracker", "speaker"),
+            "report people",
+            ["stream", "detect", "watch", "report"],
+        ),
+    ],
+    ids=["follow", "follow by warmth", "report"],
+)
+def test_words_become_the_plan_that_is_meant(
+    names: tuple[str, ...], words: str, schemas: list[str], shipped: dict[str, PluginDescription]
+) -> None:
+    contributions = components(shipped[name] for name in names)
+    merged = merge(contributions, ROVER)
+    assert not merged.quarantined
+    goal = phrasebook(contributions, merged).goal(words)
+    grounded = task(contributions, goal_text(goal.expr))
+    answer = planner().plan(grounded, 5.0)
+    assert isinstance(answer, Plan)
+    steps = [grounded.actions[step].name.split()[0] for step in answer.steps]
+    assert [step.partition(".")[2] for step in steps] == schemas
