@@ -10,9 +10,10 @@ import asyncio
 import logging
 import os
 import signal
-from collections.abc import Coroutine
+from collections.abc import Coroutine, Iterator
 from typing import Any
 
+from nondum.host import verbs
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.config import HostConfig
 from nondum.host.control.server import ControlServer
@@ -22,7 +23,7 @@ from nondum.host.devices.udev import UdevSource
 from nondum.host.drives.blocks import BlockSource
 from nondum.host.drives.slots import SlotSource
 from nondum.host.drives.source import DriveSource
-from nondum.host.events import Event, Recomposed
+from nondum.host.events import Event, HostStarted, Recomposed
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
@@ -32,11 +33,12 @@ from nondum.host.mind.frames import mounts_to_wire
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.system_tree import load_system_tree
-from nondum.host.verbs import Verbs
+from nondum.host.news import News
+from nondum.host.orders import Orders
+from nondum.host.questions import Questions
 from nondum.host.workers.spec import Limits
 from nondum.host.workers.workers import Workers
 from nondum.wheelhouse.signatures import UnsignedAllowed
-from nondum.wheelhouse.store import Store
 
 log = logging.getLogger(__name__)
 
@@ -74,8 +76,15 @@ async def _run(config: HostConfig, folders: Folders, catalogue: Catalogue) -> No
         system_tree=load_system_tree(config.host.system_tree),
     )
     bus.subscribe(_Listener(catalogue, mind, workers).on_event)
-    verbs = Verbs(catalogue, mind, workers, Store(folders.store), bus, tuple(_warnings(config)))
-    control = ControlServer(config.host.control, verbs.answering(), verbs.following())
+    news = News()
+    bus.subscribe(news.on_event)
+    listing = executor.installation.listing
+    warnings = tuple(_warnings(config, catalogue))
+    questions = Questions(catalogue, mind, workers, news, listing, warnings)
+    orders = Orders(catalogue, mind, workers, news, bus)
+    control = ControlServer(
+        config.host.control, verbs.answering(questions, orders), verbs.following(questions)
+    )
     await control.open()
     log.info("host %s listens at %s", config.host.name, config.host.control)
     try:
@@ -117,8 +126,8 @@ class _Listener:
         self._catalogue, self._mind, self._workers = catalogue, mind, workers
 
     def on_event(self, event: Event) -> None:
-        """A recomposition is a new snapshot; everything else is news."""
-        if isinstance(event, Recomposed):
+        """A start or a recomposition is a new snapshot; everything else is news."""
+        if isinstance(event, HostStarted | Recomposed):
             snapshot = self._catalogue.snapshot()
             self._workers.remount(mounts_to_wire(snapshot.host, snapshot.mounts))
             self._mind.see(snapshot)
@@ -140,8 +149,11 @@ def _install_options(config: HostConfig) -> InstallOptions:
     )
 
 
-def _warnings(config: HostConfig) -> list[str]:
-    return [UnsignedAllowed.warning] if config.drives.allow_unsigned else []
+def _warnings(config: HostConfig, catalogue: Catalogue) -> Iterator[str]:
+    if config.drives.allow_unsigned:
+        yield UnsignedAllowed.warning
+    if catalogue.set_aside is not None:
+        yield f"the catalogue was damaged and begun anew; the old one is {catalogue.set_aside}"
 
 
 async def _until_told(*parts: Coroutine[Any, Any, None]) -> None:

@@ -1,0 +1,150 @@
+"""What people's tools may have a running host do."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import cast
+
+from nondum.host.catalogue.catalogue import Catalogue
+from nondum.host.catalogue.records import MountPose, PayloadRecord, Snapshot, Step
+from nondum.host.control.arguments import Arguments, Triple
+from nondum.host.events import MountSet, RetryAsked
+from nondum.host.lifecycle import installed
+from nondum.host.lifecycle.bus import Bus
+from nondum.host.mind.frames import implausible
+from nondum.host.mind.mind import Mind
+from nondum.host.news import News
+from nondum.host.rows import Row, payload_row, unknown
+from nondum.host.workers.workers import Workers
+from nondum.planning.goal import GoalKind
+from nondum.sdk.errors import ConfigRefused, GoalRefused, InstallFailed, NondumError, Problem
+
+TAP_TIMEOUT_S = 5.0
+COMMIT_TIMEOUT_S = 5.0
+HIGHEST_PRIORITY = 1000
+
+_ZEROS: Triple = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Orders:
+    """Passes on to the parts of one host what people want done. Each method is a verb."""
+
+    catalogue: Catalogue
+    mind: Mind
+    workers: Workers
+    news: News
+    bus: Bus
+
+    async def goal(self, arguments: Arguments) -> Row:
+        """Give a goal, in `words` or in `pddl`. Raises `GoalRefused`."""
+        words, pddl = arguments.optional_text("words"), arguments.optional_text("pddl")
+        if (words is None) == (pddl is None):
+            raise GoalRefused(Problem("GOAL_AMISS", "a goal is given in words, or in PDDL"))
+        kind = cast(GoalKind | None, arguments.choice("kind", "achieve", "maintain"))
+        highest = HIGHEST_PRIORITY
+        priority = arguments.number("priority", 0, at_least=-highest, at_most=highest)
+        given = self.mind.give(words=words, pddl=pddl, kind=kind, priority=priority)
+        return given.to_dict()
+
+    async def halt(self, arguments: Arguments) -> Row:
+        """Halt a goal, or everything: the goals that were open, the behaviours that ran."""
+        now, id = arguments.flag("now"), arguments.optional_text("id")
+        open_goals = [goal.id for goal in self.mind.queue if not goal.state.is_final]
+        halted = self.mind.halt(id=id, now=now)
+        if now:
+            self.workers.halt_all()
+        goals = [goal for goal in open_goals if id in (None, goal)]
+        return {"goals": goals, "halted": list(halted)}
+
+    async def mount(self, arguments: Arguments) -> Row:
+        """Tell where a unit is mounted; what is not said stays as it was.
+
+        Raises `ConfigRefused` (UNIT_UNKNOWN).
+        """
+        unit = arguments.text("unit")
+        known = {row["unit"] for row in self.mind.views.units()}
+        if unit not in known:
+            raise ConfigRefused(unknown("unit", unit, known))
+        before = self.catalogue.snapshot().mount(unit)
+        pose = MountPose(
+            unit,
+            arguments.triple("xyz") or (before.xyz if before else _ZEROS),
+            arguments.triple("rpy") or (before.rpy if before else _ZEROS),
+            "person",
+        )
+        self.bus.emit(MountSet(pose.unit, pose.xyz, pose.rpy))
+        await self._until(lambda snapshot: snapshot.mount(unit) == pose)
+        row = {"unit": unit, "xyz": list(pose.xyz), "rpy": list(pose.rpy)}
+        return {**row, "warnings": list(implausible(pose))}
+
+    async def retry(self, arguments: Arguments) -> Row:
+        """Try again what was refused or quarantined: a payload, by id or component.
+
+        Raises `InstallFailed` (RETRY_UNKNOWN, RETRY_NOTHING).
+        """
+        name = arguments.text("name")
+        snapshot = self.catalogue.snapshot()
+        found = [p for p in snapshot.payloads if name in (p.payload_id, p.key, *p.components)]
+        if not found:
+            known = {p.payload_id for p in snapshot.payloads}
+            raise InstallFailed(unknown("payload", name, known))
+        troubled = [payload for payload in found if _is_troubled(payload, snapshot)]
+        if not troubled:
+            raise InstallFailed(Problem("RETRY_NOTHING", "nothing is wrong with it", where=name))
+        for payload in troubled:
+            self.bus.emit(RetryAsked(payload.key))
+        return {"payloads": [payload.payload_id for payload in troubled]}
+
+    async def tap(self, arguments: Arguments) -> Row:
+        """Connect a stream to the socket that the client listens on. Raises `NondumError`."""
+        name, address = arguments.text("stream"), arguments.text("address")
+        found = {s.stream: s for s in self.workers.streams.listing()}
+        if name not in found:
+            raise NondumError(unknown("stream", name, found))
+        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as connection:
+            connection.settimeout(TAP_TIMEOUT_S)
+            try:
+                await asyncio.to_thread(connection.connect, address)
+            except OSError as error:
+                problem = Problem("TAP_UNREACHABLE", str(error), where=address)
+                raise InstallFailed(problem) from error
+            await self.workers.streams.tap(name, connection)
+        return {"stream": name, "type": found[name].type}
+
+    async def install(self, arguments: Arguments) -> Row:
+        """Install a payload folder for good. Raises `PayloadRefused`."""
+        folder = Path(arguments.text("folder"))
+        return payload_row(await installed.install(folder, self.catalogue, self.bus), None)
+
+    async def uninstall(self, arguments: Arguments) -> Row:
+        """Remove an installed payload. Raises `PayloadRefused` (NOT_INSTALLED)."""
+        payload_id = arguments.text("payload")
+        await installed.uninstall(payload_id, self.catalogue, self.bus)
+        return {"payload": payload_id}
+
+    async def _until(self, holds: Callable[[Snapshot], bool]) -> None:
+        """Wait until what was asked for has been committed.
+
+        Raises `InstallFailed` (CATALOGUE_BUSY) after a few seconds.
+        """
+        version = self.news.version
+        try:
+            async with asyncio.timeout(COMMIT_TIMEOUT_S):
+                while not holds(self.catalogue.snapshot()):
+                    version = await self.news.changed(version)
+        except TimeoutError as error:
+            text = "it was not committed to the catalogue in time"
+            fix = "see the daemon's own log: is the disk full?"
+            raise InstallFailed(Problem("CATALOGUE_BUSY", text, fix=fix)) from error
+
+
+def _is_troubled(payload: PayloadRecord, snapshot: Snapshot) -> bool:
+    if payload.step is not Step.ACTIVE:
+        return payload.step in (Step.REFUSED, Step.QUARANTINED)
+    states = [c.state.value for c in snapshot.components if c.payload == payload.key]
+    return "quarantined" in states

@@ -1,0 +1,179 @@
+"""What people's tools may ask of a running host; nothing here changes it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from dataclasses import dataclass
+from typing import cast
+
+from nondum.host.catalogue.catalogue import Catalogue
+from nondum.host.control.arguments import Arguments
+from nondum.host.mind.mind import Mind
+from nondum.host.news import News
+from nondum.host.rows import (
+    Row,
+    claims_by_device,
+    component_row,
+    device_row,
+    drive_row,
+    host_state,
+    journal_row,
+    payload_row,
+    problems_of,
+    stream_row,
+    unknown,
+)
+from nondum.host.workers.workers import Workers
+from nondum.sdk.errors import GoalRefused, NondumError, Problem
+
+TOLD = 50
+"""How many of the last sentences told to people are shown."""
+MOST_JOURNAL_ROWS = 100_000
+
+Version = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Questions:
+    """Looks at the parts of one host. Each method is a verb."""
+
+    catalogue: Catalogue
+    mind: Mind
+    workers: Workers
+    news: News
+    stored: Callable[[], Awaitable[list[Row]]]
+    """Lists the store: `wheel`, `bytes`, `used_by` (payload keys), `sha256`."""
+    warnings: tuple[str, ...]
+    """What every status says of this host."""
+
+    async def status(self, arguments: Arguments) -> Row:
+        """The host, its payloads and its goals at a glance."""
+        snapshot = self.catalogue.snapshot()
+        return {
+            "host": snapshot.host,
+            "revision": snapshot.revision,
+            "state": host_state(snapshot),
+            "warnings": list(self.warnings),
+            "payloads": [payload_row(p, self.news.progress(p.key)) for p in snapshot.payloads],
+            "drives": [drive_row(drive) for drive in snapshot.drives],
+            "goals": self.mind.views.goals()["given"],
+            "told": self.mind.views.told(self.mind.people.last_number - TOLD),
+        }
+
+    async def components(self, arguments: Arguments) -> list[Row]:
+        """What the robot is made of."""
+        pids = self.workers.pids()
+        return [component_row(c, pids.get(c.id)) for c in self.catalogue.snapshot().components]
+
+    async def behaviours(self, arguments: Arguments) -> list[Row]:
+        """What can be done."""
+        return self.mind.views.behaviours()
+
+    async def units(self, arguments: Arguments) -> list[Row]:
+        """What there is to act with."""
+        return self.mind.views.units()
+
+    async def devices(self, arguments: Arguments) -> list[Row]:
+        """What is plugged in, and who has it."""
+        snapshot = self.catalogue.snapshot()
+        claims = claims_by_device(snapshot)
+        return [device_row(device, claims) for device in snapshot.devices]
+
+    async def streams(self, arguments: Arguments) -> list[Row]:
+        """Who sends what to whom."""
+        return [stream_row(stream) for stream in self.workers.streams.listing()]
+
+    async def facts(self, arguments: Arguments) -> list[Row]:
+        """What is believed, and why."""
+        return self.mind.views.facts(why=arguments.optional_text("why"))
+
+    async def goals(self, arguments: Arguments) -> Row:
+        """What can be asked for, and what was."""
+        return self.mind.views.goals()
+
+    async def plan(self, arguments: Arguments) -> Row:
+        """The plan that is carried out."""
+        return self.mind.views.plan()
+
+    async def tree(self, arguments: Arguments) -> Row:
+        """The behaviour tree as last ticked."""
+        return self.mind.views.tree()
+
+    async def why(self, arguments: Arguments) -> Row:
+        """Why the robot does what it does, or cannot; refused payloads and drives included."""
+        view = self.mind.views.why()
+        told = [str(problem) for problem in problems_of(self.catalogue.snapshot())]
+        return {**view, "problems": list(dict.fromkeys([*view["problems"], *told]))}
+
+    async def journal(self, arguments: Arguments) -> list[Row]:
+        """What happened, oldest first."""
+        limit = arguments.number("limit", 200, at_least=1, at_most=MOST_JOURNAL_ROWS)
+        subject = arguments.optional_text("subject")
+        entries = await self.catalogue.journal(subject=subject, limit=limit)
+        return [journal_row(entry) for entry in entries]
+
+    async def logs(self, arguments: Arguments) -> list[Row]:
+        """What components have written, by time. Raises `NondumError` (COMPONENT_UNKNOWN)."""
+        logs, named = self.workers.logs, arguments.optional_text("component")
+        known = {*logs.components(), *(c.id for c in self.catalogue.snapshot().components)}
+        if named is not None and named not in known:
+            raise NondumError(unknown("component", named, known))
+        rows = [
+            {"component": name, "when": line.at.wall_s, "level": line.level, "message": line.text}
+            for name in ([named] if named else logs.components())
+            for line in logs.of(name)
+        ]
+        return sorted(rows, key=lambda row: cast(float, row["when"]))
+
+    async def store(self, arguments: Arguments) -> list[Row]:
+        """The wheels that are kept, and which payloads need them."""
+        ids = {payload.key: payload.payload_id for payload in self.catalogue.snapshot().payloads}
+        rows = await self.stored()
+        return [{**row, "used_by": [ids.get(key, key) for key in row["used_by"]]} for row in rows]
+
+    # Following
+
+    async def follow_goal(self, arguments: Arguments) -> AsyncIterator[Row]:
+        """A goal, now and whenever the host looks different. Raises `GoalRefused`."""
+        id, version = arguments.text("id"), -1
+        while True:
+            version = await self.mind.changed(version)
+            given = next((row for row in self.mind.views.goals()["given"] if row["id"] == id), None)
+            if given is None:
+                raise GoalRefused(Problem("GOAL_UNKNOWN", f"there is no goal {id!r}"))
+            yield given
+
+    async def follow_tree(self, arguments: Arguments) -> AsyncIterator[Row]:
+        """The tree, now and whenever it looks different."""
+        version = -1
+        while True:
+            version = await self.mind.changed(version)
+            yield self.mind.views.tree()
+
+    async def watch(self, arguments: Arguments) -> AsyncIterator[Row]:
+        """Everything at a glance, now and whenever the host looks different."""
+        version = (-1, -1)
+        while True:
+            version = await self._changed(version)
+            yield {
+                **await self.status(arguments),
+                "components": await self.components(arguments),
+                "streams": await self.streams(arguments),
+                "plan": self.mind.views.plan(),
+                "tree": self.mind.views.tree(),
+            }
+
+    async def _changed(self, since: Version) -> Version:
+        """Wait for either the mind or the news to be at another version."""
+        waiting = [
+            asyncio.create_task(self.mind.changed(since[0])),
+            asyncio.create_task(self.news.changed(since[1])),
+        ]
+        try:
+            await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in waiting:
+                task.cancel()
+            await asyncio.gather(*waiting, return_exceptions=True)
+        return self.mind.version, self.news.version

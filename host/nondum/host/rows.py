@@ -1,0 +1,151 @@
+"""What people's tools are shown of the catalogue and the streams: plain data, one row a thing."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, TypeAlias
+
+from nondum.host.catalogue.records import (
+    ComponentRecord,
+    DeviceClaim,
+    DeviceRecord,
+    DriveRecord,
+    JournalEntry,
+    PayloadRecord,
+    Snapshot,
+    Step,
+)
+from nondum.host.news import Progress
+from nondum.host.streams import StreamStatus
+from nondum.sdk.errors import Problem
+
+Row: TypeAlias = dict[str, Any]
+
+_AT_REST = frozenset({Step.GONE, Step.ACTIVE, Step.REFUSED, Step.QUARANTINED})
+
+
+def host_state(snapshot: Snapshot) -> str:
+    """The host in a word or three: `working`, `ready`, or `ready, with problems`."""
+    if any(payload.step not in _AT_REST for payload in snapshot.payloads):
+        return "working"
+    return "ready, with problems" if any(problems_of(snapshot)) else "ready"
+
+
+def problems_of(snapshot: Snapshot) -> Iterator[Problem]:
+    """All that is wrong with payloads, components and drives."""
+    for payload in snapshot.payloads:
+        yield from payload.problems
+    for component in snapshot.components:
+        yield from component.problems
+    for drive in snapshot.drives:
+        yield from drive.problems
+
+
+def payload_row(payload: PayloadRecord, progress: Progress | None) -> Row:
+    """A payload: how far it has come, where it is, and what is wrong with it."""
+    return {
+        "payload": payload.payload_id,
+        "key": payload.key,
+        "version": payload.version,
+        "release": payload.release,
+        "state": payload.step.value,
+        "progress": progress.to_dict() if progress else None,
+        "drive": ", ".join(payload.drives),
+        "components": list(payload.components),
+        "problems": [str(problem) for problem in payload.problems],
+        "codes": [problem.code for problem in payload.problems],
+        "phases": {phase: moment.monotonic_s for phase, moment in payload.phases.items()},
+    }
+
+
+def drive_row(drive: DriveRecord) -> Row:
+    """A drive that is in."""
+    return {
+        "drive": drive.id,
+        "kind": drive.kind,
+        "state": drive.state.value,
+        "problems": [str(problem) for problem in drive.problems],
+    }
+
+
+def device_row(device: DeviceRecord, claims: Mapping[str, tuple[str, DeviceClaim]]) -> Row:
+    """A device that is plugged in, and the component that has it, if one has."""
+    component, claim = claims.get(device.id, ("", None))
+    return {
+        "device": device.id,
+        "node": str(device.node),
+        "component": component,
+        "need": claim.name if claim else "",
+        "contested_by": list(claim.contested_by) if claim else [],
+        "properties": dict(device.properties),
+    }
+
+
+def component_row(component: ComponentRecord, pid: int | None) -> Row:
+    """A component: how it is, and what it brings."""
+    described = component.description
+    return {
+        "component": component.id,
+        "state": _state(component),
+        "ready": component.is_ready,
+        "plugin": component.distribution,
+        "version": component.version,
+        "payload": component.payload_id,
+        "units": [unit.name for unit in described.units],
+        "behaviours": [behaviour.name for behaviour in described.behaviours],
+        "devices": {claim.name: claim.device for claim in component.devices},
+        "pid": pid,
+        "problem": "; ".join(str(problem) for problem in component.problems),
+    }
+
+
+def stream_row(stream: StreamStatus) -> Row:
+    """A stream: who sends it, and to whom."""
+    return {
+        "stream": stream.stream,
+        "type": stream.type,
+        "component": stream.component,
+        "flowing": stream.is_flowing,
+        "consumers": list(stream.readers),
+    }
+
+
+def journal_row(entry: JournalEntry) -> Row:
+    """An entry of the journal."""
+    return {
+        "id": entry.id,
+        "when": entry.at.wall_s,
+        "monotonic": entry.at.monotonic_s,
+        "boot": entry.boot,
+        "event": entry.event,
+        "subject": entry.subject,
+        "step": entry.step,
+        "problems": [problem.to_dict() for problem in entry.problems],
+        "detail": dict(entry.detail),
+    }
+
+
+def unknown(kind: str, name: str, known: Iterable[str]) -> Problem:
+    """What is told of a name that is none."""
+    names = sorted(known)
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    fix = f"did you mean {near[0]!r}?" if near else f"there is: {', '.join(names) or 'none'}"
+    return Problem(f"{kind.upper()}_UNKNOWN", f"there is no {kind} {name!r}", fix=fix)
+
+
+def claims_by_device(snapshot: Snapshot) -> Mapping[str, tuple[str, DeviceClaim]]:
+    """Device → the component that has it, and the claim by which."""
+    return {
+        claim.device: (component.id, claim)
+        for component in snapshot.components
+        for claim in component.devices
+        if claim.device is not None
+    }
+
+
+def _state(component: ComponentRecord) -> str:
+    missing = [c.name for c in component.devices if c.device is None and not c.optional]
+    if component.state.value == "ready" and missing:
+        return f"waits for {', '.join(missing)}"
+    return component.state.value
