@@ -78,6 +78,8 @@ HOSTILE = {
     ),
     "fifo": ("WHEEL_PATH", WheelBuilder(extra=(raw("evil/pipe", b"", mode=stat.S_IFIFO | 0o666),))),
     "library-scheme-escapes": ("WHEEL_PATH", with_file("evil-1.0.data/purelib/../x.py")),
+    "file-and-folder": ("WHEEL_PATH", with_file(f"{INIT}/b.py")),
+    "one-place-of-two-schemes": ("WHEEL_PATH", with_file(f"evil-1.0.data/purelib/{INIT}")),
     "no-record": ("WHEEL_RECORD", WheelBuilder(without=(RECORD,))),
     "empty-record": ("WHEEL_RECORD", WheelBuilder(record=b"")),
     "record-not-csv": ("WHEEL_RECORD", WheelBuilder(record=b"a,b\n")),

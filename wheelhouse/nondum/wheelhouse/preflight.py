@@ -13,9 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from packaging import markers, tags
-from packaging.requirements import Requirement
+from packaging.markers import UndefinedComparison, UndefinedEnvironmentName
+from packaging.requirements import InvalidRequirement, Requirement
 from packaging.specifiers import SpecifierSet
 from packaging.tags import Tag
+from packaging.utils import canonicalize_name
 
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem
 from nondum.wheelhouse import lock as locks_module
@@ -90,18 +92,34 @@ def preflight(
     """Everything that keeps this payload from running here."""
     problems = [*_version_problems(manifest, facts), *_resource_problems(manifest, facts)]
     for component in manifest.components:
-        where = locks_module.file_name(component.id)
         if component.id not in locks:
+            where = locks_module.file_name(component.id)
             text = f"component {component.id!r} has no lock"
             problems.append(Problem("LOCK_MISSING", text, where=where))
-        elif component.distribution not in locks[component.id].packages:
-            text = f"{component.distribution} itself is not locked"
-            problems.append(Problem("LOCK_INCOMPLETE", text, where=where))
     try:
         chosen = select(manifest, locks, facts)
     except PayloadRefused as error:
         return (*problems, *error.problems)
+    problems.extend(_unlocked(manifest, locks, chosen))
     return (*problems, *_disk_problems(manifest, chosen, facts))
+
+
+def _unlocked(
+    manifest: Manifest, locks: Mapping[str, Lock], chosen: Mapping[str, Sequence[LockedWheel]]
+) -> Iterator[Problem]:
+    """Components whose own plugin is not among their wheels."""
+    for component in manifest.components:
+        if component.id not in locks:
+            continue
+        if component.distribution not in {wheel.name for wheel in chosen[component.id]}:
+            is_for_others = component.distribution in locks[component.id].packages
+            text = "is locked for other hosts only" if is_for_others else "itself is not locked"
+            yield Problem(
+                "LOCK_INCOMPLETE",
+                f"{component.distribution} {text}",
+                where=locks_module.file_name(component.id),
+                fix="build the payload for this architecture and Python",
+            )
 
 
 def unmet(
@@ -110,25 +128,52 @@ def unmet(
     facts: HostFacts,
     where: str,
 ) -> Iterator[Problem]:
-    """Dependencies that no chosen wheel meets; `requirements` are distribution → Requires-Dist."""
+    """Dependencies that no chosen wheel meets; `requirements` are distribution → Requires-Dist.
+
+    Extras that one distribution asks of another are followed.
+    """
     versions = {wheel.name: wheel.version for wheel in chosen}
-    for distribution, lines in requirements.items():
-        for line in lines:
-            wanted = Requirement(line)
-            environment = {**facts.environment, "extra": ""}
-            if wanted.marker is not None and not wanted.marker.evaluate(environment):
+    asked = {(distribution, "") for distribution in requirements}
+    pending = sorted(asked)
+    while pending:
+        distribution, extra = pending.pop()
+        for line in requirements.get(distribution, ()):
+            try:
+                wanted = _wanted(line, extra, facts)
+            except (InvalidRequirement, UndefinedComparison, UndefinedEnvironmentName):
+                text = f"{distribution} has a dependency that cannot be read: {line[:80]!r}"
+                yield Problem("WHEEL_METADATA", text, where=where)
                 continue
-            name = wanted.name.lower().replace("_", "-").replace(".", "-")
+            if wanted is None:
+                continue
+            name = canonicalize_name(wanted.name)
             have = versions.get(name)
             if have is None or not wanted.specifier.contains(have, prereleases=True):
-                yield Problem(
-                    "LOCK_INCOMPLETE",
-                    f"{distribution} needs {wanted.name}",
-                    where=where,
-                    need=f"{wanted.name}{wanted.specifier}",
-                    have=have or "none",
-                    fix="build the payload again: every dependency must be locked",
-                )
+                yield _missing(distribution, wanted, have, where)
+            more = {(str(name), wanted_extra) for wanted_extra in wanted.extras} - asked
+            asked |= more
+            pending += sorted(more)
+
+
+def _wanted(line: str, extra: str, facts: HostFacts) -> Requirement | None:
+    """A dependency as far as this host and extra have it."""
+    wanted = Requirement(line)
+    if wanted.marker is None:
+        return wanted if not extra else None
+    needs = wanted.marker.evaluate({**facts.environment, "extra": extra})
+    always = extra and wanted.marker.evaluate({**facts.environment, "extra": ""})
+    return wanted if needs and not always else None
+
+
+def _missing(distribution: str, wanted: Requirement, have: str | None, where: str) -> Problem:
+    return Problem(
+        "LOCK_INCOMPLETE",
+        f"{distribution} needs {wanted.name}",
+        where=where,
+        need=f"{wanted.name}{wanted.specifier}",
+        have=have or "none",
+        fix="build the payload again: every dependency must be locked",
+    )
 
 
 def _version_problems(manifest: Manifest, facts: HostFacts) -> Iterator[Problem]:

@@ -6,6 +6,7 @@ installer metadata apart. `make_with_pip` runs pip itself instead.
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import subprocess
@@ -34,15 +35,13 @@ def make(venv: Path, python: Path, wheels: Sequence[StoredWheel]) -> None:
     unfinished = _fresh(venv)
     try:
         _skeleton(unfinished, python)
-        target = site_packages(unfinished)
-        made: set[str] = set()
-        owners: dict[str, tuple[str, str]] = {}
+        tree = _Tree(site_packages(unfinished))
         for stored in wheels:
-            _link_all(stored, target, made, owners)
+            tree.add(stored)
         unfinished.rename(venv)
     except OSError as error:
         shutil.rmtree(unfinished, ignore_errors=True)
-        code = "DISK_FULL" if error.errno in (28, 122) else "IO_ERROR"  # ENOSPC, EDQUOT
+        code = "DISK_FULL" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "IO_ERROR"
         raise InstallFailed(
             Problem(code, f"the venv cannot be made: {error.strerror}", where=str(venv))
         ) from error
@@ -114,33 +113,53 @@ def _skeleton(venv: Path, python: Path) -> None:
     site_packages(venv).mkdir(parents=True)
 
 
-def _link_all(
-    stored: StoredWheel, target: Path, made: set[str], owners: dict[str, tuple[str, str]]
-) -> None:
-    for file in stored.files:
-        owner, sha256 = owners.setdefault(file.path, (stored.filename, file.sha256))
-        if owner != stored.filename:
-            if sha256 == file.sha256:
-                continue  # old-style namespace packages all carry the same __init__.py
-            raise InstallFailed(
-                Problem(
-                    "FILES_COLLIDE",
-                    f"{file.path} is in {owner} and, with other contents, in {stored.filename}",
-                    where=str(target),
-                    fix="ask their authors: two distributions may not share a file",
-                )
-            )
-        parent = os.path.dirname(file.path)  # noqa: PTH120  # half the time of pathlib, per file
-        if parent and parent not in made:
-            (target / parent).mkdir(parents=True, exist_ok=True)
-            made.add(parent)
-        _link(f"{stored.root}/{file.path}", f"{target}/{file.path}")
+class _Tree:
+    """A site-packages folder as it fills. Paths are strings: there are thousands of them."""
+
+    def __init__(self, root: Path) -> None:
+        self._root = root
+        self._files: dict[str, tuple[str, str]] = {}
+        self._folders: dict[str, str] = {"": ""}
+        """Path → the wheel that was first to have it."""
+
+    def add(self, stored: StoredWheel) -> None:
+        """Link a wheel's files. Raises `InstallFailed` (FILES_COLLIDE)."""
+        for file in stored.files:
+            owner, sha256 = self._files.setdefault(file.path, (stored.filename, file.sha256))
+            if owner != stored.filename:
+                if sha256 == file.sha256:
+                    continue  # old-style namespace packages all carry the same __init__.py
+                raise _collide(file.path, owner, stored.filename)
+            if file.path in self._folders:
+                raise _collide(file.path, self._folders[file.path], stored.filename)
+            self._make_folder(file.path.rpartition("/")[0], stored.filename)
+            _link(f"{stored.root}/{file.path}", f"{self._root}/{file.path}")
+
+    def _make_folder(self, path: str, wheel: str) -> None:
+        if path in self._folders:
+            return
+        if path in self._files:
+            raise _collide(path, self._files[path][0], wheel)
+        self._make_folder(path.rpartition("/")[0], wheel)
+        (self._root / path).mkdir()
+        self._folders[path] = wheel
+
+
+def _collide(path: str, one: str, other: str) -> InstallFailed:
+    return InstallFailed(
+        Problem(
+            "FILES_COLLIDE",
+            f"{path} is in {one} and, as something else, in {other}",
+            where=path,
+            fix="ask their authors: two distributions may not share a file",
+        )
+    )
 
 
 def _link(source: str, target: str) -> None:
     try:
         os.link(source, target)  # strings, not paths: thousands of files
     except OSError as error:
-        if error.errno != 18:  # EXDEV: the store lies on another file system
+        if error.errno != errno.EXDEV:  # the store may lie on another file system
             raise
         shutil.copy2(source, target)

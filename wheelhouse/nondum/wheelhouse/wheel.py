@@ -16,7 +16,8 @@ import io
 import mmap
 import sys
 import zlib
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from email.parser import HeaderParser
@@ -102,6 +103,7 @@ def lay_out(data: Bytes, filename: str) -> Layout:
             left_out.append(member.path)
         else:
             files.append(PlannedFile(target, member, record.get(member.path, "")))
+    problems.extend(_target_problems(files, filename))
     return Layout(tuple(files), tuple(left_out), tuple(problems))
 
 
@@ -243,6 +245,16 @@ def _content_problems(members: tuple[Member, ...], name: str, filename: str) -> 
         yield Problem("WHEEL_SHADOWS", text, where=filename)
 
 
+def _target_problems(files: Sequence[PlannedFile], filename: str) -> Iterator[Problem]:
+    """Two files in one place: of two schemes, or one where another needs a folder."""
+    targets = Counter(file.target for file in files)
+    folders = {str(parent) for target in targets for parent in PurePosixPath(target).parents}
+    for target, count in targets.items():
+        if count > 1 or target in folders:
+            text = f"{target!r} would be two things at once"
+            yield Problem("WHEEL_PATH", text, where=filename)
+
+
 def _target(path: str) -> str | None:
     """Where in site-packages a member goes, or None when it does not.
 
@@ -253,4 +265,4 @@ def _target(path: str) -> str | None:
     if not top.endswith(".data"):
         return path
     scheme, _, target = rest.partition("/")
-    return target if scheme in LIBRARY_SCHEMES else None
+    return (target or None) if scheme in LIBRARY_SCHEMES else None

@@ -1,0 +1,191 @@
+"""Venvs: whole or not there, of links, and good enough for tools that know venvs."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from tests.payloads import installed_wheel, make_wheel, sha256
+from tests.wheelhouse.test_drive import file_system, needs_mount
+
+from nondum.sdk.errors import InstallFailed
+from nondum.wheelhouse import venvs
+from nondum.wheelhouse.lock import LockedWheel
+from nondum.wheelhouse.store import Store, StoredWheel
+
+PYTHON = Path(sys.base_prefix) / "bin" / f"python{sys.version_info.major}.{sys.version_info.minor}"
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    return Store(tmp_path / "store")
+
+
+def stored(store: Store, *paths: Path) -> list[StoredWheel]:
+    return [store.add(path, sha256(path)) for path in paths]
+
+
+def test_files_are_links_to_the_store(store: Store, tmp_path: Path) -> None:
+    (wheel,) = stored(store, make_wheel(tmp_path, "a", "1", {"a/__init__.py": "X = 1", "a/b": ""}))
+    venv = tmp_path / "venv"
+    venvs.make(venv, PYTHON, [wheel])
+    site = venvs.site_packages(venv)
+    assert {p.relative_to(site).as_posix() for p in site.rglob("*") if p.is_file()} == {
+        file.path for file in wheel.files
+    }
+    for file in wheel.files:
+        assert (site / file.path).samefile(wheel.root / file.path)
+
+
+def test_interpreters_and_tools_take_it_for_a_venv(store: Store, tmp_path: Path) -> None:
+    venv = tmp_path / "venv"
+    venvs.make(venv, PYTHON, stored(store, *map(installed_wheel, ("pluggy", "msgpack"))))
+    code = "import json, sys, pluggy, msgpack; print(json.dumps([sys.prefix, pluggy.__file__]))"
+    done = subprocess.run(
+        [venv / "bin/python", "-I", "-c", code], capture_output=True, text=True, check=True
+    )
+    prefix, file = json.loads(done.stdout)
+    assert Path(prefix) == venv
+    assert Path(file).is_relative_to(venvs.site_packages(venv))
+    listed = pip(venv, "list", "--format", "json")
+    assert {row["name"] for row in json.loads(listed)} == {"pluggy", "msgpack"}
+    assert "No broken requirements" in pip(venv, "check")
+
+
+def pip(venv: Path, *arguments: str) -> str:
+    command = [sys.executable, "-m", "pip", "--python", str(venv / "bin/python"), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def test_a_namespace_is_shared(store: Store, tmp_path: Path) -> None:
+    wheels = stored(
+        store,
+        make_wheel(tmp_path, "ns-a", "1", {"ns/a.py": "A = 1"}),
+        make_wheel(tmp_path, "ns-b", "1", {"ns/b.py": "B = 2"}),
+    )
+    venvs.make(tmp_path / "venv", PYTHON, wheels)
+    code = "import ns.a, ns.b; print(ns.a.A + ns.b.B)"
+    done = subprocess.run(
+        [tmp_path / "venv/bin/python", "-c", code], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "3\n"
+
+
+def test_the_same_file_of_two_wheels_is_linked_once(store: Store, tmp_path: Path) -> None:
+    same = "__import__('pkg_resources').declare_namespace(__name__)"
+    wheels = stored(
+        store,
+        *(make_wheel(tmp_path, n, "1", {"ns/__init__.py": same, f"ns/{n}.py": ""}) for n in "ab"),
+    )
+    venvs.make(tmp_path / "venv", PYTHON, wheels)
+    assert (venvs.site_packages(tmp_path / "venv") / "ns/b.py").exists()
+
+
+@pytest.mark.parametrize("other", ["ns/x.py", "ns/x.py/y.py"], ids=["contents", "folder"])
+def test_colliding_wheels_are_refused(store: Store, tmp_path: Path, other: str) -> None:
+    wheels = stored(
+        store,
+        make_wheel(tmp_path, "one", "1", {"ns/x.py": "1"}),
+        make_wheel(tmp_path, "two", "1", {other: "2"}),
+    )
+    with pytest.raises(InstallFailed) as failed:
+        venvs.make(tmp_path / "venv", PYTHON, wheels)
+    assert failed.value.code == "FILES_COLLIDE"
+    assert "one-1" in str(failed.value)
+    assert "two-1" in str(failed.value)
+    assert [p.name for p in tmp_path.iterdir() if "venv" in p.name] == []
+
+
+def test_a_venv_is_replaced_whole(store: Store, tmp_path: Path) -> None:
+    one, two = stored(
+        store,
+        make_wheel(tmp_path, "one", "1", {"one.py": ""}),
+        make_wheel(tmp_path, "two", "1", {"two.py": ""}),
+    )
+    venv = tmp_path / "venv"
+    venvs.make(venv, PYTHON, [one])
+    venvs.make(venv, PYTHON, [two])
+    assert {p.name for p in venvs.site_packages(venv).iterdir()} == {"two.py", "two-1.dist-info"}
+
+
+def test_making_is_idempotent_after_a_crash(store: Store, tmp_path: Path) -> None:
+    (wheel,) = stored(store, make_wheel(tmp_path, "one", "1", {"one.py": ""}))
+    left = venvs.site_packages(tmp_path / ".venv.part")
+    left.mkdir(parents=True)
+    (left / "half.py").touch()
+    venvs.make(tmp_path / "venv", PYTHON, [wheel])
+    assert not (venvs.site_packages(tmp_path / "venv") / "half.py").exists()
+
+
+def test_removing_leaves_nothing(store: Store, tmp_path: Path) -> None:
+    (wheel,) = stored(store, make_wheel(tmp_path, "one", "1", {"one.py": ""}))
+    venvs.make(tmp_path / "venv", PYTHON, [wheel])
+    venvs.remove(tmp_path / "venv")
+    venvs.remove(tmp_path / "venv")
+    assert not (tmp_path / "venv").exists()
+    assert store.verify(wheel.sha256) == ()
+
+
+@needs_mount
+def test_across_file_systems_files_are_copied(store: Store, tmp_path: Path) -> None:
+    (wheel,) = stored(store, make_wheel(tmp_path, "one", "1", {"one.py": "X = 1"}))
+    with file_system(tmp_path / "other", 8) as other:
+        venvs.make(other / "venv", PYTHON, [wheel])
+        assert (venvs.site_packages(other / "venv") / "one.py").read_text() == "X = 1"
+
+
+@needs_mount
+def test_a_full_disk_leaves_no_venv(store: Store, tmp_path: Path) -> None:
+    big = {"big.bin": os.urandom(3 * 1024**2)}
+    (wheel,) = stored(store, make_wheel(tmp_path, "big", "1", big))
+    with file_system(tmp_path / "small", 2) as small:
+        with pytest.raises(InstallFailed) as failed:
+            venvs.make(small / "venv", PYTHON, [wheel])
+        assert failed.value.code == "DISK_FULL"
+        assert {p.name for p in small.iterdir()} == {"lost+found"}
+
+
+def locked(path: Path) -> LockedWheel:
+    name, version = path.name.split("-")[:2]
+    return LockedWheel(name, version, f"wheels/{path.name}", sha256(path), path.stat().st_size)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "payload/wheels").mkdir(parents=True)
+    return tmp_path / "payload"
+
+
+def test_pip_makes_one_too(folder: Path, tmp_path: Path) -> None:
+    path = make_wheel(folder / "wheels", "one", "1", {"one.py": "X = 1"}, requires=["absent"])
+    venvs.make_with_pip(tmp_path / "venv", PYTHON, folder, [locked(path)])
+    site = venvs.site_packages(tmp_path / "venv")
+    assert (site / "one.py").read_text() == "X = 1"
+    assert (site / "one-1.dist-info/RECORD").exists()
+    assert not (tmp_path / "venv/requirements.txt").exists()
+
+
+def test_pip_refuses_another_wheel(folder: Path, tmp_path: Path) -> None:
+    path = make_wheel(folder / "wheels", "one", "1", {"one.py": "X = 1"})
+    entry = locked(path)
+    path.write_bytes(path.read_bytes() + b"x")
+    with pytest.raises(InstallFailed) as failed:
+        venvs.make_with_pip(tmp_path / "venv", PYTHON, folder, [entry])
+    assert failed.value.code == "PIP_FAILED"
+    assert not (tmp_path / "venv").exists()
+    assert not (tmp_path / ".venv.part").exists()
+
+
+def test_pip_is_not_swayed_by_its_environment(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "pip.conf").write_text("[install]\nprefix = /nowhere\n")
+    monkeypatch.setenv("PIP_CONFIG_FILE", str(tmp_path / "pip.conf"))
+    monkeypatch.setenv("PIP_TARGET", str(tmp_path / "elsewhere"))
+    path = make_wheel(folder / "wheels", "one", "1", {"one.py": "X = 1"})
+    venvs.make_with_pip(tmp_path / "venv", PYTHON, folder, [locked(path)])
+    assert not (tmp_path / "elsewhere").exists()
