@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -22,7 +23,7 @@ def test_reference_person_crosses_more_than_a_tolerance() -> None:
     assert clip.reference is not None
     azimuths = [clip.azimuth(column) for column in read_reference(clip.reference).values()]
     assert max(azimuths) - min(azimuths) > math.radians(35)
-    steps = [abs(b - a) * clip.frames_per_s for a, b in zip(azimuths, azimuths[1:], strict=False)]
+    steps = [abs(b - a) * clip.frames_per_s for a, b in pairwise(azimuths)]
     assert max(steps) < math.radians(15)
 
 

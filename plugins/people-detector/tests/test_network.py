@@ -33,7 +33,10 @@ def tiny_network(path: Path, layout: Layout) -> Path:
         helper.make_node("Conv", ["pooled", "mean"], ["bright"]),
         helper.make_node("Reshape", ["bright", "row"], ["scores"]),
     ]
-    constants = {"mean": weights, "row": np.array([1, 1, 2], dtype=np.int64)}
+    constants: dict[str, np.ndarray[Any, Any]] = {
+        "mean": weights,
+        "row": np.array([1, 1, 2], dtype=np.int64),
+    }
     none = np.zeros((1, 1, 2), dtype=np.float32)
     if layout == "v8":
         parts = {"boxes": BOXES[None], "none": none}
