@@ -119,6 +119,11 @@ def test_plain_wheel_passes(tmp_path: Path) -> None:
     assert wheel.check(WheelBuilder().write(tmp_path)) == ()
 
 
+def test_vendored_metadata_is_no_second_dist_info(tmp_path: Path) -> None:
+    builder = with_file("evil/_vendor/other-1.0.dist-info/WHEEL", WHEEL)
+    assert wheel.check(builder.write(tmp_path)) == ()
+
+
 @pytest.mark.parametrize("name", ["pluggy", "msgpack", "packaging", "rich", "click"])
 def test_real_wheel_passes(name: str) -> None:
     assert wheel.check(installed_wheel(name)) == ()

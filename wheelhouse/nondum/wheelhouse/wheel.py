@@ -150,7 +150,8 @@ def refuse_if_any(problems: tuple[Problem, ...]) -> None:
 
 
 def _dist_info(members: tuple[Member, ...], name: str, version: str) -> str | None:
-    folders = {m.path.split("/")[0] for m in members if m.path.endswith(".dist-info/WHEEL")}
+    marks = [PurePosixPath(m.path) for m in members if m.path.endswith(".dist-info/WHEEL")]
+    folders = {str(mark.parent) for mark in marks if len(mark.parts) == 2}  # not vendored ones
     wanted = f"{name.replace('-', '_')}-{version}.dist-info"
     for folder in folders:
         stem = folder.removesuffix(".dist-info")

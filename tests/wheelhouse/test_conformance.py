@@ -1,0 +1,148 @@
+"""What a venv holds is what pip would have put there, file by file, for wheels that people use.
+
+Scripts, other data schemes, start-up hooks of known tools and installer metadata apart. The wheels
+come from the package index.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+
+from nondum.wheelhouse import lock, locking, preflight, venvs, wheel
+from nondum.wheelhouse.store import Store, StoredWheel
+from nondum.wheelhouse.target import Target
+
+PYTHON = Path(sys.base_prefix) / "bin" / f"python{sys.version_info.major}.{sys.version_info.minor}"
+POPULAR = (
+    *("attrs", "certifi", "charset-normalizer", "click", "idna", "jinja2", "markupsafe"),
+    *("numpy<2.5", "packaging", "pillow", "pygments", "python-dateutil", "pyyaml", "requests"),
+    *("rich", "six", "typing-extensions", "urllib3", "jaraco-context", "jaraco-functools"),
+)
+INSTALLER_METADATA = {"INSTALLER", "RECORD", "REQUESTED", "direct_url.json"}
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A payload-like folder with the wheels, what they depend on, and a lock."""
+    made = tmp_path_factory.mktemp("conformance")
+    pip("download", "--only-binary", ":all:", "--dest", str(made / "wheels"), *POPULAR)
+    text = locking.lock_text({Target.here(): sorted((made / "wheels").iterdir())})
+    (made / "pylock.popular.toml").write_text(text)
+    return made
+
+
+@pytest.fixture(scope="module")
+def stored(folder: Path) -> list[StoredWheel]:
+    """The wheels as chosen from the lock, in the store."""
+    store = Store(folder / "store")
+    parsed = lock.parse((folder / "pylock.popular.toml").read_text(), "lock")
+    facts = preflight.probe(folder, reserve_mb=0, confinement=0)
+    chosen = lock.select(parsed, facts.environment, facts.tags)
+    return [store.add(folder / one.path, one.sha256) for one in chosen]
+
+
+@pytest.fixture(scope="module")
+def ours(folder: Path, stored: list[StoredWheel]) -> Path:
+    venvs.make(folder / "ours", PYTHON, stored)
+    return folder / "ours"
+
+
+@pytest.fixture(scope="module")
+def pips(folder: Path) -> Path:
+    """A venv of Python's own, filled by pip from the same lock."""
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder / "pips"], check=True)
+    pip(
+        *("--python", str(folder / "pips/bin/python"), "install"),
+        *("--no-index", "--no-deps", "--require-hashes", "--no-compile"),
+        *("-r", str(folder / "pylock.popular.toml")),
+    )
+    return folder / "pips"
+
+
+def pip(*arguments: str) -> str:
+    command = [sys.executable, "-m", "pip", "--disable-pip-version-check", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def tree(venv: Path, *, without: Iterable[str] = ()) -> dict[str, tuple[str, bool]]:
+    """Path → digest and whether it is executable, of site-packages."""
+    site = venvs.site_packages(venv)
+    return {
+        path.relative_to(site).as_posix(): (
+            hashlib.sha256(path.read_bytes()).hexdigest(),
+            os.access(path, os.X_OK),
+        )
+        for path in site.rglob("*")
+        if path.is_file()
+        and not (path.parent.suffix == ".dist-info" and path.name in INSTALLER_METADATA)
+        and path.relative_to(site).as_posix() not in without
+    }
+
+
+def test_trees_are_equal(ours: Path, pips: Path) -> None:
+    assert tree(ours) == tree(pips)
+    assert len(tree(ours)) > 1000
+
+
+def test_pip_sees_the_same_distributions(ours: Path, pips: Path) -> None:
+    lists = [
+        json.loads(pip("--python", str(venv / "bin/python"), "list", "--format", "json"))
+        for venv in (ours, pips)
+    ]
+    assert lists[0] == lists[1]
+    assert len(lists[0]) >= len(POPULAR)
+
+
+def test_pip_finds_nothing_broken(ours: Path) -> None:
+    assert "No broken requirements" in pip("--python", str(ours / "bin/python"), "check")
+
+
+def test_the_distributions_work_together(ours: Path) -> None:
+    code = (
+        "import numpy, PIL.Image, yaml, requests, jaraco.context, jaraco.functools;"
+        "print(PIL.Image.fromarray(numpy.zeros((4, 3), 'u1')).size)"
+    )
+    done = subprocess.run(
+        [ours / "bin/python", "-I", "-c", code], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "(3, 4)\n"
+
+
+def test_the_other_method_gives_the_same_tree(folder: Path, pips: Path) -> None:
+    parsed = lock.parse((folder / "pylock.popular.toml").read_text(), "lock")
+    facts = preflight.probe(folder, reserve_mb=0, confinement=0)
+    venvs.make_with_pip(
+        folder / "by-pip", PYTHON, folder, lock.select(parsed, facts.environment, facts.tags)
+    )
+    scripts = {name for name in tree(folder / "by-pip") if name.startswith("bin/")}
+    assert tree(folder / "by-pip", without=scripts) == tree(pips)
+
+
+def test_no_popular_wheel_is_refused(folder: Path) -> None:
+    for path in (folder / "wheels").iterdir():
+        assert wheel.check(path) == (), path.name
+
+
+def test_start_up_hooks_are_the_one_thing_left_out(tmp_path: Path) -> None:
+    pip("download", "--no-deps", "--only-binary", ":all:", "--dest", str(tmp_path), "setuptools")
+    (path,) = tmp_path.glob("*.whl")
+    known = Store(tmp_path / "store").add(path, locking.sha256(path))
+    venvs.make(tmp_path / "ours", PYTHON, [known])
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path / "pips"], check=True)
+    python = str(tmp_path / "pips/bin/python")
+    pip("--python", python, "install", "--no-index", "--no-deps", "--no-compile", str(path))
+    ours, pips = tree(tmp_path / "ours"), tree(tmp_path / "pips")
+    assert pips.keys() - ours.keys() == {"distutils-precedence.pth"}
+    assert all(pips[name] == found for name, found in ours.items())
