@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 from nondum.sdk.errors import Problem, ProtocolViolation
 from nondum.sdk.link import Link, OnEvent, Pending
-from nondum.sdk.packets import Handle, SocketPackets
+from nondum.sdk.packets import Handle, SocketPackets, discard
 from nondum.sdk.wire import MAX_PACKET, PROTOCOL_VERSIONS, Body, Hello
 from nondum.transport.metered import MeteredPackets
 
@@ -39,8 +39,9 @@ class WorkerLink:
         when the worker is gone, and after `on_violation` when it broke the protocol; not after
         `close`.
         """
+        self._on_closed, self._on_violation = on_closed, on_violation
         packets = MeteredPackets(SocketPackets(sock, MAX_PACKET))
-        self._link = Link(packets, _refuse, on_event, on_closed, on_violation)
+        self._link = Link(packets, self._refuse, on_event, on_closed, on_violation)
 
     @property
     def is_closed(self) -> bool:
@@ -86,6 +87,19 @@ class WorkerLink:
         """Close this end: own requests fail with `LinkClosed`."""
         self._link.close()
 
+    async def _refuse(
+        self, verb: str, _body: dict[str, Any], handles: tuple[Handle, ...], _id: int
+    ) -> NoReturn:
+        discard(handles)
+        violation = ProtocolViolation(
+            Problem("REQUEST_UNASKED", f"a worker asks nothing of its host, but this: {verb!r}")
+        )
+        if not self._link.is_closed:
+            self._link.close()
+            self._on_violation(violation)
+            self._on_closed()
+        raise violation
+
 
 def agreed_version(hello: Hello) -> int:
     """The newest protocol version that both ends speak.
@@ -108,9 +122,3 @@ def agreed_version(hello: Hello) -> int:
             )
         )
     return max(common)
-
-
-def _refuse(verb: str, _body: dict[str, Any], _handles: tuple[Handle, ...], _id: int) -> NoReturn:
-    raise ProtocolViolation(
-        Problem("REQUEST_UNASKED", f"a worker asks nothing of its host, but this one: {verb!r}")
-    )
