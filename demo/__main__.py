@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import random
 import shutil
 import sys
@@ -108,7 +109,15 @@ def _play(
     stages.withdraw(robot, *(kit.drives[n] for n in (*second, "people-detector", "visual-tracker")))
     scenario = random_scenario(options.seed)
     results.append(
-        stages.point(robot, kit.of(third), scenario, name="III", words=POINT, published_s=199)
+        stages.point(
+            robot,
+            kit.of(third),
+            scenario,
+            name="III",
+            words=POINT,
+            published_s=199,
+            mistold_rad=math.radians(options.wrong_mount),
+        )
     )
     say(results[-1].measure)
 
@@ -140,6 +149,13 @@ def _options() -> argparse.Namespace:
         type=int,
         metavar="SEED",
         help="replace every name of plugins, components, units and objects by a random one",
+    )
+    parser.add_argument(
+        "--wrong-mount",
+        type=float,
+        default=0.0,
+        metavar="DEGREES",
+        help="tell the host that the pointer is mounted turned by so much more: must fail",
     )
     parser.add_argument("--keep", action="store_true", help="keep the work folder")
     return parser.parse_args()

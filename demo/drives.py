@@ -27,7 +27,15 @@ def build(plugins: Sequence[Path], *, libraries: Sequence[Path], cache: Path) ->
         if not drive.exists():
             unfinished = drive.with_suffix(".part")
             shutil.rmtree(unfinished, ignore_errors=True)
-            command = ["payload", "build", plugin, "-o", unfinished, "--python", PYTHON]
+            command: list[str | Path] = [
+                "payload",
+                "build",
+                plugin,
+                "-o",
+                unfinished,
+                "--python",
+                PYTHON,
+            ]
             for library in libraries:
                 command += ["--library", library]
             nondum(*command, "--quiet")

@@ -21,7 +21,7 @@ class Heard:
     """Headings of the body and numbers of the frames shown, each with its stamp (monotonic)."""
 
     headings: list[tuple[float, float]] = field(default_factory=list)
-    """Stamp, yaw in radians, unwrapped."""
+    """Stamp, yaw in radians."""
     frames: list[tuple[float, int]] = field(default_factory=list)
 
     def on_message(self, message: Message) -> None:
@@ -29,9 +29,7 @@ class Heard:
         if isinstance(message, Image):
             self.frames.append((message.header.stamp_s, message.header.seq))
         elif isinstance(message, Pose):
-            before = self.headings[-1][1] if self.headings else 0.0
-            turn = (_yaw(message) - before + math.pi) % math.tau - math.pi
-            self.headings.append((message.header.stamp_s, before + turn))
+            self.headings.append((message.header.stamp_s, _yaw(message)))
 
 
 @contextmanager

@@ -21,6 +21,8 @@ INSTALL_S = 60.0
 PLAN_S = 20.0
 FOLLOW_S = 60.0
 POINT_S = 120.0
+STANDING_S = 0.5
+STANDING_RAD = math.radians(0.2)
 HOLD_S = 2.0
 """The laser must rest on the source so long before it is judged."""
 
@@ -94,16 +96,18 @@ def follow(
     `is_given`: the goal was given before and waits for what the drives bring.
     """
     before = robot.told_number()
-    stage = Stage(robot, name, words, published_s)
-    for drive in drives.values():
-        robot.plug(drive)
-    stage.installed(tuple(drives))
-    image, odometry = _stream(robot, "image"), _stream(robot, "pose")
-    with listening(robot.control, image, odometry) as heard:
-        if not is_given:
-            robot.ask("goal", words=words)
-        stage.planned()
-        share = _followed(heard, reference, stage)
+    with listening(robot.control, _stream(robot, "pose")) as body:
+        # The recording hangs where the body looks when the stream begins: it stands until then.
+        start_rad = _standing(body)
+        stage = Stage(robot, name, words, published_s)
+        for drive in drives.values():
+            robot.plug(drive)
+        stage.installed(tuple(drives))
+        with listening(robot.control, _stream(robot, "image")) as camera:
+            if not is_given:
+                robot.ask("goal", words=words)
+            stage.planned()
+            share = _followed(body, camera, reference, start_rad, stage)
     measure = (
         f"the person within ±{math.degrees(TOLERANCE_RAD):.0f}° of the heading in {share:.0%} of "
         f"frames over {WINDOW_S:.0f} s (at least {WANTED_FRACTION:.0%})"
@@ -120,8 +124,12 @@ def point(
     name: str,
     words: str,
     published_s: float,
+    mistold_rad: float = 0.0,
 ) -> StageResult:
-    """Plug drives and instruments in, tell where they are mounted, and ask for the laser."""
+    """Plug drives and instruments in, tell where they are mounted, and ask for the laser.
+
+    `mistold_rad` is a person's mistake in the yaw that they tell of the pointer's mount.
+    """
     before = robot.told_number()
     stage = Stage(robot, name, words, published_s)
     for drive in drives.values():
@@ -129,8 +137,10 @@ def point(
     with switched_on(scenario, robot.work) as instruments:
         instruments.plug(robot.devices)
         stage.installed(tuple(drives))
+        roll, pitch, yaw = scenario.pointer.rpy
+        told_rpy = {"sensor": scenario.camera.rpy, "pointer": (roll, pitch, yaw + mistold_rad)}
         for kind, mount in (("sensor", scenario.camera), ("pointer", scenario.pointer)):
-            robot.ask("mount", unit=_unit(robot, kind), xyz=mount.xyz, rpy=mount.rpy)
+            robot.ask("mount", unit=_unit(robot, kind), xyz=mount.xyz, rpy=told_rpy[kind])
         robot.ask("goal", words=words)
         stage.planned()
         robot.until(f"{name}: every step established", _all_hold, timeout_s=POINT_S)
@@ -152,13 +162,32 @@ def withdraw(robot: Robot, *drives: Path) -> None:
     )
 
 
-def _followed(heard: Heard, reference: Reference, stage: Stage) -> float:
+def _standing(body: Heard) -> float:
+    """The heading, once the body has not turned for `STANDING_S`. Raises `TooLate`."""
+    pause, deadline = threading.Event(), time.monotonic() + PLAN_S
+    while time.monotonic() < deadline:
+        headings = tuple(body.headings)
+        recent = [yaw for stamp, yaw in headings if stamp > headings[-1][0] - STANDING_S]
+        is_long = bool(headings) and headings[-1][0] - headings[0][0] > STANDING_S
+        if is_long and max(recent) - min(recent) < STANDING_RAD:
+            return recent[-1]
+        pause.wait(0.1)
+    raise TooLate("the body does not stand still, or tells no heading")
+
+
+def _followed(
+    body: Heard, camera: Heard, reference: Reference, start_rad: float, stage: Stage
+) -> float:
     """The best share of frames with the person ahead, over any window until the deadline."""
     best, deadline = 0.0, time.monotonic() + FOLLOW_S
     pause = threading.Event()
     while time.monotonic() < deadline:
-        headings, frames = tuple(heard.headings), tuple(heard.frames)
-        share = score_following(headings, frames, reference) if headings and frames else 0.0
+        frames = tuple(camera.frames)
+        if not frames:
+            pause.wait(0.25)
+            continue
+        headings = tuple(body.headings)
+        share = score_following(headings, frames, reference, start_rad=start_rad)
         best = max(best, share)
         if share >= WANTED_FRACTION:
             stage.phase("goal")

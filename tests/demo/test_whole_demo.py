@@ -1,0 +1,47 @@
+"""The demonstration as people run it: one command, three goals reached, or a non-zero exit."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+LIMIT_S = 600
+
+pytestmark = [pytest.mark.lab, pytest.mark.timeout(LIMIT_S)]
+
+
+def demonstrate(*options: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "demo", "--json", *options],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=LIMIT_S,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("options", [(), ("--shuffle", "11")], ids=["as shipped", "shuffled"])
+def test_every_stage_reaches_its_goal(options: tuple[str, ...]) -> None:
+    done = demonstrate(*options)
+    assert done.returncode == 0, done.stdout + done.stderr
+    document = json.loads(done.stdout)
+    assert document["reached"] is True
+    assert [stage["name"] for stage in document["stages"]] == ["I", "II", "III"]
+    for stage in document["stages"]:
+        phases = [stage["phases_s"][phase] for phase in ("seen", "verified", "installed", "ready")]
+        assert phases == sorted(phases)
+        assert stage["plan"]
+
+
+def test_a_wrong_mount_fails_the_demonstration() -> None:
+    """The operator tells a mount turned by half a right angle: drivers and host cannot know."""
+    done = demonstrate("--wrong-mount", "45")
+    document = json.loads(done.stdout)
+    assert done.returncode == 1
+    assert [stage["reached"] for stage in document["stages"]] == [True, True, False]
