@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import JournalEntry, PayloadRecord, Snapshot, Step
 from nondum.host.drives.slots import SlotSource
+from nondum.host.drives.source import DriveSource
 from nondum.host.events import Event, HostStarted
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.lifecycle.component_manager import ComponentManager
@@ -105,6 +106,7 @@ async def living(
     *,
     options: InstallOptions | None = None,
     timing: Timing | None = None,
+    sources: Callable[[Folders], Sequence[DriveSource]] = lambda folders: (),
 ) -> AsyncIterator[Living]:
     """Run a host's lifecycle under `root`; its state stays there for the next one."""
     folders, slots = Folders(root / "state"), root / "slots"
@@ -114,7 +116,8 @@ async def living(
     options = options or InstallOptions(allow_unsigned=True)
     executor = Executor(HOST, folders, workers, bus.emit, options)
     manager = ComponentManager(catalogue, executor, bus)
-    manager.add_source(SlotSource([slots]))
+    for source in (SlotSource([slots]), *sources(folders)):
+        manager.add_source(source)
     host = Living(catalogue, manager, executor, workers, bus, folders, slots, root / "drives")
     slots.mkdir(parents=True, exist_ok=True)
     bus.subscribe(host.heard.append)

@@ -79,6 +79,10 @@ class Children:
         if not self._idle and (self._warming is None or self._warming.done()):
             self._warming = asyncio.create_task(self._warm())
 
+    def pids(self) -> set[int]:
+        """Processes of all children."""
+        return {child.pid for child in (*self._idle, *self._busy)}
+
     async def close(self) -> None:
         """Kill all children."""
         if self._warming is not None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import logging
 from collections.abc import Awaitable, Callable, Mapping
+from functools import partial
 from typing import Any
 
 from nondum.host import effects
@@ -83,9 +84,9 @@ class Executor:
     def start(self, effect: Effect) -> None:
         """Set an effect going."""
         instead = isinstance(effect, _INSTEAD)
-        self._lanes.add(_lane(effect), self._carry_out(effect), instead=instead)
+        self._lanes.add(_lane(effect), partial(self._carry_out, effect), instead=instead)
         if isinstance(effect, effects.ClearPayload):
-            self._lanes.add("store", self._prune())
+            self._lanes.add("store", self._prune)
 
     async def close(self) -> None:
         """Give up what is being done, unmount drives, end children. Workers are their owner's."""

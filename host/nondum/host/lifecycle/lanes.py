@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine
+from collections.abc import Awaitable, Callable
 from typing import Any, TypeVar
 
 _R = TypeVar("_R")
+Work = Callable[[], Awaitable[None]]
 
 
 class Lanes:
@@ -15,7 +16,7 @@ class Lanes:
     def __init__(self) -> None:
         self._tasks: dict[str, list[asyncio.Task[None]]] = {}
 
-    def add(self, key: str, work: Coroutine[Any, Any, None], *, instead: bool = False) -> None:
+    def add(self, key: str, work: Work, *, instead: bool = False) -> None:
         """Do `work` when what is before it in its lane has ended; `instead`: cancel that first."""
         before = list(self._tasks.get(key, ()))
         if instead:
@@ -38,14 +39,10 @@ class Lanes:
             del self._tasks[key]
 
 
-async def _after(before: list[asyncio.Task[None]], work: Coroutine[Any, Any, None]) -> None:
-    try:
-        if before:
-            await asyncio.wait(before)
-    except asyncio.CancelledError:
-        work.close()
-        raise
-    await work
+async def _after(before: list[asyncio.Task[None]], work: Work) -> None:
+    if before:
+        await asyncio.wait(before)
+    await work()
 
 
 async def in_thread(function: Callable[..., _R], *arguments: Any) -> _R:

@@ -1,0 +1,96 @@
+"""A drive is pulled at every phase, and in the middle of things: all of it is undone."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+import time
+from pathlib import Path
+
+import pytest
+from tests.faults.test_kill import LAMP_ID, processes_of, sound
+from tests.host.lifecycle.living import LAMP, Living, left_over, living
+from tests.payloads import Part, make_payload
+
+from nondum.host import events
+from nondum.host.catalogue.records import Step
+from nondum.host.events import Event
+
+pytestmark = pytest.mark.anyio
+
+GOOD = "org.example.good"
+
+PHASES: tuple[type[Event], ...] = (
+    events.DriveInserted,
+    events.PayloadFound,
+    events.DriveRead,
+    events.PayloadCopied,
+    events.PayloadVerified,
+    events.PayloadStaged,
+    events.WheelsStored,
+    events.ProgressMade,
+    events.ComponentsProbed,
+    events.PayloadActivated,
+)
+
+
+async def check_undone(host: Living, root: Path) -> None:
+    """Nothing of the lamp is left, and the good payload never noticed."""
+    pulled = time.monotonic()
+    await host.until(lambda: host.snapshot.component("lamp") is None)
+    assert time.monotonic() - pulled <= 0.2
+    await host.until(lambda: "a" not in {drive.id for drive in host.snapshot.drives})
+    await host.until_gone(LAMP_ID)
+    assert time.monotonic() - pulled <= 2.0
+    (good,) = (p.key for p in host.snapshot.payloads)
+    kept = {good, "good"}
+    assert {path.name for path in left_over(host.folders)} <= kept
+    assert set(host.workers.pids()) == {"good"}
+    scratch = host.folders.scratch("lamp")
+    assert not await asyncio.to_thread(processes_of, scratch)
+
+
+async def plug_good(host: Living, root: Path) -> None:
+    make_payload(root / "good", Part("good", LAMP), payload_id=GOOD)
+    host.plug(root / "good", "good")
+    await host.until_step(GOOD, Step.ACTIVE)
+
+
+@pytest.mark.parametrize("phase", PHASES, ids=lambda phase: phase.__name__)
+async def test_pull_at_a_phase(tmp_path: Path, phase: type[Event]) -> None:
+    sound(tmp_path / "drive")
+    async with living(tmp_path) as host:
+        await plug_good(host, tmp_path)
+        host.heard.clear()
+        host.plug(tmp_path / "drive")
+        await host.until(lambda: any(type(event) is phase for event in host.heard))
+        host.pull()
+        await check_undone(host, tmp_path)
+
+
+@pytest.mark.slow
+async def test_pull_at_any_moment(tmp_path: Path) -> None:
+    sound(tmp_path / "drive")
+    moments = random.Random(11)
+    async with living(tmp_path) as host:
+        await plug_good(host, tmp_path)
+        for _ in range(25):
+            host.plug(tmp_path / "drive")
+            await asyncio.sleep(moments.uniform(0.0, 0.4))
+            host.pull()
+            await check_undone(host, tmp_path)
+
+
+async def test_pull_in_the_middle_of_a_behaviour(tmp_path: Path) -> None:
+    sound(tmp_path / "drive")
+    async with living(tmp_path) as host:
+        await plug_good(host, tmp_path)
+        host.plug(tmp_path / "drive")
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+        host.workers.behave("lamp", "shine", {"u": "spot__lamp__lamp"})
+        established = events.BehaviourEstablished
+        await host.until(lambda: any(type(event) is established for event in host.heard))
+        host.pull()
+        await check_undone(host, tmp_path)
+        ended = [event for event in host.heard if isinstance(event, events.BehaviourEnded)]
+        assert [event.component for event in ended] == ["lamp"]

@@ -1,0 +1,85 @@
+"""Entries of a slots folder are drives."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+
+from nondum.host.drives.slots import SlotSource
+from nondum.host.events import DriveInserted, DriveRemoved, DrivesScanned, Event
+
+pytestmark = pytest.mark.anyio
+
+
+@contextlib.asynccontextmanager
+async def watched(*folders: Path) -> AsyncIterator[asyncio.Queue[Event]]:
+    told: asyncio.Queue[Event] = asyncio.Queue()
+    task = asyncio.create_task(SlotSource(folders).watch(told.put_nowait))
+    try:
+        yield told
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+async def test_what_is_there_is_told_first(tmp_path: Path) -> None:
+    (tmp_path / "slots/a").mkdir(parents=True)
+    async with watched(tmp_path / "slots") as told:
+        assert await told.get() == DriveInserted("a", tmp_path / "slots/a", "slot")
+        assert await told.get() == DrivesScanned("slot", ("a",))
+
+
+async def test_links_and_folders_come_and_go(tmp_path: Path) -> None:
+    slots, drive, other = tmp_path / "slots", tmp_path / "drive", tmp_path / "other"
+    drive.mkdir()
+    other.mkdir()
+    async with watched(slots) as told:
+        assert await told.get() == DrivesScanned("slot", ())
+        (slots / "a").symlink_to(drive)
+        assert await told.get() == DriveInserted("a", slots / "a", "slot")
+        other.rename(slots / "b")
+        assert await told.get() == DriveInserted("b", slots / "b", "slot")
+        (slots / "b").rename(other)
+        assert await told.get() == DriveRemoved("b")
+        (slots / "a").unlink()
+        assert await told.get() == DriveRemoved("a")
+
+
+async def test_swapped_drive_is_another_drive(tmp_path: Path) -> None:
+    slots = tmp_path / "slots"
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+    async with watched(slots) as told:
+        await told.get()
+        (slots / "a").symlink_to(tmp_path / "one")
+        await told.get()
+        (slots / ".next").symlink_to(tmp_path / "two")
+        (slots / ".next").rename(slots / "a")
+        assert await told.get() == DriveRemoved("a")
+        assert await told.get() == DriveInserted("a", slots / "a", "slot")
+
+
+async def test_files_and_hidden_entries_are_no_drives(tmp_path: Path) -> None:
+    slots = tmp_path / "slots"
+    async with watched(slots) as told:
+        await told.get()
+        (slots / ".hidden").mkdir()
+        (slots / "file").touch()
+        (slots / "a").mkdir()
+        assert await told.get() == DriveInserted("a", slots / "a", "slot")
+
+
+async def test_drives_of_several_folders_have_names_of_their_own(tmp_path: Path) -> None:
+    for folder in ("left", "right"):
+        (tmp_path / folder / "a").mkdir(parents=True)
+    async with watched(tmp_path / "left", tmp_path / "right") as told:
+        names = [
+            event.drive
+            for event in (await told.get(), await told.get())
+            if isinstance(event, DriveInserted)
+        ]
+        assert names == ["left/a", "right/a"]

@@ -1,0 +1,115 @@
+"""Children do what may block, and nothing they meet reaches the daemon but an answer."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from nondum.host.lifecycle.children import Children
+from nondum.sdk.errors import DriveGone, InstallFailed
+
+pytestmark = pytest.mark.anyio
+
+
+@contextlib.asynccontextmanager
+async def children() -> AsyncIterator[Children]:
+    pool = Children()
+    try:
+        yield pool
+    finally:
+        await pool.close()
+
+
+def drive(root: Path) -> dict[str, Any]:
+    return {
+        "kind": "slot",
+        "root": str(root),
+        "node": None,
+        "filesystem": "",
+        "allow_unsigned": True,
+    }
+
+
+async def test_child_answers_and_is_used_again(tmp_path: Path) -> None:
+    async with children() as pool:
+        assert await pool.run("look", drive(tmp_path)) == []
+        (first,) = pool.pids()
+        assert await pool.run("look", drive(tmp_path)) == []
+        assert pool.pids() == {first}
+
+
+async def test_typed_errors_come_back_typed(tmp_path: Path) -> None:
+    async with children() as pool:
+        with pytest.raises(DriveGone) as gone:
+            await pool.run("look", drive(tmp_path / "nowhere"))
+        assert gone.value.code == "DRIVE_GONE"
+
+
+async def test_fault_of_ours_comes_back_as_a_problem(tmp_path: Path) -> None:
+    async with children() as pool:
+        with pytest.raises(InstallFailed) as failed:
+            await pool.run("look", {})
+        assert failed.value.code == "INTERNAL"
+        assert await pool.run("look", drive(tmp_path)) == []
+
+
+async def test_child_that_dies_is_told(tmp_path: Path) -> None:
+    async with children() as pool:
+        await pool.run("look", drive(tmp_path))
+        (pid,) = pool.pids()
+        os.kill(pid, signal.SIGKILL)
+        with pytest.raises(InstallFailed) as failed:
+            await pool.run("look", drive(tmp_path))
+        assert failed.value.code == "CHILD_DIED"
+        assert await pool.run("look", drive(tmp_path)) == []
+
+
+async def test_child_that_hangs_is_given_up(tmp_path: Path) -> None:
+    """A FIFO that nobody writes to stands for a disk that never answers."""
+    folder = tmp_path / "nondum/org.example.fifo"
+    folder.mkdir(parents=True)
+    staging = tmp_path / "staging"
+    staging.mkdir()
+    os.mkfifo(staging / "CONTENTS")
+    async with children() as pool:
+        with pytest.raises(InstallFailed) as failed:
+            await pool.run("verify", {**host_facts(tmp_path), "staging": str(staging)}, stall_s=0.5)
+        assert failed.value.code == "CHILD_STALLED"
+
+
+async def test_cancelled_job_ends_its_child(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "CONTENTS")
+    async with children() as pool:
+        await pool.run("look", drive(tmp_path))
+        busy = pool.pids()
+        arguments = {**host_facts(tmp_path), "staging": str(tmp_path)}
+        job = asyncio.create_task(pool.run("verify", arguments))
+        await asyncio.sleep(0)  # the child has the job from now on
+        job.cancel()
+        await asyncio.gather(job, return_exceptions=True)
+        assert job.cancelled()
+        assert not busy & pool.pids()
+
+
+async def test_no_child_outlives_the_pool(tmp_path: Path) -> None:
+    async with children() as pool:
+        await pool.run("look", drive(tmp_path))
+        (pid,) = pool.pids()
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+
+
+async def test_listing_of_an_empty_store_is_empty(tmp_path: Path) -> None:
+    async with children() as pool:
+        assert await pool.run("listing", {**host_facts(tmp_path), "folders": []}) == []
+
+
+def host_facts(root: Path) -> dict[str, Any]:
+    return {"store": str(root / "store"), "reserve_mb": 0, "confinement": 0, "method": "store"}
