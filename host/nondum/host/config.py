@@ -106,9 +106,14 @@ def default_name(hostname: str) -> str:
     return name or "host"
 
 
+def user_state() -> Path:
+    """Where a host that a user runs without root keeps what it knows."""
+    return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "nondum"
+
+
 def user_config() -> HostConfig:
     """The defaults of a host that a user runs without root: state and socket are the user's."""
-    state = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "nondum"
+    state = user_state()
     runtime = os.environ.get("XDG_RUNTIME_DIR")
     control = (Path(runtime) / "nondum" if runtime else state) / "control.sock"
     return HostConfig(
@@ -148,6 +153,12 @@ def parse(text: str, where: str, defaults: HostConfig) -> HostConfig:
     if problems:
         raise ConfigRefused(*problems)
     return HostConfig(**sections)
+
+
+def check_name(name: str, *, where: str) -> None:
+    """Raise `ConfigRefused` (CONFIG_VALUE) unless a name is one that a host can have."""
+    if problems := tuple(_name_problems(name, where)):
+        raise ConfigRefused(*problems)
 
 
 def documented() -> Iterator[tuple[str, str, Any]]:
@@ -203,17 +214,21 @@ def _typed(hint: Any, value: Any) -> Any:
 
 
 def _contradictions(host: HostSection, install: InstallSection, where: str) -> Iterator[Problem]:
-    if not HOST_NAME.fullmatch(host.name):
-        yield Problem(
-            "CONFIG_VALUE",
-            f"[host] name = {host.name!r} is not a host name",
-            where=where,
-            fix=f"lower-case letters, digits and single hyphens: {default_name(host.name)!r}",
-        )
+    yield from _name_problems(host.name, where, key="[host] name = ")
     if install.method not in ("store", "pip"):
         yield _wrong("[install] method", '"store" or "pip"', install.method, where)
     if not re.fullmatch(r"[\w.]+:\w+", host.system_tree):
         yield _wrong("[host] system_tree", '"package:function"', host.system_tree, where)
+
+
+def _name_problems(name: str, where: str, *, key: str = "") -> Iterator[Problem]:
+    if not HOST_NAME.fullmatch(name):
+        yield Problem(
+            "CONFIG_VALUE",
+            f"{key}{name!r} is not a host name",
+            where=where,
+            fix=f"lower-case letters, digits and single hyphens: {default_name(name)!r}",
+        )
 
 
 def _unknown(key: str, known: Mapping[str, Any], where: str) -> Problem:

@@ -49,7 +49,7 @@ class Orders:
         highest = HIGHEST_PRIORITY
         priority = arguments.number("priority", 0, at_least=-highest, at_most=highest)
         given = self.mind.give(words=words, pddl=pddl, kind=kind, priority=priority)
-        return given.to_dict()
+        return {**given.to_dict(), "holds": False}
 
     async def halt(self, arguments: Arguments) -> Row:
         """Halt a goal, or everything: the goals that were open, the behaviours that ran."""

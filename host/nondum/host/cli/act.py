@@ -6,106 +6,154 @@ from typing import Any
 
 import click
 
-from nondum.host.cli import render
-from nondum.host.cli.connection import connect, json_option
+from nondum.host.cli import complete, render
+from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.failure import EXIT_REFUSED
-from nondum.host.control.client import ControlClient
 
-FINAL = {"reached", "failed", "halted", "refused"}
+_TRIPLE = (float, float, float)
 
 
 @click.command()
-@click.argument("words", required=False)
+@click.argument("words", nargs=-1, shell_complete=complete.goal_words)
 @click.option("--pddl", metavar="GOAL", help="The goal as PDDL, for example (found person self).")
 @click.option("--maintain", is_flag=True, help="With --pddl: keep it true instead of reaching it.")
-@click.option("--priority", default=0, show_default=True, help="Higher goes first.")
-@click.option("--wait", is_flag=True, help="Until the goal is reached or has failed.")
+@click.option(
+    "--priority",
+    default=0,
+    show_default=True,
+    type=click.IntRange(-1000, 1000),
+    help="Higher goes first.",
+)
+@click.option("--wait", is_flag=True, help="Until it is reached, is held, or has no plan.")
 @json_option
-@click.pass_context
+@click.pass_obj
 def goal(
-    ctx: click.Context,
-    words: str | None,
+    session: Session,
+    words: tuple[str, ...],
     pddl: str | None,
     maintain: bool,
     priority: int,
     wait: bool,
-    as_json: bool,
 ) -> int:
     """Give the robot a goal, in words or in PDDL.
 
+    `nondum goals` says which words are understood now. With --wait, exits with 1 when there is no
+    plan; the goal then waits for what is missing, until it is halted.
+
     \b
-    Examples: nondum goal "follow me through the facility"
+    Examples: nondum goal follow me through the facility
               nondum goal --pddl "(reported person self)" --wait
     """
-    if (words is None) == (pddl is None):
+    if bool(words) == (pddl is not None):
         raise click.UsageError("give the goal in words, or with --pddl")
-    with connect(ctx.obj, timeout_s=None if wait else 30.0) as client:
-        given = client.ask(
-            "goal",
-            words=words,
-            pddl=pddl,
-            kind="maintain" if maintain else None,
-            priority=priority,
-        )
-        if wait:
-            given = _settled(client, given)
-    if as_json:
+    if maintain and pddl is None:
+        raise click.UsageError("--maintain is of use with --pddl only: words say it themselves")
+    kind = "maintain" if maintain else None
+    said = " ".join(words) or None
+    given = session.ask("goal", words=said, pddl=pddl, kind=kind, priority=priority)
+    if wait:
+        given = _settled(session, given)
+    if session.as_json:
         render.as_json(given)
     else:
-        click.echo(f"goal {given['id']}  {given['goal']}  {given['state']}  {given['reason']}")
-    return EXIT_REFUSED if given["state"] in FINAL - {"reached"} else 0
+        _show_goal(given)
+    return EXIT_REFUSED if given["state"] in ("suspended", "halted") else 0
 
 
-def _settled(client: ControlClient, given: dict[str, Any]) -> dict[str, Any]:
+def _settled(session: Session, given: dict[str, Any]) -> dict[str, Any]:
     latest = given
-    for latest in client.follow("follow_goal", id=given["id"]):
-        if latest["state"] in FINAL:
+    for latest in session.follow("follow_goal", id=given["id"]):
+        if latest["holds"] or latest["state"] in ("suspended", "halted"):
             break
     return latest
 
 
+def _show_goal(given: dict[str, Any]) -> None:
+    line = f"goal {given['id']}  {given['goal']}  {given['state']}  {given['reason']}"
+    render.sentence(line.rstrip())
+    for problem in given["problems"]:
+        fix = f" → {problem['fix']}" if problem.get("fix") else ""
+        render.sentence(f"{problem['code']} {problem['message']}{fix}", colour="red", mark="  ")
+
+
 @click.command()
-@click.option("--now", is_flag=True, help="Everything, at once, without the planner.")
-@click.option("--goal", "goal_id", help="Only this goal.")
+@click.option("--now", is_flag=True, help="Everything that runs, at once, without the planner.")
+@click.option(
+    "--goal",
+    "goal_id",
+    metavar="ID",
+    shell_complete=complete.goal_ids,
+    help="Only this goal, not all.",
+)
 @json_option
-@click.pass_context
-def halt(ctx: click.Context, now: bool, goal_id: str | None, as_json: bool) -> None:
+@click.pass_obj
+def halt(session: Session, now: bool, goal_id: str | None) -> None:
     """Halt what the robot is doing.
 
-    Example: nondum halt --now
+    All goals are given up, and what runs for them ends. With --now, everything else that runs is
+    halted too.
+
+    \b
+    Examples: nondum halt --now
+              nondum halt --goal 3
     """
-    with connect(ctx.obj) as client:
-        halted = client.ask("halt", now=now, id=goal_id)
-    if as_json:
+    halted = session.ask("halt", now=now, id=goal_id)
+    if session.as_json:
         render.as_json(halted)
-    else:
-        click.echo("\n".join(halted["halted"]) or "nothing was running")
+        return
+    for goal in halted["goals"]:
+        click.echo(f"goal {goal} is halted")
+    for behaviour in halted["halted"]:
+        render.sentence(behaviour, mark="halting ")
+    if not halted["goals"] and not halted["halted"]:
+        click.echo("nothing was asked for, nothing was running")
 
 
 @click.command()
-@click.argument("unit")
-@click.option("--xyz", nargs=3, type=float, default=(0.0, 0.0, 0.0), help="Metres from the body.")
-@click.option("--rpy", nargs=3, type=float, default=(0.0, 0.0, 0.0), help="Radians.")
+@click.argument("unit", shell_complete=complete.units)
+@click.option("--xyz", type=_TRIPLE, metavar="X Y Z", help="Metres from the body's frame.")
+@click.option("--rpy", type=_TRIPLE, metavar="ROLL PITCH YAW", help="Radians.")
 @json_option
-@click.pass_context
+@click.pass_obj
 def mount(
-    ctx: click.Context,
+    session: Session,
     unit: str,
-    xyz: tuple[float, float, float],
-    rpy: tuple[float, float, float],
-    as_json: bool,
+    xyz: tuple[float, float, float] | None,
+    rpy: tuple[float, float, float] | None,
 ) -> None:
     """Tell where on the body a unit is mounted.
 
     Axes follow REP-103: x forward, y left, z up; roll, pitch and yaw turn about them in that order.
+    What is not given stays as it was. `nondum units` shows units and their poses.
 
     Example: nondum mount panther__turret__head --xyz 0.1 0 0.4 --rpy 0 0 1.57
     """
-    with connect(ctx.obj) as client:
-        mounted = client.ask("mount", unit=unit, xyz=list(xyz), rpy=list(rpy))
-    if as_json:
+    if xyz is None and rpy is None:
+        raise click.UsageError("say where: --xyz X Y Z, --rpy ROLL PITCH YAW, or both")
+    mounted = session.ask("mount", unit=unit, xyz=xyz, rpy=rpy)
+    if session.as_json:
         render.as_json(mounted)
         return
-    click.echo(f"{mounted['unit']} is mounted at xyz {mounted['xyz']}, rpy {mounted['rpy']}")
+    xyz_said, rpy_said = (" ".join(f"{v:g}" for v in mounted[key]) for key in ("xyz", "rpy"))
+    click.echo(f"{mounted['unit']} is mounted at xyz {xyz_said}, rpy {rpy_said}")
     for warning in mounted["warnings"]:
         click.secho(f"warning: {warning}", fg="yellow", err=True)
+
+
+@click.command()
+@click.argument("name", metavar="PAYLOAD", shell_complete=complete.troubled)
+@json_option
+@click.pass_obj
+def retry(session: Session, name: str) -> None:
+    """Try again what was refused or quarantined.
+
+    PAYLOAD is a payload's id, or a component of it.
+
+    Example: nondum retry org.example.window-opener
+    """
+    retried = session.ask("retry", name=name)
+    if session.as_json:
+        render.as_json(retried)
+        return
+    for payload in retried["payloads"]:
+        click.echo(f"{payload} is tried again: see `nondum status --follow`")

@@ -1,38 +1,90 @@
-"""Which daemon a command talks to, and the options all commands of that kind share."""
+"""Which daemon a command talks to, and what it was told besides its own arguments."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
 from nondum.host.control.client import ControlClient
+from nondum.sdk.errors import HostUnreachable
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
-SYSTEM_CONTROL = Path("/run/nondum/control.sock")
+TIMEOUT_S = 30.0
 
 
-def user_control() -> Path:
-    """The control socket of a host run with `--user`."""
-    runtime = os.environ.get("XDG_RUNTIME_DIR")
-    base = Path(runtime) if runtime else Path.home() / ".local/state"
-    return base / "nondum/control.sock"
+@dataclass(slots=True)
+class Session:
+    """One run of the command line; `click` hands it to every command as its `obj`."""
+
+    control: Path | None = None
+    as_json: bool = False
+
+    def connect(self, *, timeout_s: float | None = TIMEOUT_S) -> ControlClient:
+        """Connect to the daemon that was named, else to the first of the usual ones that answers.
+
+        Raises `HostUnreachable` when none does.
+        """
+        paths = [self.control] if self.control else list(usual_sockets())
+        for path in paths[:-1]:
+            try:
+                return ControlClient(path, timeout_s=timeout_s)
+            except HostUnreachable:
+                continue
+        return ControlClient(paths[-1], timeout_s=timeout_s)
+
+    def ask(self, verb: str, *, timeout_s: float | None = TIMEOUT_S, **arguments: Any) -> Any:
+        """Ask one question. Raises `NondumError` with the refusal."""
+        with closing(self.connect(timeout_s=timeout_s)) as client:
+            return client.ask(verb, **arguments)
+
+    def follow(self, verb: str, **arguments: Any) -> Iterator[Any]:
+        """Ask for answers until the caller has enough. Raises `NondumError`."""
+        with closing(self.connect(timeout_s=None)) as client:
+            yield from client.follow(verb, **arguments)
 
 
-def connect(control: Path | None, *, timeout_s: float | None = 30.0) -> ControlClient:
-    """Connect to the daemon named, else to this user's, else to the system's.
+def usual_sockets() -> Iterator[Path]:
+    """Where daemons listen: this user's, with or without a login session, then the system's."""
+    from nondum.host import config  # only commands that name no socket pay for it
 
-    Raises `HostUnreachable` when none answers.
-    """
-    if control is None:
-        control = user_control() if user_control().exists() else SYSTEM_CONTROL
-    return ControlClient(control, timeout_s=timeout_s)
+    yield config.user_config().host.control
+    yield config.user_state() / "control.sock"
+    yield config.HostConfig().host.control
 
 
 def json_option(command: _F) -> _F:
-    """Add `--json`."""
-    return click.option("--json", "as_json", is_flag=True, help="Print JSON for machines.")(command)
+    """Add `--json`: it is kept in the session, so that refusals are told in JSON too."""
+    return click.option(
+        "--json",
+        "as_json",
+        is_flag=True,
+        expose_value=False,
+        callback=_keep_as_json,
+        help="Print JSON for machines.",
+    )(command)
+
+
+def control_option(command: _F) -> _F:
+    """Add `--control`."""
+    return click.option(
+        "--control",
+        type=click.Path(path_type=Path),
+        envvar="NONDUM_CONTROL",
+        expose_value=False,
+        callback=_keep_control,
+        help="The daemon's control socket [default: this user's, else the system's].",
+    )(command)
+
+
+def _keep_as_json(ctx: click.Context, _: click.Parameter, is_wanted: bool) -> None:
+    ctx.ensure_object(Session).as_json |= is_wanted
+
+
+def _keep_control(ctx: click.Context, _: click.Parameter, path: Path | None) -> None:
+    ctx.ensure_object(Session).control = path

@@ -15,7 +15,10 @@ from nondum.host.config import HostConfig
 
 @click.group()
 def host() -> None:
-    """Run the daemon."""
+    """Run the daemon.
+
+    Example: nondum host run --user
+    """
 
 
 @host.command()
@@ -23,7 +26,7 @@ def host() -> None:
 @click.option(
     "--config",
     "config_file",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=click.Path(path_type=Path),
     help=f"Configuration file [default: {host_config.SYSTEM_FILE}, none with --user].",
 )
 @click.option("--name", help="The host's name, over the configuration's.")
@@ -41,6 +44,7 @@ def run(user: bool, config_file: Path | None, name: str | None, verbose: bool) -
     )
     chosen = _config(config_file, is_user=user)
     if name is not None:
+        host_config.check_name(name, where="--name")
         chosen = dataclasses.replace(chosen, host=dataclasses.replace(chosen.host, name=name))
     from nondum.host.app import run_host
 

@@ -5,36 +5,40 @@ own."""
 from __future__ import annotations
 
 import difflib
+import os
 import sys
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from nondum.host.cli import failure
-from nondum.sdk.errors import NondumError
+from nondum.host.cli.connection import Session, control_option
+from nondum.sdk.errors import NondumError, Problem
 
 COMMANDS: dict[str, tuple[str, str]] = {
-    "behaviours": ("look", "What the robot can do."),
-    "completion": ("shell", "Print the shell completion script."),
-    "components": ("look", "What the robot is made of at this moment."),
-    "facts": ("look", "What the robot believes, and why."),
+    "behaviours": ("body", "What the robot can do."),
+    "completion": ("shell", "Print the script that completes commands in a shell."),
+    "components": ("body", "What the robot is made of at this moment."),
+    "devices": ("body", "What is plugged in, and who has it."),
+    "facts": ("mind", "What the robot believes, and why."),
     "goal": ("act", "Give the robot a goal, in words or in PDDL."),
-    "goals": ("look", "What can be asked for now, and what was."),
+    "goals": ("mind", "What can be asked for now, and what was."),
     "halt": ("act", "Halt what the robot is doing."),
     "host": ("host", "Run the daemon."),
-    "journal": ("look", "What happened on this host, oldest first."),
-    "logs": ("look", "What components have written."),
+    "journal": ("past", "What happened on this host, oldest first."),
+    "logs": ("past", "What components have written."),
     "mount": ("act", "Tell where on the body a unit is mounted."),
     "payload": ("payload", "Make, judge and install payloads."),
-    "plan": ("look", "The plan that is being carried out."),
-    "status": ("look", "The host, its payloads and its task at a glance."),
-    "store": ("look", "The wheels that this host keeps."),
-    "streams": ("look", "Who sends what to whom."),
-    "tree": ("look", "The behaviour tree as it is being ticked."),
-    "units": ("look", "What the robot has to act with."),
-    "why": ("look", "Why the robot does what it does, or why it cannot."),
+    "plan": ("mind", "The plan that is being carried out."),
+    "retry": ("act", "Try again what was refused or quarantined."),
+    "status": ("status", "The host, its payloads and its goals at a glance."),
+    "store": ("body", "The wheels that this host keeps."),
+    "streams": ("streams", "Who sends what to whom, and what is sent."),
+    "tree": ("mind", "The behaviour tree as it is being ticked."),
+    "units": ("body", "What the robot has to act with."),
+    "why": ("mind", "Why the robot does what it does, or why it cannot."),
 }
 
 
@@ -60,6 +64,11 @@ class LazyGroup(click.Group):
             ctx.fail(f"No such command {args[0]!r}.{hint}")
         return super().resolve_command(ctx, args)
 
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        found = [n for n in self.list_commands(ctx) if n.startswith(incomplete)]
+        options = click.Command.shell_complete(self, ctx, incomplete)
+        return [*(CompletionItem(n, help=COMMANDS[n][1]) for n in found), *options]
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
             formatter.write_dl([(name, COMMANDS[name][1]) for name in sorted(COMMANDS)])
@@ -68,33 +77,51 @@ class LazyGroup(click.Group):
 @click.group(
     cls=LazyGroup,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog="Example: nondum host run --user & nondum payload install DIR && nondum goals",
+    epilog="Exits with 0: done, 1: refused or failed, 2: wrong usage or bad input, 3: problems "
+    "found, 4: no daemon.",
 )
-@click.option(
-    "--control",
-    type=click.Path(path_type=Path),
-    envvar="NONDUM_CONTROL",
-    help="The daemon's control socket [default: this user's, else the system's].",
-)
+@control_option
 @click.version_option(package_name="nondum")
-@click.pass_context
-def cli(ctx: click.Context, control: Path | None) -> None:
-    """Rebuild a robot in the field: plug in a payload, and the robot plans with it."""
-    ctx.obj = control
+def cli() -> None:
+    """Rebuild a robot in the field: plug in a payload, and the robot plans with it.
+
+    \b
+    Example: nondum host run --user &
+             nondum payload install DRIVE
+             nondum goals
+    """
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit: 0 done, 1 refused or failed, 2 wrong usage or bad input,
-    3 problems found, 4 no daemon."""
+    3 problems found, 4 no daemon, 130 interrupted, 141 nobody reads the output any more."""
     try:
-        code: Any = cli.main(args=arguments, prog_name="nondum", standalone_mode=False)
-    except click.exceptions.Abort:
-        sys.exit(130)
+        code = _run(arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:  # the reader has left, as after `| head`
+        # Nothing can be written, but the interpreter would try, and complain, at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = failure.EXIT_BROKEN_PIPE
+    sys.exit(code)
+
+
+def _run(arguments: list[str] | None) -> int:
+    session = Session()
+    color = False if os.environ.get("NO_COLOR") else None
+    try:
+        code: Any = cli.main(
+            args=arguments, prog_name="nondum", standalone_mode=False, obj=session, color=color
+        )
+    except (click.exceptions.Abort, KeyboardInterrupt):
+        return failure.EXIT_INTERRUPTED
     except click.ClickException as error:
         error.show()
-        sys.exit(2)
+        return failure.EXIT_BAD_INPUT
     except NondumError as error:
-        sys.exit(failure.tell(error))
-    except BrokenPipeError:
-        sys.exit(141)  # the reader of a pipe has left, as after `| head`
-    sys.exit(code if isinstance(code, int) else 0)
+        return failure.tell(error, as_json=session.as_json)
+    except OSError as error:
+        if isinstance(error, BrokenPipeError) or error.filename is None:
+            raise
+        problem = Problem("FILE", error.strerror or str(error), where=str(error.filename))
+        return failure.tell(NondumError(problem), as_json=session.as_json)
+    return code if isinstance(code, int) else 0

@@ -1,26 +1,25 @@
-"""Commands that make, judge and install payloads. None but `install` needs a host."""
+"""Commands that make and install payloads. Making one needs no host."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import click
 
-from nondum.host.cli import render
-from nondum.host.cli.connection import connect, json_option
-from nondum.host.cli.failure import EXIT_PROBLEMS
-from nondum.sdk.errors import PayloadRefused, Problem
+from nondum.host.cli import complete, render
+from nondum.host.cli.connection import Session, json_option
+from nondum.host.cli.judge import FOLDER, check, inspect, payloads
 
 INSTALL_TIMEOUT_S = 600.0
-FOLDER = click.Path(path_type=Path, exists=True, file_okay=False)
 
 
 @click.group()
 def payload() -> None:
-    """Make, judge and install payloads."""
+    """Make, judge and install payloads.
+
+    Example: nondum payload new window-opener
+    """
 
 
 @payload.command()
@@ -33,7 +32,8 @@ def payload() -> None:
 )
 @click.option("--id", "payload_id", help="The payload's id [default: org.example.NAME].")
 @json_option
-def new(name: str, output: Path | None, payload_id: str | None, as_json: bool) -> None:
+@click.pass_obj
+def new(session: Session, name: str, output: Path | None, payload_id: str | None) -> None:
     """Make a complete plugin package that passes its own tests.
 
     Example: nondum payload new window-opener && cd window-opener && pytest
@@ -41,7 +41,7 @@ def new(name: str, output: Path | None, payload_id: str | None, as_json: bool) -
     from nondum.wheelhouse import scaffold
 
     made = scaffold.new_package(name, output or Path(name), payload_id=payload_id)
-    if as_json:
+    if session.as_json:
         render.as_json({"folder": str(made.folder), "files": [str(path) for path in made.files]})
         return
     for path in made.files:
@@ -73,7 +73,9 @@ def new(name: str, output: Path | None, payload_id: str | None, as_json: bool) -
 @click.option("--fleet", default="", help="Robots that it is meant for [default: any].")
 @click.option("--quiet", "-q", is_flag=True, help="No progress.")
 @json_option
+@click.pass_obj
 def build(
+    session: Session,
     packages: tuple[Path, ...],
     output: Path,
     architectures: tuple[str, ...],
@@ -84,7 +86,6 @@ def build(
     release: int | None,
     fleet: str,
     quiet: bool,
-    as_json: bool,
 ) -> None:
     """Build one payload a package, with wheels for every architecture and Python.
 
@@ -105,10 +106,10 @@ def build(
     )
     made = []
     for package in packages:
-        show = _Progress(package.resolve().name, is_shown=not (quiet or as_json))
+        show = _Progress(package.resolve().name, is_shown=not (quiet or session.as_json))
         made.append(building.build(package, output, options, show))
         show.end()
-    if as_json:
+    if session.as_json:
         render.as_json({"payloads": [str(folder) for folder in made]})
     elif not quiet:
         for folder in made:
@@ -118,93 +119,33 @@ def build(
 @payload.command()
 @click.argument("drive", type=FOLDER)
 @json_option
-def inspect(drive: Path, as_json: bool) -> None:
-    """Show what a drive or payload folder says it carries. Nothing is checked or run.
-
-    Example: nondum payload inspect /media/usb
-    """
-    views = [_view(folder) for folder in _payloads(drive)]
-    if as_json:
-        render.as_json({"payloads": views})
-        return
-    for view in views:
-        click.echo(f"{view['id']} {view['version']} (release {view['release']}): {view['summary']}")
-        for component in view["components"]:
-            click.echo(f"  component {component['id']}: {', '.join(component['behaviours'])}")
-            for wheel in component["wheels"]:
-                click.echo(f"    {wheel}")
-
-
-@payload.command()
-@click.argument("drive", type=FOLDER)
-@click.option("--anywhere", is_flag=True, help="Do not ask whether it fits this machine.")
-@json_option
-def check(drive: Path, anywhere: bool, as_json: bool) -> int:
-    """Judge a drive or payload folder by the rules that hosts go by. Exits with 3 on problems.
-
-    Example: nondum payload check /media/usb --json
-    """
-    from nondum.host import vocabulary_check
-    from nondum.wheelhouse import preflight
-    from nondum.wheelhouse.payload import verify_folder
-    from nondum.wheelhouse.signatures import UnsignedAllowed
-
-    facts = None if anywhere else preflight.probe(Path.cwd(), reserve_mb=0, confinement=0)
-    problems: list[Problem] = []
-    warnings: list[Problem] = []
-    for folder in _payloads(drive):
-        problems.extend(verify_folder(folder, UnsignedAllowed(), facts))
-        if not problems:
-            judged = vocabulary_check.judge(_load_index(folder))
-            problems.extend(judged.problems)
-            warnings.extend(judged.warnings)
-    if as_json:
-        render.as_json(
-            {
-                "ok": not problems,
-                "problems": [problem.to_dict() for problem in problems],
-                "warnings": [warning.to_dict() for warning in warnings],
-            }
-        )
-    else:
-        for problem in problems:
-            click.secho(str(problem), fg="red")
-        for warning in warnings:
-            click.secho(f"warning: {warning}", fg="yellow")
-        click.echo("refused" if problems else "accepted")
-    return EXIT_PROBLEMS if problems else 0
-
-
-@payload.command()
-@click.argument("drive", type=FOLDER)
-@json_option
-@click.pass_context
-def install(ctx: click.Context, drive: Path, as_json: bool) -> None:
+@click.pass_obj
+def install(session: Session, drive: Path) -> None:
     """Install a drive's payloads for good, as initial components of the running host.
 
     Example: nondum payload install /media/usb
     """
-    with connect(ctx.obj, timeout_s=INSTALL_TIMEOUT_S) as client:
-        done = [client.ask("install", folder=str(f.resolve())) for f in _payloads(drive)]
-    if as_json:
+    done = []
+    for folder in payloads(drive):
+        path = str(folder.resolve())
+        done.append(session.ask("install", timeout_s=INSTALL_TIMEOUT_S, folder=path))
+        if not session.as_json:
+            click.echo(f"installed {done[-1]['payload']} {done[-1]['version']}")
+    if session.as_json:
         render.as_json({"installed": done})
-    else:
-        for row in done:
-            click.echo(f"installed {row['payload']} {row['version']}")
 
 
 @payload.command()
-@click.argument("payload_id")
+@click.argument("payload_id", metavar="PAYLOAD", shell_complete=complete.installed)
 @json_option
-@click.pass_context
-def uninstall(ctx: click.Context, payload_id: str, as_json: bool) -> None:
+@click.pass_obj
+def uninstall(session: Session, payload_id: str) -> None:
     """Remove an installed payload from the running host.
 
     Example: nondum payload uninstall org.example.window-opener
     """
-    with connect(ctx.obj) as client:
-        done = client.ask("uninstall", payload=payload_id)
-    if as_json:
+    done = session.ask("uninstall", timeout_s=INSTALL_TIMEOUT_S, payload=payload_id)
+    if session.as_json:
         render.as_json(done)
     else:
         click.echo(f"uninstalled {payload_id}")
@@ -227,59 +168,9 @@ class _Progress:
             click.echo("\r\x1b[K", nl=False, err=True)
 
 
-def _payloads(drive: Path) -> Iterator[Path]:
-    """The payload folders of a drive, or the folder itself when it is one."""
-    from nondum.wheelhouse import contents
-    from nondum.wheelhouse.drive import find_payloads
-
-    if (drive / contents.NAME).is_file():
-        yield drive
-        return
-    found = find_payloads(drive)
-    if not found:
-        text = "there is no payload here"
-        fix = "a drive has folders nondum/<payload-id>/ with a file CONTENTS"
-        raise PayloadRefused(Problem("DRIVE_NOT_PAYLOAD", text, where=str(drive), fix=fix))
-    yield from found
-
-
-def _view(folder: Path) -> dict[str, Any]:
-    from nondum.wheelhouse import contents, drive, lock, manifest
-
-    listed = contents.parse(drive.read_contents(folder), f"{folder.name}/{contents.NAME}")
-    said = manifest.parse((folder / manifest.NAME).read_text(encoding="utf-8"), manifest.NAME)
-    described = _load_index(folder)
-    components = []
-    for component in said.components:
-        name = lock.file_name(component.id)
-        locked = lock.parse((folder / name).read_text(encoding="utf-8"), name)
-        behaviours = described[component.id].behaviours
-        components.append(
-            {
-                "id": component.id,
-                "distribution": component.distribution,
-                "behaviours": [behaviour.name for behaviour in behaviours],
-                "wheels": [wheel.filename for wheel in locked.wheels],
-            }
-        )
-    return {
-        "id": listed.payload_id,
-        "version": listed.version,
-        "release": listed.release,
-        "fleet": listed.fleet,
-        "built": listed.built,
-        "summary": said.summary,
-        "bytes": listed.total_bytes,
-        "components": components,
-    }
-
-
-def _load_index(folder: Path) -> Any:
-    from nondum.wheelhouse import index
-
-    return index.parse((folder / index.NAME).read_bytes(), index.NAME)
-
-
 def _size(folder: Path) -> str:
-    total = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
-    return f"{total / 1e6:.1f} MB"
+    return render.size(sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()))
+
+
+payload.add_command(inspect)
+payload.add_command(check)

@@ -1,76 +1,74 @@
-"""Tables and trees as text: boxed and coloured on a terminal, plain columns in a pipe."""
+"""Everything that is printed but tables: JSON, trees, times, sizes, sentences."""
 
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Mapping
 from typing import Any
 
 import click
 
-Row = Mapping[str, Any]
+from nondum.host.printable import printable, printable_text
 
 STATUS_MARK = {"SUCCESS": "✓", "FAILURE": "✗", "RUNNING": "▶", "INVALID": "·"}
+STATUS_COLOUR = {"SUCCESS": "green", "FAILURE": "red", "RUNNING": "yellow"}
 
 
 def as_json(data: Any) -> None:
-    """Print data for machines."""
+    """Print data for machines, readable for people."""
     click.echo(json.dumps(data, ensure_ascii=False, indent=2))
 
 
-def table(rows: Sequence[Row], columns: Sequence[str], *, empty: str) -> None:
-    """Print rows under their columns' names, or the sentence `empty`."""
-    if not rows:
-        click.echo(empty)
-        return
-    cells = [[cell(row.get(column)) for column in columns] for row in rows]
-    if sys.stdout.isatty():
-        _boxed(columns, cells)
-        return
-    widths = [max(len(c), *(len(line[i]) for line in cells)) for i, c in enumerate(columns)]
-    for line in ([c.upper() for c in columns], *cells):
-        click.echo("  ".join(f"{v:<{w}}" for v, w in zip(line, widths, strict=True)).rstrip())
+def as_json_line(data: Any) -> None:
+    """Print data as one line, where more lines follow."""
+    click.echo(json.dumps(data, ensure_ascii=False, separators=(",", ":")))
 
 
-def cell(value: Any) -> str:
-    """One value as a table shows it.
+def sentence(text: str, *, colour: str | None = None, mark: str = "") -> None:
+    """Print what may hold words of strangers: its lines stay lines, and nothing else."""
+    click.secho(f"{mark}{lines_of(text)}", fg=colour)
 
-    >>> cell(None), cell(True), cell(["a", "b"]), cell(1.23456)
-    ('-', 'yes', 'a, b', '1.235')
+
+def lines_of(text: str) -> str:
+    """The text, safe for a terminal."""
+    return printable_text(text)
+
+
+def clock(wall_s: float) -> str:
+    """A moment in local time, to the second."""
+    return time.strftime("%F %T", time.localtime(wall_s))
+
+
+def size(count: int) -> str:
+    """Bytes as people read them.
+
+    >>> size(0), size(921_600), size(61_440_000)
+    ('0 B', '921.6 kB', '61.4 MB')
     """
-    if value is None or value == "" or value == []:
-        return "-"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:.4g}"
-    if isinstance(value, list | tuple):
-        return ", ".join(cell(item) for item in value)
-    if isinstance(value, Mapping):
-        return ", ".join(f"{key}={cell(item)}" for key, item in value.items())
-    return str(value)
+    amount = float(count)
+    for unit in ("B", "kB", "MB", "GB"):
+        if amount < 1000.0 or unit == "GB":
+            break
+        amount /= 1000.0
+    return f"{count} B" if unit == "B" else f"{amount:.1f} {unit}"
+
+
+def progress(made: Mapping[str, Any] | None) -> str:
+    """How far something is.
+
+    >>> progress({"phase": "copy", "fraction": 0.25}), progress(None)
+    ('copy 25 %', '')
+    """
+    return f"{made['phase']} {100 * made['fraction']:.0f} %" if made else ""
 
 
 def tree_lines(node: Mapping[str, Any], depth: int = 0) -> list[str]:
     """A behaviour tree as indented lines: status, name, and why it is where it is."""
-    mark = STATUS_MARK.get(str(node.get("status")), "·")
-    why = f"  — {node['why']}" if node.get("why") else ""
-    lines = [f"{'  ' * depth}{mark} {node['name']}{why}"]
+    status = str(node.get("status"))
+    mark = click.style(STATUS_MARK.get(status, "·"), fg=STATUS_COLOUR.get(status))
+    why = f"  — {printable(str(node['why']))}" if node.get("why") else ""
+    lines = [f"{'  ' * depth}{mark} {printable(str(node['name']))}{why}"]
     for child in node.get("children", ()):
         lines.extend(tree_lines(child, depth + 1))
     return lines
-
-
-def _boxed(columns: Sequence[str], cells: Sequence[Sequence[str]]) -> None:
-    # Only a terminal pays for rich's import.
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
-
-    drawn = Table(box=SIMPLE_HEAD, pad_edge=False)
-    for column in columns:
-        drawn.add_column(column.capitalize(), overflow="fold")
-    for line in cells:
-        drawn.add_row(*line)
-    Console(markup=False, highlight=False).print(drawn)

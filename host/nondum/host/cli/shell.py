@@ -5,21 +5,23 @@ from __future__ import annotations
 import click
 from click.shell_completion import get_completion_class
 
-from nondum.host.cli.failure import EXIT_BAD_INPUT
+SHELLS = ("bash", "fish", "zsh")
 
 
 @click.command()
-@click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
+@click.argument("shell", type=click.Choice(SHELLS))
 @click.pass_context
-def completion(ctx: click.Context, shell: str) -> int:
-    """Print the shell completion script.
+def completion(ctx: click.Context, shell: str) -> None:
+    """Print the script that completes commands in a shell.
+
+    Components, units, streams and goals are completed from the running host.
 
     \b
-    Example: nondum completion bash > ~/.local/share/bash-completion/completions/nondum
+    Examples: nondum completion bash > ~/.local/share/bash-completion/completions/nondum
+              nondum completion fish > ~/.config/fish/completions/nondum.fish
+              nondum completion zsh > "${fpath[1]}/_nondum"
     """
     kind = get_completion_class(shell)
-    if kind is None:
-        return EXIT_BAD_INPUT
+    assert kind is not None  # click knows all of SHELLS
     root = ctx.find_root()
     click.echo(kind(root.command, {}, "nondum", "_NONDUM_COMPLETE").source())
-    return 0

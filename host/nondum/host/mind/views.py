@@ -11,11 +11,12 @@ from nondum.host.catalogue.records import ComponentRecord
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition, own_objects
 from nondum.host.mind.frames import implausible
-from nondum.host.mind.goals import GoalQueue
+from nondum.host.mind.goals import GoalQueue, GoalState
 from nondum.host.mind.people import People
 from nondum.host.mind.pursuit import Pursuit
 from nondum.host.mind.runner import BehaviourRunner
 from nondum.planning.goal import goal_text
+from nondum.planning.task_control import Phase
 from nondum.planning.task_tree import StepLeaf
 from nondum.sdk.errors import GoalRefused
 
@@ -79,8 +80,14 @@ class Views:
         ]
 
     def goals(self) -> Row:
-        """What can be asked for now (`can`: `words`, `goal`, `kind`), and what was (`given`)."""
-        given = [goal.to_dict() for goal in self._mind.queue]
+        """What can be asked for now (`can`: `words`, `goal`, `kind`), and what was (`given`; of
+        those that are reached, or kept up just now, `holds` is true)."""
+        current = self._mind.pursuit.current
+        held = current.goal if current and current.phase is Phase.HOLDING else None
+        given = [
+            {**goal.to_dict(), "holds": goal.state is GoalState.REACHED or goal.id == held}
+            for goal in self._mind.queue
+        ]
         return {"can": list(self._offers()), "given": given}
 
     def why(self) -> Row:

@@ -12,8 +12,6 @@ LINES = 1000
 """Lines that are kept of one component."""
 COMPONENTS = 256
 """Components that lines are kept of."""
-MAX_LINE = 4096
-"""Characters that are kept of one line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,21 +46,3 @@ class Logs:
     def components(self) -> Iterator[str]:
         """Who has said something."""
         return iter(sorted(self._rings))
-
-
-def printable_text(text: str) -> str:
-    """Any lines, each made `printable`."""
-    return "\n".join(printable(line) for line in text.splitlines())
-
-
-def printable(text: str) -> str:
-    r"""One line for a terminal: what could control it is shown as an escape, and it is not endless.
-
-    >>> printable("done\x1b[2J\n")
-    'done\\x1b[2J'
-    """
-    kept = text.rstrip("\r\n")[:MAX_LINE]
-    if kept.isprintable():
-        return kept
-    shown = (c if c.isprintable() or c == "\t" else c.encode("unicode_escape") for c in kept)
-    return "".join(part if isinstance(part, str) else part.decode("ascii") for part in shown)

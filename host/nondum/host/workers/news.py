@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import Any, TypeAlias
 
 from nondum.host.events import FactForgotten, FactKnown, StreamFlowing, WorkerLogged
-from nondum.host.workers.logs import printable, printable_text
+from nondum.host.printable import printable, printable_text
 from nondum.sdk.errors import MessageInvalid, Problem, ProtocolViolation
 from nondum.sdk.messages import value_from_wire
 

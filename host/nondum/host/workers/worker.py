@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from nondum.host.events import BehaviourProgressed, Event, WorkerLogged
+from nondum.host.printable import printable
 from nondum.host.workers import problems
 from nondum.host.workers.call import Call
 from nondum.host.workers.index import mismatches
 from nondum.host.workers.launcher import Launcher
 from nondum.host.workers.leftovers import end_leftovers
-from nondum.host.workers.logs import printable
 from nondum.host.workers.news import Claims, parse_news, parse_progress
 from nondum.host.workers.output import Output
 from nondum.host.workers.process import WorkerProcess

@@ -1,0 +1,69 @@
+"""The host at a glance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from nondum.host.cli import render
+from nondum.host.cli.connection import Session, json_option
+from nondum.host.cli.table import table
+
+LAST_TOLD = 5
+
+
+@click.command()
+@click.option("--follow", "-f", is_flag=True, help="Show it again whenever it changes.")
+@json_option
+@click.pass_obj
+def status(session: Session, follow: bool) -> None:
+    """The host, its payloads and its goals at a glance.
+
+    With --follow and --json, each line is all that there is to see: components, streams, plan and
+    tree too.
+
+    \b
+    Examples: nondum status
+              nondum status --follow
+    """
+    if not follow:
+        view = session.ask("status")
+        render.as_json(view) if session.as_json else show(view)
+        return
+    for view in session.follow("watch"):
+        if session.as_json:
+            render.as_json_line(view)
+        else:
+            click.clear()
+            show(view)
+
+
+def show(view: dict[str, Any]) -> None:
+    """Print a status for people."""
+    click.echo(f"host {view['host']}  revision {view['revision']}  {view['state']}")
+    for warning in view["warnings"]:
+        render.sentence(warning, colour="yellow", mark="warning: ")
+    click.echo()
+    _show_payloads(view["payloads"])
+    for drive in view["drives"]:
+        for problem in drive["problems"]:
+            render.sentence(problem, colour="red", mark=f"drive {drive['drive']}: ")
+    if view["goals"]:
+        click.echo()
+        table(view["goals"], ["id", "text", "kind", "state", "reason"], empty="")
+    if view["told"]:
+        click.echo()
+    for told in view["told"][-LAST_TOLD:]:
+        render.sentence(told["text"], mark="> ")
+
+
+def _show_payloads(payloads: list[dict[str, Any]]) -> None:
+    rows = [{**row, "progress": render.progress(row["progress"])} for row in payloads]
+    columns = ["payload", "version", "state", "drive", "components"]
+    if any(row["progress"] for row in rows):
+        columns.append("progress")
+    table(rows, columns, empty="no payloads")
+    for row in rows:
+        for problem in row["problems"]:
+            render.sentence(problem, colour="red", mark=f"{row['payload']}: ")
