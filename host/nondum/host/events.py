@@ -245,6 +245,14 @@ class HostStarted(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class CatalogueSetAside(Event):
+    """The catalogue's file was damaged: it was kept under another name and a new one begun."""
+
+    host: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Recomposed(Event):
     """The catalogue has a new revision: components came, went or changed."""
 

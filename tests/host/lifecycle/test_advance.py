@@ -207,6 +207,12 @@ def test_same_release_with_other_content_is_refused() -> None:
     assert [p.code for p in state.payloads["k2"].problems] == ["RELEASE_CONFLICT"]
 
 
+def test_implausible_release_is_refused() -> None:
+    gone, _ = after(events.DriveRemoved("a"), events.PayloadCleared("k1"), state=active())
+    state, _ = after(drive(), found("k2", release=2**53), state=gone)
+    assert [p.code for p in state.payloads["k2"].problems] == ["RELEASE_JUMP"]
+
+
 def test_component_id_belongs_to_the_first() -> None:
     rival = way_to_active("k2", "b", payload_id="org.y")[:3]
     state, _ = after(drive("b"), *rival, state=active())

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from nondum.host.catalogue.records import PayloadRecord, Step
+from nondum.host.catalogue.records import Moment, PayloadRecord, Step
 from nondum.host.catalogue.state import HostState
 from nondum.host.events import PayloadFound
 from nondum.sdk.errors import Problem
 
 RELEASE_JUMP = 1_000_000
-"""A release this far ahead would lock out every honest one after it."""
+"""A release this far ahead of both the newest known and the clock (releases may be build times)
+would lock out every honest one after it."""
 
 _HOLDS_NOTHING = frozenset({Step.RECEIVED, Step.COPIED, Step.REFUSED, Step.GONE})
 
 
-def release_problems(state: HostState, found: PayloadFound) -> Iterator[Problem]:
+def release_problems(state: HostState, found: PayloadFound, at: Moment) -> Iterator[Problem]:
     """What the releases that were active here have against this one."""
     newest = state.highwater.get((found.fleet, found.payload_id))
     if newest is None:
         return
     where = found.payload_id
+    limit = max(newest.release, int(at.wall_s)) + RELEASE_JUMP
     if found.release < newest.release:
         yield Problem(
             "ROLLBACK",
@@ -37,12 +39,12 @@ def release_problems(state: HostState, found: PayloadFound) -> Iterator[Problem]
             where=where,
             fix="find out which is genuine; a changed payload needs a higher release",
         )
-    elif found.release > newest.release + RELEASE_JUMP:
+    elif found.release > limit:
         yield Problem(
             "RELEASE_JUMP",
             "the release is implausibly far ahead",
             where=where,
-            need=f"at most {newest.release + RELEASE_JUMP}",
+            need=f"at most {limit}",
             have=str(found.release),
         )
 

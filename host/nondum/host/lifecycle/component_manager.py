@@ -9,6 +9,7 @@ import asyncio
 import logging
 import sqlite3
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Protocol
 
 from nondum.host.catalogue.catalogue import Catalogue
@@ -16,12 +17,13 @@ from nondum.host.catalogue.records import Snapshot
 from nondum.host.catalogue.state import HostState
 from nondum.host.drives.source import DriveSource
 from nondum.host.effects import Effect
-from nondum.host.events import DrivesScanned
+from nondum.host.events import CatalogueSetAside, DrivesScanned
 from nondum.host.lifecycle.advance import advance
 from nondum.host.lifecycle.bus import Bus, Stamped, is_told_early
 from nondum.host.lifecycle.recovery import recover
 from nondum.host.lifecycle.telling import entries_of
 from nondum.host.lifecycle.turn import Outcome
+from nondum.sdk.errors import Problem
 
 COMMIT_AGAIN_S = 0.5
 """After a commit failed: on a full disk, say."""
@@ -88,6 +90,8 @@ class ComponentManager:
         self._bus.tell(recovered.events)
         for effect in recovered.effects:
             self._executor.start(effect)
+        if (aside := self._catalogue.set_aside) is not None:
+            self._bus.emit(CatalogueSetAside(recovered.state.host, (_set_aside(aside),)))
         watched = {INSTALLED, *(source.kind for source in self._sources)}
         for kind in {drive.kind for drive in recovered.state.drives.values()} - watched:
             self._bus.emit(DrivesScanned(kind, ()))
@@ -117,6 +121,15 @@ class ComponentManager:
             except sqlite3.OperationalError:
                 log.exception("the catalogue cannot be written; trying again")
                 await asyncio.sleep(COMMIT_AGAIN_S)
+
+
+def _set_aside(file: Path) -> Problem:
+    return Problem(
+        "CATALOGUE_REBUILT",
+        "the catalogue was damaged; drives are read anew, what was installed for good is not here",
+        where=str(file),
+        fix="install initial components again",
+    )
 
 
 def _advance_all(state: HostState, batch: Sequence[Stamped]) -> tuple[Outcome, list[Stamped]]:

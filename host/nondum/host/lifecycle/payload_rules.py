@@ -58,7 +58,7 @@ def on_payload_found(turn: Turn, event: PayloadFound) -> None:
         sources={event.drive: event.folder},
         phases={"seen": turn.state.drives[event.drive].since},
     )
-    problems = (*event.problems, *admission.release_problems(turn.state, event))
+    problems = (*event.problems, *admission.release_problems(turn.state, event, turn.at))
     enter(turn, new, event, TRANSITIONS[Step.GONE, PayloadFound], with_effect=not problems)
     if problems:
         turn.pending.append(PayloadRefused(event.payload, problems))
