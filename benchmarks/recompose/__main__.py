@@ -1,0 +1,56 @@
+"""The command: `python -m benchmarks.recompose`, from the root of the checkout."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+from pathlib import Path
+
+from benchmarks.recompose import machine, measuring, needs, payloads, report
+from benchmarks.recompose.results import Results
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs/benchmarks/recompose.md"
+METHOD = Path(__file__).with_name("method.md")
+
+
+def main() -> None:
+    """Measure, print the tables, and write the page."""
+    chosen = _arguments()
+    chosen.work.mkdir(parents=True, exist_ok=True)
+    work = chosen.work.resolve()
+    _say("building the payloads")
+    carried = tuple(payloads.built(work))
+    missing = needs.lacking()
+    if missing:
+        _say(f"no container will be measured: {missing}")
+    half = None if missing else measuring.containers(carried, work, _say)
+    try:
+        found = measuring.measure(carried, half, chosen.rounds, work, _say)
+    finally:
+        shutil.rmtree(work / "host", ignore_errors=True)
+    told = (*machine.describe(work), f"{chosen.rounds} rounds")
+    tables = report.as_markdown(Results(told, found, missing))
+    chosen.output.parent.mkdir(parents=True, exist_ok=True)
+    chosen.output.write_text(f"{METHOD.read_text(encoding='utf-8')}\n{tables}", encoding="utf-8")
+    print(tables)
+    _say(f"written to {chosen.output}")
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=7, help="how often each way is taken [7]")
+    parser.add_argument("--output", type=Path, default=PAGE, help="the page to write")
+    parser.add_argument(
+        "--work", type=Path, default=ROOT / "build/benchmarks/recompose", help="scratch folder"
+    )
+    return parser.parse_args()
+
+
+def _say(text: str) -> None:
+    print(f"recompose: {text}", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,58 @@
+"""What processes take: memory by share (proc(5), smaps_rollup) and processor time (stat)."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+PROC = Path("/proc")
+_QUIET_S = 0.6
+"""How long nothing may have been done for processes to count as at rest."""
+_TICK_S = 1 / os.sysconf("SC_CLK_TCK")
+
+
+def pss_mb(pid: int, proc: Path = PROC) -> float:
+    """Proportional set size of one process in MB (10^6 bytes)."""
+    for line in (proc / str(pid) / "smaps_rollup").read_text().splitlines():
+        if line.startswith("Pss:"):
+            return int(line.split()[1]) * 1024 / 1e6
+    raise ValueError(f"process {pid} has no Pss")
+
+
+def descendants(pid: int, proc: Path = PROC) -> Iterator[int]:
+    """All processes below one, nearest first."""
+    for task in sorted((proc / str(pid) / "task").iterdir()):
+        for child in (task / "children").read_text().split():
+            yield int(child)
+            yield from descendants(int(child), proc)
+
+
+def cpu_s(pid: int, proc: Path = PROC) -> float:
+    """Processor time of a process and of all below it, those that have ended included."""
+    total = 0
+    for one in (pid, *descendants(pid, proc)):
+        try:
+            stat = (proc / str(one) / "stat").read_text()
+        except OSError:  # it has just ended, and counts with its parent now
+            continue
+        fields = stat.rpartition(")")[2].split()
+        total += sum(map(int, fields[11:15]))  # utime, stime, cutime, cstime
+    return total * _TICK_S
+
+
+def await_rest(pid: int, *, timeout_s: float) -> None:
+    """Wait until a process and all below it have done next to nothing for a while.
+
+    Raises `TimeoutError`.
+    """
+    until_s = time.monotonic() + timeout_s
+    before = cpu_s(pid)
+    while time.monotonic() < until_s:
+        time.sleep(_QUIET_S)
+        after = cpu_s(pid)
+        if after - before <= 2 * _TICK_S:
+            return
+        before = after
+    raise TimeoutError(f"process {pid} does not come to rest")
