@@ -13,6 +13,7 @@ from tests.wheelhouse.test_lock import host
 
 from nondum.sdk.errors import ConfigRefused, InstallFailed, NondumError, PayloadRefused
 from nondum.wheelhouse import build, contents, drive, index, lock, preflight
+from nondum.wheelhouse.library_wheels import library_wheel
 from nondum.wheelhouse.payload import verify_folder
 from nondum.wheelhouse.resolve import Sources
 from nondum.wheelhouse.signatures import UnsignedAllowed
@@ -203,6 +204,28 @@ def test_a_hostile_dependency_is_refused(built: Build, tmp_path: Path, wheels: P
     source = make_source(tmp_path / "src", requires=["nondum-sdk", "evil"])
     assert refused(lambda: built(source), PayloadRefused) == ["WHEEL_STARTUP_HOOK"]
     assert not (tmp_path / "drive").exists()
+
+
+def test_a_library_is_made_anew_only_when_its_sources_change(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    library = make_source(tmp_path / "lib", "lib", requires=[])
+    made = [library_wheel(library, tmp_path / f"made{n}", Sources(offline=True)) for n in (1, 2)]
+    assert made[0].read_bytes() == made[1].read_bytes()
+    (library / "wheel.json").write_text((library / "wheel.json").read_text().replace("1.0", "2.0"))
+    newer = library_wheel(library, tmp_path / "made3", Sources(offline=True))
+    assert newer.name.startswith("lib-2.0-")
+    assert len(list((tmp_path / "cache").rglob("*.whl"))) == 1
+
+
+def test_a_cache_that_cannot_be_written_is_done_without(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "cache").write_text("a file")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    library = make_source(tmp_path / "lib", "lib", requires=[])
+    assert library_wheel(library, tmp_path / "made", Sources(offline=True)).exists()
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem, problems_of
 from nondum.wheelhouse import capture, contents, index, lock, locking, manifest, resolve, wheel
 from nondum.wheelhouse.contents import Contents, Entry
+from nondum.wheelhouse.library_wheels import library_wheel
 from nondum.wheelhouse.manifest import Manifest
 from nondum.wheelhouse.resolve import Sources
 from nondum.wheelhouse.target import Target
@@ -62,7 +63,7 @@ def build(package: Path, drive: Path, options: Options, progress: Progress) -> P
         work = Path(temporary)
         steps = 4 + len(options.targets)
         progress("making the wheels of the sources", 0, steps)
-        own, *libraries = _made((package, *options.libraries), work / "made", options.sources)
+        own, *libraries = _made(package, work / "made", options)
         folders = (*(path.parent for path in libraries), *options.sources.wheel_folders)
         sources = replace(options.sources, wheel_folders=folders)
         chosen = _fetched(own, work, options, sources, progress)
@@ -102,13 +103,14 @@ def _source(package: Path) -> Manifest:
     return manifest.parse(text, str(package / manifest.NAME))
 
 
-def _made(packages: Sequence[Path], work: Path, sources: Sources) -> list[Path]:
-    """The wheel of each source folder, in order, each in a folder of its own."""
+def _made(package: Path, work: Path, options: Options) -> list[Path]:
+    """The wheels of the package and of its libraries, each in a folder of its own."""
+    libraries = [
+        partial(library_wheel, library, work / str(number), options.sources)
+        for number, library in enumerate(options.libraries)
+    ]
     return _all_of(
-        [
-            partial(resolve.make_wheel, package, work / str(number), sources)
-            for number, package in enumerate(packages)
-        ]
+        [partial(resolve.make_wheel, package, work / "own", options.sources), *libraries]
     )
 
 
@@ -202,7 +204,7 @@ def _write(
     wheels.mkdir(parents=True)
     for path in (path for group in locked.values() for path in group):
         if not (wheels / path.name).exists():
-            shutil.copyfile(path, wheels / path.name)
+            os.link(path, wheels / path.name)
     shutil.copyfile(package / manifest.NAME, folder / manifest.NAME)
     for component in said.components:
         text = locking.lock_text(locked)
