@@ -6,21 +6,21 @@ import asyncio
 import contextlib
 import os
 import signal
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from nondum.host.lifecycle.children import Children
+from nondum.host.lifecycle.children import SPARES, Children
 from nondum.sdk.errors import DriveGone, InstallFailed
 
 pytestmark = pytest.mark.anyio
 
 
 @contextlib.asynccontextmanager
-async def children() -> AsyncIterator[Children]:
-    pool = Children()
+async def children(quiet_s: float = 60.0) -> AsyncIterator[Children]:
+    pool = Children(quiet_s=quiet_s)
     try:
         yield pool
     finally:
@@ -96,6 +96,35 @@ async def test_cancelled_job_ends_its_child(tmp_path: Path) -> None:
         await asyncio.gather(job, return_exceptions=True)
         assert job.cancelled()
         assert not busy & pool.pids()
+
+
+async def test_one_spare_stays_when_work_has_ended(tmp_path: Path) -> None:
+    async with children(quiet_s=0.2) as pool:
+        jobs = (pool.run("look", drive(tmp_path)) for _ in range(4))
+        await asyncio.gather(*jobs)
+        assert len(pool.pids()) == SPARES
+        first, second = pool.pids()
+        with process_ended(first) as one, process_ended(second) as other:
+            _, pending = await asyncio.wait(
+                [asyncio.create_task(ended.wait()) for ended in (one, other)],
+                return_when=asyncio.FIRST_COMPLETED,
+            )
+            for task in pending:
+                task.cancel()
+        assert len(pool.pids()) == 1
+
+
+@contextlib.contextmanager
+def process_ended(pid: int) -> Iterator[asyncio.Event]:
+    """Set when a process ends (pidfd_open(2))."""
+    ended, descriptor = asyncio.Event(), os.pidfd_open(pid)
+    loop = asyncio.get_running_loop()
+    loop.add_reader(descriptor, ended.set)
+    try:
+        yield ended
+    finally:
+        loop.remove_reader(descriptor)
+        os.close(descriptor)
 
 
 async def test_no_child_outlives_the_pool(tmp_path: Path) -> None:

@@ -23,7 +23,10 @@ LINE_LIMIT = 16 * 1024 * 1024
 """Bytes of one answer: it may hold the descriptions of many components."""
 
 SPARES = 2
-"""Idle children that are kept. The one used last is used first: the other's memory is swappable."""
+"""Idle children that are kept while there is work; the one used last is used first."""
+
+QUIET_S = 30.0
+"""Without work for so long, one spare is enough."""
 
 END_S = 1.0
 """How long a killed child is waited for: one that hangs in its disk cannot even die."""
@@ -36,7 +39,9 @@ log = logging.getLogger(__name__)
 class Children:
     """A pool that grows as jobs need it and shrinks to its spares. `close` it."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, quiet_s: float = QUIET_S) -> None:
+        self._quiet_s = quiet_s
+        self._shrinking: asyncio.Task[None] | None = None
         self._idle: list[Process] = []
         self._busy: set[Process] = set()
         self._warming: asyncio.Task[None] | None = None
@@ -87,6 +92,9 @@ class Children:
         """Kill all children."""
         if self._warming is not None:
             await asyncio.wait([self._warming])
+        if self._shrinking is not None:
+            self._shrinking.cancel()
+            await asyncio.wait([self._shrinking])
         await asyncio.gather(*(self._end(child) for child in (*self._idle, *self._busy)))
         self._idle.clear()
 
@@ -94,10 +102,18 @@ class Children:
         self._idle.append(await _spawn())
 
     async def _keep(self, child: Process) -> None:
-        if len(self._idle) < SPARES:
-            self._idle.append(child)
-        else:
+        if len(self._idle) >= SPARES:
             await self._end(child)
+            return
+        self._idle.append(child)
+        if self._shrinking is not None:
+            self._shrinking.cancel()
+        self._shrinking = asyncio.create_task(self._shrink())
+
+    async def _shrink(self) -> None:
+        await asyncio.sleep(self._quiet_s)
+        while len(self._idle) > 1:
+            await self._end(self._idle.pop(0))
 
     async def _end(self, child: Process) -> None:
         self._busy.discard(child)
