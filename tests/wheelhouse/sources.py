@@ -44,7 +44,7 @@ def build_wheel(folder, config_settings=None, metadata_directory=None):
     name = f"{stem}-py3-none-any.whl"
     with zipfile.ZipFile(Path(folder) / name, "w") as archive:
         for path, data in files.items():
-            archive.writestr(path, data)
+            archive.writestr(zipfile.ZipInfo(path, (2026, 1, 1, 0, 0, 0)), data)
     return name
 '''
 
