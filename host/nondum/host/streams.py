@@ -160,8 +160,11 @@ class Streams:
     def _wires_of(
         self, component: str, behaviour: str, arguments: Mapping[str, str]
     ) -> Iterator[Wire]:
+        member = self._members.get(component)
+        if member is None:
+            raise WorkerFailed(Problem("NOT_RUNNING", "its worker has just ended", where=component))
         sources = {source.stream: source for source in self._sources()}
-        types = _parameter_types(self._members[component].description, behaviour)
+        types = _parameter_types(member.description, behaviour)
         for parameter, argument in arguments.items():
             source = sources.get(argument)
             if source is None:

@@ -152,6 +152,20 @@ async def test_cancelled_start_leaves_no_process(house: House) -> None:
     assert not is_alive(int(said.message.split()[1]))
 
 
+async def test_start_waits_for_the_one_that_is_being_stopped(house: House) -> None:
+    source = HOOKED.format("async def stop(ctx):\n    await __import__('asyncio').sleep(0.3)")
+    spec = await house.start("guest", source)
+    old = house.workers.pids()["guest"]
+    stopping = asyncio.create_task(house.workers.stop("guest"))
+    await asyncio.sleep(0)
+    assert not house.workers.pids()
+    await house.workers.start(spec)
+    assert not is_alive(old)
+    assert is_alive(house.workers.pids()["guest"])
+    await stopping
+    assert is_alive(house.workers.pids()["guest"])
+
+
 async def test_second_worker_of_a_component_is_a_mistake(house: House) -> None:
     spec = await house.start("guest", "")
     with pytest.raises(ValueError, match="has a worker already"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+from collections.abc import Callable
 
 import pytest
 from tests.host.workers.house import HOST, House
@@ -190,7 +191,8 @@ async def test_optional_input_moves_on_when_its_stream_goes(house: House) -> Non
     await odometer(house, "a-base")
     await odometer(house, "b-base")
     await panner(house)
-    await house.until(StreamFlowing, lambda e: e.component == "b-base")
+    await house.until(StreamFlowing, _from("a-base"))
+    await house.until(StreamFlowing, _from("b-base"))
     assert _readers(house) == {f"{HOST}__a-base__odometry"}
     await house.workers.stop("a-base")
     assert _readers(house) == {f"{HOST}__b-base__odometry"}
@@ -221,6 +223,10 @@ async def test_calls_are_established_only_by_themselves(house: House) -> None:
     assert established.component == "cam"
     await asyncio.sleep(0)
     assert len(house.told(BehaviourEstablished)) == 1
+
+
+def _from(component: str) -> Callable[[StreamFlowing], bool]:
+    return lambda event: event.component == component
 
 
 def _readers(house: House) -> set[str]:

@@ -84,7 +84,10 @@ async def test_finishing_behaviour_succeeds(house: House) -> None:
     assert (known.component, known.predicate, known.arguments) == ("greeter", "greeted", ("ada",))
     progress = await house.until(BehaviourProgressed)
     assert (progress.call_id, progress.fraction, progress.text) == (call.id, 0.5, "half way")
-    assert f"greeting ada by {HOST}__greeter__mouth" in house.lines("greeter")
+    said = f"greeting ada by {HOST}__greeter__mouth"
+    logged = await house.until(WorkerLogged, lambda line: line.message == said)
+    assert logged.level == "info"
+    assert said in house.lines("greeter")
 
 
 async def test_failing_behaviour_says_why(house: House) -> None:

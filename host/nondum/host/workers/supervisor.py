@@ -48,13 +48,18 @@ class Supervisor:
 
     def __init__(self, spec: WorkerSpec, household: Household) -> None:
         self.spec = spec
-        self.worker: Worker | None = None
-        """The one that runs and is ready, if any."""
+        self._worker: Worker | None = None
         self._household = household
         self._supervision = Supervision()
         self._task: asyncio.Task[None] | None = None
         """Starts the first worker, then keeps one alive."""
-        self._is_stopping = False
+        self.is_stopping = False
+        """Whether it has been told to end, for good."""
+
+    @property
+    def worker(self) -> Worker | None:
+        """The one that runs and may be asked for things, if any."""
+        return None if self.is_stopping else self._worker
 
     @property
     def is_alive(self) -> bool:
@@ -66,31 +71,35 @@ class Supervisor:
 
         Raises `WorkerFailed`; then there is none, and none will be. Cancelled, it leaves none.
         """
-        self._is_stopping, self._supervision = False, Supervision()
+        self.is_stopping, self._supervision = False, Supervision()
         self._task = asyncio.create_task(self._start_worker())
         try:
             await self._task
         except asyncio.CancelledError:
-            if self._is_stopping:
+            if self.is_stopping:
                 raise WorkerFailed(problems.removed(self.spec.component)) from None
             raise
         self._task = asyncio.create_task(self._keep_alive())
 
     async def stop(self, grace_s: float) -> None:
         """End the worker, if there is one, and start no more. Stopping twice is allowed."""
-        self._is_stopping = True
-        if self.worker is not None:
-            self._household.on_gone(self.worker)  # nobody shall count on it any more
-            await self.worker.stop(grace_s, problems.removed(self.spec.component))
+        self.is_stopping = True
+        if self._worker is not None:
+            self._household.on_gone(self._worker)  # nobody shall count on it any more
+            await self._worker.stop(grace_s, problems.removed(self.spec.component))
         elif self._task is not None:
             self._task.cancel()
+        await self.ended()
+
+    async def ended(self) -> None:
+        """Wait until there is no worker and none will be started."""
         if self._task is not None:
             await asyncio.wait([self._task])
 
     async def _keep_alive(self) -> None:
         while True:
             problem = await self._work()
-            if self._is_stopping:
+            if self.is_stopping:
                 return
             self._emit(events.WorkerExited(self.spec.component, str(problem)))
             if not await self._restart(problem):
@@ -98,10 +107,10 @@ class Supervisor:
 
     async def _work(self) -> Problem:
         """Wait for the end of the present worker; say why it ended."""
-        worker = self.worker
+        worker = self._worker
         assert worker is not None, "only called after a start"
         problem = await asyncio.shield(worker.gone)
-        self.worker = None
+        self._worker = None
         self._household.on_gone(worker)
         return problem
 
@@ -128,14 +137,14 @@ class Supervisor:
 
     async def _start_worker(self) -> None:
         household = self._household
-        self.worker = await start_worker(
+        self._worker = await start_worker(
             self.spec,
             household.welcome(self.spec),
             launcher=household.launcher,
             timing=household.timing,
             emit=household.emit,
         )
-        household.on_ready(self.worker)
+        household.on_ready(self._worker)
         self._emit(events.WorkerReady(self.spec.component, self.spec.index))
 
     @property

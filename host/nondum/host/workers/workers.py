@@ -74,11 +74,13 @@ class Workers:
         """Start a component's worker and keep one alive until `stop`.
 
         Returns once its plugin has described itself as the index says and has started. Raises
-        `errors.WorkerFailed` with what went wrong, and `ValueError` when it has a worker already.
+        `errors.WorkerFailed` with what went wrong, and `ValueError` when it has a worker already;
+        one that is being stopped is waited for.
         """
-        present = self._supervisors.get(spec.component)
-        if present is not None and present.is_alive:
-            raise ValueError(f"component {spec.component!r} has a worker already")
+        while (present := self._supervisors.get(spec.component)) and present.is_alive:
+            if not present.is_stopping:
+                raise ValueError(f"component {spec.component!r} has a worker already")
+            await present.ended()
         supervisor = self._supervisors[spec.component] = Supervisor(spec, self)
         await supervisor.start()
         return spec.index
@@ -102,10 +104,12 @@ class Workers:
         It is withdrawn at once: no stream, hook or behaviour reaches it any more. Unknown
         components are ignored; one that is being started is given up.
         """
-        supervisor = self._supervisors.pop(component, None)
+        supervisor = self._supervisors.get(component)
         self._devices.pop(component, None)
         if supervisor is not None:
             await supervisor.stop(grace_s)
+            if self._supervisors.get(component) is supervisor:
+                del self._supervisors[component]
 
     async def close(self, grace_s: float = GRACE_S) -> None:
         """End all workers."""
