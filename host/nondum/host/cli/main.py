@@ -11,11 +11,15 @@ from importlib import import_module
 from typing import Any
 
 import click
-from click.shell_completion import CompletionItem
+from click.shell_completion import CompletionItem, shell_complete
 
 from nondum.host.cli import failure
 from nondum.host.cli.connection import Session, control_option
 from nondum.sdk.errors import NondumError, Problem
+
+PROGRAM = "nondum"
+COMPLETE = "_NONDUM_COMPLETE"
+"""The variable by which a shell asks for completions."""
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "behaviours": ("body", "What the robot can do."),
@@ -96,7 +100,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit: 0 done, 1 refused or failed, 2 wrong usage or bad input,
     3 problems found, 4 no daemon, 130 interrupted, 141 nobody reads the output any more."""
     try:
-        code = _run(arguments)
+        code = _run(sys.argv[1:] if arguments is None else arguments)
         sys.stdout.flush()
     except BrokenPipeError:  # the reader has left, as after `| head`
         # Nothing can be written, but the interpreter would try, and complain, at its end.
@@ -105,13 +109,17 @@ def main(arguments: list[str] | None = None) -> None:
     sys.exit(code)
 
 
-def _run(arguments: list[str] | None) -> int:
+def _run(arguments: list[str]) -> int:
+    """What click's own `main` would do, but for pipes, which it closes with the wrong code."""
     session = Session()
+    if instruction := os.environ.get(COMPLETE):
+        return shell_complete(cli, {"obj": session}, PROGRAM, COMPLETE, instruction)
     color = False if os.environ.get("NO_COLOR") else None
     try:
-        code: Any = cli.main(
-            args=arguments, prog_name="nondum", standalone_mode=False, obj=session, color=color
-        )
+        with cli.make_context(PROGRAM, arguments, obj=session, color=color) as ctx:
+            code: Any = cli.invoke(ctx)
+    except click.exceptions.Exit as end:  # --help and --version
+        return end.exit_code
     except (click.exceptions.Abort, KeyboardInterrupt):
         return failure.EXIT_INTERRUPTED
     except click.ClickException as error:

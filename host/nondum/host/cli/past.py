@@ -10,6 +10,9 @@ from nondum.host.cli import complete, render
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.table import cell, table
 
+_LEFT_OUT = frozenset({"payload", "digest", "component"})
+"""Details that a table has no room for: the subject says the same in words."""
+
 
 @click.command()
 @click.option(
@@ -43,8 +46,14 @@ def journal(session: Session, subject: str | None, limit: int) -> None:
 
 
 def _detail(row: dict[str, Any]) -> str:
+    """What is wrong, or else what the row says beyond its subject."""
     problems = "; ".join(f"{p['code']} {p['message']}" for p in row["problems"])
-    return problems or cell({k: v for k, v in row["detail"].items() if v not in ("", [], None)})
+    said = {
+        key: value
+        for key, value in row["detail"].items()
+        if key not in _LEFT_OUT and value not in ("", [], {}, None, row["subject"])
+    }
+    return problems or cell(said)
 
 
 @click.command()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import click
 from click.shell_completion import get_completion_class
 
+from nondum.host.cli.main import COMPLETE, PROGRAM
+
 SHELLS = ("bash", "fish", "zsh")
 
 
@@ -24,4 +26,4 @@ def completion(ctx: click.Context, shell: str) -> None:
     kind = get_completion_class(shell)
     assert kind is not None  # click knows all of SHELLS
     root = ctx.find_root()
-    click.echo(kind(root.command, {}, "nondum", "_NONDUM_COMPLETE").source())
+    click.echo(kind(root.command, {}, PROGRAM, COMPLETE).source())

@@ -52,6 +52,8 @@ class Hold(Behaviour):
 
     def why(self) -> str:
         """What is waited for."""
+        if self.status is Status.INVALID:
+            return "a plan is carried out"
         return self._waits_for() or "nothing is asked for"
 
 

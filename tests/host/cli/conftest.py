@@ -1,0 +1,57 @@
+"""One daemon for a module of tests, with a payload that it has never seen plugged in."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Protocol
+
+import pytest
+from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, part, running
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    with running(tmp_path_factory.mktemp("host")) as daemon:
+        daemon.plug(BEACON_ID, part("beacon", BEACON))
+        daemon.until_state(BEACON_ID, "active")
+        daemon.until(lambda view: any(row["ready"] for row in view["components"]))
+        yield daemon
+
+
+class Answering(Protocol):
+    """Makes a socket whose daemon answers any one question with these bytes."""
+
+    def __call__(self, answer: bytes, *, hangs_up: bool = True) -> Path: ...
+
+
+@pytest.fixture
+def answering(tmp_path: Path) -> Iterator[Answering]:
+    listeners: list[socket.socket] = []
+    threads: list[threading.Thread] = []
+
+    def serve(listener: socket.socket, answer: bytes, hangs_up: bool) -> None:
+        connection, _ = listener.accept()
+        with connection, connection.makefile("rb") as lines:
+            lines.readline()
+            connection.sendall(answer)
+            if not hangs_up:
+                lines.readline()  # until the other end leaves
+
+    def answering(answer: bytes, *, hangs_up: bool = True) -> Path:
+        path = tmp_path / "answering.sock"
+        listener = socket.socket(socket.AF_UNIX)
+        listener.bind(str(path))
+        listener.listen()
+        threads.append(threading.Thread(target=serve, args=(listener, answer, hangs_up)))
+        threads[-1].start()
+        listeners.append(listener)
+        return path
+
+    yield answering
+    for thread in threads:
+        thread.join(timeout=30)
+    for listener in listeners:
+        listener.close()

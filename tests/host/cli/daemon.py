@@ -1,0 +1,237 @@
+"""A real daemon with its own state and slots, and the command line run against it."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import subprocess
+import sys
+import types
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tests.payloads import Part, make_payload
+
+from nondum.host.control.client import ControlClient
+from nondum.sdk.plugin import describe, load
+
+HOST = "panther"
+PATIENCE_S = 60.0
+
+BEACON = '''"""A light that shines for people and greets them."""
+
+from nondum.sdk import Fragment, Header, Label, Output, Phrase, Scalar, Unit, behaviour, hookimpl
+
+DOMAIN = """
+(define (domain beacon)
+  (:predicates (lit ?h - host) (greeted ?c - class ?h - host))
+  (:action shine
+    :parameters (?u - light ?o - scalar ?h - host)
+    :precondition (and (ready ?u) (on ?u ?h) (output ?u ?o) (free ?o))
+    :effect (and (not (free ?o)) (flowing ?o) (lit ?h)))
+  (:action greet
+    :parameters (?u - light ?c - class ?h - host)
+    :precondition (and (ready ?u) (on ?u ?h) (lit ?h))
+    :effect (greeted ?c ?h)))
+"""
+PROBLEM = "(define (problem beacon) (:domain beacon) (:objects person - class))"
+
+@hookimpl
+def units():
+    return [Unit("lamp", "light", outputs=(Output("brightness", "scalar"),))]
+
+@hookimpl
+def fragments():
+    return [Fragment("domain.pddl", DOMAIN), Fragment("problem.pddl", PROBLEM)]
+
+@hookimpl
+def phrases():
+    return [Phrase("shine [for {words:text}]", "(lit self)", kind="maintain")]
+
+@hookimpl
+def labels():
+    return [Label("person", "people")]
+
+@hookimpl
+def start(ctx):
+    ctx.log.info("polished")
+    print("plain words")
+
+@behaviour("shine", action="(shine ?u - light ?o - scalar ?h - host)", lasting=True)
+async def shine(ctx, u, o, h):
+    """Shine until halted."""
+    await ctx.established()
+    seq = 0
+    while True:
+        seq += 1
+        ctx.output(o).send(Scalar(Header(frame_id=u, seq=seq), 0.5, "1"))
+        await ctx.sleep(0.01)
+
+@behaviour(
+    "greet", action="(greet ?u - light ?c - class ?h - host)", phrase="greet {c}"
+)
+async def greet(ctx, u, c, h):
+    """Greet once."""
+    ctx.know("greeted", c, h)
+'''
+BEACON_ID = "org.example.beacon"
+LAMP = f"{HOST}__beacon__lamp"
+BRIGHTNESS = f"{HOST}__beacon__brightness"
+
+
+@dataclass(frozen=True)
+class Ran:
+    """What one run of the command line came to."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> Any:
+        """Standard output, parsed."""
+        return json.loads(self.out)
+
+    def ok(self) -> Ran:
+        """This, if the command did what it was asked for."""
+        assert self.code == 0, (self.code, self.out, self.err)
+        assert not self.err, self.err
+        return self
+
+    def refused(self, code: int, words: str) -> Ran:
+        """This, if the command refused with that exit code and those words, without a traceback."""
+        assert "Traceback" not in self.err, self.err
+        assert self.code == code, (self.code, self.out, self.err)
+        assert words in self.err, self.err
+        return self
+
+
+@dataclass(frozen=True)
+class Daemon:
+    """One host, running."""
+
+    root: Path
+    process: subprocess.Popen[str]
+
+    @property
+    def control(self) -> Path:
+        return self.root / "control.sock"
+
+    @property
+    def slots(self) -> Path:
+        return self.root / "slots"
+
+    def plug(self, payload_id: str, *parts: Part, **options: Any) -> Path:
+        """Make a drive with one payload and put it into a slot."""
+        drive = self.root / "drives" / payload_id
+        make_payload(drive, *parts, payload_id=payload_id, **options)
+        (self.slots / payload_id).symlink_to(drive)
+        return drive
+
+    def pull(self, payload_id: str) -> None:
+        """Take a drive out."""
+        (self.slots / payload_id).unlink()
+
+    def until(self, holds: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+        """Wait until the host looks like that, and give that look."""
+        view: dict[str, Any] = {}
+        with ControlClient(self.control, timeout_s=PATIENCE_S) as client:
+            for view in client.follow("watch"):
+                if holds(view):
+                    break
+        return view
+
+    def until_state(self, payload_id: str, state: str) -> dict[str, Any]:
+        """Wait until a payload is in a state, and give its row."""
+
+        def rows(view: dict[str, Any]) -> list[dict[str, Any]]:
+            return [row for row in view["payloads"] if row["payload"] == payload_id]
+
+        view = self.until(lambda view: any(row["state"] == state for row in rows(view)))
+        return rows(view)[0]
+
+    def run(self, *arguments: str | Path, **environment: str) -> Ran:
+        """Run `nondum` against this host."""
+        return nondum("--control", self.control, *arguments, **environment)
+
+
+def nondum(*arguments: str | Path, **environment: str) -> Ran:
+    """Run `nondum` as a process of its own."""
+    done = subprocess.run(
+        command(*arguments),
+        capture_output=True,
+        text=True,
+        env=quiet_environment() | environment,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+    return Ran(done.returncode, done.stdout, done.stderr)
+
+
+def command(*arguments: str | Path) -> list[str]:
+    """The command line that runs `nondum`."""
+    return [sys.executable, "-m", "nondum.host.cli", *map(str, arguments)]
+
+
+def quiet_environment() -> dict[str, str]:
+    """This process's environment, less what would change what is printed, or who answers."""
+    changing = {"NONDUM_CONTROL", "COLUMNS", "NO_COLOR", "FORCE_COLOR"}
+    return {key: value for key, value in os.environ.items() if key not in changing}
+
+
+def part(id: str, source: str, **options: Any) -> Part:
+    """A component that says in its index what its plugin says itself."""
+    made = Part(id, source, **options)
+    module = types.ModuleType(made.module)
+    exec(compile(source, f"{made.module}.py", "exec"), module.__dict__)
+    sys.modules[made.module] = module
+    try:
+        described = describe(load(module, made.distribution))
+    finally:
+        del sys.modules[made.module]
+    described = dataclasses.replace(described, name=made.distribution, version=made.version)
+    return dataclasses.replace(made, description=described)
+
+
+def write_config(root: Path, more: str = "") -> Path:
+    """A host that needs nothing of the machine."""
+    root.mkdir(parents=True, exist_ok=True)
+    for folder in ("slots", "devices"):
+        (root / folder).mkdir(exist_ok=True)
+    config = root / "host.toml"
+    config.write_text(
+        f'[host]\nname = "{HOST}"\nstate = "{root}/state"\ncontrol = "{root}/control.sock"\n'
+        f'[drives]\nslots = ["{root}/slots"]\nallow_unsigned = true\n'
+        f'[devices]\nslots = ["{root}/devices"]\nudev = false\n{more}',
+        encoding="utf-8",
+    )
+    return config
+
+
+@contextmanager
+def running(root: Path) -> Iterator[Daemon]:
+    """Run a daemon; it must end well when it is told to."""
+    config = write_config(root)
+    process = subprocess.Popen(
+        command("host", "run", "--user", "--config", config),
+        stderr=subprocess.PIPE,
+        text=True,
+        env=quiet_environment(),
+    )
+    assert process.stderr is not None
+    try:
+        for line in process.stderr:
+            if "listens at" in line:
+                break
+        yield Daemon(root, process)
+        process.terminate()
+        _, err = process.communicate(timeout=PATIENCE_S)
+        assert process.returncode == 0, err
+        assert "Traceback" not in err, err
+    finally:
+        process.kill()
+        process.wait()
