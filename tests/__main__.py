@@ -1,0 +1,36 @@
+"""`python -m tests`: all tests in the order that CI runs them; with arguments, pytest with those.
+
+Whole hosts (marker `lab`) run by themselves, after the rest: they are judged in real time, and
+other tests beside them would be load that no robot has. Each plugin's own tests run as its author
+runs them, in its folder.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+PYTEST = [sys.executable, "-m", "pytest"]
+# `.` on the path gives tests/ and demo/ only: nondum itself is what is installed.
+INSTALLED = ["-o", "pythonpath=."]
+
+
+def main(arguments: list[str]) -> int:
+    """Run what was asked for; the worst exit status of all runs."""
+    if arguments:
+        return subprocess.run([*PYTEST, *INSTALLED, *arguments], cwd=ROOT, check=False).returncode
+    runs = [
+        (ROOT, [*INSTALLED, "-n", "2", "--dist", "loadfile", "-m", "not lab"]),
+        (ROOT, [*INSTALLED, "-m", "lab"]),
+        *((folder.parent, []) for folder in sorted(ROOT.glob("plugins/*/tests"))),
+    ]
+    return max(
+        subprocess.run([*PYTEST, "-q", *options], cwd=folder, check=False).returncode
+        for folder, options in runs
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
