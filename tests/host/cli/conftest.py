@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Protocol
 
 import pytest
-from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, part, running
+from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, running
+from tests.payloads import Part
 
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
     with running(tmp_path_factory.mktemp("host")) as daemon:
-        daemon.plug(BEACON_ID, part("beacon", BEACON))
+        daemon.plug(BEACON_ID, Part("beacon", BEACON))
         daemon.until_state(BEACON_ID, "active")
         daemon.until(lambda view: any(row["ready"] for row in view["components"]))
         yield daemon

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import os
 import subprocess
 import sys
-import types
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,7 +15,6 @@ from typing import Any
 from tests.payloads import Part, make_payload
 
 from nondum.host.control.client import ControlClient
-from nondum.sdk.plugin import describe, load
 
 HOST = "panther"
 PATIENCE_S = 60.0
@@ -158,6 +155,22 @@ class Daemon:
         """Run `nondum` against this host."""
         return nondum("--control", self.control, *arguments, **environment)
 
+    @contextmanager
+    def started(self, *arguments: str | Path) -> Iterator[subprocess.Popen[str]]:
+        """Run `nondum` against this host for as long as the context lasts."""
+        process = subprocess.Popen(
+            command("--control", self.control, *arguments),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=quiet_environment() | {"PYTHONUNBUFFERED": "1"},
+        )
+        with process:
+            try:
+                yield process
+            finally:
+                process.kill()
+
 
 def nondum(*arguments: str | Path, **environment: str) -> Ran:
     """Run `nondum` as a process of its own."""
@@ -181,20 +194,6 @@ def quiet_environment() -> dict[str, str]:
     """This process's environment, less what would change what is printed, or who answers."""
     changing = {"NONDUM_CONTROL", "COLUMNS", "NO_COLOR", "FORCE_COLOR"}
     return {key: value for key, value in os.environ.items() if key not in changing}
-
-
-def part(id: str, source: str, **options: Any) -> Part:
-    """A component that says in its index what its plugin says itself."""
-    made = Part(id, source, **options)
-    module = types.ModuleType(made.module)
-    exec(compile(source, f"{made.module}.py", "exec"), module.__dict__)
-    sys.modules[made.module] = module
-    try:
-        described = describe(load(module, made.distribution))
-    finally:
-        del sys.modules[made.module]
-    described = dataclasses.replace(described, name=made.distribution, version=made.version)
-    return dataclasses.replace(made, description=described)
 
 
 def write_config(root: Path, more: str = "") -> Path:

@@ -7,14 +7,14 @@ import click
 from nondum.host.cli import render
 from nondum.host.cli.body import show
 from nondum.host.cli.connection import Session, json_option
-from nondum.host.cli.table import table
+from nondum.host.cli.table import cell, table
 
 
 @click.command()
 @click.option(
     "--why",
     metavar="FACT",
-    help="Only this fact, true or not, with a row for every reason.",
+    help="Only this fact, true or not, with every reason.",
 )
 @json_option
 @click.pass_obj
@@ -25,8 +25,14 @@ def facts(session: Session, why: str | None) -> None:
     Examples: nondum facts
               nondum facts --why "(ready panther__eye__camera)"
     """
-    columns = ["fact", "source", "value"]
-    show(session, session.ask("facts", why=why), columns, "nothing is believed")
+    rows = session.ask("facts", why=why)
+    if why is None or session.as_json:
+        show(session, rows, ["fact", "source", "value"], "nothing is believed")
+        return
+    for row in rows:
+        render.sentence(row["source"])
+    if rows and rows[0]["value"] is not None:
+        render.sentence(f"its value: {cell(rows[0]['value'])}")
 
 
 @click.command()

@@ -1,0 +1,235 @@
+"""Every question of the command line, asked of a real host with one payload plugged in."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+from tests.host.cli.daemon import BEACON_ID, BRIGHTNESS, LAMP, Daemon
+
+GOAL_KEYS = {"id", "goal", "text", "kind", "priority", "state", "reason", "problems", "holds"}
+ROWS: dict[str, set[str]] = {
+    "behaviours": {"behaviour", "component", "kind", "running", "phrases"},
+    "components": {
+        "component",
+        "state",
+        "ready",
+        "plugin",
+        "version",
+        "payload",
+        "units",
+        "behaviours",
+        "devices",
+        "pid",
+        "problem",
+    },
+    "facts": {"fact", "source", "value"},
+    "journal": {
+        "id",
+        "when",
+        "monotonic",
+        "boot",
+        "event",
+        "subject",
+        "step",
+        "problems",
+        "detail",
+    },
+    "logs": {"component", "when", "level", "message"},
+    "store": {"wheel", "bytes", "used_by", "sha256"},
+    "streams": {"stream", "type", "component", "flowing", "consumers"},
+    "units": {"unit", "type", "component", "ready", "xyz", "rpy", "mount", "warnings"},
+}
+VIEWS: dict[str, set[str]] = {
+    "goals": {"can", "given"},
+    "plan": {"goal", "kind", "steps"},
+    "status": {
+        "host",
+        "revision",
+        "state",
+        "warnings",
+        "payloads",
+        "drives",
+        "goals",
+        "told",
+    },
+    "tree": {"name", "status", "why", "children"},
+    "why": {"sentences", "problems", "told"},
+}
+PAYLOAD_KEYS = {
+    "payload",
+    "key",
+    "version",
+    "release",
+    "state",
+    "progress",
+    "drive",
+    "components",
+    "problems",
+    "codes",
+    "phases",
+}
+
+STATUS = """\
+host panther  revision N  ready
+warning: payloads without a signature are accepted (allow_unsigned)
+
+PAYLOAD             VERSION  STATE   DRIVE               COMPONENTS
+org.example.beacon  1.0      active  org.example.beacon  beacon
+
+> beacon is here: it can greet, shine
+"""
+COMPONENTS = """\
+COMPONENT  STATE  PLUGIN       VERSION  PAYLOAD             UNITS  PROBLEM
+beacon     ready  test-beacon  1.0      org.example.beacon  lamp   -
+"""
+BEHAVIOURS = """\
+BEHAVIOUR  COMPONENT  KIND       RUNNING  PHRASES
+greet      beacon     finishing  no       greet {c}
+shine      beacon     lasting    no       -
+"""
+UNITS = """\
+UNIT                   TYPE   COMPONENT  READY  XYZ  RPY  MOUNT
+panther__beacon__lamp  light  beacon     yes    -    -    unknown
+"""
+STREAMS = """\
+STREAM                       TYPE    COMPONENT  FLOWING  CONSUMERS
+panther__beacon__brightness  scalar  beacon     no       -
+"""
+FACTS = """\
+FACT                                              SOURCE                                       VALUE
+free panther__beacon__brightness                  nobody uses it                               -
+idle panther__beacon__lamp                        nobody uses it                               -
+on panther__beacon__lamp panther                  beacon is plugged into this host             -
+output panther__beacon__lamp                      beacon declares it                           -
+panther__beacon__brightness
+ready panther__beacon__lamp                       beacon is healthy and its devices are there  -
+self panther                                      this is the host that plans                  -
+"""
+GOALS = """\
+WORDS         GOAL                      KIND
+greet people  (greeted person panther)  achieve
+shine         (lit panther)             maintain
+
+no goal was given
+"""
+TREE = """\
+✓ nondum
+  ✓ monitor  — revision N
+  ✓ world model  — N facts hold
+  ✓ goals
+  ✓ task  — nothing is asked for
+    ✓ hold  — nothing is asked for
+  ✓ people  — N sentences told
+"""
+WHY = """\
+nothing is asked for
+
+> beacon is here: it can greet, shine
+"""
+SHOWN = {
+    "status": STATUS,
+    "components": COMPONENTS,
+    "behaviours": BEHAVIOURS,
+    "units": UNITS,
+    "devices": "no devices\n",
+    "streams": STREAMS,
+    "facts": FACTS,
+    "goals": GOALS,
+    "plan": "no plan\n",
+    "tree": TREE,
+    "why": WHY,
+}
+
+
+def normalised(text: str) -> str:
+    """What a command printed, without what differs from run to run."""
+    text = re.sub(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d", "WHEN", text)
+    return re.sub(r"(revision|world model  —|people  —) \d+", r"\1 N", text)
+
+
+def rows(daemon: Daemon, *arguments: str) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = daemon.run(*arguments, "--json").ok().json
+    return found
+
+
+@pytest.mark.parametrize("verb", SHOWN)
+def test_a_hundred_columns_are_enough(daemon: Daemon, verb: str) -> None:
+    assert normalised(daemon.run(verb, COLUMNS="100").ok().out) == SHOWN[verb]
+
+
+@pytest.mark.parametrize("verb", ROWS)
+def test_rows_have_these_keys_in_json(daemon: Daemon, verb: str) -> None:
+    found = rows(daemon, verb)
+    assert found
+    for row in found:
+        assert row.keys() == ROWS[verb]
+
+
+@pytest.mark.parametrize("verb", VIEWS)
+def test_views_have_these_keys_in_json(daemon: Daemon, verb: str) -> None:
+    assert daemon.run(verb, "--json").ok().json.keys() == VIEWS[verb]
+
+
+def test_a_payload_has_these_keys_and_phases(daemon: Daemon) -> None:
+    (payload,) = daemon.run("status", "--json").ok().json["payloads"]
+    assert payload.keys() == PAYLOAD_KEYS
+    phases = [payload["phases"][name] for name in ("seen", "verified", "installed", "ready")]
+    assert phases == sorted(phases)
+
+
+def test_a_pipe_folds_nothing(daemon: Daemon) -> None:
+    lines = daemon.run("journal").ok().out.splitlines()
+    assert any(line.split()[2:] and "DriveInserted" in line for line in lines)
+    assert max(map(len, lines)) > 100
+
+
+def test_the_journal_tells_a_payload_step_by_step(daemon: Daemon) -> None:
+    found = rows(daemon, "journal", "--subject", BEACON_ID)
+    steps = [row["step"] for row in found if row["step"]]
+    assert steps == ["received", "copied", "verified", "staged", "stored", "probed", "active"]
+    assert rows(daemon, "journal", "--subject", BEACON_ID, "--limit", "2") == found[-2:]
+
+
+def test_the_journal_is_silent_of_strangers(daemon: Daemon) -> None:
+    shown = daemon.run("journal", "--subject", "nobody").ok().out
+    assert shown == "the journal says nothing of it\n"
+
+
+def test_logs_are_lines_with_time_component_and_level(daemon: Daemon) -> None:
+    shown = normalised(daemon.run("logs", "beacon").ok().out).splitlines()
+    assert "WHEN  beacon  info  polished" in shown
+    assert "WHEN  beacon  stdout  plain words" in shown
+
+
+def test_logs_of_a_stranger_are_refused_with_the_nearest(daemon: Daemon) -> None:
+    daemon.run("logs", "baecon").refused(1, "COMPONENT_UNKNOWN").refused(1, "'beacon'?")
+
+
+def test_the_store_says_who_needs_what(daemon: Daemon) -> None:
+    shown = daemon.run("store").ok().out.splitlines()
+    own = next(line for line in shown if line.startswith("test_beacon-1.0"))
+    assert BEACON_ID in own
+    assert re.fullmatch(r"4 wheels, \d+\.\d MB", shown[-1])
+
+
+def test_one_fact_is_explained_whether_it_is_true_or_not(daemon: Daemon) -> None:
+    shown = daemon.run("facts", "--why", f"(ready {LAMP})").ok().out
+    because = "for it: beacon is healthy and its devices are there"
+    assert shown == f"(ready {LAMP}) holds\n{because}\n"
+    untrue = daemon.run("facts", "--why", f"flowing {BRIGHTNESS}").ok().out
+    assert untrue.startswith(f"(flowing {BRIGHTNESS}) does not hold\n")
+
+
+def test_a_stream_that_is_none_is_refused_with_the_nearest(daemon: Daemon) -> None:
+    ran = daemon.run("streams", "--follow", "panther__beacon__brightnes")
+    ran.refused(1, "STREAM_UNKNOWN").refused(1, f"did you mean '{BRIGHTNESS}'?")
+
+
+@pytest.mark.parametrize("follow", [["status", "-f"], ["tree", "-f"]], ids=" ".join)
+def test_following_draws_what_asking_does(daemon: Daemon, follow: list[str]) -> None:
+    with daemon.started(*follow) as process:
+        assert process.stdout is not None
+        first = process.stdout.readline()
+    assert first.startswith(("host panther", "✓ nondum"))
