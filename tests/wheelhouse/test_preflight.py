@@ -26,6 +26,7 @@ FACTS = HostFacts(
     free_memory_mb=1000,
     gpu_memory_mb=None,
     confinement=1,
+    nondum="0.1.0",
 )
 
 
@@ -52,6 +53,11 @@ def test_what_fits_has_no_problems() -> None:
     assert [w.filename for w in select(said(), {"a": locked("a")}, FACTS)["a"]] == [
         "dist_a-1.0-py3-none-any.whl"
     ]
+
+
+def test_an_older_nondum_is_told() -> None:
+    (problem,) = preflight(said(), {"a": locked("a")}, FACTS, minimum_nondum="0.2")
+    assert (problem.code, problem.need, problem.have) == ("NONDUM_VERSION", ">=0.2", "0.1.0")
 
 
 REFUSED = {

@@ -99,7 +99,8 @@ def _verify_staged(payload: StagedPayload, facts: HostFacts | None) -> Iterator[
     for path in sorted((payload.folder / "wheels").glob("*.whl")):
         yield from wheel.check(path)
     if facts is not None:
-        problems = preflight(payload.manifest, payload.locks, facts)
+        minimum = payload.contents.minimum_nondum
+        problems = preflight(payload.manifest, payload.locks, facts, minimum_nondum=minimum)
         yield from problems
         if not problems:
             yield from check_wheels(payload, facts)

@@ -10,6 +10,7 @@ import platform
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
 
 from packaging import markers, tags
@@ -18,8 +19,10 @@ from packaging.requirements import InvalidRequirement, Requirement
 from packaging.specifiers import SpecifierSet
 from packaging.tags import Tag
 from packaging.utils import canonicalize_name
+from packaging.version import Version
 
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem
+from nondum.wheelhouse import gpu
 from nondum.wheelhouse import lock as locks_module
 from nondum.wheelhouse.lock import Lock, LockedWheel
 from nondum.wheelhouse.manifest import Manifest
@@ -48,6 +51,8 @@ class HostFacts:
     """None: no GPU that is known of."""
     confinement: int
     """Level at which workers run here."""
+    nondum: str
+    """Version of nondum."""
 
 
 def probe(state: Path, *, reserve_mb: int, confinement: int) -> HostFacts:
@@ -61,8 +66,9 @@ def probe(state: Path, *, reserve_mb: int, confinement: int) -> HostFacts:
         tags=tuple(tags.sys_tags()),
         free_disk_mb=max(0, shutil.disk_usage(there).free // _MB - reserve_mb),
         free_memory_mb=_free_memory_mb(),
-        gpu_memory_mb=None,
+        gpu_memory_mb=gpu.free_memory_mb(_free_memory_mb),
         confinement=confinement,
+        nondum=metadata.version("nondum"),
     )
 
 
@@ -87,10 +93,16 @@ def select(
 
 
 def preflight(
-    manifest: Manifest, locks: Mapping[str, Lock], facts: HostFacts
+    manifest: Manifest, locks: Mapping[str, Lock], facts: HostFacts, *, minimum_nondum: str = "0"
 ) -> tuple[Problem, ...]:
-    """Everything that keeps this payload from running here."""
-    problems = [*_version_problems(manifest, facts), *_resource_problems(manifest, facts)]
+    """Everything that keeps this payload from running here.
+
+    `minimum_nondum` is what the contents list asks for.
+    """
+    problems = [
+        *_version_problems(manifest, facts, minimum_nondum),
+        *_resource_problems(manifest, facts),
+    ]
     for component in manifest.components:
         if component.id not in locks:
             where = locks_module.file_name(component.id)
@@ -176,7 +188,18 @@ def _missing(distribution: str, wanted: Requirement, have: str | None, where: st
     )
 
 
-def _version_problems(manifest: Manifest, facts: HostFacts) -> Iterator[Problem]:
+def _version_problems(
+    manifest: Manifest, facts: HostFacts, minimum_nondum: str
+) -> Iterator[Problem]:
+    if Version(facts.nondum) < Version(minimum_nondum):
+        yield Problem(
+            "NONDUM_VERSION",
+            "this nondum is too old",
+            where=manifest.id,
+            need=f">={minimum_nondum}",
+            have=facts.nondum,
+            fix="update the host, or use an older release of the payload",
+        )
     wanted = SpecifierSet(manifest.requires.python)
     if not wanted.contains(facts.python, prereleases=True):
         yield Problem(

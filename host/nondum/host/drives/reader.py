@@ -63,7 +63,10 @@ def copy(arguments: Arguments, report: Report) -> dict[str, int]:
     (staging / contents.NAME).write_bytes(data)
     staged = payload.load(staging, listed)
     facts = facts_of(arguments)
-    _refuse_if_any(preflight.preflight(staged.manifest, staged.locks, facts))
+    minimum = listed.minimum_nondum
+    _refuse_if_any(
+        preflight.preflight(staged.manifest, staged.locks, facts, minimum_nondum=minimum)
+    )
     needed = chosen(staged, facts)
     known = known_wheels(arguments, staged, facts)
     missing = {locked.path for locked in needed if locked.sha256 not in known}
