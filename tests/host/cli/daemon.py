@@ -222,15 +222,15 @@ def running(root: Path) -> Iterator[Daemon]:
         env=quiet_environment(),
     )
     assert process.stderr is not None
-    try:
-        for line in process.stderr:
-            if "listens at" in line:
-                break
-        yield Daemon(root, process)
-        process.terminate()
-        _, err = process.communicate(timeout=PATIENCE_S)
-        assert process.returncode == 0, err
-        assert "Traceback" not in err, err
-    finally:
-        process.kill()
-        process.wait()
+    with process:
+        try:
+            for line in process.stderr:
+                if "listens at" in line:
+                    break
+            yield Daemon(root, process)
+            process.terminate()
+            _, err = process.communicate(timeout=PATIENCE_S)
+            assert process.returncode == 0, err
+            assert "Traceback" not in err, err
+        finally:
+            process.kill()

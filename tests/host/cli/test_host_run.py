@@ -1,0 +1,108 @@
+"""Starting a host: every mistake is told in words, before anything has begun."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+from tests.host.cli.daemon import Daemon, command, nondum, quiet_environment, running, write_config
+
+
+def host_run(*arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        command("host", "run", "--user", *arguments),
+        capture_output=True,
+        text=True,
+        env=quiet_environment() | environment,
+        timeout=60,
+        check=False,
+    )
+
+
+def refused(done: subprocess.CompletedProcess[str], *words: str, code: int = 2) -> None:
+    assert "Traceback" not in done.stderr, done.stderr
+    assert done.returncode == code, done.stderr
+    for word in words:
+        assert word in done.stderr, done.stderr
+
+
+def test_every_mistake_of_a_configuration_is_told(tmp_path: Path) -> None:
+    config = tmp_path / "host.toml"
+    config.write_text('[host]\nnaem = "x"\n[workers]\ntasks = "many"\n', encoding="utf-8")
+    done = host_run("--config", config)
+    refused(done, "did you mean 'name'?", "[workers] tasks = 'many'", str(config))
+    assert done.stderr.count("error: ") == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("[host\n", "CONFIG_TOML"), ("a = 1\n" * 3, "CONFIG_TOML"), ("host = 3\n", "a table")],
+    ids=["no TOML", "key thrice", "no table"],
+)
+def test_what_is_no_configuration_is_told(tmp_path: Path, text: str, words: str) -> None:
+    config = tmp_path / "host.toml"
+    config.write_text(text, encoding="utf-8")
+    refused(host_run("--config", config), words)
+
+
+def test_a_configuration_that_is_not_there_is_told(tmp_path: Path) -> None:
+    refused(host_run("--config", tmp_path / "none.toml"), "CONFIG_UNREADABLE", "none.toml")
+    refused(host_run("--config", tmp_path), "CONFIG_UNREADABLE")
+
+
+@pytest.mark.parametrize("name", ["Spot 7", "a--b", "-a", "", "spot_7"])
+def test_a_name_is_held_to_the_rules_of_the_configuration(tmp_path: Path, name: str) -> None:
+    refused(host_run("--config", write_config(tmp_path), "--name", name), "is not a host name")
+
+
+def test_a_system_tree_that_is_none_is_told(tmp_path: Path) -> None:
+    config = write_config(tmp_path)
+    text = config.read_text(encoding="utf-8")
+    tree = '[host]\nsystem_tree = "nobody.knows:it"'
+    config.write_text(text.replace("[host]", tree), encoding="utf-8")
+    refused(host_run("--config", config), "CONFIG_SYSTEM_TREE", "nobody.knows:it")
+
+
+def test_a_state_folder_that_cannot_be_is_told(tmp_path: Path) -> None:
+    config = write_config(tmp_path)
+    (tmp_path / "state").write_text("a file", encoding="utf-8")
+    refused(host_run("--config", config), str(tmp_path / "state"), code=1)
+
+
+def test_two_hosts_cannot_share_state_or_socket(tmp_path: Path) -> None:
+    with running(tmp_path) as daemon:
+        refused(host_run("--config", daemon.root / "host.toml"), "ALREADY_RUNNING")
+        other = daemon.root / "other.toml"
+        text = (daemon.root / "host.toml").read_text(encoding="utf-8")
+        other.write_text(text.replace("/state", "/state-2"), encoding="utf-8")
+        refused(host_run("--config", other), "CONTROL_IN_USE")
+        assert daemon.run("status").ok().out.startswith("host panther")
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_host_ends_well_when_told_to(tmp_path: Path, number: signal.Signals) -> None:
+    with running(tmp_path) as daemon:
+        daemon.process.send_signal(number)
+        _, err = daemon.process.communicate(timeout=60)
+        assert (daemon.process.returncode, err) == (0, "")
+        daemon.run("status").refused(4, "HOST_UNREACHABLE")
+
+
+def test_defaults_of_a_user_need_no_configuration(tmp_path: Path) -> None:
+    places = {"XDG_STATE_HOME": str(tmp_path), "XDG_RUNTIME_DIR": str(tmp_path / "run")}
+    process = subprocess.Popen(
+        command("host", "run", "--user", "--name", "lone-host"),
+        stderr=subprocess.PIPE,
+        text=True,
+        env=quiet_environment() | places,
+    )
+    daemon = Daemon(tmp_path, process)
+    assert process.stderr is not None
+    with process:
+        try:
+            assert any("listens at" in line for line in process.stderr)
+            assert nondum("status", **places).ok().out.startswith("host lone-host")
+        finally:
+            daemon.process.terminate()

@@ -1,0 +1,102 @@
+"""Making and judging payloads: no host is needed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from tests.host.cli.daemon import BEACON, BEACON_ID, nondum
+from tests.payloads import Part, make_payload
+
+INSPECTED = """\
+org.example.beacon 1.0 (release 1): Made by a test  SIZE
+  component beacon: greet, shine
+"""
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> Path:
+    make_payload(tmp_path / "drive", Part("beacon", BEACON), payload_id=BEACON_ID)
+    return tmp_path / "drive"
+
+
+def test_a_new_package_is_complete(tmp_path: Path) -> None:
+    folder = tmp_path / "window-opener"
+    made = nondum("payload", "new", "window-opener", "-o", folder, "--json").ok().json
+    assert made["folder"] == str(folder)
+    assert "pyproject.toml" in made["files"]
+    assert all((folder / path).is_file() for path in made["files"])
+    nondum("payload", "new", "window-opener", "-o", folder).refused(2, "FOLDER_NOT_EMPTY")
+    nondum("payload", "new", "Window Opener", "-o", tmp_path / "b").refused(2, "NAME_INVALID")
+
+
+def test_a_new_package_needs_a_folder_that_can_be(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    nondum("payload", "new", "x", "-o", tmp_path / "file/x").refused(1, "FILE")
+
+
+def test_a_drive_is_shown_as_it_says(drive: Path) -> None:
+    shown = nondum("payload", "inspect", drive).ok().out.splitlines(keepends=True)
+    size = shown[0].rsplit("  ", 1)[1]
+    assert "".join(shown[:2]).replace(size, "SIZE\n") == INSPECTED
+    assert "    test_beacon-1.0-py3-none-any.whl\n" in shown
+    (payload,) = nondum("payload", "inspect", drive, "--json").ok().json["payloads"]
+    assert (payload["id"], payload["release"]) == (BEACON_ID, 1)
+    assert [component["id"] for component in payload["components"]] == ["beacon"]
+
+
+def test_a_sound_drive_is_accepted(drive: Path) -> None:
+    ran = nondum("payload", "check", drive)
+    assert ran.code == 0
+    assert ran.out.endswith("accepted\n")
+    said = nondum("payload", "check", drive / "nondum" / BEACON_ID, "--json").ok().json
+    assert (said["ok"], said["problems"]) == (True, [])
+    assert {warning["code"] for warning in said["warnings"]} == {"W-OWN-WORD"}
+
+
+def test_what_is_wrong_is_told_and_counts(drive: Path) -> None:
+    (drive / "nondum" / BEACON_ID / "payload.toml").write_text("id = 3\n", encoding="utf-8")
+    ran = nondum("payload", "check", drive, "--json")
+    assert ran.code == 3
+    assert not ran.json["ok"]
+    assert ran.json["problems"][0]["code"]
+    assert nondum("payload", "check", drive).out.endswith("refused\n")
+
+
+@pytest.mark.parametrize("name", ["payload.toml", "index.json", "pylock.beacon.toml", "CONTENTS"])
+@pytest.mark.parametrize("verb", ["inspect", "check"])
+def test_a_drive_with_garbage_is_no_crash(drive: Path, name: str, verb: str) -> None:
+    (drive / "nondum" / BEACON_ID / name).write_bytes(b"\xff\x00\x1b[2J = {\n")
+    ran = nondum("payload", verb, drive)
+    assert ran.code in (1, 3), ran
+    assert "Traceback" not in ran.err
+    assert "\x1b" not in ran.out + ran.err
+
+
+@pytest.mark.parametrize("name", ["payload.toml", "index.json", "pylock.beacon.toml", "CONTENTS"])
+@pytest.mark.parametrize("verb", ["inspect", "check"])
+def test_a_drive_with_a_file_missing_is_no_crash(drive: Path, name: str, verb: str) -> None:
+    (drive / "nondum" / BEACON_ID / name).unlink()
+    ran = nondum("payload", verb, drive)
+    assert ran.code in (1, 3), ran
+    assert "Traceback" not in ran.err
+
+
+def test_an_empty_drive_says_what_a_payload_is(tmp_path: Path) -> None:
+    nondum("payload", "check", tmp_path).refused(1, "DRIVE_NOT_PAYLOAD")
+
+
+def test_a_package_that_is_none_cannot_be_built(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    ran = nondum("payload", "build", tmp_path / "empty", "-o", tmp_path / "drive", "--offline")
+    ran.refused(1, "error: ")
+
+
+def test_nobody_builds_for_such_machines(tmp_path: Path) -> None:
+    ran = nondum("payload", "build", tmp_path, "-o", tmp_path / "d", "--arch", "vax")
+    ran.refused(2, "TARGET_UNKNOWN")
+
+
+def test_installing_needs_a_host(drive: Path, tmp_path: Path) -> None:
+    nowhere = tmp_path / "control.sock"
+    nondum("--control", nowhere, "payload", "install", drive).refused(4, "HOST_UNREACHABLE")
