@@ -10,10 +10,11 @@ import asyncio
 import logging
 import os
 import signal
-from collections.abc import Coroutine, Iterator
+from collections.abc import Coroutine, Iterator, Sequence
 from typing import Any
 
 from nondum.host import verbs
+from nondum.host.announcements import announced
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.config import HostConfig
 from nondum.host.control.server import ControlServer
@@ -36,36 +37,44 @@ from nondum.host.mind.system_tree import load_system_tree
 from nondum.host.news import News
 from nondum.host.orders import Orders
 from nondum.host.questions import Questions
-from nondum.host.workers.spec import Limits
+from nondum.host.workers.spec import Limits, Timing
 from nondum.host.workers.workers import Workers
 from nondum.wheelhouse.signatures import UnsignedAllowed
 
 log = logging.getLogger(__name__)
 
 
-async def run_host(config: HostConfig) -> None:
-    """Run a host until SIGTERM or SIGINT.
+async def run_host(config: HostConfig, *, more_drives: Sequence[DriveSource] = ()) -> None:
+    """Run a host until SIGTERM or SIGINT. `more_drives` are sources beside the configuration's.
 
     Raises `ConfigRefused` (ALREADY_RUNNING, SYSTEM_TREE, …) before anything has begun.
     """
+    stop = _told_to_stop()
     folders = Folders(config.host.state)
     held = claim(folders)
     try:
         catalogue = await Catalogue.open(folders.catalogue, config.host.name)
         try:
-            await _run(config, folders, catalogue)
+            await _run(config, folders, catalogue, more_drives, stop)
         finally:
             await catalogue.close()
     finally:
         os.close(held)
 
 
-async def _run(config: HostConfig, folders: Folders, catalogue: Catalogue) -> None:
+async def _run(
+    config: HostConfig,
+    folders: Folders,
+    catalogue: Catalogue,
+    more_drives: Sequence[DriveSource],
+    stop: asyncio.Event,
+) -> None:
     bus = Bus()
-    workers = Workers(config.host.name, bus.emit)
+    timing = Timing(startup_s=config.workers.startup_s)
+    workers = Workers(config.host.name, bus.emit, timing=timing)
     executor = Executor(config.host.name, folders, workers, bus.emit, _install_options(config))
     manager = ComponentManager(catalogue, executor, bus)
-    for source in drive_sources(config, folders):
+    for source in (*drive_sources(config, folders), *more_drives):
         manager.add_source(source)
     mind = Mind(
         config.host.name,
@@ -88,7 +97,8 @@ async def _run(config: HostConfig, folders: Folders, catalogue: Catalogue) -> No
     await control.open()
     log.info("host %s listens at %s", config.host.name, config.host.control)
     try:
-        await _until_told(
+        await _until(
+            stop,
             manager.run(),
             mind.run(),
             *(source.watch(bus.emit) for source in device_sources(config)),
@@ -131,8 +141,11 @@ class _Listener:
             snapshot = self._catalogue.snapshot()
             self._workers.remount(mounts_to_wire(snapshot.host, snapshot.mounts))
             self._mind.see(snapshot)
-        else:
-            self._mind.on_event(event)
+            return
+        sentence = announced(event, self._catalogue.snapshot())
+        if sentence is not None:
+            self._mind.people.tell(sentence)
+        self._mind.on_event(event)
 
 
 def _install_options(config: HostConfig) -> InstallOptions:
@@ -156,12 +169,16 @@ def _warnings(config: HostConfig, catalogue: Catalogue) -> Iterator[str]:
         yield f"the catalogue was damaged and begun anew; the old one is {catalogue.set_aside}"
 
 
-async def _until_told(*parts: Coroutine[Any, Any, None]) -> None:
-    """Run all parts until one fails or a signal asks to stop; then let all of them end."""
+def _told_to_stop() -> asyncio.Event:
+    """Set by a signal that asks to stop, from now on: also while the host is still starting."""
     stop = asyncio.Event()
-    loop = asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(number, stop.set)
+        asyncio.get_running_loop().add_signal_handler(number, stop.set)
+    return stop
+
+
+async def _until(stop: asyncio.Event, *parts: Coroutine[Any, Any, None]) -> None:
+    """Run all parts until one fails or `stop` is set; then let all of them end."""
     async with asyncio.TaskGroup() as group:
         tasks = [group.create_task(part) for part in parts]
         group.create_task(_cancel_when(stop, tasks))

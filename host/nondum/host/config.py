@@ -74,6 +74,8 @@ class WorkersSection:
     memory_mb: int = 2048
     tasks: int = 256
     descriptors: int = 1024
+    startup_s: float = 30.0
+    """What a plugin has from its launch until it has started; then it counts as hung."""
 
 
 @dataclass(frozen=True, slots=True)

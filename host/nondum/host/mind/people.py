@@ -63,7 +63,19 @@ def recomposed(old: Composition | None, new: Composition) -> list[str]:
             sentences.append(f"{id} is here: {_offers(component)}")
         elif earlier.is_ready != component.is_ready:
             sentences.append(f"{id} is {_health(component)}")
-    return sentences + _doubts(old, new) + _kept_out(old, new)
+    return sentences + _contested(old, new) + _doubts(old, new) + _kept_out(old, new)
+
+
+def _contested(old: Composition | None, new: Composition) -> list[str]:
+    """Who has a device that others want too, and by what rule."""
+    known = {c.id: c.devices for c in old.snapshot.components} if old else {}
+    return [
+        f"{component.id} has the device {claim.device}, which {' and '.join(claim.contested_by)} "
+        "would need too: it stays with whoever has it, and a free one goes to the first by name"
+        for component in new.snapshot.components
+        for claim in component.devices
+        if claim.contested_by and claim not in known.get(component.id, ())
+    ]
 
 
 def _doubts(old: Composition | None, new: Composition) -> list[str]:

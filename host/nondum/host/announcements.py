@@ -1,0 +1,41 @@
+"""What people are told of payloads and drives as they come, fail and go: sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from nondum.host.catalogue.records import Snapshot
+from nondum.host.events import (
+    DriveRead,
+    DriveUnreadable,
+    Event,
+    PayloadFailed,
+    PayloadRefused,
+    PayloadWithdrawn,
+)
+from nondum.sdk.errors import Problem
+
+
+def announced(event: Event, snapshot: Snapshot) -> str | None:
+    """What is said of an event once `snapshot` has taken it in; None: nothing."""
+    match event:
+        case PayloadRefused():
+            return f"{_name(event.payload, snapshot)} is refused: {_joined(event.problems)}"
+        case PayloadFailed():
+            return f"{_name(event.payload, snapshot)} does not work: {_joined(event.problems)}"
+        case PayloadWithdrawn():
+            return f"{_name(event.payload, snapshot)} is withdrawn: {event.reason}"
+        case DriveUnreadable():
+            return f"drive {event.drive} cannot be used: {_joined(event.problems)}"
+        case DriveRead() if not event.payloads:
+            return f"drive {event.drive} carries no payload"
+    return None
+
+
+def _name(key: str, snapshot: Snapshot) -> str:
+    """A payload's id; its key once it is gone."""
+    return next((p.payload_id for p in snapshot.payloads if p.key == key), f"payload {key}")
+
+
+def _joined(problems: Iterable[Problem]) -> str:
+    return "; ".join(str(problem) for problem in problems)
