@@ -80,14 +80,18 @@ class Robot:
             raise TooLate(f"{what}: not within {timeout_s:.0f} s\n{self._last_words()}")
         return result[0]
 
+    def see(self, view: View) -> None:
+        """Take in a newer view: everyone who waits looks at it."""
+        with self._changed:
+            self._view = view
+            self._changed.notify_all()
+
     def watch(self) -> None:
         """Keep `view` fresh until the daemon leaves; runs in a thread of its own."""
         try:
             with ControlClient(self.control, timeout_s=None) as client:
                 for view in client.follow("watch"):
-                    with self._changed:
-                        self._view = view
-                        self._changed.notify_all()
+                    self.see(view)
         except HostUnreachable:
             pass  # the daemon was stopped: `until` says so
         finally:
@@ -118,7 +122,7 @@ def running(work: Path, *, name: str, initial: Mapping[str, Path]) -> Iterator[R
     for folder in (robot.slots, robot.devices):
         folder.mkdir(parents=True)
     config = work / "host.toml"
-    config.write_text(_config(robot), encoding="utf-8")
+    config.write_text(configuration(robot), encoding="utf-8")
     with (work / "daemon.log").open("wb") as log:
         daemon = subprocess.Popen(
             [*NONDUM, "host", "run", "--user", "--config", str(config)], stdout=log, stderr=log
@@ -135,7 +139,8 @@ def running(work: Path, *, name: str, initial: Mapping[str, Path]) -> Iterator[R
             daemon.wait(timeout=20)
 
 
-def _config(robot: Robot) -> str:
+def configuration(robot: Robot) -> str:
+    """What a robot is told of itself: slots instead of real ports, unsigned payloads allowed."""
     return f"""\
 [host]
 name = "{robot.name}"

@@ -1,0 +1,92 @@
+"""What payloads have on a machine through a host: processes, mounts, folders and rows."""
+
+from __future__ import annotations
+
+import contextlib
+import sqlite3
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from nondum.host.drives.mounting import mounted_below
+
+FOLDERS = ("staging", "payloads", "venvs", "scratch", "mounts")
+LASTING = {"host", "highwater", "journal"}
+"""Tables that outlive payloads."""
+
+
+@dataclass(frozen=True)
+class Traces:
+    """Two of them are equal when nothing came and nothing stayed."""
+
+    workers: tuple[str, ...]
+    """Scratch folder of each process that a worker is or has started, whosever child it is."""
+    opened: tuple[str, ...]
+    """Files on drives that any process has open."""
+    mounts: tuple[Path, ...]
+    folders: tuple[str, ...]
+    rows: tuple[tuple[str, tuple[object, ...]], ...]
+    """Rows of the catalogue, but for what outlives payloads."""
+
+    @classmethod
+    def of(cls, state: Path, drives: Path) -> Traces:
+        """Look for them: `state` is the host's state folder, `drives` where its drives lie."""
+        return cls(
+            tuple(sorted(folder for _, folder in workers(state))),
+            tuple(sorted(_open(drives))),
+            tuple(mounted_below(state)),
+            tuple(sorted(_folders(state))),
+            tuple(_rows(state / "catalogue.sqlite")),
+        )
+
+
+def workers(state: Path) -> Iterator[tuple[int, str]]:
+    """Processes of workers of a host, by what their environment says: pid and scratch folder."""
+    for pid in pids():
+        with contextlib.suppress(OSError):
+            variables = Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
+            for variable in variables:
+                name, _, value = variable.decode(errors="replace").partition("=")
+                if name == "NONDUM_WORKER" and value.startswith(str(state)):
+                    yield pid, value
+
+
+def descendants(pid: int) -> set[int]:
+    """Processes that one has started, and that those have started; zombies are none."""
+    parents: dict[int, int] = {}
+    for other in pids():
+        with contextlib.suppress(OSError):
+            fields = Path(f"/proc/{other}/stat").read_text().rpartition(")")[2].split()
+            parents[other] = 0 if fields[0] == "Z" else int(fields[1])
+    below = {pid}
+    while more := {child for child, parent in parents.items() if parent in below} - below:
+        below |= more
+    return below - {pid}
+
+
+def pids() -> Iterator[int]:
+    """All processes."""
+    return (int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit())
+
+
+def _open(folder: Path) -> Iterator[str]:
+    for pid in pids():
+        with contextlib.suppress(OSError):
+            for descriptor in Path(f"/proc/{pid}/fd").iterdir():
+                with contextlib.suppress(OSError):
+                    if str(target := descriptor.readlink()).startswith(f"{folder}/"):
+                        yield str(target)
+
+
+def _folders(state: Path) -> Iterator[str]:
+    for name in FOLDERS:
+        yield from (str(path.relative_to(state)) for path in state.glob(f"{name}/*"))
+
+
+def _rows(catalogue: Path) -> Iterator[tuple[str, tuple[object, ...]]]:
+    with contextlib.closing(sqlite3.connect(f"file:{catalogue}?mode=ro", uri=True)) as connection:
+        names = connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
+        for (table,) in sorted(names.fetchall()):
+            if table not in LASTING and not table.startswith("sqlite_"):
+                for row in sorted(connection.execute(f"SELECT * FROM {table}"), key=repr):
+                    yield table, tuple(row)
