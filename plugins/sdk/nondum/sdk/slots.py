@@ -7,9 +7,11 @@ it under a reader, grow it, or write to it. The producer alone counts who still 
 from __future__ import annotations
 
 import fcntl
+import itertools
 import mmap
 import os
-from collections.abc import Iterator
+import weakref
+from collections.abc import Callable, Iterator
 
 from nondum.sdk.errors import Problem, ProtocolViolation
 from nondum.sdk.messages import Buffer
@@ -107,6 +109,13 @@ class MappedSlots:
 
     def __init__(self) -> None:
         self._slots: dict[int, mmap.mmap] = {}
+        self._lent: dict[int, weakref.ref[object]] = {}
+        self._loans = itertools.count()
+
+    @property
+    def lent(self) -> int:
+        """Views that somebody still holds."""
+        return len(self._lent)
 
     def add(self, slot_id: int, handle: Handle) -> None:
         """Map a slot whose descriptor was handed over, and close that.
@@ -122,10 +131,6 @@ class MappedSlots:
         finally:
             discard((handle,))
 
-    def read(self, slot_id: int, length: int) -> bytes:
-        """Copy a frame out of its slot. Raises `ProtocolViolation`."""
-        return self.check(slot_id, length)[:length]
-
     def check(self, slot_id: int, length: int) -> mmap.mmap:
         """Give the slot's memory if the slot is known and as long as claimed."""
         memory = self._slots.get(slot_id)
@@ -135,16 +140,37 @@ class MappedSlots:
             raise _violation("SLOT_LENGTH", f"{length} bytes in a slot of {len(memory)}")
         return memory
 
+    def copy(self, slot_id: int, length: int) -> bytes:
+        """Copy a frame out of its slot. Raises `ProtocolViolation`."""
+        return self.check(slot_id, length)[:length]
+
+    def lend(self, slot_id: int, length: int, on_return: Callable[[], None]) -> memoryview:
+        """Give a read-only view of a frame in its slot. Raises `ProtocolViolation`.
+
+        `on_return` is called, in whichever thread, as soon as nothing looks at the frame any more:
+        no slice of the view, no numpy array on it.
+        """
+        import ctypes  # for this only: most workers never see a frame
+
+        # Every view of a buffer keeps its exporter alive, and this exporter is this frame's own.
+        exporter = (ctypes.c_ubyte * length).from_buffer(self.check(slot_id, length))
+        loan, lent = next(self._loans), self._lent
+
+        def returned(_: object) -> None:
+            del lent[loan]
+            on_return()
+
+        lent[loan] = weakref.ref(exporter, returned)
+        return memoryview(exporter).cast("B").toreadonly()
+
     def remove(self, slot_id: int) -> None:
-        """Unmap a slot that its producer has retired."""
-        memory = self._slots.pop(slot_id, None)
-        if memory is not None:
-            memory.close()
+        """Let go of a slot that its producer has retired; views of it stay valid."""
+        self._slots.pop(slot_id, None)
 
     def close(self) -> None:
-        """Unmap all."""
-        for slot_id in list(self._slots):
-            self.remove(slot_id)
+        """Let go of all slots; views stay valid, and are not asked back."""
+        self._slots.clear()
+        self._lent.clear()
 
 
 def _map_sealed(descriptor: int) -> mmap.mmap:
@@ -155,7 +181,9 @@ def _map_sealed(descriptor: int) -> mmap.mmap:
             raise _violation("SLOT_SEALS", f"a slot has the seals {seals:#x}, not {SEALS:#x}")
         if not 0 < size <= MAX_SLOT_BYTES:
             raise _violation("SLOT_SIZE", f"a slot has {size} bytes")
-        return mmap.mmap(descriptor, size, prot=mmap.PROT_READ)
+        # Private, so that it may be mapped for writing, which ctypes asks for; nobody ever writes,
+        # and pages that are only read are the producer's own.
+        return mmap.mmap(descriptor, size, access=mmap.ACCESS_COPY)
     except (OSError, ValueError) as error:  # no memfd at all, or not mappable
         raise _violation("SLOT_SEALS", f"a slot is no sealed memory: {error}") from error
 

@@ -1,9 +1,12 @@
 """One stream's way from its producer to each of its consumers on the same host.
 
 Each pair has a connection of its own; the host brokers it and is out of the data path. Frames lie
-in shared slots (`nondum.sdk.slots`), small messages travel inline. At most two messages are
-outstanding per consumer; while they are, the newest one waits and older ones are dropped, so that a
-slow, stopped or dead consumer costs its producer nothing. Only messages cross: no shared counters.
+in shared slots (`nondum.sdk.slots`), small messages travel inline. A few messages are outstanding
+per consumer; while they are, the newest one waits and older ones are dropped, so that a slow,
+stopped or dead consumer costs its producer nothing. Only messages cross: no shared counters.
+
+A consumer's code looks at frames where they lie, two at a time: the one that it works on and the
+one before or after. Further ones are copied out, so that keeping frames never stops a stream.
 
     producer → consumer   [0, seq, header, bytes or nil]         a message, inline
                           [1, seq, slot, length, header]         a message in a slot; the first time
@@ -14,6 +17,9 @@ slow, stopped or dead consumer costs its producer nothing. Only messages cross: 
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -24,8 +30,10 @@ from nondum.sdk.packets import Handle, Packets, discard
 from nondum.sdk.slots import MappedSlots, Slot, SlotRing
 from nondum.sdk.wire import MAX_PACKET, pack, unpack
 
-OUTSTANDING = 2
-"""Messages that a consumer may hold."""
+LENT = 2
+"""Frames that a consumer's code may look at in their slots."""
+OUTSTANDING = LENT + 1
+"""Messages that a consumer may hold: one more, to be copied out or replaced by a newer one."""
 INLINE_BYTES = 16 * 1024
 """Bulk bytes up to here travel in the packet."""
 SPARE_SLOTS = 2
@@ -200,6 +208,17 @@ class _Outlet:
             self._on_closed()
 
 
+@dataclass(frozen=True, slots=True)
+class _Waiting:
+    """A message that has arrived and was not taken yet."""
+
+    seq: int
+    header: dict[str, Any]
+    inline: bytes | None = None
+    slot: int | None = None
+    length: int = 0
+
+
 class Consumer:
     """The receiving end of a stream; keeps only the newest message until it is taken."""
 
@@ -218,23 +237,32 @@ class Consumer:
         self._kind, self._packets = kind, packets
         self._on_message, self._on_closed = on_message, on_closed
         self._slots = MappedSlots()
-        self._waiting: tuple[int, dict[str, Any], Callable[[], bytes | None]] | None = None
+        self._loop = asyncio.get_running_loop()
+        self._thread = threading.get_ident()
+        self._waiting: _Waiting | None = None
         self._limit = MAX_PACKET if packets.shares_memory else UNLIMITED
         packets.open(self._receive, self._lose)
 
     def take(self) -> Message | None:
-        """Copy the waiting message out and let its slot go; None when none waits.
+        """Give the waiting message; None when none waits.
 
-        Raises `MessageInvalid` when it is not what its type says, `ProtocolViolation` when its slot
-        was taken away.
+        Its bulk data may lie in shared memory: read-only, and unchanged as long as anything looks
+        at them. Raises `MessageInvalid` when it is not what its type says, `ProtocolViolation` when
+        its slot was taken away.
         """
-        if self._waiting is None:
+        waiting, self._waiting = self._waiting, None
+        if waiting is None:
             return None
-        seq, header, read = self._waiting
-        self._waiting = None
-        buffer = read()
-        self._release(seq)
-        return message_from_wire(self._kind, header, buffer)
+        if waiting.slot is None:
+            buffer: Buffer | None = waiting.inline
+            self._release(waiting.seq)
+        elif self._slots.lent < LENT:
+            seq = waiting.seq
+            buffer = self._slots.lend(waiting.slot, waiting.length, lambda: self._give_back(seq))
+        else:
+            buffer = self._slots.copy(waiting.slot, waiting.length)
+            self._release(waiting.seq)
+        return message_from_wire(self._kind, waiting.header, buffer)
 
     def close(self) -> None:
         """Stop reading."""
@@ -258,22 +286,30 @@ class Consumer:
     def _accept(self, fields: Any, handles: list[Handle]) -> None:
         match fields:
             case [0, int(seq), dict(header), bytes() | None as buffer]:
-                self._replace(seq, header, lambda: buffer)
+                self._replace(_Waiting(seq, header, inline=buffer))
             case [1, int(seq), int(slot), int(length), dict(header)]:
                 if handles:
                     self._slots.add(slot, handles.pop(0))
                 self._slots.check(slot, length)
-                self._replace(seq, header, lambda: self._slots.read(slot, length))
+                self._replace(_Waiting(seq, header, slot=slot, length=length))
             case [2, int(slot)]:
                 self._slots.remove(slot)
             case _:
                 raise ProtocolViolation(Problem("STREAM_PACKET", "no packet of a stream"))
 
-    def _replace(self, seq: int, header: dict[str, Any], read: Callable[[], bytes | None]) -> None:
-        older, self._waiting = self._waiting, (seq, header, read)
+    def _replace(self, newer: _Waiting) -> None:
+        older, self._waiting = self._waiting, newer
         if older is not None:
-            self._release(older[0])
+            self._release(older.seq)
         self._on_message()
+
+    def _give_back(self, seq: int) -> None:
+        """Release a frame that nobody looks at any more, from whichever thread."""
+        if threading.get_ident() == self._thread:
+            self._release(seq)
+        else:
+            with contextlib.suppress(RuntimeError):  # the loop is closed
+                self._loop.call_soon_threadsafe(self._release, seq)
 
     def _release(self, seq: int) -> None:
         # A producer that lets releases pile up until the socket is full harms only itself.
