@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import select
 import sqlite3
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -49,6 +50,18 @@ def workers(state: Path) -> Iterator[tuple[int, str]]:
                 name, _, value = variable.decode(errors="replace").partition("=")
                 if name == "NONDUM_WORKER" and value.startswith(str(state)):
                     yield pid, value
+
+
+def until_unmounted(folder: Path, timeout_s: float = 10.0) -> None:
+    """Wait until nothing is mounted below a folder. Raises `TimeoutError`."""
+    with Path("/proc/self/mountinfo").open() as changes:  # see proc(5): polls as an exception
+        poll = select.poll()
+        poll.register(changes, select.POLLPRI)
+        while mounted_below(folder):
+            if not poll.poll(timeout_s * 1000):
+                raise TimeoutError(f"still mounted: {mounted_below(folder)}")
+            changes.seek(0)
+            changes.read()
 
 
 def descendants(pid: int) -> set[int]:
