@@ -122,7 +122,10 @@ class RunningHost(Robot):
 
         def found(view: View) -> Row | None:
             row = payload(view, name)
-            return row if row is not None and row["state"] in steps else None
+            if row is None or row["state"] in steps:
+                return row
+            assert row["state"] not in ("refused", "quarantined"), row["problems"]
+            return None
 
         return self.until(f"{name}: {' or '.join(steps)}", found, timeout_s=READY_S)
 
