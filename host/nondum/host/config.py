@@ -72,8 +72,11 @@ class WorkersSection:
     """Limits of one worker, unless its payload asks for less."""
 
     memory_mb: int = 2048
+    """Data that it, and each process that it starts, may hold."""
     tasks: int = 256
+    """Processes and threads."""
     descriptors: int = 1024
+    """Open files, sockets and streams."""
     startup_s: float = 30.0
     """What a plugin has from its launch until it has started; then it counts as hung."""
 
@@ -83,7 +86,9 @@ class PlanningSection:
     """How plans are searched for."""
 
     deadline_s: float = 10.0
+    """Time that a search for a plan is given."""
     memory_mb: int = 512
+    """Memory of a planner's process."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,146 @@
+"""The parts of docs/ that say what the code says: made from it, and compared with it.
+
+    python -m tests.docs.reference        # writes them anew
+
+Each document begins with words of its own; what follows `MARK` comes from here.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import textwrap
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+
+from nondum.host import config
+from nondum.host.cli.main import cli
+from nondum.sdk import hooks
+
+DOCS = Path(__file__).parents[2] / "docs"
+MARK = "<!-- What follows is written by `python -m tests.docs.reference`. -->\n"
+
+
+def all_commands() -> Iterator[tuple[str, click.Command, click.Context]]:
+    """Every command, by what a person types, in the order of the alphabet."""
+    root = click.Context(cli, info_name="nondum")
+    for name in cli.list_commands(root):
+        found = cli.get_command(root, name)
+        assert found is not None
+        context = click.Context(found, info_name=name, parent=root)
+        if not isinstance(found, click.Group):
+            yield f"nondum {name}", found, context
+            continue
+        for inner in sorted(found.commands):
+            command = found.commands[inner]
+            yield (
+                f"nondum {name} {inner}",
+                command,
+                click.Context(command, info_name=inner, parent=context),
+            )
+
+
+def commands() -> str:
+    """A section a command: usage, what it does, its options, its examples."""
+    return "\n".join(_command(*found) for found in all_commands())
+
+
+def configuration() -> str:
+    """A section a table of the file, a row a key."""
+    rows: dict[str, list[str]] = {}
+    for section, key, default in config.documented():
+        kind = type(getattr(config.HostConfig(), section))
+        meaning = _field_docs(kind)[key]
+        rows.setdefault(section, []).append(f"| `{key}` | {_shown(default)} | {meaning} |")
+    return "\n".join(_section(section, found) for section, found in rows.items())
+
+
+def hook_signatures() -> str:
+    """A section a hook: its signature and what it is for."""
+    return "\n".join(
+        [
+            "## Describing hooks\n",
+            *(_hook(name) for name in hooks.DESCRIBING),
+            "## Acting hooks\n",
+            *(_hook(name) for name in hooks.ACTING),
+        ]
+    )
+
+
+DOCUMENTS: dict[str, Callable[[], str]] = {
+    "cli.md": commands,
+    "configuration.md": configuration,
+    "hooks.md": hook_signatures,
+}
+
+
+def _command(name: str, command: click.Command, context: click.Context) -> str:
+    about, _, examples = inspect.cleandoc(command.help or "").partition("Example")
+    usage = " ".join([name, *command.collect_usage_pieces(context)])
+    lines = [f"## {name}\n", f"    {usage}\n", about.replace("\b\n", "").strip(), ""]
+    options = [
+        record
+        for param in command.get_params(context)
+        if isinstance(param, click.Option) and (record := param.get_help_record(context))
+        if "--help" not in param.opts
+    ]
+    if options:
+        lines += ["| option | |", "|---|---|", *(f"| `{o}` | {text} |" for o, text in options), ""]
+    shown = examples.partition(":")[2].strip().splitlines()
+    lines += [*(f"    {line.strip()}" for line in shown), ""]
+    return "\n".join(lines)
+
+
+def _section(name: str, rows: list[str]) -> str:
+    kind = type(getattr(config.HostConfig(), name))
+    heads = ["| key | default | |", "|---|---|---|"]
+    return "\n".join([f"## [{name}]\n", f"{inspect.getdoc(kind)}\n", *heads, *rows, ""])
+
+
+def _field_docs(kind: type[Any]) -> dict[str, str]:
+    """What stands under each field of a dataclass."""
+    (body,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
+    assert isinstance(body, ast.ClassDef)
+    docs = {}
+    for field, below in zip(body.body, body.body[1:], strict=False):
+        if isinstance(field, ast.AnnAssign) and isinstance(below, ast.Expr):
+            assert isinstance(field.target, ast.Name)
+            docs[field.target.id] = " ".join(ast.literal_eval(below.value).split())
+    return docs
+
+
+def _shown(default: Any) -> str:
+    """A default as the file would say it."""
+    match default:
+        case None:
+            return "from the machine's"
+        case bool():
+            return f"`{str(default).lower()}`"
+        case int() | float():
+            return f"`{default}`"
+        case ():
+            return "`[]`"
+        case _:
+            return f'`"{default}"`'
+
+
+def _hook(name: str) -> str:
+    function = getattr(hooks, name)
+    kind = "async def" if inspect.iscoroutinefunction(function) else "def"
+    signature = f"{kind} {name}{inspect.signature(function)}".replace("'", "")
+    return f"### {name}\n\n    {signature}\n\n{inspect.getdoc(function)}\n"
+
+
+def main() -> None:
+    """Write what follows the mark of each document anew."""
+    for name, make in DOCUMENTS.items():
+        path = DOCS / name
+        words = path.read_text(encoding="utf-8").partition(MARK)[0]
+        path.write_text(f"{words}{MARK}\n{make()}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
