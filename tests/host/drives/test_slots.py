@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import shutil
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -71,6 +72,28 @@ async def test_files_and_hidden_entries_are_no_drives(tmp_path: Path) -> None:
         (slots / "file").touch()
         (slots / "a").mkdir()
         assert await told.get() == DriveInserted("a", slots / "a", "slot")
+
+
+async def test_links_that_lead_nowhere_are_no_drives(tmp_path: Path) -> None:
+    slots = tmp_path / "slots"
+    async with watched(slots) as told:
+        await told.get()
+        (slots / "circle").symlink_to("circle")
+        (slots / "nowhere").symlink_to(tmp_path / "nothing")
+        (slots / "a").mkdir()
+        assert await told.get() == DriveInserted("a", slots / "a", "slot")
+
+
+async def test_slot_folder_that_is_deleted_holds_no_drives(tmp_path: Path) -> None:
+    left, right = tmp_path / "left", tmp_path / "right"
+    (left / "a").mkdir(parents=True)
+    async with watched(left, right) as told:
+        assert await told.get() == DriveInserted("left/a", left / "a", "slot")
+        await told.get()
+        shutil.rmtree(left)
+        assert await told.get() == DriveRemoved("left/a")
+        (right / "b").mkdir()
+        assert await told.get() == DriveInserted("right/b", right / "b", "slot")
 
 
 async def test_drives_of_several_folders_have_names_of_their_own(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ Put an entry there by rename or as a symlink, so that it is whole the moment it 
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -14,6 +15,8 @@ from nondum.host.inotify import folders_watched
 
 _Identity = tuple[Path, int, str]
 """Path, inode and symlink target: an entry that is replaced is another drive."""
+
+log = logging.getLogger(__name__)
 
 
 class SlotSource:
@@ -49,9 +52,29 @@ class SlotSource:
 
     def _entries(self) -> Iterator[tuple[str, _Identity]]:
         for folder in self._folders:
-            for entry in sorted(os.scandir(folder), key=lambda entry: entry.name):
-                if entry.name.startswith(".") or not entry.is_dir():
+            for entry in _scanned(folder):
+                try:
+                    identity = _identity(entry)
+                except OSError as error:  # it has just gone, or is a link that leads in circles
+                    log.debug("%s is no drive: %s", entry.path, error)
                     continue
-                name = entry.name if len(self._folders) == 1 else f"{folder.name}/{entry.name}"
-                target = str(Path(entry.path).readlink()) if entry.is_symlink() else ""
-                yield name, (Path(entry.path), entry.inode(), target)
+                if identity is not None:
+                    name = entry.name
+                    yield name if len(self._folders) == 1 else f"{folder.name}/{name}", identity
+
+
+def _scanned(folder: Path) -> list[os.DirEntry[str]]:
+    """What is in a slot folder, by name; one that was taken away is empty."""
+    try:
+        return sorted(os.scandir(folder), key=lambda entry: entry.name)
+    except OSError as error:
+        log.warning("the slot folder %s cannot be read: %s", folder, error)
+        return []
+
+
+def _identity(entry: os.DirEntry[str]) -> _Identity | None:
+    """What tells a drive from another; None: the entry is none. Raises `OSError`."""
+    if entry.name.startswith(".") or not entry.is_dir():
+        return None
+    target = str(Path(entry.path).readlink()) if entry.is_symlink() else ""
+    return Path(entry.path), entry.inode(), target
