@@ -59,7 +59,8 @@ def machine() -> str:
     )
     cores = len(os.sched_getaffinity(0))
     release = platform.release().partition("-")[0]
-    return f"{cores} × {model}, Linux {release}, CPython {platform.python_version()}"
+    priority = f", niceness {os.nice(0)}" if os.nice(0) else ""
+    return f"{cores} × {model}, Linux {release}, CPython {platform.python_version()}{priority}"
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
