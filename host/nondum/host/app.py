@@ -39,6 +39,7 @@ from nondum.host.orders import Orders
 from nondum.host.questions import Questions
 from nondum.host.workers.spec import Limits, Timing
 from nondum.host.workers.workers import Workers
+from nondum.sdk.errors import ConfigRefused, Problem
 from nondum.wheelhouse.signatures import UnsignedAllowed
 
 log = logging.getLogger(__name__)
@@ -50,6 +51,7 @@ async def run_host(config: HostConfig, *, more_drives: Sequence[DriveSource] = (
     Raises `ConfigRefused` (ALREADY_RUNNING, SYSTEM_TREE, …) before anything has begun.
     """
     stop = _told_to_stop()
+    _make_slots(config)
     folders = Folders(config.host.state)
     held = claim(folders)
     try:
@@ -127,6 +129,21 @@ def device_sources(config: HostConfig) -> list[DeviceSource]:
     if config.devices.udev:
         sources.append(UdevSource())
     return sources
+
+
+def _make_slots(config: HostConfig) -> None:
+    """Make the folders that are watched. Raises `ConfigRefused` (CONFIG_FOLDER) for each failure."""
+    problems = []
+    for section in ("drives", "devices"):
+        for folder in getattr(config, section).slots:
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                text = f"cannot be a folder of slots ({error.strerror})"
+                fix = f"see `slots` under [{section}]"
+                problems.append(Problem("CONFIG_FOLDER", text, where=str(folder), fix=fix))
+    if problems:
+        raise ConfigRefused(*problems)
 
 
 class _Listener:

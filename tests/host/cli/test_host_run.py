@@ -71,6 +71,15 @@ def test_a_state_folder_that_cannot_be_is_told(tmp_path: Path) -> None:
     refused(host_run("--config", config), str(tmp_path / "state"), code=1)
 
 
+def test_every_slot_folder_that_cannot_be_is_told(tmp_path: Path) -> None:
+    config = write_config(tmp_path)
+    for name in ("slots", "devices"):
+        (tmp_path / name).rmdir()
+        (tmp_path / name).write_text("a file", encoding="utf-8")
+    done = host_run("--config", config)
+    refused(done, f"CONFIG_FOLDER {tmp_path}/slots", f"CONFIG_FOLDER {tmp_path}/devices")
+
+
 def test_two_hosts_cannot_share_state_or_socket(tmp_path: Path) -> None:
     with running(tmp_path) as daemon:
         refused(host_run("--config", daemon.root / "host.toml"), "ALREADY_RUNNING")
