@@ -65,6 +65,14 @@ def test_a_source_becomes_a_payload_that_hosts_take(built: Build, tmp_path: Path
     assert (said.name, said.version, said.behaviours[0].name) == ("blinker", "1.0", "shine")
 
 
+def test_a_source_is_found_from_beside_it(
+    built: Build, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_source(tmp_path / "src")
+    monkeypatch.chdir(tmp_path)
+    assert built(Path("src")).is_relative_to(tmp_path / "drive")
+
+
 def test_the_lock_names_every_wheel_on_the_drive(built: Build, tmp_path: Path) -> None:
     folder = built(make_source(tmp_path / "src"))
     parsed = lock.parse((folder / "pylock.blinker.toml").read_text(), "lock")

@@ -40,8 +40,9 @@ def make_wheel(package: Path, folder: Path, sources: Sources) -> Path:
     """Build a package's own wheel into `folder`, which is made. Raises `InstallFailed`
     (BUILD_FAILED)."""
     folder.mkdir(parents=True)
+    absolute = package.absolute()  # pip takes `package` alone for a name in the index
     _pip(
-        ["wheel", "--no-deps", "--wheel-dir", str(folder), *sources.options(), str(package)],
+        ["wheel", "--no-deps", "--wheel-dir", str(folder), *sources.options(), str(absolute)],
         "BUILD_FAILED",
         str(package),
     )
