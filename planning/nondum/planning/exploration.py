@@ -43,20 +43,24 @@ class Exploration:
 
 
 def explore(
-    merged: Merged, facts: Iterable[str], objects: Mapping[str, tuple[str, ...]] | None = None
+    merged: Merged,
+    facts: Iterable[str],
+    objects: Mapping[str, tuple[str, ...]] | None = None,
+    *,
+    limit: int = INSTANCES_LIMIT,
 ) -> Exploration:
     """Explore from where exactly `facts` hold; `objects` exist beside the merged ones.
 
     A condition that something is false counts as reachable, unless it is true and nothing can ever
     make it false. Raises `FragmentRefused` (PDDL_TOO_MANY) that names the action with most
-    bindings when there are more than `INSTANCES_LIMIT`: to leave some out would make a wrong proof.
+    bindings when there are more than `limit`: to leave some out would make a wrong proof.
     """
     types = {name: found.types for name, found in merged.objects.items()} | dict(objects or {})
     believed = frozenset(f for f in facts if all(o in types for o in parts(f)[1]))
     deletable = {a.predicate for action in _actions(merged) for a in action.effect.delete}
     members = members_of(merged, types)
     rules = [(action, _rule(action, members)) for action in _actions(merged)]
-    return _Fixpoint(rules, believed, frozenset(deletable)).run()
+    return _Fixpoint(rules, believed, frozenset(deletable), limit).run()
 
 
 def _actions(merged: Merged) -> Iterable[Action]:
@@ -111,8 +115,10 @@ class _Fixpoint:
         rules: Iterable[tuple[Action, Rule]],
         believed: frozenset[str],
         deletable: frozenset[str],
+        limit: int,
     ) -> None:
         self._rules = tuple(rules)
+        self._limit = limit
         self._believed = believed
         self._deletable = deletable
         self._triggers: defaultdict[str, list[tuple[Action, Rule, int]]] = defaultdict(list)
@@ -155,7 +161,7 @@ class _Fixpoint:
             cost=action.effect.cost,
         )
         self._instances[name] = instance
-        if len(self._instances) > INSTANCES_LIMIT:
+        if len(self._instances) > self._limit:
             raise self._too_many()
         new = add - self._reached
         self._reached |= new
@@ -165,7 +171,7 @@ class _Fixpoint:
         count = Counter(name.split(" ", 1)[0] for name in self._instances)
         widest = max((action for action, _ in self._rules), key=lambda action: count[action.name])
         message = (
-            f"more than {INSTANCES_LIMIT} ways to bind the actions,"
+            f"more than {self._limit} ways to bind the actions,"
             f" {count[widest.name]} of them of {widest.name!r}"
         )
         where = " and ".join(map(str, widest.origins))

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from nondum.planning.domain import Merged
-from nondum.planning.exploration import Instance, explore
+from nondum.planning.exploration import INSTANCES_LIMIT, Instance, explore
 from nondum.planning.facts import fact, twin
 from nondum.planning.goal import GoalExpr
 from nondum.planning.syntax import Atom, Equal
@@ -21,6 +21,8 @@ def ground(
     facts: Iterable[str],
     goal: GoalExpr,
     objects: Mapping[str, tuple[str, ...]] | None = None,
+    *,
+    limit: int = INSTANCES_LIMIT,
 ) -> GroundTask:
     """Make the task of reaching `goal` from where exactly `facts` are true.
 
@@ -28,9 +30,9 @@ def ground(
     about objects that are not there are left out. `objects` (name → types) exist beside the merged
     ones. A fact that must be false somewhere has its twin in the task (`facts.twin`). The same
     input gives the same task, whatever the order of `facts`. Raises `FragmentRefused` as `explore`
-    does.
+    does, for more than `limit` bound actions.
     """
-    found = explore(merged, facts, objects)
+    found = explore(merged, facts, objects, limit=limit)
     wanted, unwanted = _goal_facts(goal)
     helpful = _helpful(found.instances, wanted, unwanted)
     negated = unwanted.union(*(instance.negative for instance in helpful))

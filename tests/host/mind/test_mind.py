@@ -279,3 +279,25 @@ async def test_conflicting_component_is_named(robot: Robot) -> None:
     robot.plug(MOBILE_BASE, broken)
     await robot.until(lambda: any("speaker is kept out of planning" in t for t in robot.told))
     assert robot.mind.views.why()["problems"]
+
+
+KNOBS = " ".join(f"k{number}" for number in range(40))
+TOO_WIDE = f"""(define (domain knobs) (:types knob - object) (:constants {KNOBS} - knob)
+    (:predicates (turned ?a ?b ?c - knob))
+    (:action turn :parameters (?u - speaker ?a ?b ?c ?d - knob)
+                  :precondition (ready ?u) :effect (turned ?a ?b ?c)))"""
+
+
+async def test_words_with_too_many_bindings_disturb_no_plan(robot: Robot) -> None:
+    await follow(robot)
+    (report,) = SPEAKER.behaviours
+    turn = replace(report, name="turn", action="(turn ?u - speaker ?a ?b ?c ?d - knob)", phrases=())
+    fragment = Fragment("domain.pddl", TOO_WIDE)
+    robot.plug(replace(SPEAKER, name="knobs", fragments=(fragment,), behaviours=(turn,)))
+    await robot.until_holding()
+    assert robot.started.count("drive") <= 1
+    assert robot.running == {"recorded-camera.stream", *CHAIN}
+    robot.mind.give(pddl=FOLLOW, priority=1)  # asks for a task of its own
+    await robot.until_goal("suspended", "2")
+    assert [p.code for p in robot.mind.queue["2"].problems] == ["PDDL_TOO_MANY"]
+    assert "knobs 1.0 domain.pddl:3" in str(robot.mind.queue["2"].problems[0])

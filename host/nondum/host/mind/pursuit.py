@@ -25,7 +25,7 @@ from nondum.planning.replay import replayed
 from nondum.planning.running import Run
 from nondum.planning.task_control import Phase
 from nondum.planning.task_tree import TaskTree
-from nondum.sdk.errors import GoalRefused, Problem
+from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
 from nondum.sdk.planner import GroundTask, Plan
 
 log = logging.getLogger(__name__)
@@ -323,7 +323,10 @@ class Pursuit:
             goal = parse_goal(given.pddl, composition.merged, kind=given.kind)
         except GoalRefused:
             return None
-        task = task_of(composition, goal, self._situation(current.goal))
+        try:
+            task = task_of(composition, goal, self._situation(current.goal))
+        except FragmentRefused:  # too many ways: the plan at hand goes on, guarded as before
+            task = current.task
         believed = self._beliefs.world.facts
         plan = replayed(task, current.names, believed, composition.merged.lasting())
         return None if plan is None else (task, plan)

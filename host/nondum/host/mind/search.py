@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterable
+import contextlib
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TypeVar
 
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.goals import GivenGoal
 from nondum.host.mind.planners import Planners
 from nondum.planning.contribution import Contribution
 from nondum.planning.explain import explain, suppliers
+from nondum.planning.exploration import INSTANCES_LIMIT
 from nondum.planning.goal import Goal, parse_goal
 from nondum.planning.ground import ground
 from nondum.planning.partial_order import causal_links, threats
 from nondum.planning.step import steps_of, words
-from nondum.sdk.errors import GoalRefused, Problem
+from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
 from nondum.sdk.planner import AlreadyTrue, GaveUp, GroundTask, Plan, Unsolvable
 
+AT_ONCE = 2_000
+"""Ground actions that the loop can spare the time for: some tens of milliseconds."""
 SMALL = 20
 """Up to so many components, grounding takes less of the loop than a thread's switching does."""
-
-_T = TypeVar("_T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +71,15 @@ class NoPlan:
     problems: tuple[Problem, ...]
 
 
-def task_of(composition: Composition, goal: Goal, situation: Situation) -> GroundTask:
-    """The ground task of a goal, without the actions that are excluded."""
-    task = ground(composition.merged, situation.facts, goal.expr)
+def task_of(
+    composition: Composition, goal: Goal, situation: Situation, *, limit: int = AT_ONCE
+) -> GroundTask:
+    """The ground task of a goal, without the actions that are excluded.
+
+    Raises `FragmentRefused` (PDDL_TOO_MANY) for more than `limit` bound actions; up to `AT_ONCE`
+    of them are made in a time that the loop can spare.
+    """
+    task = ground(composition.merged, situation.facts, goal.expr, limit=limit)
     kept = tuple(a for a in task.actions if a.name not in situation.excluded)
     return GroundTask(task.facts, task.init, task.goal, kept)
 
@@ -94,7 +101,10 @@ async def search(
         goal = parse_goal(given.pddl, composition.merged, kind=given.kind)
     except GoalRefused as refused:
         return NoPlan(situation, refused.problems)
-    task = await off_loop(composition, lambda: task_of(composition, goal, situation))
+    try:
+        task = await _task_of_any_size(composition, goal, situation)
+    except FragmentRefused as refused:
+        return NoPlan(situation, refused.problems)
     found = await planners.plan(task, deadline_s)
     match found.answer:
         case AlreadyTrue():
@@ -108,9 +118,7 @@ async def search(
             problem = Problem("NO_ANSWER", f"no planner found a plan: {why}", fix=fix)
             return NoPlan(situation, (problem,))
         case Unsolvable():
-            problems = await off_loop(
-                composition, lambda: why_not(composition, goal, situation, tuple(seen))
-            )
+            problems = await asyncio.to_thread(why_not, composition, goal, situation, tuple(seen))
             return NoPlan(situation, problems)
 
 
@@ -143,8 +151,11 @@ def why_not(
     return problems
 
 
-async def off_loop(composition: Composition, work: Callable[[], _T]) -> _T:
-    """Do pure work at once where it is short, in a thread where it would hold up the loop."""
+async def _task_of_any_size(
+    composition: Composition, goal: Goal, situation: Situation
+) -> GroundTask:
+    """The task, made at once where that is short, in a thread where it would hold up the loop."""
     if len(composition.contributions) <= SMALL:
-        return work()
-    return await asyncio.to_thread(work)
+        with contextlib.suppress(FragmentRefused):
+            return task_of(composition, goal, situation)
+    return await asyncio.to_thread(task_of, composition, goal, situation, limit=INSTANCES_LIMIT)
