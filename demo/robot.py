@@ -133,6 +133,7 @@ def running(work: Path, *, name: str, initial: Mapping[str, Path]) -> Iterator[R
                 nondum("--control", robot.control, "payload", "install", drive)
             watcher = threading.Thread(target=robot.watch, daemon=True)
             watcher.start()
+            robot.until("the first view", bool, timeout_s=20)
             yield robot
         finally:
             daemon.terminate()
