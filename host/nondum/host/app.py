@@ -94,7 +94,7 @@ async def _run(
     questions = Questions(catalogue, mind, workers, news, listing, warnings)
     orders = Orders(catalogue, mind, workers, news, bus)
     control = ControlServer(
-        config.host.control, verbs.answering(questions, orders), verbs.following(questions)
+        config.host.control, verbs.answering(questions, orders), verbs.following(questions, orders)
     )
     await control.open()
     log.info("host %s listens at %s", config.host.name, config.host.control)
@@ -132,7 +132,7 @@ def device_sources(config: HostConfig) -> list[DeviceSource]:
 
 
 def _make_slots(config: HostConfig) -> None:
-    """Make the folders that are watched. Raises `ConfigRefused` (CONFIG_FOLDER) for each failure."""
+    """Make the folders that are watched. Raises `ConfigRefused` (CONFIG_FOLDER)."""
     problems = []
     for section in ("drives", "devices"):
         for folder in getattr(config, section).slots:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
@@ -116,16 +116,37 @@ class Orders:
             await self.workers.streams.tap(name, connection)
         return {"stream": name, "type": found[name].type}
 
-    async def install(self, arguments: Arguments) -> Row:
-        """Install a payload folder for good. Raises `PayloadRefused`."""
+    async def install(self, arguments: Arguments) -> AsyncIterator[Row]:
+        """Install a payload folder for good: how far it is, and at last that it is `done`.
+
+        A client that leaves before has given it up: nothing of it stays. Raises `PayloadRefused`.
+        """
         folder = Path(arguments.text("folder"))
-        return payload_row(await installed.install(folder, self.catalogue, self.bus), None)
+        installing = asyncio.create_task(installed.install(folder, self.catalogue, self.bus))
+        try:
+            version = self.news.version
+            while not installing.done():
+                yield {"done": False, "payload": self._payload(folder.name)}
+                news = asyncio.create_task(self.news.changed(version))
+                await asyncio.wait({news, installing}, return_when=asyncio.FIRST_COMPLETED)
+                news.cancel()
+                version = self.news.version
+            yield {"done": True, "payload": payload_row(installing.result(), None)}
+        finally:
+            installing.cancel()
+            await asyncio.gather(installing, return_exceptions=True)
 
     async def uninstall(self, arguments: Arguments) -> Row:
         """Remove an installed payload. Raises `PayloadRefused` (NOT_INSTALLED)."""
         payload_id = arguments.text("payload")
         await installed.uninstall(payload_id, self.catalogue, self.bus)
         return {"payload": payload_id}
+
+    def _payload(self, payload_id: str) -> Row | None:
+        """The row of a payload that is known already."""
+        payloads = self.catalogue.snapshot().payloads
+        found = next((p for p in payloads if p.payload_id == payload_id), None)
+        return payload_row(found, self.news.progress(found.key)) if found else None
 
     async def _until(self, holds: Callable[[Snapshot], bool]) -> None:
         """Wait until what was asked for has been committed.

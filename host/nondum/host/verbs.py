@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from typing import Any
 
 from nondum.host.control.arguments import Arguments
 from nondum.host.control.server import Follow, Verb
 from nondum.host.orders import Orders
 from nondum.host.questions import Questions
+from nondum.host.rows import Row
 
 
 def answering(questions: Questions, orders: Orders) -> dict[str, Verb]:
@@ -21,7 +22,6 @@ def answering(questions: Questions, orders: Orders) -> dict[str, Verb]:
         "goal": orders.goal,
         "goals": questions.goals,
         "halt": orders.halt,
-        "install": orders.install,
         "journal": questions.journal,
         "logs": questions.logs,
         "mount": orders.mount,
@@ -39,11 +39,12 @@ def answering(questions: Questions, orders: Orders) -> dict[str, Verb]:
     return {name: _parsing(verb) for name, verb in verbs.items()}
 
 
-def following(questions: Questions) -> dict[str, Follow]:
+def following(questions: Questions, orders: Orders) -> dict[str, Follow]:
     """Verbs that go on answering."""
-    verbs = {
+    verbs: dict[str, Callable[[Arguments], AsyncIterator[Row]]] = {
         "follow_goal": questions.follow_goal,
         "follow_tree": questions.follow_tree,
+        "install": orders.install,
         "watch": questions.watch,
     }
     return {name: _parsing(verb) for name, verb in verbs.items()}

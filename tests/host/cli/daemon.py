@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import pty
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -183,6 +184,32 @@ def nondum(*arguments: str | Path, **environment: str) -> Ran:
         check=False,
     )
     return Ran(done.returncode, done.stdout, done.stderr)
+
+
+def in_terminal(*arguments: str | Path, **environment: str) -> str:
+    """Run `nondum` in a terminal, and give everything that it shows there."""
+    ours, theirs = pty.openpty()
+    process = subprocess.Popen(
+        command(*arguments),
+        stdout=theirs,
+        stderr=theirs,
+        env=quiet_environment() | {"TERM": "xterm"} | environment,
+    )
+    os.close(theirs)
+    shown = b""
+    with process:
+        while some := _read(ours):
+            shown += some
+    os.close(ours)
+    assert process.returncode == 0, shown
+    return shown.decode()
+
+
+def _read(terminal: int) -> bytes:
+    try:
+        return os.read(terminal, 65536)
+    except OSError:  # how Linux tells that nobody has the other end open
+        return b""
 
 
 def command(*arguments: str | Path) -> list[str]:

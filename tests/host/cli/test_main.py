@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pty
 import signal
 import subprocess
 import sys
@@ -13,7 +12,7 @@ from pathlib import Path
 import click
 import pytest
 from tests.host.cli.conftest import Answering
-from tests.host.cli.daemon import command, nondum, quiet_environment
+from tests.host.cli.daemon import command, in_terminal, nondum, quiet_environment
 
 from nondum.host.cli.main import COMMANDS, cli
 
@@ -222,16 +221,8 @@ def test_a_reader_that_leaves_ends_it_in_silence(answering: Answering) -> None:
 
 @pytest.mark.parametrize("wants_colour", [True, False], ids=["plain", "NO_COLOR"])
 def test_colour_is_for_terminals_that_want_it(answering: Answering, wants_colour: bool) -> None:
-    environment = quiet_environment() | {"TERM": "xterm"}
-    if not wants_colour:
-        environment["NO_COLOR"] = "1"
-    master, slave = pty.openpty()
-    process = subprocess.Popen(
-        command("--control", answering(TREE), "tree"), stdout=slave, env=environment
-    )
-    os.close(slave)
-    shown = read_terminal(master)
-    assert process.wait() == 0
+    environment = {} if wants_colour else {"NO_COLOR": "1"}
+    shown = in_terminal("--control", answering(TREE), "tree", **environment)
     assert "nondum" in shown
     assert ("\x1b[33m▶" in shown) == wants_colour
 
@@ -239,17 +230,3 @@ def test_colour_is_for_terminals_that_want_it(answering: Answering, wants_colour
 def test_no_colour_in_a_pipe(answering: Answering) -> None:
     ran = nondum("--control", answering(TREE), "tree").ok()
     assert ran.out == "▶ nondum  — it is \\x1b[2Jticked\n"
-
-
-def read_terminal(master: int) -> str:
-    """Everything that is written to the other end of a terminal."""
-    shown = b""
-    while True:
-        try:
-            some = os.read(master, 65536)
-        except OSError:  # how Linux tells that the other end is closed
-            some = b""
-        if not some:
-            os.close(master)
-            return shown.decode()
-        shown += some

@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import json
+import signal
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from tests.host.cli.daemon import BEACON, BEACON_ID, BRIGHTNESS, LAMP, Daemon
-from tests.payloads import Part
+from tests.payloads import Part, make_payload
 
 from nondum.sdk.description import PluginDescription
 
+SLOW = """
+import asyncio
+from nondum.sdk import hookimpl
+
+@hookimpl
+async def start(ctx):
+    await asyncio.sleep(20)
+"""
 SHINE = f"test-beacon.shine {LAMP} {BRIGHTNESS} panther"
 
 
@@ -162,10 +171,32 @@ def test_what_was_refused_is_told_and_tried_again(daemon: Daemon) -> None:
 
 
 def test_a_payload_is_installed_for_good_and_removed(daemon: Daemon) -> None:
-    drive = daemon.root / "drives/org.example.torch"
+    drive = daemon.root / "drives/torch-to-install"
+    torch = Part("torch", BEACON.replace("beacon", "torch"))
+    make_payload(drive, torch, payload_id="org.example.torch")
     shown = daemon.run("payload", "install", drive).ok().out
     assert shown == "installed org.example.torch 1.0\n"
     daemon.run("payload", "install", drive).refused(1, "ALREADY_PRESENT")
     removed = daemon.run("payload", "uninstall", "org.example.torch").ok().out
     assert removed == "uninstalled org.example.torch\n"
     daemon.run("payload", "uninstall", "org.example.torch").refused(1, "NOT_INSTALLED")
+
+
+def test_what_cannot_be_installed_leaves_nothing(daemon: Daemon) -> None:
+    drive = daemon.root / "drives/broken-to-install"
+    said = PluginDescription("test-broken", "1.0")
+    broken = Part("broken", "raise RuntimeError('no bulb')", description=said)
+    make_payload(drive, broken, payload_id="org.example.broken")
+    daemon.run("payload", "install", drive).refused(1, "no bulb")
+    daemon.until(lambda view: len(view["payloads"]) == 1)
+
+
+def test_an_interrupted_installation_leaves_nothing(daemon: Daemon) -> None:
+    drive = daemon.root / "drives/slow-to-install"
+    slow = Part("slow", SLOW)
+    make_payload(drive, slow, payload_id="org.example.slow")
+    with daemon.started("payload", "install", drive) as process:
+        daemon.until_state("org.example.slow", "stored")
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=60) == 130
+        daemon.until(lambda view: len(view["payloads"]) == 1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.host.cli.daemon import BEACON, BEACON_ID, nondum
+from tests.host.cli.daemon import BEACON, BEACON_ID, in_terminal, nondum
 from tests.payloads import Part, make_payload
 
 INSPECTED = """\
@@ -52,6 +52,11 @@ def test_a_sound_drive_is_accepted(drive: Path) -> None:
     said = nondum("payload", "check", drive / "nondum" / BEACON_ID, "--json").ok().json
     assert (said["ok"], said["problems"]) == (True, [])
     assert {warning["code"] for warning in said["warnings"]} == {"W-OWN-WORD"}
+
+
+def test_a_terminal_shows_how_far_judging_is(drive: Path) -> None:
+    shown = in_terminal("payload", "check", drive)
+    assert f"\r\x1b[K{BEACON_ID}: copy 100 %\r\x1b[K" in shown
 
 
 def test_what_is_wrong_is_told_and_counts(drive: Path) -> None:

@@ -16,6 +16,7 @@ from typing import TypeVar
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem
 from nondum.wheelhouse import contents, drive, index, lock, manifest, wheel
 from nondum.wheelhouse.contents import Contents
+from nondum.wheelhouse.drive import Progress
 from nondum.wheelhouse.index import Index
 from nondum.wheelhouse.lock import Lock, LockedWheel
 from nondum.wheelhouse.manifest import Manifest
@@ -78,7 +79,10 @@ def check_wheels(payload: StagedPayload, facts: HostFacts) -> tuple[Problem, ...
 
 
 def verify_folder(
-    folder: Path, verifier: Verifier, facts: HostFacts | None = None
+    folder: Path,
+    verifier: Verifier,
+    facts: HostFacts | None = None,
+    progress: Progress | None = None,
 ) -> tuple[Problem, ...]:
     """Everything wrong with a payload folder; with `facts`, also what keeps it from that host."""
     try:
@@ -89,7 +93,7 @@ def verify_folder(
         listed = contents.parse(data, f"{folder.name}/{contents.NAME}")
         with tempfile.TemporaryDirectory(prefix="nondum-check-") as staging:
             copied = Path(staging) / "payload"
-            drive.copy(folder, listed, copied)
+            drive.copy(folder, listed, copied, progress)
             return tuple(_verify_staged(load(copied, listed), facts))
     except NondumError as error:
         return error.problems

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,7 +43,7 @@ class Session:
         with closing(self.connect(timeout_s=timeout_s)) as client:
             return client.ask(verb, **arguments)
 
-    def follow(self, verb: str, **arguments: Any) -> Iterator[Any]:
+    def follow(self, verb: str, **arguments: Any) -> Generator[Any]:
         """Ask for answers until the caller has enough. Raises `NondumError`."""
         with closing(self.connect(timeout_s=None)) as client:
             yield from client.follow(verb, **arguments)

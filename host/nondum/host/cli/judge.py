@@ -11,6 +11,7 @@ import click
 from nondum.host.cli import render
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.failure import EXIT_PROBLEMS
+from nondum.host.cli.progress import ProgressLine
 from nondum.sdk.errors import PayloadRefused, Problem
 
 if TYPE_CHECKING:
@@ -57,7 +58,8 @@ def check(session: Session, drive: Path, anywhere: bool) -> int:
     problems: list[Problem] = []
     warnings: list[Problem] = []
     for folder in payloads(drive):
-        found, doubts = _judged(folder, anywhere=anywhere)
+        with ProgressLine(folder.name, is_wanted=not session.as_json) as show:
+            found, doubts = _judged(folder, show, anywhere=anywhere)
         problems.extend(found)
         warnings.extend(doubts)
     if session.as_json:
@@ -96,7 +98,9 @@ def payloads(drive: Path) -> Iterator[Path]:
     yield from found
 
 
-def _judged(folder: Path, *, anywhere: bool) -> tuple[tuple[Problem, ...], tuple[Problem, ...]]:
+def _judged(
+    folder: Path, show: ProgressLine, *, anywhere: bool
+) -> tuple[tuple[Problem, ...], tuple[Problem, ...]]:
     """The problems of a payload, and its warnings."""
     from nondum.host import vocabulary_check
     from nondum.wheelhouse import preflight
@@ -104,7 +108,7 @@ def _judged(folder: Path, *, anywhere: bool) -> tuple[tuple[Problem, ...], tuple
     from nondum.wheelhouse.signatures import UnsignedAllowed
 
     facts = None if anywhere else preflight.probe(Path.cwd(), reserve_mb=0, confinement=0)
-    problems = verify_folder(folder, UnsignedAllowed(), facts)
+    problems = verify_folder(folder, UnsignedAllowed(), facts, show)
     if problems:
         return problems, ()
     judged = vocabulary_check.judge(_loaded(folder).index)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import sys
+from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import click
 
 from nondum.host.cli import complete, render
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.judge import FOLDER, check, inspect, payloads
+from nondum.host.cli.progress import ProgressLine
 
 INSTALL_TIMEOUT_S = 600.0
 
@@ -106,9 +108,9 @@ def build(
     )
     made = []
     for package in packages:
-        show = _Progress(package.resolve().name, is_shown=not (quiet or session.as_json))
-        made.append(building.build(package, output, options, show))
-        show.end()
+        is_wanted = not (quiet or session.as_json)
+        with ProgressLine(package.resolve().name, is_wanted=is_wanted) as show:
+            made.append(building.build(package, output, options, show))
     if session.as_json:
         render.as_json({"payloads": [str(folder) for folder in made]})
     elif not quiet:
@@ -123,16 +125,32 @@ def build(
 def install(session: Session, drive: Path) -> None:
     """Install a drive's payloads for good, as initial components of the running host.
 
+    Interrupted before it is done, it leaves nothing.
+
     Example: nondum payload install /media/usb
     """
     done = []
     for folder in payloads(drive):
-        path = str(folder.resolve())
-        done.append(session.ask("install", timeout_s=INSTALL_TIMEOUT_S, folder=path))
+        with ProgressLine(folder.name, is_wanted=not session.as_json) as show:
+            done.append(_installed(session, folder.resolve(), show))
         if not session.as_json:
             click.echo(f"installed {done[-1]['payload']} {done[-1]['version']}")
     if session.as_json:
         render.as_json({"installed": done})
+
+
+def _installed(session: Session, folder: Path, show: ProgressLine) -> Any:
+    """Install a payload, and give its row."""
+    row: Any = None
+    with closing(session.follow("install", folder=str(folder))) as news:
+        for told in news:
+            row = told["payload"]
+            if told["done"]:
+                break
+            if row is not None:
+                made = row["progress"] or {"phase": row["state"], "done": 0, "total": 0}
+                show(made["phase"], made["done"], made["total"])
+    return row
 
 
 @payload.command()
@@ -149,23 +167,6 @@ def uninstall(session: Session, payload_id: str) -> None:
         render.as_json(done)
     else:
         click.echo(f"uninstalled {payload_id}")
-
-
-class _Progress:
-    """One line that is written over on a terminal; nothing elsewhere."""
-
-    def __init__(self, name: str, *, is_shown: bool) -> None:
-        self._name = name
-        self._is_shown = is_shown and sys.stderr.isatty()
-
-    def __call__(self, phase: str, done: int, total: int) -> None:
-        if self._is_shown:
-            click.echo(f"\r\x1b[K{self._name}: {phase} ({done}/{total})", nl=False, err=True)
-
-    def end(self) -> None:
-        """Clear the line."""
-        if self._is_shown:
-            click.echo("\r\x1b[K", nl=False, err=True)
 
 
 def _size(folder: Path) -> str:
