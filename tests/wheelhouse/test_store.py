@@ -37,9 +37,9 @@ def added(store: Store, path: Path) -> StoredWheel:
 
 
 def test_a_wheel_is_unpacked_whole(store: Store, tmp_path: Path) -> None:
-    told: list[int] = []
+    told: list[tuple[int, int]] = []
     path = plain(tmp_path / "w")
-    stored = store.add(path, sha256(path), told.append)
+    stored = store.add(path, sha256(path), lambda done, total: told.append((done, total)))
     assert {f.path for f in stored.files} == {
         *SOURCES,
         *(f"plain-1.0.dist-info/{name}" for name in ("METADATA", "WHEEL", "RECORD")),
@@ -47,7 +47,8 @@ def test_a_wheel_is_unpacked_whole(store: Store, tmp_path: Path) -> None:
     for file in stored.files:
         data = (stored.root / file.path).read_bytes()
         assert (file.size, file.sha256) == (len(data), hashlib.sha256(data).hexdigest())
-    assert sum(told) == stored.size
+    assert told == sorted(told)
+    assert told[-1] == (stored.size, stored.size)
     assert store.verify(stored.sha256) == ()
     assert store.get(stored.sha256) == stored
     assert store.listing() == (stored,)
@@ -71,6 +72,24 @@ def test_a_known_wheel_is_not_unpacked_again(store: Store, tmp_path: Path) -> No
     before = (first.root / "plain/data.bin").stat().st_ino
     assert added(store, path) == first
     assert (first.root / "plain/data.bin").stat().st_ino == before
+
+
+def test_several_wheels_come_in_together(store: Store, tmp_path: Path) -> None:
+    paths = [plain(tmp_path / "w", name) for name in ("one", "two", "three")]
+    known = added(store, paths[1])
+    stored = store.add_all([(path, sha256(path)) for path in paths])
+    assert [wheel.filename for wheel in stored] == [path.name for path in paths]
+    assert stored[1] == known
+    assert all(store.get(wheel.sha256) == wheel for wheel in stored)
+    assert not any(store.verify(wheel.sha256) for wheel in stored)
+
+
+def test_one_bad_wheel_keeps_out_all_new_ones(store: Store, tmp_path: Path) -> None:
+    good, bad = plain(tmp_path / "w"), plain(tmp_path / "w", "bad")
+    known = added(store, plain(tmp_path / "w", "known"))
+    with pytest.raises(PayloadRefused, match="HASH_MISMATCH"):
+        store.add_all([(good, sha256(good)), (bad, "0" * 64)])
+    assert [path.name for path in store.root.iterdir()] == [known.sha256]
 
 
 @pytest.mark.parametrize("harm", ["change", "truncate", "remove"])

@@ -11,12 +11,12 @@ import itertools
 import stat
 import struct
 import zipfile
-import zlib
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from nondum.sdk.errors import Problem
+from nondum.wheelhouse.inflate import crc32, inflated
 
 Bytes = memoryview
 MAX_MEMBERS = 20_000
@@ -81,9 +81,9 @@ def read(data: Bytes, where: str) -> Archive:
 
 
 def unpack(data: Bytes, member: Member) -> Iterator[bytes]:
-    """The member's bytes in pieces. Raises `zlib.error` or `ValueError` when they are not whole."""
+    """The member's bytes in pieces. Raises `ValueError` when they are not whole."""
     raw = data[member.start : member.end]
-    yield from _checked(_inflated(raw) if member.is_packed else _cut(raw), member)
+    yield from _checked(inflated(raw) if member.is_packed else _cut(raw), member)
 
 
 def _cut(raw: Bytes) -> Iterator[bytes]:
@@ -91,21 +91,11 @@ def _cut(raw: Bytes) -> Iterator[bytes]:
         yield bytes(raw[start : start + _CHUNK])
 
 
-def _inflated(raw: Bytes) -> Iterator[bytes]:
-    inflate = zlib.decompressobj(-zlib.MAX_WBITS)
-    piece = inflate.decompress(raw, _CHUNK)
-    while piece:
-        yield piece
-        piece = inflate.decompress(inflate.unconsumed_tail, _CHUNK)
-    if not inflate.eof or inflate.unused_data:
-        raise ValueError("the packed bytes do not end where the directory says")
-
-
 def _checked(pieces: Iterator[bytes], member: Member) -> Iterator[bytes]:
     size, crc = 0, 0
     for piece in pieces:
         size += len(piece)
-        crc = zlib.crc32(piece, crc)
+        crc = crc32(piece, crc)
         if size > member.size:
             break
         yield piece

@@ -16,33 +16,19 @@ import hashlib
 import json
 import os
 import shutil
-import zlib
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
-from nondum.wheelhouse import archive, wheel
-from nondum.wheelhouse.archive import Bytes
-from nondum.wheelhouse.wheel import Layout, PlannedFile
+from nondum.wheelhouse import unpacking
+from nondum.wheelhouse.unpacking import THREADS, Progress, Source, StoredFile, Unpacked
 
 MANIFEST = "manifest.json"
 FILES = "files"
-THREADS = 2
-"""Inflating lets other threads run; more than two gained nothing where it was measured."""
-
 _CHUNK = 1024 * 1024
 _libc = ctypes.CDLL(None, use_errno=True)
-
-
-@dataclass(frozen=True, slots=True)
-class StoredFile:
-    """One file of a stored wheel."""
-
-    path: str
-    size: int
-    sha256: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,32 +65,41 @@ class Store:
         self,
         wheel_path: Path,
         sha256: str,
-        progress: Callable[[int], None] | None = None,
+        progress: Progress | None = None,
     ) -> StoredWheel:
-        """Unpack a wheel whose hash is given, unless it is here and whole.
-
-        The file must not change meanwhile: give a staged copy. `progress` gets bytes as they are
-        written. Raises `PayloadRefused` (HASH_MISMATCH, WHEEL_…), `InstallFailed` (DISK_FULL, …).
-        """
-        if (known := self.get(sha256)) is not None and not self.verify(sha256):
-            os.utime(known.folder)
-            return known
-        self.remove(sha256)
-        unfinished = self.root / f".{sha256}.part"
-        shutil.rmtree(unfinished, ignore_errors=True)
-        try:
-            with wheel.opened(wheel_path) as data:
-                stored = self._unpack(data, wheel_path.name, sha256, unfinished, progress)
-            _sync_file_system(unfinished)
-            unfinished.rename(stored.folder)
-            _sync_folder(self.root)
-        except OSError as error:
-            shutil.rmtree(unfinished, ignore_errors=True)
-            raise _failed(error, wheel_path.name) from error
-        except PayloadRefused:
-            shutil.rmtree(unfinished, ignore_errors=True)
-            raise
+        """Unpack one wheel (see `add_all`)."""
+        (stored,) = self.add_all([(wheel_path, sha256)], progress)
         return stored
+
+    def add_all(
+        self,
+        wheels: Sequence[tuple[Path, str]],
+        progress: Progress | None = None,
+    ) -> tuple[StoredWheel, ...]:
+        """Unpack wheels whose hashes are given, but those that are here and whole.
+
+        The files must not change meanwhile: give staged copies. Either all of them are stored or
+        none of those that were not. Raises `PayloadRefused` (HASH_MISMATCH, WHEEL_…),
+        `InstallFailed` (DISK_FULL, …).
+        """
+        stored: dict[str, StoredWheel] = {}
+        sources = []
+        for path, sha256 in wheels:
+            if (known := self.get(sha256)) is not None and not self.verify(sha256):
+                os.utime(known.folder)
+                stored[sha256] = known
+            else:
+                self.remove(sha256)
+                sources.append(Source(path, sha256, self._unfinished(sha256) / FILES))
+        try:
+            stored.update((wheel.sha256, wheel) for wheel in self._unpack(sources, progress))
+        except OSError as error:
+            self._clear_away(sources)
+            raise _failed(error, ", ".join(source.path.name for source in sources)) from error
+        except PayloadRefused:
+            self._clear_away(sources)
+            raise
+        return tuple(stored[sha256] for _, sha256 in wheels)
 
     def get(self, sha256: str) -> StoredWheel | None:
         """A stored wheel by hash, without looking at its files."""
@@ -173,69 +168,40 @@ class Store:
         return left
 
     def _unpack(
-        self,
-        data: Bytes,
-        filename: str,
-        sha256: str,
-        folder: Path,
-        progress: Callable[[int], None] | None,
-    ) -> StoredWheel:
-        if hashlib.sha256(data).hexdigest() != sha256:
-            raise PayloadRefused(
-                Problem("HASH_MISMATCH", "is not the wheel that was locked", where=filename)
-            )
-        layout = wheel.lay_out(data, filename)
-        wheel.refuse_if_any(layout.problems)
-        root = folder / FILES
-        for parent in sorted({Path(file.target).parent for file in layout.files}):
-            (root / parent).mkdir(parents=True, exist_ok=True)
-        files = _written(data, filename, layout, root, progress)
-        said = {
-            "wheel": filename,
-            "files": [[file.path, file.size, file.sha256] for file in files],
-            "left_out": layout.left_out,
-        }
-        (folder / MANIFEST).write_text(json.dumps(said), encoding="utf-8")
-        return StoredWheel(sha256, filename, self.root / sha256, files, layout.left_out)
-
-
-def _written(
-    data: Bytes,
-    filename: str,
-    layout: Layout,
-    root: Path,
-    progress: Callable[[int], None] | None,
-) -> tuple[StoredFile, ...]:
-    """Write all files, largest first, in parallel."""
-
-    def write(file: PlannedFile) -> StoredFile | Problem:
-        try:
-            stored = _write(data, file, root / file.target)
-        except (ValueError, zlib.error) as error:
-            return wheel.damaged(file, filename, str(error))
-        if file.sha256 and stored.sha256 != file.sha256:
-            return wheel.damaged(file, filename, "it is not what RECORD says")
-        if progress is not None:
-            progress(stored.size)
+        self, sources: Sequence[Source], progress: Progress | None
+    ) -> tuple[StoredWheel, ...]:
+        """Unpack, sync once, rename in."""
+        if not sources:
+            return ()
+        self._clear_away(sources)
+        unpacked = unpacking.unpack(sources, progress)
+        stored = tuple(self._told(s, found) for s, found in zip(sources, unpacked, strict=True))
+        _sync_file_system(self.root)
+        for wheel in stored:
+            self._unfinished(wheel.sha256).rename(wheel.folder)
+        _sync_folder(self.root)
         return stored
 
-    largest_first = sorted(layout.files, key=lambda file: -file.member.size)
-    with ThreadPoolExecutor(THREADS) as pool:
-        results = list(pool.map(write, largest_first))
-    wheel.refuse_if_any(tuple(r for r in results if isinstance(r, Problem)))
-    stored = (result for result in results if isinstance(result, StoredFile))
-    return tuple(sorted(stored, key=lambda file: file.path))
+    def _told(self, source: Source, unpacked: Unpacked) -> StoredWheel:
+        """Write the manifest of an unpacked wheel."""
+        said = {
+            "wheel": source.path.name,
+            "files": [[file.path, file.size, file.sha256] for file in unpacked.files],
+            "left_out": unpacked.left_out,
+        }
+        manifest = self._unfinished(source.sha256) / MANIFEST
+        manifest.write_text(json.dumps(said), encoding="utf-8")
+        folder = self.root / source.sha256
+        return StoredWheel(
+            source.sha256, source.path.name, folder, unpacked.files, unpacked.left_out
+        )
 
+    def _unfinished(self, sha256: str) -> Path:
+        return self.root / f".{sha256}.part"
 
-def _write(data: Bytes, file: PlannedFile, target: Path) -> StoredFile:
-    digest = hashlib.sha256()
-    # Buffered: a raw file on a full disk writes less than it was given, and does not raise.
-    with target.open("xb") as out:
-        for piece in archive.unpack(data, file.member):
-            digest.update(piece)
-            out.write(piece)
-    target.chmod(0o555 if file.member.is_executable else 0o444)
-    return StoredFile(file.target, file.member.size, digest.hexdigest())
+    def _clear_away(self, sources: Sequence[Source]) -> None:
+        for source in sources:
+            shutil.rmtree(self._unfinished(source.sha256), ignore_errors=True)
 
 
 def _is_whole(path: Path, file: StoredFile) -> bool:

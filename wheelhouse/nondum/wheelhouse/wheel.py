@@ -15,7 +15,6 @@ import hashlib
 import io
 import mmap
 import sys
-import zlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -89,7 +88,7 @@ def lay_out(data: Bytes, filename: str) -> Layout:
         return Layout((), (), (Problem("WHEEL_STRUCTURE", text, where=filename),))
     try:
         record = _record(data, found.members, info)
-    except (ValueError, zlib.error, csv.Error, KeyError) as error:
+    except (ValueError, csv.Error, KeyError) as error:
         text = f"RECORD is missing or cannot be read ({error})"
         return Layout((), (), (Problem("WHEEL_RECORD", text, where=filename),))
     problems = [
@@ -129,7 +128,7 @@ def _damaged(data: Bytes, layout: Layout, filename: str) -> Iterator[Problem]:
         try:
             for piece in archive.unpack(data, file.member):
                 digest.update(piece)
-        except (ValueError, zlib.error) as error:
+        except ValueError as error:
             yield damaged(file, filename, str(error))
             continue
         if file.sha256 and digest.hexdigest() != file.sha256:

@@ -90,16 +90,14 @@ def _stored(
 ) -> tuple[dict[str, StoredWheel], int]:
     """The wheels in the store, and how many were not there before."""
     store = Store(Path(arguments["store"]))
-    total, done, fresh = sum(locked.size for locked in wheels), 0, 0
-    stored: dict[str, StoredWheel] = {}
+    fresh = sum(store.get(locked.sha256) is None for locked in wheels)
+    paths = [(folder / locked.path, locked.sha256) for locked in wheels]
+    copied = [(path, sha256) for path, sha256 in paths if path.exists()]
+    added = store.add_all(copied, lambda done, total: report("install", done, total))
+    stored = {wheel.sha256: wheel for wheel in added}
     for locked in wheels:
-        path = folder / locked.path
-        fresh += store.get(locked.sha256) is None
-        stored[locked.sha256] = (
-            store.add(path, locked.sha256) if path.exists() else _checked(store, locked)
-        )
-        done += locked.size
-        report("install", done, total)
+        if locked.sha256 not in stored:
+            stored[locked.sha256] = _checked(store, locked)
     return stored, fresh
 
 

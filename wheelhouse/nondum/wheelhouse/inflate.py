@@ -1,0 +1,53 @@
+"""Inflating (RFC 1951): by ISA-L where python-isal is installed, twice as fast, else by zlib.
+
+Either way the bytes are the same, and what is read is bounded piece by piece.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+from typing import Any
+
+_FEED = 256 * 1024
+"""Packed bytes given at once. What is not taken is copied every time, so not all of them."""
+_PIECE = 1024 * 1024
+"""Most unpacked bytes taken at once."""
+
+
+def _library() -> Any:
+    try:
+        from isal import isal_zlib
+    except ImportError:
+        return zlib
+    return isal_zlib
+
+
+_LIBRARY: Any = _library()
+crc32 = _LIBRARY.crc32
+"""crc32(data, value=0) of ISO 3309, as zlib has it."""
+
+
+def inflated(packed: memoryview, library: Any = _LIBRARY) -> Iterator[bytes]:
+    """Unpack raw deflated bytes piece by piece. Raises `ValueError` unless all of them were one
+    whole stream."""
+    inflate = library.decompressobj(-zlib.MAX_WBITS)
+    try:
+        for start in range(0, len(packed), _FEED):
+            if inflate.eof:
+                raise ValueError("bytes follow the packed ones")
+            yield from _taken(inflate, packed[start : start + _FEED])
+    except (library.error, zlib.error) as error:
+        raise ValueError(str(error)) from error
+    if not inflate.eof or inflate.unused_data:
+        raise ValueError("the packed bytes do not end where the directory says")
+
+
+def _taken(inflate: Any, fed: Any) -> Iterator[bytes]:
+    """All that comes of some packed bytes."""
+    piece = inflate.decompress(fed, _PIECE)
+    while piece:
+        yield piece
+        if inflate.eof:
+            return
+        piece = inflate.decompress(inflate.unconsumed_tail, _PIECE)
