@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Callable, Sequence
 
 from nondum.host.catalogue.catalogue import now
@@ -11,6 +12,8 @@ from nondum.host.events import Emit, Event
 from nondum.host.lifecycle.advance import RULES
 
 Stamped = tuple[Event, Moment]
+
+log = logging.getLogger(__name__)
 
 
 class Bus:
@@ -44,10 +47,13 @@ class Bus:
         return batch
 
     def tell(self, events: Sequence[Event]) -> None:
-        """Tell listeners what has happened."""
+        """Tell listeners what has happened. One that is at fault is nobody else's trouble."""
         for event in events:
             for listener in tuple(self._listeners):
-                listener(event)
+                try:
+                    listener(event)
+                except Exception:
+                    log.exception("a listener is at fault over %s", event.name)
 
 
 def is_told_early(event: Event) -> bool:
