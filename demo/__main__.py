@@ -68,7 +68,10 @@ def main() -> int:
             print(f"kept: {work}", file=sys.stderr)
         else:
             shutil.rmtree(work, ignore_errors=True)
-    print(json.dumps(table.as_data(results), indent=2) if options.json else table.as_text(results))
+    if options.json:
+        print(json.dumps(table.as_data(results, seed=options.seed), indent=2))
+    else:
+        print(table.as_text(results))
     return 0 if len(results) == 3 and all(result.reached for result in results) else 1
 
 
@@ -104,7 +107,7 @@ def _play(
         )
     )
     say(results[-1].measure)
-    say(f"stage III: those come out; {', '.join(third)} go in; “{POINT}”")
+    say(f"stage III: those come out; {', '.join(third)} go in; “{POINT}” (--seed {options.seed})")
     robot.ask("halt", now=True)
     stages.withdraw(robot, *(kit.drives[n] for n in (*second, "people-detector", "visual-tracker")))
     scenario = random_scenario(options.seed)
@@ -143,7 +146,12 @@ def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="./run demo", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON document, nothing else")
     parser.add_argument("--plain", action="store_true", help="no live view, even on a terminal")
-    parser.add_argument("--seed", type=int, default=1, help="of source and mounts in stage III")
+    parser.add_argument(
+        "--seed",
+        type=int,
+        default=random.SystemRandom().randrange(1_000_000),
+        help="of source and mounts in stage III [default: another one each time]",
+    )
     parser.add_argument(
         "--shuffle",
         type=int,

@@ -54,9 +54,10 @@ def as_text(results: Sequence[StageResult]) -> str:
     return "\n".join([*lines, "", *measures, "", f"* {NOTE}"])
 
 
-def as_data(results: Sequence[StageResult]) -> dict[str, Any]:
-    """The same as one JSON document."""
+def as_data(results: Sequence[StageResult], *, seed: int) -> dict[str, Any]:
+    """The same as one JSON document; `seed` made stage III's source and mounts."""
     return {
+        "seed": seed,
         "reached": all(result.reached for result in results),
         "note": NOTE,
         "stages": [asdict(result) for result in results],
