@@ -73,3 +73,119 @@ def talker(id: str = "talker", **options: Any) -> Part:
 def scribe(id: str = "scribe", **options: Any) -> Part:
     """Makes `(written <host>)` true while it reads what is spoken."""
     return Part(id, SCRIBE, **options)
+
+
+GAUGE = '''"""Reads a gauge for as long as it is there."""
+from pathlib import Path
+
+from nondum.sdk import BehaviourFailed, DeviceNeed, Fragment, Unit, behaviour, hookimpl
+
+DOMAIN = """
+(define (domain gauge)
+  (:predicates (measured ?h - host))
+  (:action measure
+    :parameters (?u - sensor ?h - host)
+    :precondition (and (ready ?u) (on ?u ?h))
+    :effect (measured ?h)))
+"""
+
+@hookimpl
+def units():
+    return [Unit("gauge", "sensor")]
+
+@hookimpl
+def devices():
+    return [DeviceNeed("gauge", {"ID_MODEL": "Gauge"})]
+
+@hookimpl
+def fragments():
+    return [Fragment("gauge.pddl", DOMAIN)]
+
+@behaviour("measure", action="(measure ?u - sensor ?h - host)", lasting=True)
+async def measure(ctx, u, h):
+    node = Path(ctx.device("gauge").node)
+    node.read_text()
+    await ctx.established()
+    while node.exists():
+        await ctx.sleep(0.05)
+    raise BehaviourFailed("nothing is read any more", code="GAUGE_GONE")
+'''
+
+
+def gauge(id: str = "gauge") -> Part:
+    """Makes `(measured <host>)` true while its device is there."""
+    need = '[[component.device]]\nname = "gauge"\nmatch = { ID_MODEL = "Gauge" }\n'
+    return Part(id, GAUGE, manifest=need)
+
+
+ARM = '''"""Raises and waves an arm."""
+from nondum.sdk import Fragment, Unit, behaviour, hookimpl
+
+DOMAIN = """
+(define (domain arm)
+  (:predicates (raised ?h - host) (waved ?h - host))
+  (:action lift
+    :parameters (?u - arm ?h - host)
+    :precondition (and (ready ?u) (on ?u ?h) (idle ?u))
+    :effect (and (not (idle ?u)) (raised ?h)))
+  (:action wave
+    :parameters (?u - arm ?h - host)
+    :precondition (and (ready ?u) (on ?u ?h) (idle ?u))
+    :effect (and (not (idle ?u)) (waved ?h))))
+"""
+
+@hookimpl
+def units():
+    return [Unit("arm", "arm")]
+
+@hookimpl
+def fragments():
+    return [Fragment("arm.pddl", DOMAIN)]
+
+@behaviour("lift", action="(lift ?u - arm ?h - host)", lasting=True)
+async def lift(ctx, u, h):
+    await ctx.established()
+    await ctx.sleep(3600)
+
+@behaviour("wave", action="(wave ?u - arm ?h - host)", lasting=True)
+async def wave(ctx, u, h):
+    await ctx.established()
+    await ctx.sleep(3600)
+'''
+
+COMPASS = '''"""Sees everything straight ahead of itself."""
+from nondum.sdk import Bearing, Fragment, Header, Unit, behaviour, hookimpl
+
+DOMAIN = """
+(define (domain compass)
+  (:constants north south - target)
+  (:action sight
+    :parameters (?u - sensor ?t - target ?h - host)
+    :precondition (and (ready ?u) (on ?u ?h))
+    :effect (bearing-known ?t ?h)))
+"""
+
+@hookimpl
+def units():
+    return [Unit("needle", "sensor")]
+
+@hookimpl
+def fragments():
+    return [Fragment("compass.pddl", DOMAIN)]
+
+@behaviour("sight", action="(sight ?u - sensor ?t - target ?h - host)")
+async def sight(ctx, u, t, h):
+    ahead = Bearing(Header(frame_id=u), (1.0, 0.0, 0.0), 0.01)
+    ctx.know("bearing-known", t, h, value=ctx.transform(ahead, to=h))
+'''
+
+
+def arm(id: str = "arm", *, is_rude: bool = False) -> Part:
+    """Makes `(raised <host>)` or `(waved <host>)` true; a rude one does not ask who uses it."""
+    source = ARM.replace("(not (idle ?u)) ", "").replace(" (idle ?u)", "") if is_rude else ARM
+    return Part(id, source)
+
+
+def compass(id: str = "compass") -> Part:
+    """Knows the bearing of `north` and `south` in the body's frame: wherever its unit looks."""
+    return Part(id, COMPASS)

@@ -143,13 +143,14 @@ class RunningHost(Robot):
         return self.until(f"{id}: {state}", found, timeout_s=READY_S)
 
     def until_goal(self, id: str, state: str) -> Row:
-        """Wait until a goal is in a state; one that is kept true `holds`."""
+        """Wait until a goal is in a state; an active one that is true `holds`."""
 
         def found(view: View) -> Row | None:
             row = goal(view, id)
             if row is None:
                 return None
-            return row if state == ("holds" if row["holds"] else row["state"]) else None
+            is_kept = row["state"] == "active" and row["holds"]
+            return row if state == ("holds" if is_kept else row["state"]) else None
 
         return self.until(f"goal {id}: {state}", found, timeout_s=READY_S)
 

@@ -1,0 +1,71 @@
+"""Devices come and go while what needs them is at work, and two components want the same one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from demo import slots
+from tests.lab.plugins import gauge
+from tests.lab.running_host import RunningHost
+
+pytestmark = pytest.mark.lab
+
+WAITS = "waits for gauge"
+
+
+def plug_gauge(host: RunningHost) -> Path:
+    """Plug a gauge in; returns its node."""
+    node = host.work / "node"
+    node.write_text("1.5 bar\n")
+    slots.plug(host.devices, "port-1", str(node), {"ID_MODEL": "Gauge"})
+    return node
+
+
+def test_device_pulled_in_the_middle_of_a_behaviour(host: RunningHost) -> None:
+    node = plug_gauge(host)
+    host.bring("gauge", gauge())
+    before = host.component("gauge")
+    goal = host.want("(measured spot)")
+    host.until_goal(goal, "holds")
+    node.unlink()
+    host.until_goal(goal, "active")
+    slots.unplug(host.devices, "port-1")
+    host.until_component("gauge", WAITS)
+    host.until_told("gauge is not ready: it waits for the device gauge")
+    reason = host.until_goal(goal, "suspended")["reason"]
+    assert "ready spot__gauge__gauge" in reason
+    ends = [e["detail"] for e in host.journal("gauge") if e["event"] == "BehaviourEnded"]
+    assert ends[0]["outcome"] == "FAILED"
+    assert ends[0]["reason"].startswith("GAUGE_GONE")
+    plug_gauge(host)
+    host.until_goal(goal, "holds")
+    assert host.component("gauge") == before
+
+
+def test_device_that_comes_after_its_component_is_as_good(host: RunningHost) -> None:
+    host.bring("gauge", gauge())
+    host.until_component("gauge", WAITS)
+    goal = host.want("(measured spot)")
+    host.until_goal(goal, "suspended")
+    plug_gauge(host)
+    host.until_goal(goal, "holds")
+
+
+def test_one_device_for_two_stays_with_whoever_has_it_and_that_is_told(host: RunningHost) -> None:
+    plug_gauge(host)
+    host.bring("second", gauge("second"))
+    host.until_component("second", "ready")
+    host.bring("first", gauge("first"))
+    host.until_component("first", WAITS)
+    told = host.until_told("second has the device port-1, which first would need too")
+    assert told.endswith("it stays with whoever has it, and a free one goes to the first by name")
+    (row,) = host.ask("devices")
+    assert (row["component"], row["contested_by"]) == ("second", ["first"])
+    slots.unplug(host.devices, "port-1")
+    host.until_component("second", WAITS)
+    plug_gauge(host)
+    host.until_component("first", "ready")
+    assert host.until_component("second", WAITS)
+    host.pull("first")
+    host.until_component("second", "ready")
