@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import itertools
 from dataclasses import replace
 
 import pytest
@@ -19,6 +21,7 @@ from tests.planning.strangers import (
 
 from nondum.host.catalogue.records import ComponentState
 from nondum.host.events import FactKnown, GoalReached, PlanMade, PlanMissing
+from nondum.host.mind.mind import PAUSE_S
 from nondum.planning.running import RunState
 from nondum.sdk.description import Fragment, Output, Unit
 from nondum.sdk.errors import GoalRefused
@@ -301,3 +304,22 @@ async def test_words_with_too_many_bindings_disturb_no_plan(robot: Robot) -> Non
     await robot.until_goal("suspended", "2")
     assert [p.code for p in robot.mind.queue["2"].problems] == ["PDDL_TOO_MANY"]
     assert "knobs 1.0 domain.pddl:3" in str(robot.mind.queue["2"].problems[0])
+
+
+async def test_flood_of_news_costs_few_ticks(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    await follow(robot)
+    ticks, tick = list[float](), robot.mind.tick
+    clock = asyncio.get_running_loop().time
+
+    def timed() -> None:
+        ticks.append(clock())
+        tick()
+
+    monkeypatch.setattr(robot.mind, "tick", timed)
+    for _ in range(500):
+        robot.know("visual-tracker", "found", "person", HOST)
+        robot.forget("visual-tracker", "found", "person", HOST)
+        await asyncio.sleep(0.0002)
+    pauses = [later - earlier for earlier, later in itertools.pairwise(ticks)]
+    assert min(pauses) >= PAUSE_S * 0.9
+    assert robot.mind.queue["1"].reason == "it holds and is kept so"

@@ -36,6 +36,8 @@ BUSY_S = 0.05
 """Time between ticks while a task runs."""
 IDLE_S = 1.0
 """Time between ticks while nothing is asked for."""
+PAUSE_S = 0.005
+"""Between two ticks, however much news there is: a plugin that floods costs no more than this."""
 
 
 class Mind:
@@ -160,11 +162,14 @@ class Mind:
         self.root.tick_once()
 
     async def run(self) -> None:
-        """Tick until cancelled: at once when there is news, else every `BUSY_S` or `IDLE_S`."""
+        """Tick until cancelled: when there is news, at once or `PAUSE_S` after the last tick; else
+        every `BUSY_S` or `IDLE_S`."""
         warming = asyncio.create_task(self._planners.warm())
+        loop = asyncio.get_running_loop()
         try:
             while True:
                 self._news.clear()
+                earliest_s = loop.time() + PAUSE_S
                 self._tick_safely()
                 if self._may_look_different():
                     async with self._viewers:
@@ -172,6 +177,7 @@ class Mind:
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(BUSY_S if self.pursuit.current else IDLE_S):
                         await self._news.wait()
+                await asyncio.sleep(max(0.0, earliest_s - loop.time()))
         finally:
             warming.cancel()
             await asyncio.gather(warming, return_exceptions=True)
