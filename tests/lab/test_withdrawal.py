@@ -52,7 +52,7 @@ def test_drive_pulled_while_nothing_is_asked_for(host: RunningHost) -> None:
     stored = len(host.ask("store"))
     host.pull("talk")
     host.until_gone("talk")
-    host.until_told("talker is gone: it can talk")
+    host.until_told("talker is gone: it could talk")
     assert host.traces() == before
     assert len(host.ask("store")) == stored > 0
 

@@ -78,9 +78,36 @@ async def test_pulled_camera_halts_and_is_explained(robot: Robot) -> None:
     robot.unplug("recorded-camera")
     await robot.until_goal("suspended")
     assert not robot.running
-    assert any(t.startswith("recorded-camera is gone: it can stream") for t in robot.told)
+    assert any(t.startswith("recorded-camera is gone: it could stream") for t in robot.told)
     assert any("recorded-camera used to supply it" in text for text in robot.told)
     assert any(isinstance(event, PlanMissing) for event in robot.events)
+
+
+LIT = """(define (domain lamp) (:predicates (lit ?h - host))
+    (:action shine :parameters (?u - light ?h - host) :precondition (ready ?u) :effect (lit ?h)))"""
+
+
+async def test_goal_whose_words_went_names_who_brought_them(robot: Robot) -> None:
+    (report,) = SPEAKER.behaviours
+    shine = replace(report, name="shine", action="(shine ?u - light ?h - host)", lasting=True)
+    lamp = replace(
+        SPEAKER,
+        name="lamp",
+        units=(Unit("bulb", "light"),),
+        fragments=(Fragment("domain.pddl", LIT),),
+        behaviours=(replace(shine, phrases=()),),
+    )
+    robot.plug(lamp)
+    robot.mind.give(pddl="(lit self)", kind="maintain")
+    await robot.until_holding()
+    robot.unplug("lamp")
+    await robot.until_goal("suspended")
+    [problem] = robot.mind.queue["1"].problems
+    assert str(problem) == (
+        "WHY_WORDS_GONE 'lit' means nothing without lamp, which brought it → plug in lamp"
+    )
+    robot.plug(lamp)
+    await robot.until_holding()
 
 
 async def test_other_camera_takes_over(robot: Robot) -> None:

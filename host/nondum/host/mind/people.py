@@ -56,7 +56,7 @@ def recomposed(old: Composition | None, new: Composition) -> list[str]:
     """Sentences on what a recomposition gains, loses and changes."""
     before = {c.id: c for c in old.snapshot.components} if old else {}
     after = {c.id: c for c in new.snapshot.components}
-    sentences = [f"{id} is gone: {_offers(before[id])}" for id in before if id not in after]
+    sentences = [f"{id} is gone: {_offered(before[id])}" for id in before if id not in after]
     for id, component in after.items():
         earlier = before.get(id)
         if earlier is None or earlier.payload != component.payload:
@@ -95,8 +95,17 @@ def _kept_out(old: Composition | None, new: Composition) -> list[str]:
 
 
 def _offers(component: ComponentRecord) -> str:
-    names = [behaviour.name for behaviour in component.description.behaviours]
-    return f"it can {', '.join(names)}" if names else "it has no behaviours"
+    names = _abilities(component)
+    return f"it can {names}" if names else "it has no behaviours"
+
+
+def _offered(component: ComponentRecord) -> str:
+    names = _abilities(component)
+    return f"it could {names}" if names else "it had no behaviours"
+
+
+def _abilities(component: ComponentRecord) -> str:
+    return ", ".join(behaviour.name for behaviour in component.description.behaviours)
 
 
 def _health(component: ComponentRecord) -> str:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.goals import GivenGoal
 from nondum.host.mind.planners import Planners
+from nondum.planning.claims import claims_of
 from nondum.planning.contribution import Contribution
 from nondum.planning.explain import explain, suppliers
 from nondum.planning.exploration import INSTANCES_LIMIT
@@ -100,7 +102,7 @@ async def search(
     try:
         goal = parse_goal(given.pddl, composition.merged, kind=given.kind)
     except GoalRefused as refused:
-        return NoPlan(situation, refused.problems)
+        return NoPlan(situation, words_gone(composition, given, seen) or refused.problems)
     try:
         task = await _task_of_any_size(composition, goal, situation)
     except FragmentRefused as refused:
@@ -142,13 +144,44 @@ def why_not(
         names = ", ".join(sorted(situation.excluded))
         message = f"there is no way without what failed again and again: {names}"
         return (Problem("NO_OTHER_WAY", message, fix="it is tried again after a while"),)
-    present = {contribution.component for contribution in composition.contributions}
-    gone = [c for c in suppliers(diagnosis.causes, seen) if c.component not in present]
+    gone = _gone(composition, suppliers(diagnosis.causes, seen))
     problems = diagnosis.problems()
     if gone:
         names = ", ".join(sorted({c.component for c in gone}))
         problems += (Problem("WHY_SUPPLIER", f"{names} used to supply it", fix=f"plug in {names}"),)
     return problems
+
+
+def words_gone(
+    composition: Composition, given: GivenGoal, seen: Iterable[Contribution]
+) -> tuple[Problem, ...]:
+    """Which of a goal's words mean nothing any more, and who brought them. Empty: none."""
+    merged = composition.merged
+    lost = {*re.findall(r"[^\s()]+", given.pddl)} - {*merged.domain.predicates, *merged.objects}
+    brought = {c.component: lost & _names(c) for c in _gone(composition, seen)}
+    words = ", ".join(sorted({repr(word) for found in brought.values() for word in found}))
+    names = ", ".join(sorted(component for component, found in brought.items() if found))
+    if not words:
+        return ()
+    message = f"{words} means nothing without {names}, which brought it"
+    return (Problem("WHY_WORDS_GONE", message, fix=f"plug in {names}"),)
+
+
+def _names(contribution: Contribution) -> set[str]:
+    """The predicates and objects that a contribution declares."""
+    claims = claims_of(contribution)
+    return {
+        *(predicate.name for predicate in claims.predicates),
+        *(claim.name for claim in claims.objects),
+        *(unit.object for unit in contribution.units),
+        *(stream.object for stream in contribution.streams),
+    }
+
+
+def _gone(composition: Composition, seen: Iterable[Contribution]) -> list[Contribution]:
+    """Those that are not here now."""
+    present = {contribution.component for contribution in composition.contributions}
+    return [contribution for contribution in seen if contribution.component not in present]
 
 
 async def _task_of_any_size(
