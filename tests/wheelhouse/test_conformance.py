@@ -12,12 +12,14 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterable
+from importlib.util import cache_from_source
 from pathlib import Path
 
 import pytest
 
-from nondum.wheelhouse import lock, locking, preflight, venvs, wheel
-from nondum.wheelhouse.store import Store, StoredWheel
+from nondum.wheelhouse import bytecode, lock, locking, preflight, venvs, wheel
+from nondum.wheelhouse.store import Store
+from nondum.wheelhouse.stored import StoredWheel
 from nondum.wheelhouse.target import Target
 
 PYTHON = Path(sys.base_prefix) / "bin" / f"python{sys.version_info.major}.{sys.version_info.minor}"
@@ -48,7 +50,9 @@ def stored(folder: Path) -> list[StoredWheel]:
     parsed = lock.parse((folder / "pylock.popular.toml").read_text(), "lock")
     facts = preflight.probe(folder, reserve_mb=0, confinement=0)
     chosen = lock.select(parsed, facts.environment, facts.tags)
-    return [store.add(folder / one.path, one.sha256) for one in chosen]
+    for one in chosen:
+        store.add(folder / one.path, one.sha256)
+    return [store.compile(one.sha256) for one in chosen]
 
 
 @pytest.fixture(scope="module")
@@ -88,6 +92,7 @@ def tree(venv: Path, *, without: Iterable[str] = ()) -> dict[str, tuple[str, boo
         )
         for path in site.rglob("*")
         if path.is_file()
+        and path.parent.name != bytecode.FOLDER
         and not (path.parent.suffix == ".dist-info" and path.name in INSTALLER_METADATA)
         and path.relative_to(site).as_posix() not in without
     }
@@ -96,6 +101,14 @@ def tree(venv: Path, *, without: Iterable[str] = ()) -> dict[str, tuple[str, boo
 def test_trees_are_equal(ours: Path, pips: Path) -> None:
     assert tree(ours) == tree(pips)
     assert len(tree(ours)) > 1000
+
+
+def test_compiled_files_are_those_that_interpreters_look_for(ours: Path) -> None:
+    site = venvs.site_packages(ours)
+    modules = [path for path in site.rglob("*.py") if "templates" not in path.parts]
+    compiled = [path for path in modules if Path(cache_from_source(str(path))).exists()]
+    assert len(compiled) > 1000
+    assert len(compiled) >= len(modules) - 5
 
 
 def test_pip_sees_the_same_distributions(ours: Path, pips: Path) -> None:

@@ -15,7 +15,8 @@ from tests.wheelhouse.hostile_wheels import INFO, WHEEL, Lie, WheelBuilder, reco
 from tests.wheelhouse.test_drive import file_system, needs_mount
 
 from nondum.sdk.errors import InstallFailed, PayloadRefused
-from nondum.wheelhouse.store import Store, StoredWheel
+from nondum.wheelhouse.store import Store
+from nondum.wheelhouse.stored import StoredWheel
 
 SOURCES = {"plain/__init__.py": "X = 1\n", "plain/data.bin": "d" * 10_000}
 

@@ -13,9 +13,10 @@ from tests.payloads import installed_wheel, make_wheel, sha256
 from tests.wheelhouse.test_drive import file_system, needs_mount
 
 from nondum.sdk.errors import InstallFailed
-from nondum.wheelhouse import venvs
+from nondum.wheelhouse import bytecode, venvs
 from nondum.wheelhouse.lock import LockedWheel
-from nondum.wheelhouse.store import Store, StoredWheel
+from nondum.wheelhouse.store import Store
+from nondum.wheelhouse.stored import StoredWheel
 
 PYTHON = Path(sys.base_prefix) / "bin" / f"python{sys.version_info.major}.{sys.version_info.minor}"
 
@@ -136,6 +137,10 @@ def test_across_file_systems_files_are_copied(store: Store, tmp_path: Path) -> N
     with file_system(tmp_path / "other", 8) as other:
         venvs.make(other / "venv", PYTHON, [wheel])
         assert (venvs.site_packages(other / "venv") / "one.py").read_text() == "X = 1"
+        for _ in range(2):
+            venvs.add_compiled(other / "venv", [store.compile(wheel.sha256)])
+        (copy,) = venvs.site_packages(other / "venv").rglob("__pycache__/*")
+        assert copy.name == Path(bytecode.cached("one.py")).name
 
 
 @needs_mount
@@ -147,6 +152,49 @@ def test_a_full_disk_leaves_no_venv(store: Store, tmp_path: Path) -> None:
             venvs.make(small / "venv", PYTHON, [wheel])
         assert failed.value.code == "DISK_FULL"
         assert {p.name for p in small.iterdir()} == {"lost+found"}
+
+
+COMPILED = bytecode.cached("ns/__init__.py")
+
+
+def test_compiled_files_are_linked_too(store: Store, tmp_path: Path) -> None:
+    (wheel,) = stored(store, make_wheel(tmp_path, "a", "1", {"ns/__init__.py": "", "b.py": ""}))
+    compiled = store.compile(wheel.sha256)
+    venvs.make(tmp_path / "venv", PYTHON, [compiled])
+    site = venvs.site_packages(tmp_path / "venv")
+    for file in compiled.all_files:
+        assert (site / file.path).samefile(compiled.root / file.path)
+
+
+def test_compiled_files_are_added_to_a_venv(store: Store, tmp_path: Path) -> None:
+    same = {"ns/__init__.py": ""}
+    wheels = stored(store, *(make_wheel(tmp_path, n, "1", {**same, f"{n}.py": ""}) for n in "ab"))
+    venvs.make(tmp_path / "venv", PYTHON, wheels)
+    site = venvs.site_packages(tmp_path / "venv")
+    assert not list(site.rglob("*.pyc"))
+    compiled = [store.compile(wheel.sha256) for wheel in wheels]
+    for _ in range(2):
+        venvs.add_compiled(tmp_path / "venv", compiled)
+    assert (site / COMPILED).samefile(compiled[0].root / COMPILED)
+    assert (site / bytecode.cached("b.py")).samefile(compiled[1].root / bytecode.cached("b.py"))
+
+
+@pytest.mark.parametrize("path", [COMPILED, "ns/__pycache__"])
+def test_what_another_wheel_brings_stays(store: Store, tmp_path: Path, path: str) -> None:
+    one, other = stored(
+        store,
+        make_wheel(tmp_path, "one", "1", {"ns/__init__.py": ""}),
+        make_wheel(tmp_path, "other", "1", {path: "its own"}),
+    )
+    venvs.make(tmp_path / "venv", PYTHON, [store.compile(one.sha256), other])
+    assert (venvs.site_packages(tmp_path / "venv") / path).read_text() == "its own"
+
+
+def test_adding_to_no_venv_is_told(store: Store, tmp_path: Path) -> None:
+    (wheel,) = stored(store, make_wheel(tmp_path, "one", "1", {"one.py": ""}))
+    with pytest.raises(InstallFailed) as failed:
+        venvs.add_compiled(tmp_path / "nowhere", [store.compile(wheel.sha256)])
+    assert failed.value.code == "IO_ERROR"
 
 
 def locked(path: Path) -> LockedWheel:

@@ -2,10 +2,11 @@
 
     store/<sha256>/
         manifest.json      what the wheel was, and path, size and SHA-256 of every file
-        files/…            site-packages as this wheel fills it
+        files/…            site-packages as this wheel fills it, compiled files beside the modules
 
 A wheel is hashed and unpacked from the same bytes, synced to disk, and renamed in: what is there
-is whole. Before files are used again they are hashed again. Venvs are hard links to them.
+is whole. Compiled files come later; those that the manifest tells of are there and whole. Before
+files are used again they are hashed again. Venvs are hard links to them.
 """
 
 from __future__ import annotations
@@ -13,45 +14,23 @@ from __future__ import annotations
 import ctypes
 import errno
 import hashlib
-import json
 import os
 import shutil
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
-from nondum.wheelhouse import unpacking
+from nondum.wheelhouse import bytecode, unpacking
+from nondum.wheelhouse.stored import FILES, MANIFEST, CompiledFiles, StoredWheel, read_entry
 from nondum.wheelhouse.unpacking import THREADS, Progress, Source, StoredFile, Unpacked
 
-MANIFEST = "manifest.json"
-FILES = "files"
+UNFINISHED = ".part"
+"""Folder of an entry for what is not in its place yet."""
+
 _CHUNK = 1024 * 1024
 _libc = ctypes.CDLL(None, use_errno=True)
-
-
-@dataclass(frozen=True, slots=True)
-class StoredWheel:
-    """A wheel in the store."""
-
-    sha256: str
-    """Of the wheel file that it was unpacked from."""
-    filename: str
-    folder: Path
-    files: tuple[StoredFile, ...]
-    left_out: tuple[str, ...] = ()
-    """Members that were not unpacked."""
-
-    @property
-    def size(self) -> int:
-        """Bytes of its files."""
-        return sum(file.size for file in self.files)
-
-    @property
-    def root(self) -> Path:
-        """Folder that its files are under."""
-        return self.folder / FILES
 
 
 class Store:
@@ -85,7 +64,7 @@ class Store:
         stored: dict[str, StoredWheel] = {}
         sources = []
         for path, sha256 in wheels:
-            if (known := self.get(sha256)) is not None and not self.verify(sha256):
+            if (known := self.whole(sha256)) is not None:
                 os.utime(known.folder)
                 stored[sha256] = known
             else:
@@ -103,31 +82,70 @@ class Store:
 
     def get(self, sha256: str) -> StoredWheel | None:
         """A stored wheel by hash, without looking at its files."""
-        folder = self.root / sha256
-        try:
-            said = json.loads((folder / MANIFEST).read_bytes())
-            files = tuple(StoredFile(*row) for row in said["files"])
-            return StoredWheel(sha256, said["wheel"], folder, files, tuple(said["left_out"]))
-        except (OSError, ValueError, LookupError, TypeError):
-            return None
+        return read_entry(self.root / sha256)
 
     def verify(self, sha256: str) -> tuple[Problem, ...]:
         """Hash a stored wheel's files again; what is not as it was."""
         stored = self.get(sha256)
         if stored is None:
-            return (Problem("STORE_MISSING", "the wheel is not in the store", where=sha256),)
-        with ThreadPoolExecutor(THREADS) as pool:
-            whole = pool.map(lambda file: _is_whole(stored.root / file.path, file), stored.files)
-            return tuple(
-                Problem(
-                    "STORE_DAMAGED",
-                    f"{file.path} of {stored.filename} is not what was stored",
-                    where=str(stored.folder),
-                    fix="it is unpacked again from the payload",
-                )
-                for file, is_whole in zip(stored.files, whole, strict=True)
-                if not is_whole
+            return (_missing(sha256),)
+        return tuple(
+            Problem(
+                "STORE_DAMAGED",
+                f"{file.path} of {stored.filename} is not what was stored",
+                where=str(stored.folder),
+                fix="it is unpacked again from the payload",
             )
+            for file in _damaged(stored)
+        )
+
+    def whole(self, sha256: str) -> StoredWheel | None:
+        """A stored wheel whose files have been hashed again, if they are as they were.
+
+        Compiled files are dropped if any of them is not. Raises `InstallFailed`.
+        """
+        stored = self.get(sha256)
+        if stored is None or not (damaged := _damaged(stored)):
+            return stored
+        if not set(damaged).isdisjoint(stored.files):
+            return None
+        kept = replace(stored, compiled=())
+        try:
+            _replace_manifest(kept)
+            for file in stored.all_files[len(stored.files) :]:
+                (stored.root / file.path).unlink(missing_ok=True)
+        except OSError as error:
+            raise _failed(error, stored.filename) from error
+        return kept
+
+    def compile(self, sha256: str, progress: Callable[[int], None] | None = None) -> StoredWheel:
+        """Compile a stored wheel's modules for interpreters like this one, unless they are.
+
+        `progress` gets bytes of source. It may be killed at any moment. Raises `InstallFailed`
+        (STORE_MISSING, DISK_FULL, …).
+        """
+        stored = self.get(sha256)
+        if stored is None:
+            raise InstallFailed(_missing(sha256))
+        if stored.compiled_here is not None:
+            return stored
+        unfinished = stored.folder / UNFINISHED
+        try:
+            shutil.rmtree(unfinished, ignore_errors=True)
+            files = bytecode.write(stored.root, stored.files, unfinished, progress)
+            for file in files:
+                target = stored.root / file.path
+                target.parent.mkdir(exist_ok=True)
+                (unfinished / file.path).rename(target)
+            compiled = (*stored.compiled, CompiledFiles(bytecode.TAG, files))
+            stored = replace(stored, compiled=compiled)
+            _sync_file_system(stored.folder)
+            _replace_manifest(stored)
+        except OSError as error:
+            raise _failed(error, stored.filename) from error
+        finally:
+            shutil.rmtree(unfinished, ignore_errors=True)
+        return stored
 
     def listing(self) -> tuple[StoredWheel, ...]:
         """All stored wheels, by file name."""
@@ -162,7 +180,7 @@ class Store:
 
     def sweep(self) -> tuple[Path, ...]:
         """Delete what an interrupted run left half done; returns what it was."""
-        left = tuple(path for path in self.root.iterdir() if path.name.startswith("."))
+        left = (*self.root.glob(".*"), *self.root.glob(f"[!.]*/{UNFINISHED}"))
         for path in left:
             shutil.rmtree(path)
         return left
@@ -184,17 +202,13 @@ class Store:
 
     def _told(self, source: Source, unpacked: Unpacked) -> StoredWheel:
         """Write the manifest of an unpacked wheel."""
-        said = {
-            "wheel": source.path.name,
-            "files": [[file.path, file.size, file.sha256] for file in unpacked.files],
-            "left_out": unpacked.left_out,
-        }
-        manifest = self._unfinished(source.sha256) / MANIFEST
-        manifest.write_text(json.dumps(said), encoding="utf-8")
         folder = self.root / source.sha256
-        return StoredWheel(
+        wheel = StoredWheel(
             source.sha256, source.path.name, folder, unpacked.files, unpacked.left_out
         )
+        manifest = self._unfinished(source.sha256) / MANIFEST
+        manifest.write_text(wheel.manifest(), encoding="utf-8")
+        return wheel
 
     def _unfinished(self, sha256: str) -> Path:
         return self.root / f".{sha256}.part"
@@ -202,6 +216,31 @@ class Store:
     def _clear_away(self, sources: Sequence[Source]) -> None:
         for source in sources:
             shutil.rmtree(self._unfinished(source.sha256), ignore_errors=True)
+
+
+def _missing(sha256: str) -> Problem:
+    return Problem("STORE_MISSING", "the wheel is not in the store", where=sha256)
+
+
+def _replace_manifest(wheel: StoredWheel) -> None:
+    """Have an entry's manifest tell of what is there now; it is the old one or the new one."""
+    unfinished = wheel.folder / UNFINISHED
+    unfinished.mkdir(exist_ok=True)
+    with (unfinished / MANIFEST).open("w", encoding="utf-8") as manifest:
+        manifest.write(wheel.manifest())
+        manifest.flush()
+        os.fsync(manifest.fileno())
+    (unfinished / MANIFEST).rename(wheel.folder / MANIFEST)
+    _sync_folder(wheel.folder)
+    shutil.rmtree(unfinished)
+
+
+def _damaged(wheel: StoredWheel) -> tuple[StoredFile, ...]:
+    """Hash an entry's files again; those that are not as they were."""
+    with ThreadPoolExecutor(THREADS) as pool:
+        whole = pool.map(lambda file: _is_whole(wheel.root / file.path, file), wheel.all_files)
+        pairs = zip(wheel.all_files, whole, strict=True)
+        return tuple(file for file, is_whole in pairs if not is_whole)
 
 
 def _is_whole(path: Path, file: StoredFile) -> bool:

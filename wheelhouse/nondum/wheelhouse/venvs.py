@@ -1,11 +1,12 @@
 """A component's venv: made in-process, filled with hard links to the store, run by its worker only.
 
 In purelib and platlib the result is what `pip install --no-index --no-deps --require-hashes` gives,
-installer metadata apart. `make_with_pip` runs pip itself instead.
+installer metadata and compiled files apart. `make_with_pip` runs pip itself instead.
 """
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import shutil
@@ -16,7 +17,7 @@ from pathlib import Path
 
 from nondum.sdk.errors import InstallFailed, Problem
 from nondum.wheelhouse.lock import LockedWheel
-from nondum.wheelhouse.store import StoredWheel
+from nondum.wheelhouse.stored import StoredWheel
 
 PIP_TIMEOUT_S = 600
 
@@ -38,16 +39,25 @@ def make(venv: Path, python: Path, wheels: Sequence[StoredWheel]) -> None:
         tree = _Tree(site_packages(unfinished))
         for stored in wheels:
             tree.add(stored)
+        _link_compiled(unfinished, wheels)
         unfinished.rename(venv)
     except OSError as error:
         shutil.rmtree(unfinished, ignore_errors=True)
-        code = "DISK_FULL" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "IO_ERROR"
-        raise InstallFailed(
-            Problem(code, f"the venv cannot be made: {error.strerror}", where=str(venv))
-        ) from error
+        raise _failed(error, venv) from error
     except InstallFailed:
         shutil.rmtree(unfinished, ignore_errors=True)
         raise
+
+
+def add_compiled(venv: Path, wheels: Sequence[StoredWheel]) -> None:
+    """Link what was compiled since a venv was made, each file whole, whoever runs it meanwhile.
+
+    Raises `InstallFailed` (DISK_FULL, IO_ERROR).
+    """
+    try:
+        _link_compiled(venv, wheels)
+    except OSError as error:
+        raise _failed(error, venv) from error
 
 
 def make_with_pip(venv: Path, python: Path, folder: Path, wheels: Sequence[LockedWheel]) -> None:
@@ -156,10 +166,40 @@ def _collide(path: str, one: str, other: str) -> InstallFailed:
     )
 
 
+def _link_compiled(venv: Path, wheels: Sequence[StoredWheel]) -> None:
+    """Link compiled files where their place is free: wheels may bring the same, or their own."""
+    root = site_packages(venv)
+    for stored in wheels:
+        for file in stored.compiled_here or ():
+            source, target = f"{stored.root}/{file.path}", f"{root}/{file.path}"
+            with contextlib.suppress(FileExistsError, NotADirectoryError):
+                try:
+                    _link(source, target)
+                except FileNotFoundError:  # the first one in its folder
+                    Path(target).parent.mkdir()
+                    _link(source, target)
+
+
 def _link(source: str, target: str) -> None:
     try:
         os.link(source, target)  # strings, not paths: thousands of files
     except OSError as error:
         if error.errno != errno.EXDEV:  # the store may lie on another file system
             raise
-        shutil.copy2(source, target)
+        _copy(source, target)
+
+
+def _copy(source: str, target: str) -> None:
+    """Copy a file; it is there whole or not at all, and nothing is replaced."""
+    copy = f"{target}.part"
+    shutil.copy2(source, copy)
+    try:
+        os.link(copy, target)
+    finally:
+        Path(copy).unlink()
+
+
+def _failed(error: OSError, venv: Path) -> InstallFailed:
+    code = "DISK_FULL" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "IO_ERROR"
+    text = f"the venv cannot be filled: {error.strerror}"
+    return InstallFailed(Problem(code, text, where=str(venv)))

@@ -22,7 +22,8 @@ from nondum.wheelhouse.lock import LockedWheel
 from nondum.wheelhouse.payload import StagedPayload
 from nondum.wheelhouse.preflight import HostFacts
 from nondum.wheelhouse.signatures import SignatureDemanded, UnsignedAllowed, Verifier
-from nondum.wheelhouse.store import Store, StoredWheel
+from nondum.wheelhouse.store import Store
+from nondum.wheelhouse.stored import StoredWheel
 
 Report = Callable[[str, int, int], None]
 """Phase, done, total."""

@@ -15,7 +15,8 @@ from nondum.wheelhouse import build, venvs
 from nondum.wheelhouse.lock import LockedWheel
 from nondum.wheelhouse.manifest import ComponentManifest
 from nondum.wheelhouse.payload import StagedPayload
-from nondum.wheelhouse.store import Store, StoredWheel
+from nondum.wheelhouse.store import Store
+from nondum.wheelhouse.stored import StoredWheel
 
 
 def install(arguments: Arguments, report: Report) -> dict[str, Any]:
@@ -29,7 +30,7 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
     python, root = Path(arguments["python"]), Path(arguments["venvs"])
     wheels = staged.wheels(facts)
     root.mkdir(parents=True, exist_ok=True)
-    fresh = 0
+    fresh, uncompiled = 0, False
     if arguments["method"] == "pip":
         for component, chosen in wheels.items():
             venvs.make_with_pip(root / component, python, folder, chosen)
@@ -38,9 +39,10 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
         for component, chosen in wheels.items():
             linked = [stored[locked.sha256] for locked in chosen]
             venvs.make(root / component, python, linked)
+        uncompiled = any(wheel.compiled_here is None for wheel in stored.values())
         shutil.rmtree(folder / "wheels", ignore_errors=True)  # the store has them now
     components = [_told(staged, component, root) for component in staged.manifest.components]
-    return {"fresh": fresh, "wheels": sorted(stored_names(wheels)), "components": components}
+    return {"fresh": fresh, "uncompiled": uncompiled, "components": components}
 
 
 def stored_names(wheels: dict[str, tuple[LockedWheel, ...]]) -> set[str]:
@@ -103,9 +105,8 @@ def _stored(
 
 def _checked(store: Store, locked: LockedWheel) -> StoredWheel:
     """A wheel that was not copied because the store had it."""
-    problems = store.verify(locked.sha256)
-    found = store.get(locked.sha256)
-    if found is not None and not problems:
+    found = store.whole(locked.sha256)
+    if found is not None:
         return found
     store.remove(locked.sha256)  # so that it is copied the next time
     raise InstallFailed(
