@@ -99,6 +99,7 @@ async def _run(
     await control.open()
     log.info("host %s listens at %s", config.host.name, config.host.control)
     try:
+        workers.keep_spare()
         await _until(
             stop,
             manager.run(),

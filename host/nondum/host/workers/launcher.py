@@ -7,21 +7,21 @@ privileges, nothing inherited but the link.
 
 from __future__ import annotations
 
-import json
+import logging
 import os
 import socket
-import subprocess
 from dataclasses import asdict
-from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from nondum.host.workers.process import WorkerProcess
-from nondum.host.workers.spec import WorkerSpec
+from nondum.host.workers.spare import ROOM, ROOM_BYTES, Spare
+from nondum.host.workers.spec import WorkerSpec, base_interpreter
 from nondum.sdk.errors import Problem, WorkerFailed
 
-BOOTSTRAP = Path(__file__).with_name("bootstrap.py")
 MARK = "NONDUM_WORKER"
 """Environment variable of every worker: its scratch folder. It tells whose a process is."""
+log = logging.getLogger(__name__)
+
 _NUMERIC_LIBRARIES = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR", "VECLIB_MAXIMUM")
 
 
@@ -41,6 +41,14 @@ class Launcher(Protocol):
         """
         ...
 
+    def warm(self) -> None:
+        """Prepare for the next launch what can be. Blocks for some milliseconds, never raises."""
+        ...
+
+    def close(self) -> None:
+        """Give up what was prepared."""
+        ...
+
 
 class RlimitLauncher:
     """Holds workers with resource limits only."""
@@ -48,39 +56,61 @@ class RlimitLauncher:
     level = 0
     name = "resource limits"
 
+    def __init__(self) -> None:
+        self._spare: Spare | None = None
+
     def launch(self, spec: WorkerSpec, sock: socket.socket) -> WorkerProcess:
-        """Start a worker (see `Launcher`)."""
+        """Start a worker (see `Launcher`), from the spare interpreter if there is one."""
+        spare, self._spare = self._spare, None
         try:
             spec.scratch.mkdir(parents=True, exist_ok=True, mode=0o700)
-            popen = subprocess.Popen(
-                [spec.python, "-I", "-S", "-B", "-u", BOOTSTRAP, _parameters(spec, sock.fileno())],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                bufsize=0,
-                pass_fds=(sock.fileno(),),
-                start_new_session=True,
-                cwd=spec.scratch,
-                env=_environment(spec),
-            )
+            parameters = _parameters(spec)
+            if spare is not None and spare.python == spec.python:
+                if spare.become(parameters, sock):
+                    return WorkerProcess(spare.popen)
+            elif spare is not None:
+                spare.close()
+            started = Spare(spec.python)
+            if started.become(parameters, sock):
+                return WorkerProcess(started.popen)
         except OSError as error:
             problem = Problem("LAUNCH_FAILED", str(error), where=spec.component)
             raise WorkerFailed(problem) from error
-        return WorkerProcess(popen)
+        text = f"{spec.python} ends at once"
+        raise WorkerFailed(Problem("LAUNCH_FAILED", text, where=spec.component))
+
+    def warm(self) -> None:
+        """Have a spare interpreter."""
+        if self._spare is None:
+            try:
+                self._spare = Spare(base_interpreter())
+            except OSError as error:  # launching will tell, should it be lasting
+                log.warning("no spare interpreter: %s", error)
+
+    def close(self) -> None:
+        """End the spare interpreter."""
+        if self._spare is not None:
+            self._spare.close()
+            self._spare = None
 
 
-def _parameters(spec: WorkerSpec, descriptor: int) -> str:
-    return json.dumps(
-        {
-            "fd": descriptor,
-            "host_pid": os.getpid(),
-            "component": spec.component,
-            "entry_point": spec.entry_point,
-            "distribution": spec.distribution,
-            "site_packages": [str(folder) for folder in spec.site_packages],
-            "limits": asdict(spec.limits),
-        }
-    )
+def _parameters(spec: WorkerSpec) -> dict[str, Any]:
+    """What `bootstrap.py` is told. Raises `OSError` when the mark finds no room."""
+    mark = f"{MARK}={spec.scratch}"
+    if len(os.fsencode(mark)) >= ROOM_BYTES:
+        raise OSError(f"the path of the scratch folder is too long: {spec.scratch}")
+    return {
+        "host_pid": os.getpid(),
+        "component": spec.component,
+        "entry_point": spec.entry_point,
+        "distribution": spec.distribution,
+        "site_packages": [str(folder) for folder in spec.site_packages],
+        "limits": asdict(spec.limits),
+        "scratch": str(spec.scratch),
+        "environment": _environment(spec),
+        "mark": mark,
+        "room": ROOM,
+    }
 
 
 def _environment(spec: WorkerSpec) -> dict[str, str]:

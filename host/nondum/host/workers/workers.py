@@ -34,6 +34,8 @@ FactValue: TypeAlias = tuple[str, Sequence[str], Any]
 GRACE_S = 2.0
 """What a worker has to end when its component is removed."""
 
+SPARE_AFTER_S = 2.0
+"""From a launch until the next one is prepared."""
 
 log = logging.getLogger(__name__)
 
@@ -64,6 +66,8 @@ class Workers:
         self._mounts: Mapping[str, Any] = {}
         self._call_ids = itertools.count(1)
         self._calls: dict[asyncio.Task[None], Call] = {}
+        self._keeps_spare = False
+        self._warming: asyncio.TimerHandle | None = None
 
     @property
     def hook(self) -> pluggy.HookRelay:
@@ -116,6 +120,9 @@ class Workers:
         await asyncio.gather(*(self.stop(name, grace_s) for name in tuple(self._supervisors)))
         await asyncio.gather(*self._calls, return_exceptions=True)
         await self.streams.close()
+        if self._warming is not None:
+            self._warming.cancel()
+        self.launcher.close()
 
     def behave(
         self,
@@ -175,6 +182,11 @@ class Workers:
             return ()
         return tuple(supervisor.worker.claims)
 
+    def keep_spare(self) -> None:
+        """Prepare the next launch, now and, from now on, some time after every launch."""
+        self._keeps_spare = True
+        self.launcher.warm()
+
     def pids(self) -> dict[str, int]:
         """The process of each running worker, by component."""
         workers = ((name, s.worker) for name, s in sorted(self._supervisors.items()))
@@ -183,7 +195,8 @@ class Workers:
     # What supervisors need
 
     def welcome(self, spec: WorkerSpec) -> Mapping[str, Any]:
-        """What a new worker is told of its place."""
+        """What a new worker, about to be launched, is told of its place."""
+        self._warm_later()
         return {
             "host": self._host,
             "component": spec.component,
@@ -223,6 +236,14 @@ class Workers:
         if self._manager.has_plugin(component):
             self._manager.unregister(name=component)
         self.streams.leave(component)
+
+    def _warm_later(self) -> None:
+        """Not while workers are being started: they need the processors."""
+        if self._warming is not None:
+            self._warming.cancel()
+        if self._keeps_spare:
+            loop = asyncio.get_running_loop()
+            self._warming = loop.call_later(SPARE_AFTER_S, self.launcher.warm)
 
     def _worker(self, component: str) -> Worker:
         supervisor = self._supervisors.get(component)

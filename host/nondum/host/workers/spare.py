@@ -1,0 +1,76 @@
+"""An interpreter that waits to become a worker, with the standard library that workers need loaded.
+
+Starting one costs more than anything else that is done for a known payload, and most of that is
+the same for all workers: it is done before anybody waits for it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+BOOTSTRAP = Path(__file__).with_name("bootstrap.py")
+ROOM = "NONDUM_ROOM"
+"""Environment variable that keeps room for the mark of the worker (see `launcher.py`)."""
+ROOM_BYTES = 2048
+
+
+class Spare:
+    """A started interpreter. It ends when it is closed, or with the thread that started it."""
+
+    def __init__(self, python: Path) -> None:
+        """Start it. Raises `OSError`."""
+        self.python = python
+        self._orders, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        try:
+            with theirs:
+                self.popen = _started(python, theirs.fileno())
+        except OSError:
+            self._orders.close()
+            raise
+
+    def become(self, parameters: Mapping[str, Any], link: socket.socket) -> bool:
+        """Have it become a worker on its end of a link; answer whether it could be told.
+
+        From then on the process is the caller's. See `bootstrap.py` for the parameters.
+        """
+        try:
+            socket.send_fds(self._orders, [json.dumps(parameters).encode()], [link.fileno()])
+        except OSError:
+            self.close()
+            return False
+        self._orders.close()
+        return True
+
+    def close(self) -> None:
+        """End it unused."""
+        self._orders.close()
+        self.popen.kill()
+        self.popen.wait()
+        for pipe in (self.popen.stdout, self.popen.stderr):
+            if pipe is not None:
+                pipe.close()
+
+
+def _started(python: Path, orders: int) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [python, "-I", "-S", "-B", "-u", BOOTSTRAP, str(orders), str(os.getpid())],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        bufsize=0,
+        pass_fds=(orders,),
+        start_new_session=True,
+        cwd="/",
+        env={
+            "PATH": "/usr/local/bin:/usr/bin:/bin",
+            "LANG": "C.UTF-8",
+            "MALLOC_ARENA_MAX": "2",  # read before Python's first line
+            ROOM: "-" * ROOM_BYTES,
+        },
+    )

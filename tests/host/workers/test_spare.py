@@ -1,0 +1,110 @@
+"""The interpreter that waits to become a worker: loaded ahead, like any other, never left over."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from tests.host.workers.house import SDK, House, is_alive, until_gone
+
+from nondum.host.workers import base_interpreter
+from nondum.host.workers.bootstrap import PRELOADED
+from nondum.host.workers.launcher import MARK, RlimitLauncher
+from nondum.host.workers.leftovers import end_leftovers
+
+pytestmark = pytest.mark.anyio
+
+QUIET = "X = 1\n"
+FORKING = (
+    "import os, time\n"
+    "if os.fork() == 0:\n"
+    "    os.setsid()\n"
+    "    open('child', 'w').write(str(os.getpid()))\n"
+    "    while True: time.sleep(1)\n"
+    "while not os.path.exists('child') or not open('child').read(): time.sleep(0.01)\n"
+)
+
+
+def spare_of(house: House) -> int:
+    launcher = house.workers.launcher
+    assert isinstance(launcher, RlimitLauncher)
+    assert launcher._spare is not None
+    return launcher._spare.popen.pid
+
+
+def environment(pid: int) -> dict[str, str]:
+    pairs = Path(f"/proc/{pid}/environ").read_bytes().decode().split("\0")
+    return {name: value for name, _, value in (pair.partition("=") for pair in pairs) if name}
+
+
+def place(pid: int) -> Path:
+    return Path(f"/proc/{pid}/cwd").readlink()
+
+
+async def test_the_spare_becomes_the_next_worker(house: House) -> None:
+    house.workers.keep_spare()
+    spare = spare_of(house)
+    await house.start("cam", QUIET)
+    assert house.workers.pids() == {"cam": spare}
+    await house.start("cam-2", QUIET)
+    assert house.workers.pids()["cam-2"] != spare
+
+
+async def test_a_worker_that_was_a_spare_lives_where_others_do(house: House) -> None:
+    house.workers.keep_spare()
+    spec = await house.start("cam", "import os; print(os.getcwd(), dict(os.environ))\n")
+    pid = house.workers.pids()["cam"]
+    assert environment(pid)[MARK] == str(spec.scratch)
+    assert place(pid) == spec.scratch
+    (line,) = house.lines("cam")
+    assert line.startswith(f"{spec.scratch} ")
+    assert f"'HOME': '{spec.scratch}'" in line
+    assert "'OMP_NUM_THREADS': '1'" in line
+    assert "NONDUM_ROOM" not in line
+
+
+async def test_what_a_spare_forks_is_found(house: House) -> None:
+    house.workers.keep_spare()
+    spec = await house.start("cam", FORKING)
+    forked = int((spec.scratch / "child").read_text())
+    assert is_alive(forked)
+    assert end_leftovers(spec.scratch) >= 1
+    await until_gone(forked)
+
+
+async def test_a_spare_that_died_is_not_missed(house: House) -> None:
+    house.workers.keep_spare()
+    spare = spare_of(house)
+    os.kill(spare, signal.SIGKILL)
+    await asyncio.to_thread(os.waitid, os.P_PID, spare, os.WEXITED | os.WNOWAIT)
+    await house.start("cam", QUIET)
+    assert house.workers.pids()["cam"] != spare
+
+
+async def test_an_unused_spare_ends_with_the_workers(house: House) -> None:
+    house.workers.keep_spare()
+    spare = spare_of(house)
+    await house.workers.close()
+    assert not is_alive(spare)
+
+
+def loaded(*names: str) -> set[str]:
+    """Modules of the standard library that imports have loaded in a bare interpreter."""
+    libraries = [str(SDK), *(path for path in sys.path if path.endswith("site-packages"))]
+    program = (
+        f"import sys; sys.path += {libraries!r}\n"
+        f"for name in {names!r}: __import__(name)\n"
+        "print(*(n for n in sys.modules if n.partition('.')[0] in sys.stdlib_module_names))\n"
+    )
+    command = [str(base_interpreter()), "-I", "-S", "-c", program]
+    return set(subprocess.run(command, capture_output=True, text=True, check=True).stdout.split())
+
+
+def test_what_is_loaded_ahead_is_what_workers_need() -> None:
+    assert loaded(*PRELOADED, "nondum.sdk.worker") == loaded(*PRELOADED)
+    assert set(PRELOADED) <= loaded("nondum.sdk.worker")
