@@ -76,6 +76,11 @@ class ActivatePayload(PayloadEffect):
 
 
 @dataclass(frozen=True, slots=True)
+class CompileWheels(PayloadEffect):
+    """Byte-compile what an active payload runs, for the next start; it may fail or never end."""
+
+
+@dataclass(frozen=True, slots=True)
 class SuspendPayload(PayloadEffect):
     """Stop what runs of a quarantined payload and drop its venvs; it may be tried again."""
 

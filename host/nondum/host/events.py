@@ -271,6 +271,14 @@ class ProgressMade(Event):
     total: int
 
 
+@dataclass(frozen=True, slots=True)
+class WheelsCompiled(Event):
+    """Workers of a payload find its modules compiled when they are started again."""
+
+    JOURNALLED: ClassVar[bool] = False
+    payload: str
+
+
 # Workers
 
 

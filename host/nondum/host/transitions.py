@@ -35,7 +35,7 @@ TRANSITIONS: _Rows = {
     (Step.VERIFIED, events.PayloadStaged): Transition(Step.STAGED, effects.StoreWheels),
     (Step.STAGED, events.WheelsStored): Transition(Step.STORED, effects.ProbeComponents),
     (Step.STORED, events.ComponentsProbed): Transition(Step.PROBED, effects.ActivatePayload),
-    (Step.PROBED, events.PayloadActivated): Transition(Step.ACTIVE),
+    (Step.PROBED, events.PayloadActivated): Transition(Step.ACTIVE, effects.CompileWheels),
     **{
         (step, events.PayloadRefused): Transition(Step.REFUSED, effects.ClearPayload)
         for step in _INSTALLING

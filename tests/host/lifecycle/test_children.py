@@ -73,14 +73,9 @@ async def test_child_that_dies_is_told(tmp_path: Path) -> None:
 
 async def test_child_that_hangs_is_given_up(tmp_path: Path) -> None:
     """A FIFO that nobody writes to stands for a disk that never answers."""
-    folder = tmp_path / "nondum/org.example.fifo"
-    folder.mkdir(parents=True)
-    staging = tmp_path / "staging"
-    staging.mkdir()
-    os.mkfifo(staging / "CONTENTS")
     async with children() as pool:
         with pytest.raises(InstallFailed) as failed:
-            await pool.run("verify", {**host_facts(tmp_path), "staging": str(staging)}, stall_s=0.5)
+            await pool.run("verify", staged_fifo(tmp_path), stall_s=0.5)
         assert failed.value.code == "CHILD_STALLED"
 
 
@@ -96,6 +91,34 @@ async def test_cancelled_job_ends_its_child(tmp_path: Path) -> None:
         await asyncio.gather(job, return_exceptions=True)
         assert job.cancelled()
         assert not busy & pool.pids()
+
+
+async def test_work_aside_is_idle_and_ends_with_its_child(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "CONTENTS")
+    arguments = {**host_facts(tmp_path), "folder": str(tmp_path), "venvs": str(tmp_path)}
+    async with children() as pool:
+        job = asyncio.create_task(pool.run_aside("compile", arguments))
+        while not pool.pids():
+            await asyncio.wait([job], timeout=0.01)
+        (pid,) = pool.pids()
+        assert os.sched_getscheduler(pid) == os.SCHED_IDLE
+        with process_ended(pid) as ended:
+            job.cancel()
+            await ended.wait()
+        await asyncio.wait([job])
+        assert not pool.pids()
+
+
+async def test_work_aside_gives_its_answer(tmp_path: Path) -> None:
+    async with children() as pool:
+        assert await pool.run_aside("look", drive(tmp_path)) == []
+        assert not pool.pids()
+        with pytest.raises(DriveGone):
+            await pool.run_aside("look", drive(tmp_path / "nowhere"))
+        with pytest.raises(InstallFailed) as failed:
+            await pool.run_aside("verify", staged_fifo(tmp_path), stall_s=0.5)
+        assert failed.value.code == "CHILD_STALLED"
+        assert not pool.pids()
 
 
 async def test_one_spare_stays_when_work_has_ended(tmp_path: Path) -> None:
@@ -138,6 +161,13 @@ async def test_no_child_outlives_the_pool(tmp_path: Path) -> None:
 async def test_listing_of_an_empty_store_is_empty(tmp_path: Path) -> None:
     async with children() as pool:
         assert await pool.run("listing", {**host_facts(tmp_path), "folders": []}) == []
+
+
+def staged_fifo(root: Path) -> dict[str, Any]:
+    staging = root / "staging"
+    staging.mkdir()
+    os.mkfifo(staging / "CONTENTS")
+    return {**host_facts(root), "staging": str(staging)}
 
 
 def host_facts(root: Path) -> dict[str, Any]:

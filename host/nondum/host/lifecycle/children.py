@@ -28,6 +28,9 @@ SPARES = 2
 QUIET_S = 30.0
 """Without work for so long, one spare is enough."""
 
+ASIDE_STALL_S = 600.0
+"""Silence that is borne from a child that works only while nobody else does."""
+
 END_S = 1.0
 """How long a killed child is waited for: one that hangs in its disk cannot even die."""
 
@@ -67,17 +70,33 @@ class Children:
         except TimeoutError as error:
             await self._end(child)
             self.warm()
-            message = f"{job}: nothing was heard for {stall_s:g} s"
-            raise InstallFailed(Problem("CHILD_STALLED", message)) from error
+            raise _stalled(job, stall_s) from error
         except BaseException:
             await self._end(child)
             self.warm()
             raise
         self._busy.discard(child)
         await self._keep(child)
-        if "problems" in answer:
-            raise _error(answer)
-        return answer["result"]
+        return _result(answer)
+
+    async def run_aside(
+        self, job: str, arguments: Mapping[str, Any], *, stall_s: float = ASIDE_STALL_S
+    ) -> Any:
+        """Have a child of its own do a job with what processor and disk time nobody else wants.
+
+        Otherwise as `run`; the child ends with its job.
+        """
+        child = await _spawn()
+        self._busy.add(child)
+        try:
+            _make_idle(child.pid)
+            async with asyncio.timeout(None) as deadline:
+                answer = await _converse(child, job, arguments, None, deadline, stall_s)
+        except TimeoutError as error:
+            raise _stalled(job, stall_s) from error
+        finally:
+            await self._end(child)
+        return _result(answer)
 
     def warm(self) -> None:
         """Have a spare, soon, if there is none."""
@@ -164,7 +183,21 @@ async def _converse(
             on_progress(*answer["progress"])
 
 
-def _error(answer: Mapping[str, Any]) -> NondumError:
-    kind = getattr(errors, answer["error"], InstallFailed)
-    error: NondumError = kind(*(Problem(**problem) for problem in answer["problems"]))
-    return error
+def _make_idle(pid: int) -> None:
+    """SCHED_IDLE (sched(7)): below any niceness, and its disk accesses are idle, too."""
+    with contextlib.suppress(OSError):  # it died, which is told later, or a sandbox forbids it
+        os.sched_setscheduler(pid, os.SCHED_IDLE, os.sched_param(0))
+
+
+def _result(answer: Mapping[str, Any]) -> Any:
+    """What a job gave. Raises what it raised."""
+    if "problems" in answer:
+        kind = getattr(errors, answer["error"], InstallFailed)
+        error: NondumError = kind(*(Problem(**problem) for problem in answer["problems"]))
+        raise error
+    return answer["result"]
+
+
+def _stalled(job: str, stall_s: float) -> InstallFailed:
+    message = f"{job}: nothing was heard for {stall_s:g} s"
+    return InstallFailed(Problem("CHILD_STALLED", message))

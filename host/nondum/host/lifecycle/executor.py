@@ -28,6 +28,7 @@ from nondum.host.lifecycle.children import Children
 from nondum.host.lifecycle.folders import Folders
 from nondum.host.lifecycle.installation import Installation, InstallOptions
 from nondum.host.lifecycle.lanes import Lanes
+from nondum.host.lifecycle.quiet import Quiet
 from nondum.host.workers import Workers
 from nondum.sdk.errors import DriveGone, NondumError, Problem
 
@@ -59,6 +60,7 @@ class Executor:
         self._workers, self._emit = workers, emit
         self._children = Children()
         self._lanes = Lanes()
+        self._quiet = Quiet()
         self._drives = DriveReading(self._children, allow_unsigned=options.allow_unsigned)
         self.installation = Installation(host, folders, workers, self._children, emit, options)
         self._hands: Mapping[type[Effect], _Hand] = {
@@ -70,6 +72,7 @@ class Executor:
             effects.StoreWheels: self.installation.store,
             effects.ProbeComponents: self.installation.probe,
             effects.ActivatePayload: self.installation.activate,
+            effects.CompileWheels: self._compile,
             effects.SuspendPayload: self.installation.suspend,
             effects.ClearPayload: self.installation.clear,
             effects.RestartWorker: self._restart,
@@ -96,7 +99,8 @@ class Executor:
 
     async def _carry_out(self, effect: Effect) -> None:
         try:
-            reported = await self._hands[type(effect)](effect)
+            with self._urgent(effect):
+                reported = await self._hands[type(effect)](effect)
         except NondumError as error:
             reported = _failure(effect, error)
         except Exception as error:
@@ -106,8 +110,16 @@ class Executor:
         for event in reported:
             self._emit(event)
 
+    def _urgent(self, effect: Effect) -> contextlib.AbstractContextManager[None]:
+        can_wait = isinstance(effect, effects.CompileWheels)
+        return contextlib.nullcontext() if can_wait else self._quiet.urgent()
+
+    async def _compile(self, effect: effects.CompileWheels) -> tuple[Event, ...]:
+        return await self._quiet.run(partial(self.installation.compile, effect))
+
     async def _prune(self) -> None:
-        with contextlib.suppress(NondumError):  # tried again when the next payload goes
+        # What fails is tried again when the next payload goes.
+        with contextlib.suppress(NondumError), self._quiet.urgent():
             await self.installation.prune()
 
     async def _restart(self, effect: effects.RestartWorker) -> tuple[Event, ...]:
@@ -152,6 +164,9 @@ def _failure(effect: Effect, error: NondumError) -> tuple[Event, ...]:
             return (PayloadCleared(effect.payload),)
         case effects.SuspendPayload():
             log.error("%s is not suspended whole: %s", effect.payload, error)
+            return ()
+        case effects.CompileWheels():
+            log.info("%s stays as it is, not all compiled: %s", effect.payload, error)
             return ()
         case effects.PayloadEffect():
             return (PayloadRefused(effect.payload, error.problems),)

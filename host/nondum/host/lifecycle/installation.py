@@ -24,6 +24,7 @@ from nondum.host.events import (
     PayloadStaged,
     PayloadVerified,
     ProgressMade,
+    WheelsCompiled,
     WheelsStored,
 )
 from nondum.host.lifecycle.children import Children
@@ -74,6 +75,8 @@ class Installation:
         self._turns = asyncio.Semaphore(AT_ONCE)
         self._store = asyncio.Lock()
         """One process writes to the store."""
+        self._uncompiled: set[str] = set()
+        """Payloads whose workers would be started sooner if their modules were compiled."""
 
     async def prepare(self, state: HostState) -> None:
         """Clear away what a recovered state does not account for."""
@@ -142,6 +145,18 @@ class Installation:
             ),
         )
 
+    async def compile(self, effect: effects.CompileWheels) -> tuple[Event, ...]:
+        """Byte-compile in the store what it runs, and link that into its venvs.
+
+        What pip installed is left as it is.
+        """
+        if effect.payload in self._uncompiled:
+            arguments = self._arguments(**self._places(effect.payload))
+            async with self._store:
+                await self._children.run_aside("compile", arguments)
+            self._uncompiled.discard(effect.payload)
+        return (WheelsCompiled(effect.payload),)
+
     async def suspend(self, effect: effects.SuspendPayload) -> tuple[Event, ...]:
         """Keep of a payload only what another try needs."""
         await self._stop(effect.components)
@@ -171,13 +186,11 @@ class Installation:
 
     async def _install(self, key: str) -> int:
         """Run the job `install`; says how many wheels the store did not have."""
-        arguments = self._arguments(
-            folder=str(self._folders.payload(key)),
-            venvs=str(self._folders.venvs(key)),
-            python=str(base_interpreter()),
-        )
+        arguments = self._arguments(python=str(base_interpreter()), **self._places(key))
         async with self._store:
             told = await self._run("install", key, arguments)
+        if told["uncompiled"]:
+            self._uncompiled.add(key)
         self._prepared[key] = tuple(
             Prepared.parse(said, self._folders.scratch(said["id"])) for said in told["components"]
         )
@@ -196,10 +209,16 @@ class Installation:
         self, effect: effects.ClearPayload | effects.SuspendPayload, *folders: Path
     ) -> None:
         self._prepared.pop(effect.payload, None)
+        self._uncompiled.discard(effect.payload)
         scratches = [self._folders.scratch(component) for component in effect.components]
         for scratch in scratches:
             await in_thread(end_leftovers, scratch)
         await in_thread(_remove_all, (*folders, *scratches))
+
+    def _places(self, key: str) -> dict[str, str]:
+        """Where a payload's metadata and venvs are."""
+        folder, venvs = self._folders.payload(key), self._folders.venvs(key)
+        return {"folder": str(folder), "venvs": str(venvs)}
 
     def _arguments(self, **more: Any) -> dict[str, Any]:
         return {

@@ -7,7 +7,7 @@ from typing import Any
 
 from nondum.host.drives import reader
 from nondum.host.drives.reader import Arguments, Report
-from nondum.host.lifecycle import installing
+from nondum.host.lifecycle import compiling, installing
 
 Job = Callable[[Arguments, Report], Any]
 
@@ -16,6 +16,7 @@ JOBS: Mapping[str, Job] = {
     "copy": reader.copy,
     "verify": reader.verify,
     "install": installing.install,
+    "compile": compiling.compile_wheels,
     "prune": installing.prune,
     "listing": installing.listing,
     "sweep": installing.sweep,
