@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from tests.docs import codes
 
 from nondum.host import config
 from nondum.host.cli.main import cli
@@ -136,7 +137,7 @@ def _hook(name: str) -> str:
 
 def main() -> None:
     """Write what follows the mark of each document anew."""
-    for name, make in DOCUMENTS.items():
+    for name, make in {**DOCUMENTS, "codes.md": codes.references}.items():
         path = DOCS / name
         words = path.read_text(encoding="utf-8").partition(MARK)[0]
         path.write_text(f"{words}{MARK}\n{make()}", encoding="utf-8")
