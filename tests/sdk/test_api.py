@@ -82,6 +82,10 @@ def test_readme_plugin_works(worker: WorkerFactory) -> None:
         del sys.modules["blinker"]
 
 
+def test_front_page_shows_the_same_plugin() -> None:
+    assert python_blocks(ROOT / "README.md") == python_blocks(README)[:1]
+
+
 @pytest.mark.parametrize("block", python_blocks(DOCS))
 def test_documented_code_can_be_loaded(block: str) -> None:
     module = ModuleType("documented")

@@ -1,0 +1,94 @@
+"""The front page's session, typed as it is printed, prints what it shows."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PATIENCE_S = 30.0
+"""For a host to get where the page says it is."""
+
+pytestmark = [pytest.mark.lab, pytest.mark.timeout(300)]
+
+
+def session() -> Iterator[tuple[str, str]]:
+    """Every command of the page's terminals, and what it shows of its output."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    for block in re.findall(r"^```console\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
+        yield from re.findall(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", block, re.MULTILINE)
+
+
+def is_as_shown(shown: str, printed: str) -> bool:
+    """Whether an output is the one on the page, where `…` and decimal numbers stand for any."""
+    pattern = re.escape(shown).replace("…", ".*")
+    pattern = re.sub(r"\d+\\\.\d+", r"\\d+\\.\\d+", pattern)
+    return re.fullmatch(pattern, printed, re.DOTALL) is not None
+
+
+@pytest.fixture
+def environment(tmp_path: Path) -> dict[str, str]:
+    """A checkout, a user's home, and the environment that the set-up makes."""
+    (tmp_path / "plugins").symlink_to(ROOT / "plugins")
+    (tmp_path / "home").mkdir()
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("XDG_")}
+    return kept | {"HOME": str(tmp_path / "home"), "PATH": path, "PYTHONUNBUFFERED": "1"}
+
+
+def test_the_session_goes_as_it_is_printed(tmp_path: Path, environment: dict[str, str]) -> None:
+    host: subprocess.Popen[str] | None = None
+    try:
+        for command, shown in session():
+            if "activate" in command:
+                continue
+            if command.startswith("nondum host run"):
+                host = start(command, shown, tmp_path, environment)
+            else:
+                follow(command, shown, tmp_path, environment)
+        assert host is not None
+    finally:
+        if host is not None:
+            host.terminate()
+            host.communicate()
+
+
+def start(command: str, shown: str, folder: Path, env: dict[str, str]) -> subprocess.Popen[str]:
+    """Run what keeps running, until it has said what the page shows."""
+    host = subprocess.Popen(
+        ["bash", "-c", f"exec {command}"],
+        cwd=folder,
+        env=env,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    )
+    assert host.stdout is not None
+    printed = "".join(host.stdout.readline() for _ in shown.splitlines())
+    assert is_as_shown(shown, printed), printed
+    return host
+
+
+def follow(command: str, shown: str, folder: Path, env: dict[str, str]) -> None:
+    """Run a command; where a host has yet to get there, ask again as a person would."""
+    asks = command.startswith(("nondum goals", "nondum components", "nondum why"))
+    deadline = time.monotonic() + PATIENCE_S
+    while True:
+        done = subprocess.run(
+            ["bash", "-c", command],
+            cwd=folder,
+            env=env,
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+        )
+        if done.returncode == 0 and is_as_shown(shown, done.stdout):
+            return
+        assert asks and time.monotonic() < deadline, f"$ {command}\n{done.stdout}"
