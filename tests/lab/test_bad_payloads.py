@@ -67,7 +67,9 @@ def test_plugin_that_ends_again_and_again_is_quarantined(host: RunningHost, tmp_
 
 
 def test_command_line_shows_what_is_wrong(host: RunningHost, tmp_path: Path) -> None:
-    make_payload(tmp_path / "bad", bare(""), payload_id=BAD, requires='python = ">=3.99"')
+    make_payload(
+        tmp_path / "bad", bare(""), payload_id=BAD, requires='python = ">=3.99"', release=2
+    )
     host.plug(tmp_path / "bad")
     host.until("judged", judged, timeout_s=20)
     for command in (["status"], ["why"], ["journal", "--subject", BAD]):

@@ -43,6 +43,19 @@ def test_device_pulled_in_the_middle_of_a_behaviour(host: RunningHost) -> None:
     assert host.component("gauge") == before
 
 
+def test_behaviour_that_does_not_notice_is_halted_when_its_device_goes(host: RunningHost) -> None:
+    plug_gauge(host)
+    host.bring("gauge", gauge())
+    goal = host.want("(measured spot)")
+    host.until_goal(goal, "holds")
+    slots.unplug(host.devices, "port-1")  # its node can still be read
+    host.until_goal(goal, "suspended")
+    (end,) = (e["detail"] for e in host.journal("gauge") if e["event"] == "BehaviourEnded")
+    assert end["outcome"] == "HALTED"
+    plug_gauge(host)
+    host.until_goal(goal, "holds")
+
+
 def test_device_that_comes_after_its_component_is_as_good(host: RunningHost) -> None:
     host.bring("gauge", gauge())
     host.until_component("gauge", WAITS)
