@@ -11,8 +11,9 @@ import pytest
 
 from nondum.host.devices import UdevSource
 from nondum.host.devices.source import Found, Sightings
-from nondum.host.devices.udev import UDEV_RUNS, _look, _present
+from nondum.host.devices.udev import _look, _present
 from nondum.host.events import DeviceAppeared, DeviceRemoved, Event
+from nondum.host.uevents import UDEV_RUNS
 
 pytestmark = pytest.mark.anyio
 

@@ -7,7 +7,6 @@ alone, and no block devices, which are drives.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +14,7 @@ import pyudev
 
 from nondum.host.devices.source import Found, Sightings
 from nondum.host.events import Emit
-
-UDEV_RUNS = Path("/run/udev/control")
+from nondum.host.uevents import uevents
 
 
 class UdevSource:
@@ -24,25 +22,16 @@ class UdevSource:
 
     async def watch(self, emit: Emit) -> None:
         """Tell what is there, then what comes and goes (see `DeviceSource`)."""
-        monitor = pyudev.Monitor.from_netlink(pyudev.Context(), _voice())
-        monitor.start()
-        ready = asyncio.Event()
-        loop = asyncio.get_running_loop()
-        loop.add_reader(monitor.fileno(), ready.set)
         sightings = Sightings(emit)
-        try:
+        with uevents(pyudev.Context()) as messages:
             sightings.see_all(await asyncio.to_thread(_present))
             while True:
-                await ready.wait()
-                ready.clear()
-                for device in _received(monitor):
+                devices = await messages.next()
+                if devices is None:
+                    sightings.see_all(await asyncio.to_thread(_present))
+                    continue
+                for device in devices:
                     _look(device, sightings)
-        finally:
-            loop.remove_reader(monitor.fileno())
-
-
-def _voice() -> str:
-    return "udev" if UDEV_RUNS.exists() else "kernel"
 
 
 def _present() -> dict[str, Found]:
@@ -69,8 +58,3 @@ def _found(device: Any) -> Found:
 
 _FLEETING = frozenset({"ACTION", "SEQNUM", "USEC_INITIALIZED", "SYNTH_UUID", "DEVPATH"})
 """Properties that tell of the message, not of the device."""
-
-
-def _received(monitor: Any) -> Iterator[Any]:
-    while (device := monitor.poll(timeout=0)) is not None:
-        yield device

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pyudev
 
 from nondum.host.events import DriveInserted, DriveRemoved, DrivesScanned, Emit
-
-UDEV_RUNS = Path("/run/udev/control")
+from nondum.host.uevents import udev_runs, uevents
 
 Accepts = Callable[[pyudev.Device], bool]
 
@@ -19,11 +16,6 @@ Accepts = Callable[[pyudev.Device], bool]
 def is_usb_drive(device: pyudev.Device) -> bool:
     """Whether a block device hangs on USB: fixed disks are never touched."""
     return device.properties.get("ID_BUS") == "usb" or "/usb" in device.sys_path
-
-
-def udev_runs() -> bool:
-    """Whether udevd is there to tell of devices."""
-    return UDEV_RUNS.exists()
 
 
 class BlockSource:
@@ -40,25 +32,24 @@ class BlockSource:
     async def watch(self, emit: Emit) -> None:
         """Tell what is there, then what comes and goes, until cancelled."""
         context = pyudev.Context()
-        # Without udevd only the kernel's own messages arrive; they carry no file system.
-        source = "udev" if udev_runs() else "kernel"
-        monitor = pyudev.Monitor.from_netlink(context, source)
-        monitor.filter_by("block")
-        monitor.start()
-        ready = asyncio.Event()
-        loop = asyncio.get_running_loop()
-        loop.add_reader(monitor.fileno(), ready.set)
-        try:
-            for device in context.list_devices(subsystem="block"):
-                self._look(device, emit)
+        with uevents(context, "block") as messages:
+            self._look_at_all(context, emit)
             emit(DrivesScanned(self.kind, tuple(self._seen.values())))
             while True:
-                await ready.wait()
-                ready.clear()
-                for device in _received(monitor):
+                devices = await messages.next()
+                if devices is None:
+                    self._look_at_all(context, emit)
+                    continue
+                for device in devices:
                     self._look(device, emit)
-        finally:
-            loop.remove_reader(monitor.fileno())
+
+    def _look_at_all(self, context: pyudev.Context, emit: Emit) -> None:
+        """Compare what is there now with what was known."""
+        present = {d.sys_path: d for d in context.list_devices(subsystem="block")}
+        for path in self._seen.keys() - present.keys():
+            emit(DriveRemoved(self._seen.pop(path)))
+        for device in present.values():
+            self._look(device, emit)
 
     def _look(self, device: pyudev.Device, emit: Emit) -> None:
         """Compare one device with what was known of it."""
@@ -87,11 +78,6 @@ class BlockSource:
         if udev_runs() and "ID_FS_TYPE" not in device.properties:
             return False
         return self._accepts(device)
-
-
-def _received(monitor: Any) -> Iterator[pyudev.Device]:
-    while (device := monitor.poll(timeout=0)) is not None:
-        yield device
 
 
 def _drive(device: pyudev.Device) -> str:
