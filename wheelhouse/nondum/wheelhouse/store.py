@@ -13,23 +13,20 @@ from __future__ import annotations
 
 import ctypes
 import errno
-import hashlib
 import os
 import shutil
-from collections.abc import Callable, Collection, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
-from nondum.wheelhouse import bytecode, unpacking
+from nondum.wheelhouse import bytecode, checking, unpacking
 from nondum.wheelhouse.stored import FILES, MANIFEST, CompiledFiles, StoredWheel, read_entry
-from nondum.wheelhouse.unpacking import THREADS, Progress, Source, StoredFile, Unpacked
+from nondum.wheelhouse.unpacking import Progress, Source, Unpacked
 
 UNFINISHED = ".part"
 """Folder of an entry for what is not in its place yet."""
 
-_CHUNK = 1024 * 1024
 _libc = ctypes.CDLL(None, use_errno=True)
 
 
@@ -96,7 +93,7 @@ class Store:
                 where=str(stored.folder),
                 fix="it is unpacked again from the payload",
             )
-            for file in _damaged(stored)
+            for file in checking.damaged(stored.root, stored.all_files)
         )
 
     def whole(self, sha256: str) -> StoredWheel | None:
@@ -105,7 +102,9 @@ class Store:
         Compiled files are dropped if any of them is not. Raises `InstallFailed`.
         """
         stored = self.get(sha256)
-        if stored is None or not (damaged := _damaged(stored)):
+        if stored is None:
+            return None
+        if not (damaged := checking.damaged(stored.root, stored.all_files)):
             return stored
         if not set(damaged).isdisjoint(stored.files):
             return None
@@ -233,35 +232,6 @@ def _replace_manifest(wheel: StoredWheel) -> None:
     (unfinished / MANIFEST).rename(wheel.folder / MANIFEST)
     _sync_folder(wheel.folder)
     shutil.rmtree(unfinished)
-
-
-def _damaged(wheel: StoredWheel) -> tuple[StoredFile, ...]:
-    """Hash an entry's files again; those that are not as they were."""
-    with ThreadPoolExecutor(THREADS) as pool:
-        whole = pool.map(lambda file: _is_whole(wheel.root / file.path, file), wheel.all_files)
-        pairs = zip(wheel.all_files, whole, strict=True)
-        return tuple(file for file, is_whole in pairs if not is_whole)
-
-
-def _is_whole(path: Path, file: StoredFile) -> bool:
-    try:
-        with path.open("rb", buffering=0) as content:
-            is_same_size = os.fstat(content.fileno()).st_size == file.size
-            return is_same_size and _digest(content.fileno()) == file.sha256
-    except OSError:
-        return False
-
-
-def _digest(descriptor: int) -> str:
-    digest = hashlib.sha256()
-    for piece in _pieces(descriptor):
-        digest.update(piece)
-    return digest.hexdigest()
-
-
-def _pieces(descriptor: int) -> Iterator[bytes]:
-    while piece := os.read(descriptor, _CHUNK):
-        yield piece
 
 
 def _sync_file_system(folder: Path) -> None:
