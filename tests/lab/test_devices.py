@@ -14,18 +14,18 @@ pytestmark = pytest.mark.lab
 WAITS = "waits for gauge"
 
 
-def plug_gauge(host: RunningHost) -> Path:
+def plug_gauge(host: RunningHost, port: str = "port-1") -> Path:
     """Plug a gauge in; returns its node."""
-    node = host.work / "node"
+    node = host.work / f"node-at-{port}"
     node.write_text("1.5 bar\n")
-    slots.plug(host.devices, "port-1", str(node), {"ID_MODEL": "Gauge"})
+    slots.plug(host.devices, port, str(node), {"ID_MODEL": "Gauge"})
     return node
 
 
 def test_device_pulled_in_the_middle_of_a_behaviour(host: RunningHost) -> None:
     node = plug_gauge(host)
     host.bring("gauge", gauge())
-    before = host.component("gauge")
+    before = host.until_component("gauge", "ready")
     goal = host.want("(measured spot)")
     host.until_goal(goal, "holds")
     node.unlink()
@@ -38,9 +38,10 @@ def test_device_pulled_in_the_middle_of_a_behaviour(host: RunningHost) -> None:
     ends = [e["detail"] for e in host.journal("gauge") if e["event"] == "BehaviourEnded"]
     assert ends[0]["outcome"] == "FAILED"
     assert ends[0]["reason"].startswith("GAUGE_GONE")
-    plug_gauge(host)
+    plug_gauge(host, "port-2")
     host.until_goal(goal, "holds")
-    assert host.component("gauge") == before
+    assert before["devices"] == {"gauge": "port-1"}
+    assert host.component("gauge") == {**before, "devices": {"gauge": "port-2"}}
 
 
 def test_behaviour_that_does_not_notice_is_halted_when_its_device_goes(host: RunningHost) -> None:
