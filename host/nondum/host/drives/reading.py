@@ -41,7 +41,9 @@ class DriveReading:
             if error.code != "CHILD_STALLED":
                 raise
             message = f"does not answer within {LOOK_S:g} s"
-            raise DriveGone(Problem("DRIVE_STALLED", message, where=effect.drive)) from error
+            fix = "pull it and plug it in again, or into another port"
+            problem = Problem("DRIVE_STALLED", message, where=effect.drive, fix=fix)
+            raise DriveGone(problem) from error
         payloads = [
             PayloadFound(
                 payload=said["payload"],

@@ -46,6 +46,7 @@ def release_problems(state: HostState, found: PayloadFound, at: Moment) -> Itera
             where=where,
             need=f"at most {limit}",
             have=str(found.release),
+            fix="build it again with a plausible --release",
         )
 
 

@@ -54,6 +54,8 @@ def on_drive_read(turn: Turn, event: DriveRead) -> None:
         "carries no payload",
         where=event.drive,
         need="a folder nondum/<payload-id>",
+        have="none",
+        fix="make one with `nondum payload build`",
     )
     problems = () if event.payloads else (nothing,)
     turn.put_drive(replace(drive, state=DriveState.COPYING, problems=problems))

@@ -25,7 +25,9 @@ async def install(folder: Path, catalogue: Catalogue, bus: Bus) -> PayloadRecord
     """
     drive = _drive(folder.name)
     if drive in catalogue.state.drives:
-        raise PayloadRefused(Problem("ALREADY_PRESENT", "is installed already", where=folder.name))
+        fix = f"`nondum payload uninstall {folder.name}` first"
+        problem = Problem("ALREADY_PRESENT", "is installed already", where=folder.name, fix=fix)
+        raise PayloadRefused(problem)
     with_drive = _Watch(catalogue, bus, drive)
     bus.emit(DriveInserted(drive, folder, INSTALLED))
     try:

@@ -253,7 +253,8 @@ class Mind:
         if (words is None) == (pddl is None):
             raise ValueError("a goal is given in words or in PDDL")
         if self.composition is None:
-            raise GoalRefused(Problem("GOAL_TOO_EARLY", "the host does not know itself yet"))
+            text = "the host does not know itself yet"
+            raise GoalRefused(Problem("GOAL_TOO_EARLY", text, fix="ask again in a second"))
         if words is not None:
             return self.composition.book.goal(words)
         assert pddl is not None  # the other way to give one

@@ -47,7 +47,9 @@ def silent(component: str, silence_s: float) -> Problem:
 
 def overdue(component: str, startup_s: float) -> Problem:
     """It did not come through its start."""
-    return Problem("WORKER_HUNG", f"it did not start within {startup_s:g} s", where=component)
+    message = f"it did not start within {startup_s:g} s"
+    fix = f"see `nondum logs {component}`; a slow plugin needs a longer [workers] startup_s"
+    return Problem("WORKER_HUNG", message, where=component, fix=fix)
 
 
 def unhalted(component: str, behaviour: str, halt_s: float) -> Problem:
