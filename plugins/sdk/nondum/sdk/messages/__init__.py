@@ -2,29 +2,90 @@
 
 Named after the field's standard messages (sensor_msgs, vision_msgs, geometry_msgs); axes and units
 are those of REP-103: metres, radians, seconds, x forward, y left, z up. Constructors trust;
-`from_wire` and `check` do not.
+`from_wire` and `check` do not. Classes are made when they are first used: a worker needs two or
+three of them, and waits at its start for each.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
-from typing import Any
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from nondum.sdk.errors import MessageInvalid, Problem
-from nondum.sdk.messages.detections import BoundingBox2D, Detection, Detections
 from nondum.sdk.messages.fields import Buffer, Message
-from nondum.sdk.messages.header import Header
-from nondum.sdk.messages.images import CameraModel, Depth, Image
-from nondum.sdk.messages.motion import Bearing, Pose, Quaternion, Twist, Vector
-from nondum.sdk.messages.signals import Audio, Points, Scalar, Text
 
-MESSAGES: Mapping[str, type[Message]] = MappingProxyType(
-    {
-        kind.TYPE: kind
-        for kind in (Audio, Bearing, Depth, Detections, Image, Points, Pose, Scalar, Text, Twist)
-    }
+if TYPE_CHECKING:
+    from nondum.sdk.messages.detections import BoundingBox2D, Detection, Detections
+    from nondum.sdk.messages.header import Header
+    from nondum.sdk.messages.images import CameraModel, Depth, Image
+    from nondum.sdk.messages.motion import Bearing, Pose, Quaternion, Twist, Vector
+    from nondum.sdk.messages.signals import Audio, Points, Scalar, Text
+
+_HOME = {
+    "BoundingBox2D": "detections",
+    "Detection": "detections",
+    "Detections": "detections",
+    "Header": "header",
+    "CameraModel": "images",
+    "Depth": "images",
+    "Image": "images",
+    "Bearing": "motion",
+    "Pose": "motion",
+    "Quaternion": "motion",
+    "Twist": "motion",
+    "Vector": "motion",
+    "Audio": "signals",
+    "Points": "signals",
+    "Scalar": "signals",
+    "Text": "signals",
+}
+"""The module of each name."""
+_STREAMED = (
+    *("Audio", "Bearing", "Depth", "Detections", "Image"),
+    *("Points", "Pose", "Scalar", "Text", "Twist"),
 )
+"""The classes that streams and facts are of; their types are their names in small letters."""
+
+
+def _home_of(name: str) -> object:
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+
+
+if not TYPE_CHECKING:  # a checker that saw this would take any misspelt name for good
+
+    def __getattr__(name: str) -> object:
+        if name not in _HOME:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        value = globals()[name] = _home_of(name)  # from now on without this function
+        return value
+
+
+class _Classes(Mapping[str, type[Message]]):
+    """The streamed classes by type."""
+
+    def __init__(self) -> None:
+        self._names = {name.lower(): name for name in _STREAMED}
+        self._made: dict[str, type[Message]] = {}
+
+    def __getitem__(self, kind: str) -> type[Message]:
+        if kind not in self._made:
+            made = _home_of(self._names[kind])
+            assert isinstance(made, type) and issubclass(made, Message)
+            self._made[kind] = made
+        return self._made[kind]
+
+    def __contains__(self, kind: object) -> bool:
+        return kind in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
+MESSAGES: Mapping[str, type[Message]] = _Classes()
 """Every message class by its stream type."""
 
 
