@@ -5,6 +5,7 @@ Every problem is told at once, with what is needed and what is there.
 
 from __future__ import annotations
 
+import functools
 import os
 import platform
 import shutil
@@ -12,6 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+from types import MappingProxyType
 
 from packaging import markers, tags
 from packaging.markers import UndefinedComparison, UndefinedEnvironmentName
@@ -57,19 +59,36 @@ class HostFacts:
 
 def probe(state: Path, *, reserve_mb: int, confinement: int) -> HostFacts:
     """Look at this machine. `state` is where the store is, or will be."""
-    environment = {key: str(value) for key, value in markers.default_environment().items()}
     there = next(folder for folder in (state, *state.parents) if folder.exists())
     return HostFacts(
         architecture=platform.machine(),
         python=platform.python_version(),
-        environment=environment,
-        tags=tuple(tags.sys_tags()),
+        environment=_environment(),
+        tags=_tags(),
         free_disk_mb=max(0, shutil.disk_usage(there).free // _MB - reserve_mb),
         free_memory_mb=_free_memory_mb(),
         gpu_memory_mb=gpu.free_memory_mb(_free_memory_mb),
         confinement=confinement,
-        nondum=metadata.version("nondum"),
+        nondum=_version(),
     )
+
+
+# What stays as it is while a process lives is looked at once: all of it takes ten milliseconds.
+
+
+@functools.cache
+def _environment() -> Mapping[str, str]:
+    return MappingProxyType({k: str(v) for k, v in markers.default_environment().items()})
+
+
+@functools.cache
+def _tags() -> tuple[Tag, ...]:
+    return tuple(tags.sys_tags())
+
+
+@functools.cache
+def _version() -> str:
+    return metadata.version("nondum")
 
 
 def select(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from nondum.wheelhouse.manifest import ComponentManifest
 from nondum.wheelhouse.payload import StagedPayload
 from nondum.wheelhouse.store import Store
 from nondum.wheelhouse.stored import StoredWheel
+from nondum.wheelhouse.unpacking import THREADS
 
 
 def install(arguments: Arguments, report: Report) -> dict[str, Any]:
@@ -97,9 +99,10 @@ def _stored(
     copied = [(path, sha256) for path, sha256 in paths if path.exists()]
     added = store.add_all(copied, lambda done, total: report("install", done, total))
     stored = {wheel.sha256: wheel for wheel in added}
-    for locked in wheels:
-        if locked.sha256 not in stored:
-            stored[locked.sha256] = _checked(store, locked)
+    known = [locked for locked in wheels if locked.sha256 not in stored]
+    with ThreadPoolExecutor(THREADS) as pool:
+        checked = pool.map(lambda locked: _checked(store, locked), known)
+        stored.update((wheel.sha256, wheel) for wheel in checked)
     return stored, fresh
 
 
