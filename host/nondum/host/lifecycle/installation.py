@@ -6,7 +6,6 @@ Each may be done again after a crash, and leaves either its result or what was t
 from __future__ import annotations
 
 import asyncio
-import os
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -231,22 +230,10 @@ class Installation:
 
 
 def _move(staging: Path, lasting: Path) -> None:
-    """Rename a folder whose files are all on disk first."""
+    """Rename a folder. Whoever says that its payload is stored sees to it that it is on disk."""
     remove(lasting)
     lasting.parent.mkdir(parents=True, exist_ok=True)
-    for folder, _, files in os.walk(staging):
-        for path in (*(Path(folder) / name for name in files), Path(folder)):
-            _sync(path)
     staging.rename(lasting)
-    _sync(lasting.parent)
-
-
-def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _remove_all(folders: Iterable[Path]) -> None:

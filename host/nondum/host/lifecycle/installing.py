@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -16,6 +17,7 @@ from nondum.wheelhouse import build, venvs
 from nondum.wheelhouse.lock import LockedWheel
 from nondum.wheelhouse.manifest import ComponentManifest
 from nondum.wheelhouse.payload import StagedPayload
+from nondum.wheelhouse.preflight import HostFacts
 from nondum.wheelhouse.store import Store
 from nondum.wheelhouse.stored import StoredWheel
 from nondum.wheelhouse.unpacking import THREADS
@@ -24,27 +26,59 @@ from nondum.wheelhouse.unpacking import THREADS
 def install(arguments: Arguments, report: Report) -> dict[str, Any]:
     """Make a payload's venvs and tell what its workers are started from. Idempotent.
 
-    Raises `InstallFailed` (DISK_FULL, STORE_DAMAGED, …) and `PayloadRefused`.
+    Afterwards, whatever a starting daemon needs to make them again is safe on disk. Raises
+    `InstallFailed` (DISK_FULL, STORE_DAMAGED, …) and `PayloadRefused`.
     """
-    folder = Path(arguments["folder"])
+    folder, root = Path(arguments["folder"]), Path(arguments["venvs"])
+    by_pip = arguments["method"] == "pip"
     staged = reader.load_staged(folder)
     facts = reader.facts_of(arguments)
-    python, root = Path(arguments["python"]), Path(arguments["venvs"])
-    wheels = staged.wheels(facts)
     root.mkdir(parents=True, exist_ok=True)
-    fresh, uncompiled = 0, False
-    if arguments["method"] == "pip":
-        for component, chosen in wheels.items():
-            venvs.make_with_pip(root / component, python, folder, chosen)
-    else:
-        stored, fresh = _stored(arguments, folder, reader.chosen(staged, facts), report)
-        for component, chosen in wheels.items():
-            linked = [stored[locked.sha256] for locked in chosen]
-            venvs.make(root / component, python, linked)
-        uncompiled = any(wheel.compiled_here is None for wheel in stored.values())
+    with ThreadPoolExecutor(1) as pool:  # disks take their time; what is linked is not waited for
+        synced = pool.submit(_sync, folder, with_wheels=by_pip)
+        if by_pip:
+            _make_with_pip(arguments, staged, facts)
+            fresh, uncompiled = 0, False
+        else:
+            fresh, uncompiled = _make(arguments, staged, facts, report)
+        synced.result()
+    if not by_pip:
         shutil.rmtree(folder / "wheels", ignore_errors=True)  # the store has them now
     components = [_told(staged, component, root) for component in staged.manifest.components]
     return {"fresh": fresh, "uncompiled": uncompiled, "components": components}
+
+
+def _make(
+    arguments: Arguments, staged: StagedPayload, facts: HostFacts, report: Report
+) -> tuple[int, bool]:
+    """Make the venvs from the store; how many wheels it did not have, and whether any was there
+    that is not compiled yet."""
+    wheels = reader.chosen(staged, facts)
+    stored, fresh = _stored(arguments, staged.folder, wheels, report)
+    for component, chosen in staged.wheels(facts).items():
+        linked = [stored[locked.sha256] for locked in chosen]
+        venvs.make(Path(arguments["venvs"]) / component, Path(arguments["python"]), linked)
+    return fresh, any(wheel.compiled_here is None for wheel in stored.values())
+
+
+def _make_with_pip(arguments: Arguments, staged: StagedPayload, facts: HostFacts) -> None:
+    for component, chosen in staged.wheels(facts).items():
+        venv = Path(arguments["venvs"]) / component
+        venvs.make_with_pip(venv, Path(arguments["python"]), staged.folder, chosen)
+
+
+def _sync(folder: Path, *, with_wheels: bool) -> None:
+    """Have a payload's folder on disk: its metadata, and wheels where the store has them not."""
+    files = [path for path in folder.iterdir() if path.is_file()]
+    wheels = folder / "wheels"
+    if with_wheels and wheels.exists():
+        files += [*wheels.iterdir(), wheels]
+    for path in (*files, folder, folder.parent):
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def stored_names(wheels: dict[str, tuple[LockedWheel, ...]]) -> set[str]:
