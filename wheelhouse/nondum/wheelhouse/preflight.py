@@ -69,7 +69,7 @@ def probe(state: Path, *, reserve_mb: int, confinement: int) -> HostFacts:
         free_memory_mb=_free_memory_mb(),
         gpu_memory_mb=gpu.free_memory_mb(_free_memory_mb),
         confinement=confinement,
-        nondum=_version(),
+        nondum=nondum_version(),
     )
 
 
@@ -87,7 +87,8 @@ def _tags() -> tuple[Tag, ...]:
 
 
 @functools.cache
-def _version() -> str:
+def nondum_version() -> str:
+    """The version of nondum that runs here."""
     return metadata.version("nondum")
 
 

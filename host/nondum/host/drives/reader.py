@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator, Mapping
-from importlib.metadata import distributions, version
+from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any
 
@@ -166,7 +166,7 @@ def _found(folder: Path, verifier: Verifier) -> dict[str, Any]:
 
 
 def _version_problems(listed: Contents) -> Iterator[Problem]:
-    have = version("nondum")
+    have = preflight.nondum_version()
     if Version(listed.minimum_nondum) > Version(have):
         yield Problem(
             "NONDUM_VERSION",

@@ -14,10 +14,12 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TextIO
 
 from nondum.host.lifecycle.jobs import JOBS
 from nondum.sdk.errors import NondumError, Problem
+from nondum.wheelhouse import preflight
 
 MEMORY_BYTES = 2 * 1024**3
 DESCRIPTORS = 512
@@ -33,6 +35,8 @@ def main(daemon: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(DESCRIPTORS, hard), hard))
+    # What is found and imported now is there when somebody waits for a job.
+    preflight.probe(Path.cwd(), reserve_mb=0, confinement=0)
     # Whatever prints goes to stderr: stdout belongs to the conversation.
     with os.fdopen(os.dup(1), "w", buffering=1) as answers:
         os.dup2(2, 1)
