@@ -12,7 +12,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from nondum.sdk.errors import InstallFailed, Problem
@@ -20,6 +20,7 @@ from nondum.wheelhouse.lock import LockedWheel
 from nondum.wheelhouse.stored import StoredWheel
 
 PIP_TIMEOUT_S = 600
+PIP_ALIVE_S = 5
 
 
 def site_packages(venv: Path) -> Path:
@@ -60,10 +61,17 @@ def add_compiled(venv: Path, wheels: Sequence[StoredWheel]) -> None:
         raise _failed(error, venv) from error
 
 
-def make_with_pip(venv: Path, python: Path, folder: Path, wheels: Sequence[LockedWheel]) -> None:
+def make_with_pip(
+    venv: Path,
+    python: Path,
+    folder: Path,
+    wheels: Sequence[LockedWheel],
+    alive: Callable[[], None] = lambda: None,
+) -> None:
     """Make a venv by pip, from the wheels of a staged payload folder, by hash and offline.
 
-    pip runs from this interpreter, never from the venv. Raises `InstallFailed` (PIP_FAILED).
+    pip runs from this interpreter, never from the venv; `alive` is called every few seconds while
+    it does. Raises `InstallFailed` (PIP_FAILED).
     """
     unfinished = _fresh(venv)
     _skeleton(unfinished, python)
@@ -78,20 +86,33 @@ def make_with_pip(venv: Path, python: Path, folder: Path, wheels: Sequence[Locke
         *("--no-input", "--disable-pip-version-check", "--quiet", "--no-warn-script-location"),
         *("--target", str(site_packages(unfinished)), "--requirement", str(requirements)),
     ]
-    done = subprocess.run(
-        command,
-        capture_output=True,
-        text=True,
-        timeout=PIP_TIMEOUT_S,
-        env={"PATH": os.defpath, "LC_ALL": "C.UTF-8"},
-        check=False,
-    )
-    if done.returncode:
+    failure = _run_pip(command, alive)
+    if failure is not None:
         shutil.rmtree(unfinished, ignore_errors=True)
-        last = (done.stderr.strip().splitlines() or ["pip said nothing"])[-1]
-        raise InstallFailed(Problem("PIP_FAILED", last, where=str(folder)))
+        raise InstallFailed(Problem("PIP_FAILED", failure, where=str(folder)))
     requirements.unlink()
     unfinished.rename(venv)
+
+
+def _run_pip(command: Sequence[str], alive: Callable[[], None]) -> str | None:
+    """Why pip failed, or None when it did not."""
+    with subprocess.Popen(
+        command,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={"PATH": os.defpath, "LC_ALL": "C.UTF-8"},
+    ) as pip:
+        for _ in range(0, PIP_TIMEOUT_S, PIP_ALIVE_S):
+            try:
+                _, errors = pip.communicate(timeout=PIP_ALIVE_S)
+            except subprocess.TimeoutExpired:
+                alive()
+                continue
+            last = (errors.strip().splitlines() or ["pip said nothing"])[-1]
+            return last if pip.returncode else None
+        pip.kill()
+    return f"pip was not done after {PIP_TIMEOUT_S} s"
 
 
 def remove(venv: Path) -> None:

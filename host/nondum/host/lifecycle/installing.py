@@ -6,6 +6,7 @@ import os
 import shutil
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,7 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
     with ThreadPoolExecutor(1) as pool:  # disks take their time; what is linked is not waited for
         synced = pool.submit(_sync, folder, with_wheels=by_pip)
         if by_pip:
-            _make_with_pip(arguments, staged, facts)
+            _make_with_pip(arguments, staged, facts, report)
             fresh, uncompiled = 0, False
         else:
             fresh, uncompiled = _make(arguments, staged, facts, report)
@@ -61,10 +62,15 @@ def _make(
     return fresh, any(wheel.compiled_here is None for wheel in stored.values())
 
 
-def _make_with_pip(arguments: Arguments, staged: StagedPayload, facts: HostFacts) -> None:
-    for component, chosen in staged.wheels(facts).items():
-        venv = Path(arguments["venvs"]) / component
-        venvs.make_with_pip(venv, Path(arguments["python"]), staged.folder, chosen)
+def _make_with_pip(
+    arguments: Arguments, staged: StagedPayload, facts: HostFacts, report: Report
+) -> None:
+    selected = staged.wheels(facts)
+    for number, (component, chosen) in enumerate(selected.items()):
+        venv, python = Path(arguments["venvs"]) / component, Path(arguments["python"])
+        # pip tells nothing of its progress: that it is at work is all that there is to report.
+        alive = partial(report, "pip", number, len(selected))
+        venvs.make_with_pip(venv, python, staged.folder, chosen, alive)
 
 
 def _sync(folder: Path, *, with_wheels: bool) -> None:
