@@ -138,7 +138,7 @@ class TaskControl:
     def _uphold(self, world: World) -> Footing:
         ground = footing(world, self.runs.values(), self._twins)
         for run, lacking in ground.fallen:
-            run.halt(f"its guard is broken: {in_words(lacking)} does not hold")
+            run.halt(f"its guard is broken: {do_not_hold(lacking)}")
         return ground
 
     # When no rest of the plan is supported
@@ -183,7 +183,8 @@ class TaskControl:
             return Phase.UNDER_WAY
         link = stuck.missing[0]
         needed = "the goal" if link.consumer == GOAL else self.regression.steps[link.consumer].name
-        return self._give_up(f"{in_words(stuck.facts)} does not hold, which {needed} needs")
+        lacking = {other.fact for other in stuck.missing if other.consumer == link.consumer}
+        return self._give_up(f"{do_not_hold(lacking)}, which {needed} needs")
 
     def _give_up(self, why: str) -> Phase:
         """Hold safely until there is another plan: nothing that moves the body goes on."""
@@ -283,3 +284,12 @@ def in_words(facts: Collection[str]) -> str:
     '(ready cam)'
     """
     return ", ".join(f"({fact})" for fact in sorted(facts))
+
+
+def do_not_hold(facts: Collection[str]) -> str:
+    """The sentence that facts are not so.
+
+    >>> do_not_hold({"ready cam"})
+    '(ready cam) does not hold'
+    """
+    return f"{in_words(facts)} {'do' if len(facts) > 1 else 'does'} not hold"
