@@ -41,7 +41,11 @@ def environment(tmp_path: Path) -> dict[str, str]:
     (tmp_path / "plugins").symlink_to(ROOT / "plugins")
     (tmp_path / "home").mkdir()
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    kept = {name: value for name, value in os.environ.items() if not name.startswith("XDG_")}
+    kept = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith(("XDG_", "PYTEST_"))
+    }
     return kept | {"HOME": str(tmp_path / "home"), "PATH": path, "PYTHONUNBUFFERED": "1"}
 
 
