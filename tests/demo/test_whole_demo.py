@@ -42,6 +42,6 @@ def test_every_stage_reaches_its_goal(options: tuple[str, ...]) -> None:
 def test_a_wrong_mount_fails_the_demonstration() -> None:
     """The operator tells a mount turned by half a right angle: drivers and host cannot know."""
     done = demonstrate("--wrong-mount", "45", "--seed", "1")
+    assert done.returncode == 1, done.stdout + done.stderr
     document = json.loads(done.stdout)
-    assert done.returncode == 1
     assert [stage["reached"] for stage in document["stages"]] == [True, True, False]

@@ -55,10 +55,12 @@ def _own_words(merged: Merged) -> Iterator[Problem]:
 
 def _warned(kind: str, own: Collection[str], core: Collection[str]) -> Iterator[Problem]:
     for name in sorted(own):
-        near = difflib.get_close_matches(name, core, n=1, cutoff=0.0)
+        near = difflib.get_close_matches(name, core, n=1)
         yield Problem(
             "W-OWN-WORD",
             f"{kind} {name!r} is in no other fragment that is known here",
             where=name,
-            fix=f"the nearest word of nondum-core is {near[0]!r}" if near else "",
+            fix=f"the nearest word of nondum-core is {near[0]!r}"
+            if near
+            else "keep it if no word of nondum-core means the same",
         )
