@@ -30,7 +30,9 @@ def main() -> None:
         found = measuring.measure(carried, half, chosen.rounds, work, _say)
     finally:
         shutil.rmtree(work / "host", ignore_errors=True)
-    told = (*machine.describe(work), f"{chosen.rounds} rounds")
+    calm = [is_calm for findings in found for is_calm in findings.calm]
+    load = f"{sum(calm)} of {len(calm)} measurements began on a calm machine"
+    told = (*machine.describe(work), f"{chosen.rounds} rounds; {load}")
     tables = report.as_markdown(Results(told, found, missing))
     chosen.output.parent.mkdir(parents=True, exist_ok=True)
     chosen.output.write_text(f"{METHOD.read_text(encoding='utf-8')}\n{tables}", encoding="utf-8")

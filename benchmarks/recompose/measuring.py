@@ -15,9 +15,10 @@ from benchmarks.recompose import insertion
 from benchmarks.recompose.image import Image
 from benchmarks.recompose.payloads import CONTENT, Carried
 from benchmarks.recompose.podman import Podman
-from benchmarks.recompose.processes import pss_mb
+from benchmarks.recompose.processes import await_calm, pss_mb
 from benchmarks.recompose.results import FIRST, KNOWN, LOAD, START, Container, Findings
 
+CALM_TIMEOUT_S = 30.0
 Say = Callable[[str], None]
 
 
@@ -74,7 +75,7 @@ def _insert(payload: Carried, findings: Findings, work: Path) -> None:
     shutil.rmtree(work, ignore_errors=True)
     with insertion.fresh_host(work) as robot:
         for way in (FIRST, KNOWN):
-            os.sync()  # what others have yet to write is not this one's burden
+            _settle(findings)
             done = insertion.insert(robot, payload.drive, payload.component, payload.goal)
             findings.insertions.setdefault(way, []).append(done)
             if way == KNOWN:
@@ -82,10 +83,16 @@ def _insert(payload: Carried, findings: Findings, work: Path) -> None:
             insertion.remove(robot, payload.drive)
 
 
+def _settle(findings: Findings) -> None:
+    """What others have yet to write, or are doing, is not the burden of what comes next."""
+    os.sync()
+    findings.calm.append(await_calm(timeout_s=CALM_TIMEOUT_S))
+
+
 def _contain(payload: Carried, findings: Findings, half: Containers) -> None:
     image = half.images[payload.name]
     for way in (LOAD, START):
-        os.sync()
+        _settle(findings)
         began_s = time.monotonic()
         if way == LOAD:
             half.podman.load(image.tar)

@@ -10,6 +10,9 @@ from pathlib import Path
 PROC = Path("/proc")
 _QUIET_S = 0.6
 """How long nothing may have been done for processes to count as at rest."""
+_CALM = 0.95
+"""Idle share of the processors from which on a machine counts as calm."""
+_CALM_S = 0.5
 _TICK_S = 1 / os.sysconf("SC_CLK_TCK")
 
 
@@ -56,3 +59,32 @@ def await_rest(pid: int, *, timeout_s: float) -> None:
             return
         before = after
     raise TimeoutError(f"process {pid} does not come to rest")
+
+
+def await_calm(*, timeout_s: float) -> bool:
+    """Wait until the whole machine has next to nothing to do; answer whether that came."""
+    until_s = time.monotonic() + timeout_s
+    before = processor_ticks()
+    while time.monotonic() < until_s:
+        time.sleep(_CALM_S)
+        after = processor_ticks()
+        if is_calm(before, after):
+            return True
+        before = after
+    return False
+
+
+def is_calm(before: tuple[int, int], after: tuple[int, int]) -> bool:
+    """Whether processors were idle between two looks at their ticks.
+
+    >>> is_calm((100, 200), (196, 300)), is_calm((100, 200), (190, 300))
+    (True, False)
+    """
+    return after[0] - before[0] >= _CALM * (after[1] - before[1])
+
+
+def processor_ticks(proc: Path = PROC) -> tuple[int, int]:
+    """Idle time and all time of all processors since the machine started."""
+    first, _, _ = (proc / "stat").read_text().partition("\n")
+    ticks = [int(word) for word in first.split()[1:9]]
+    return ticks[3] + ticks[4], sum(ticks)  # idle and iowait

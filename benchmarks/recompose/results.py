@@ -38,6 +38,8 @@ class Findings:
     """Way → seconds until a container was ready."""
     memory: list[Memory] = field(default_factory=list)
     containers: list[Container] = field(default_factory=list)
+    calm: list[bool] = field(default_factory=list)
+    """Of each measurement, whether the machine had nothing else to do when it began."""
 
     def ready_s(self, way: str) -> list[float]:
         """Seconds until ready, by round; empty when it was not measured."""

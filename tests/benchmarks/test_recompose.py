@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -35,7 +36,7 @@ def row_of(text: str, *words: str) -> str:
     return row
 
 
-@pytest.mark.parametrize("module", [spreads, report], ids=lambda module: module.__name__)
+@pytest.mark.parametrize("module", [spreads, report, processes], ids=lambda module: module.__name__)
 def test_examples_are_true(module: ModuleType) -> None:
     assert doctest.testmod(module).failed == 0
 
@@ -74,6 +75,11 @@ def child() -> Iterator[subprocess.Popen[bytes]]:
         started.stdout.readline()
         yield started
         started.communicate()
+
+
+def test_ticks_count_every_processor(tmp_path: Path) -> None:
+    (tmp_path / "stat").write_text("cpu  10 0 5 100 3 0 2 0 0 0\ncpu0 1 0\n", encoding="utf-8")
+    assert processes.processor_ticks(tmp_path) == (103, 120)
 
 
 def test_memory_and_time_of_a_real_process(child: subprocess.Popen[bytes]) -> None:
