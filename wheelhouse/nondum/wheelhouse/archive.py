@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import itertools
+import re
 import stat
 import struct
 import zipfile
@@ -33,6 +34,7 @@ _ZIP64 = 0xFFFFFFFF
 _DESCRIPTOR_MAX = 24
 """Longest data descriptor that may follow a member; no header fits in it."""
 _CHUNK = 1024 * 1024
+_CONTROL = re.compile(r"[\x00-\x1f]")
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +206,7 @@ def _path_flaw(info: zipfile.ZipInfo) -> str | None:
     parts = path.rstrip("/").split("/")
     if path.startswith("/") or ".." in parts:
         return "leaves the wheel"
-    if "\\" in info.orig_filename or ":" in path or any(ord(c) < 32 for c in info.orig_filename):
+    if "\\" in info.orig_filename or ":" in path or _CONTROL.search(info.orig_filename):
         return "has characters that paths may not have"
     if "" in parts or "." in parts:
         return "is not in its shortest form"

@@ -248,7 +248,12 @@ def _content_problems(members: tuple[Member, ...], name: str, filename: str) -> 
 def _target_problems(files: Sequence[PlannedFile], filename: str) -> Iterator[Problem]:
     """Two files in one place: of two schemes, or one where another needs a folder."""
     targets = Counter(file.target for file in files)
-    folders = {str(parent) for target in targets for parent in PurePosixPath(target).parents}
+    folders: set[str] = set()
+    for target in targets:
+        parent = target.rpartition("/")[0]
+        while parent and parent not in folders:  # those above a known one are known
+            folders.add(parent)
+            parent = parent.rpartition("/")[0]
     for target, count in targets.items():
         if count > 1 or target in folders:
             text = f"{target!r} would be two things at once"
