@@ -38,6 +38,7 @@ class PyperplanPlanner:
     """Complete: without pruning by preferred operators, every reachable state is looked at."""
 
     speaks: ClassVar[str] = "ground"
+    handles: ClassVar[frozenset[str]] = frozenset()
 
     def plan(self, task: GroundTask, deadline_s: float) -> Answer:
         """Search for at most about `deadline_s` seconds; never raises for lack of time."""

@@ -1,7 +1,8 @@
-"""The seam that planners are plugged in behind: a ground task in, a typed answer out.
+"""The seam that planners are plugged in behind: a task in, a typed answer out.
 
-A planner is an entry point in group `nondum.planners` that loads to a class with a `speaks`
-attribute and a `plan` method. It runs in a process of its own and is killed when it overruns.
+A planner is an entry point in group `nondum.planners` that loads to a class with `speaks` and
+`handles` attributes and a `plan` method. It runs in a process of its own and is killed when it
+overruns.
 """
 
 from __future__ import annotations
@@ -9,17 +10,36 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Protocol, TypeAlias, runtime_checkable
 
+CONDITIONAL_EFFECTS = "conditional-effects"
+"""A feature that a planner may handle: actions with effects under conditions."""
+DERIVED_PREDICATES = "derived-predicates"
+"""A feature that a planner may handle: facts that follow from others by rules."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionalEffect:
+    """Changes that an action makes only where a condition holds when it is applied."""
+
+    condition: frozenset[int]
+    add: frozenset[int]
+    delete: frozenset[int]
+
 
 @dataclass(frozen=True, slots=True)
 class GroundAction:
-    """An action with all its parameters bound. Facts are indices into `GroundTask.facts`."""
+    """An action with all its parameters bound. Facts are indices into `GroundTask.facts`.
+
+    All conditions are read before anything changes, and what is both deleted and added holds
+    afterwards. A disjunctive precondition makes several actions of one name.
+    """
 
     name: str
-    """`schema obj obj …`, unique in its task; the schema is `plugin.action`."""
+    """`schema obj obj …`; the schema is `plugin.action`."""
     precondition: frozenset[int]
     add: frozenset[int]
     delete: frozenset[int]
     cost: int = 1
+    conditional: tuple[ConditionalEffect, ...] = ()
 
     @property
     def schema(self) -> str:
@@ -33,14 +53,52 @@ class GroundAction:
 
 
 @dataclass(frozen=True, slots=True)
+class Rule:
+    """A derived fact that holds wherever all of `body` does."""
+
+    head: int
+    body: frozenset[int]
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    """Derived facts that depend on each other; earlier layers are settled before it.
+
+    In each state the rules are applied until nothing changes; after that, the second fact of each
+    of `complements` holds where the first does not. Source: PDDL 2.2 (Edelkamp and Hoffmann 2004),
+    stratified semantics.
+    """
+
+    rules: tuple[Rule, ...]
+    complements: tuple[tuple[int, int], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class GroundTask:
-    """A STRIPS task: positive facts only; a negated fact that matters has a twin `not-p`."""
+    """A STRIPS task: positive facts only; a negated fact that matters has a twin of its own."""
 
     facts: tuple[str, ...]
     """`predicate obj obj …` by index."""
     init: frozenset[int]
+    """Without derived facts."""
     goal: frozenset[int]
     actions: tuple[GroundAction, ...]
+    derived: tuple[Layer, ...] = ()
+    """In the order in which they are settled."""
+
+    @property
+    def features(self) -> frozenset[str]:
+        """What a planner must handle to be asked: `CONDITIONAL_EFFECTS`, `DERIVED_PREDICATES`."""
+        conditional = {CONDITIONAL_EFFECTS for action in self.actions if action.conditional}
+        return frozenset(conditional | ({DERIVED_PREDICATES} if self.derived else set()))
+
+
+@dataclass(frozen=True, slots=True)
+class PddlTask:
+    """The same task in words, for planners that ground by themselves."""
+
+    domain: str
+    problem: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +107,13 @@ class Plan:
 
     steps: tuple[int, ...]
     cost: int
+
+
+@dataclass(frozen=True, slots=True)
+class PlanText:
+    """A plan as a planner of `PddlTask` gives it: `action obj obj …` for each step."""
+
+    steps: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,15 +139,35 @@ class GaveUp:
 
 
 Answer: TypeAlias = Plan | AlreadyTrue | Unsolvable | GaveUp
+"""What is known after a search."""
+
+TextAnswer: TypeAlias = PlanText | AlreadyTrue | Unsolvable | GaveUp
+"""What a planner of PDDL text answers."""
 
 
 @runtime_checkable
 class Planner(Protocol):
-    """What a planner plugin provides."""
+    """A planner of ground tasks."""
 
     speaks: ClassVar[str]
-    """`ground`: `plan` takes a `GroundTask`."""
+    """`ground`."""
+    handles: ClassVar[frozenset[str]]
+    """The features beyond STRIPS that it may be asked about."""
 
     def plan(self, task: GroundTask, deadline_s: float) -> Answer:
+        """Search for at most about `deadline_s` seconds."""
+        ...
+
+
+@runtime_checkable
+class TextPlanner(Protocol):
+    """A planner of PDDL text, such as a solver that is a program of its own."""
+
+    speaks: ClassVar[str]
+    """`pddl`."""
+    handles: ClassVar[frozenset[str]]
+    """The features beyond STRIPS that it may be asked about."""
+
+    def plan(self, task: PddlTask, deadline_s: float) -> TextAnswer:
         """Search for at most about `deadline_s` seconds."""
         ...
