@@ -99,6 +99,12 @@ class Pursuit:
         """Whether a plan is being searched for."""
         return self._search is not None
 
+    @property
+    def excluded(self) -> frozenset[str]:
+        """The actions that failed too often to be planned with for now."""
+        now_s = self._now_s()
+        return frozenset(n for n, until_s in self._excluded_until_s.items() if until_s > now_s)
+
     # Between ticks
 
     def step(self) -> None:
@@ -175,10 +181,8 @@ class Pursuit:
     # Searching
 
     def _situation(self, goal: str) -> Situation:
-        now_s = self._now_s()
         revision = self._composition.revision if self._composition else 0
-        excluded = frozenset(n for n, until_s in self._excluded_until_s.items() if until_s > now_s)
-        return Situation(goal, revision, self._beliefs.world.bare_facts, excluded)
+        return Situation(goal, revision, self._beliefs.world.bare_facts, self.excluded)
 
     def _is_on_its_way(self, wanted: GivenGoal) -> bool:
         """Whether a goal has a plan that goes on, or will have one soon."""
