@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
+from nondum.planning.facts import twin
+from nondum.planning.testimony import Source
 from nondum.planning.world import WorldModel
 
 
@@ -117,8 +117,10 @@ def test_facts_about_absent_objects_are_parked(world: WorldModel) -> None:
     world.know("near cup", "map", 0.0)
     world.frame(objects=frozenset(), observed=frozenset())
     assert not world.facts
-    assert "parked: there is no object cup now" in world.why("near cup")
+    assert world.parked() == ("near cup",)
+    assert world.evidence("near cup").absent == ("cup",)
     world.frame(objects=frozenset({"cup"}), observed=frozenset())
+    assert world.parked() == ()
     assert world.facts == {"near cup"}
 
 
@@ -140,56 +142,132 @@ def test_same_news_again_changes_nothing(world: WorldModel) -> None:
 
 
 def test_twins_are_nobodys_claim(world: WorldModel) -> None:
-    world.establish("s", "c", add=["on", "not-off"], delete=["off", "not-on"], at_s=0.0)
+    world.establish("s", "c", add=["on", twin("off")], delete=["off", twin("on")], at_s=0.0)
     assert world.facts == {"on"}
 
 
-def test_why_tells_both_sides(world: WorldModel) -> None:
+def said(sources: tuple[Source, ...]) -> list[str]:
+    return [source.said for source in sources]
+
+
+def test_evidence_tells_both_sides(world: WorldModel) -> None:
     stream(world)
-    assert world.why("free img") == (
-        "(free img) does not hold",
-        "for it: nobody uses it",
-        "against it: stream cam is established",
-    )
-    assert world.why("flowing img")[1] == "for it: stream cam is established"
-    assert world.why("rain") == ("(rain) does not hold", "nobody has said so")
+    free = world.evidence("free img")
+    assert not free.holds
+    assert said(free.pros) == ["nobody uses it"]
+    assert said(free.cons) == ["stream cam is established"]
+    assert free.cons[0].action == "stream cam"
+    flowing = world.evidence("flowing img")
+    assert (flowing.holds, flowing.since_s) == (True, 1.0)
+    rain = world.evidence("rain")
+    assert (rain.holds, rain.pros, rain.cons, rain.since_s) == (False, (), (), None)
 
 
-names = st.sampled_from(["a", "b", "c"])
-told = st.one_of(
-    st.tuples(st.just("know"), names, names),
-    st.tuples(st.just("forget"), names, names),
-    st.tuples(st.just("establish"), names, names),
-    st.tuples(st.just("end"), names, names),
-    st.tuples(st.just("succeed"), names, names),
-)
-
-
-@given(st.lists(told, max_size=12), st.lists(told, max_size=12))
-def test_removal_leaves_no_trace_of_a_component(
-    before: list[tuple[str, str, str]], after: list[tuple[str, str, str]]
-) -> None:
-    world = WorldModel()
-    for news in before:
-        tell(world, *news, component="guest")
-    world.remove_component("guest", ())
+def test_news_beat_what_a_running_behaviour_took(world: WorldModel) -> None:
+    world.know("docked rover", "dock", 0.0)
+    world.establish("drive", "base", add=[], delete=["docked rover"], at_s=1.0)
     assert not world.facts
-    fresh = WorldModel()
-    for news in after:
-        tell(world, *news, component="other")
-        tell(fresh, *news, component="other")
-    assert world.facts == fresh.facts
+    world.know("docked rover", "dock", 2.0)
+    assert world.facts == {"docked rover"}
 
 
-def tell(world: WorldModel, what: str, one: str, other: str, *, component: str) -> None:
-    match what:
-        case "know":
-            world.know(one, component, 0.0)
-        case "forget":
-            world.forget(one, component, 0.0)
-        case "establish":
-            world.establish(f"s {one}", component, add=[one], delete=[other], at_s=0.0)
-        case "end":
-            world.end(f"s {one}")
-        case "succeed":
-            world.succeed(f"f {one}", component, add=[one], delete=[other], at_s=0.0)
+def test_dead_observer_lets_nothing_be_believed(world: WorldModel) -> None:
+    world.succeed("open", "arm", add=["open door"], delete=[], at_s=0.0)
+    world.forget("open door", "camera", 1.0)
+    world.silence("camera")
+    assert not world.facts
+
+
+def test_denial_goes_with_who_denied(world: WorldModel) -> None:
+    world.seed("map", ["at a"], 0.0)
+    world.succeed("go a b", "base", add=["at b"], delete=["at a"], at_s=1.0)
+    world.remove_component("base", ())
+    assert world.facts == {"at a"}
+
+
+# Functional predicates
+
+
+@pytest.fixture
+def placed(world: WorldModel) -> WorldModel:
+    """A world in which a thing is at one place."""
+    places = frozenset({"cup", "pot", "a", "b", "c"})
+    world.frame(objects=places, observed=frozenset(), functional=frozenset({"at"}))
+    return world
+
+
+def test_observation_beats_a_default(placed: WorldModel) -> None:
+    placed.know("at cup b", "camera", 0.0)
+    placed.seed("map", ["at cup a", "at pot a"], 1.0)
+    assert placed.facts == {"at cup b", "at pot a"}
+    assert placed.evidence("at cup a").rival == "at cup b"
+    placed.remove_component("camera", ())
+    assert placed.facts == {"at cup a", "at pot a"}
+
+
+def test_effect_withdraws_the_earlier_place(placed: WorldModel) -> None:
+    placed.know("at cup a", "camera", 0.0)
+    placed.succeed("carry cup b", "arm", add=["at cup b"], delete=[], at_s=1.0)
+    assert placed.facts == {"at cup b"}
+
+
+def test_effect_waits_where_conditions_observe(placed: WorldModel) -> None:
+    places, at = frozenset({"cup", "a", "b"}), frozenset({"at"})
+    placed.frame(objects=places, observed=at, functional=at)
+    placed.know("at cup a", "camera", 0.0)
+    placed.establish("hold cup b", "arm", add=["at cup b"], delete=[], at_s=1.0)
+    assert placed.facts == {"at cup a"}
+
+
+def test_running_behaviour_hides_a_place_until_it_ends(placed: WorldModel) -> None:
+    placed.seed("map", ["at cup a"], 0.0)
+    placed.establish("hold cup b", "arm", add=["at cup b"], delete=[], at_s=1.0)
+    assert placed.facts == {"at cup b"}
+    assert placed.bare_facts == {"at cup a"}
+    placed.end("hold cup b")
+    assert placed.facts == {"at cup a"}
+
+
+def test_newest_of_two_observers_wins_and_both_are_named(placed: WorldModel) -> None:
+    placed.know("at cup a", "left", 1.0)
+    placed.know("at cup b", "right", 0.0)
+    assert placed.facts == {"at cup a"}
+    [problem] = placed.conflicts()
+    assert problem.code == "E-FACT-CONFLICT"
+    assert "left says (at cup a), right says (at cup b)" in problem.message
+    assert "the newest is believed: (at cup a)" in problem.message
+    placed.forget("at cup a", "left", 2.0)
+    assert placed.facts == {"at cup b"}
+    assert not placed.conflicts()
+
+
+def test_observer_that_moves_on_contradicts_nobody(placed: WorldModel) -> None:
+    placed.know("at cup a", "camera", 0.0)
+    placed.know("at cup b", "camera", 1.0)
+    assert placed.facts == {"at cup b"}
+    assert not placed.conflicts()
+    placed.forget("at cup b", "camera", 2.0)
+    assert not placed.facts
+
+
+def test_word_that_turns_functional_later_is_sorted_out(world: WorldModel) -> None:
+    world.know("at cup a", "camera", 0.0)
+    world.know("at cup b", "camera", 1.0)
+    objects = frozenset({"cup", "a", "b"})
+    world.frame(objects=objects, observed=frozenset(), functional=frozenset({"at"}))
+    assert world.facts == {"at cup b"}
+
+
+def test_functional_predicate_of_one_argument_has_one(world: WorldModel) -> None:
+    objects = frozenset({"slow", "fast"})
+    world.frame(objects=objects, observed=frozenset(), functional=frozenset({"speed"}))
+    world.know("speed slow", "base", 0.0)
+    world.know("speed fast", "base", 1.0)
+    assert world.facts == {"speed fast"}
+
+
+def test_value_that_is_parked_outdoes_nobody(placed: WorldModel) -> None:
+    placed.know("at cup a", "left", 0.0)
+    placed.know("at cup attic", "right", 1.0)
+    assert placed.facts == {"at cup a"}
+    assert not placed.conflicts()

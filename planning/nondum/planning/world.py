@@ -1,62 +1,30 @@
 """The world model: what the robot believes, where it has each belief from, and since when.
 
-A fact holds while somebody live supports it: the host, a fragment, a component that says so, or a
-behaviour that succeeded. On top lie the effects of established lasting behaviours, for as long as
-they run. What a component observes beats what others assume. There is no clock: times are passed
-in, in seconds, and only shown.
+Every voice's last word on every fact is kept (see `testimony`), and what holds is worked out from
+all of them: the order in which news of different moments arrive changes nothing, and who goes away
+leaves exactly what never depended on them. On top lie the effects of established lasting
+behaviours, for as long as they run. There is no clock: times are passed in, in seconds.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, replace
-from enum import Enum
-from typing import Any, TypeAlias
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
+from typing import Any
 
 from nondum.planning.facts import is_twin, parts
-
-
-class SourceKind(Enum):
-    """What kind of voice supports a fact."""
-
-    HOST = "host"
-    """The host itself: what is plugged in, ready, idle. Nobody else can deny it."""
-    FRAGMENT = "fragment"
-    """A component's problem fragment; applied once, when the component appears."""
-    OBSERVATION = "observation"
-    """A component says so, now."""
-    EFFECT = "effect"
-    """A behaviour succeeded, so it is assumed."""
-
-
-@dataclass(frozen=True, slots=True)
-class Source:
-    """One voice for or against a fact."""
-
-    kind: SourceKind
-    who: str
-    """The component that the belief goes away with; the host's name for the host's own."""
-    said: str
-    """In words, for people: `behaviour localise succeeded`."""
-    at_s: float
-    value: Any = None
-    """What a valued fact carries beside it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Overlay:
-    """The effects of an established lasting behaviour."""
-
-    add: frozenset[str]
-    delete: frozenset[str]
-    source: Source
-
-
-Voice: TypeAlias = tuple[SourceKind, str]
-"""What kind of source, and who."""
-
-_FIRM = (SourceKind.HOST, SourceKind.OBSERVATION)
-_ASSUMED = (SourceKind.FRAGMENT, SourceKind.EFFECT)
+from nondum.planning.rivals import Weight, conflict, group_of, outdone
+from nondum.planning.testimony import (
+    Evidence,
+    Overlay,
+    Source,
+    SourceKind,
+    Testimony,
+    Voice,
+    stands,
+    weight,
+)
+from nondum.sdk.errors import Problem
 
 
 class WorldModel:
@@ -65,12 +33,14 @@ class WorldModel:
     def __init__(self) -> None:
         self.revision = 0
         """Rises with every change."""
-        self._supports: dict[str, dict[Voice, Source]] = {}
-        self._denials: dict[str, Source] = {}
+        self._testimony = Testimony()
         self._overlays: dict[str, Overlay] = {}
         self._seeded: dict[str, frozenset[str]] = {}
         self._observed: frozenset[str] = frozenset()
+        self._functional: frozenset[str] = frozenset()
         self._objects: frozenset[str] | None = None
+        self._parked: set[str] = set()
+        self._words_taken = 0
         self._facts: frozenset[str] | None = None
         self._bare: frozenset[str] | None = None
 
@@ -105,88 +75,115 @@ class WorldModel:
         if not self.holds(fact):
             return None
         valued = [source for source in self.sources(fact) if source.value is not None]
-        return max(valued, key=lambda source: source.at_s).value if valued else None
+        return max(valued, key=lambda source: source.moment).value if valued else None
 
     def sources(self, fact: str) -> tuple[Source, ...]:
-        """Who supports a fact, oldest first; lasting behaviours last."""
-        found = sorted(self._supports.get(fact, {}).values(), key=lambda s: s.at_s)
-        return (*found, *(o.source for o in self._overlays.values() if fact in o.add))
+        """Who speaks for a fact, oldest first; lasting behaviours last."""
+        return tuple(word for word in self._words(fact) if not word.is_against)
 
-    def why(self, fact: str) -> tuple[str, ...]:
-        """Sentences that explain why a fact holds or does not."""
-        verdict = "holds" if self.holds(fact) else "does not hold"
-        lines = [f"({fact}) {verdict}"]
-        lines += [f"for it: {source.said}" for source in self.sources(fact)]
-        if denial := self._denials.get(fact):
-            lines.append(f"against it: {denial.said}")
-        lines += [
-            f"against it: {o.source.said}" for o in self._overlays.values() if fact in o.delete
-        ]
-        if unknown := self._unknown_objects(fact):
-            lines.append(f"parked: there is no object {', '.join(unknown)} now")
-        if len(lines) == 1:
-            lines.append("nobody has said so")
-        return tuple(lines)
+    def evidence(self, fact: str) -> Evidence:
+        """All that speaks for a fact and against it."""
+        words = self._words(fact)
+        return Evidence(
+            fact,
+            self.holds(fact),
+            tuple(word for word in words if not word.is_against),
+            tuple(word for word in words if word.is_against),
+            rival=self._believed_rival(fact),
+            absent=tuple(self._absent(fact)),
+        )
+
+    def parked(self) -> tuple[str, ...]:
+        """The facts that would hold if all the objects that they name were there."""
+        return tuple(sorted(f for f in self._parked if self._is_upheld(f, ())))
+
+    def conflicts(self) -> tuple[Problem, ...]:
+        """Where components observe different values of a functional predicate (E-FACT-CONFLICT)."""
+        observed: dict[str, dict[str, str]] = {}
+        for fact in self._functional_facts():
+            for source in self._standing(fact, ()) if fact not in self._parked else ():
+                if source.kind is SourceKind.OBSERVATION:
+                    observed.setdefault(group_of(fact), {})[source.who] = fact
+        return tuple(
+            conflict(says, next((f for f in says.values() if self.holds(f)), ""))
+            for _, says in sorted(observed.items())
+            if len(set(says.values())) > 1
+        )
 
     # What the host knows
 
-    def frame(self, *, objects: frozenset[str], observed: frozenset[str]) -> None:
-        """Say which objects there are, and which predicates components observe.
+    def frame(
+        self,
+        *,
+        objects: frozenset[str],
+        observed: frozenset[str],
+        functional: frozenset[str] = frozenset(),
+    ) -> None:
+        """Say which objects there are, and which predicates are observed or functional.
 
         Facts about other objects are parked until the object appears. The effects of behaviours on
-        observed predicates are not assumed but waited for.
+        observed predicates are not assumed but waited for. A functional predicate has at most one
+        last argument for each of the others.
         """
-        if (objects, observed) != (self._objects, self._observed):
-            self._objects, self._observed = objects, observed
-            self._changed()
+        if (objects, observed, functional) == (self._objects, self._observed, self._functional):
+            return
+        self._objects, self._observed, self._functional = objects, observed, functional
+        self._parked = {fact for fact in self._testimony if self._absent(fact)}
+        for fact in self._functional_facts():
+            self._leave_newest(fact)
+        self._changed()
 
     def set_host_facts(self, host: str, facts: Mapping[str, str], at_s: float) -> None:
         """Replace all that the host itself asserts: fact → why, in words."""
-        key = (SourceKind.HOST, host)
-        for fact in [f for f, voices in self._supports.items() if key in voices]:
+        voice = (SourceKind.HOST, host)
+        for fact in self._testimony:
             if fact not in facts:
-                self._silence(fact, [key])
+                self._drop(fact, voice)
         for fact, said in facts.items():
-            if key not in self._voices(fact):
-                self._support(fact, Source(SourceKind.HOST, host, said, at_s))
+            if voice not in self._testimony.of(fact):
+                self._take(fact, Source(SourceKind.HOST, host, said, at_s))
 
     def seed(self, component: str, facts: Iterable[str], at_s: float) -> None:
         """Apply a component's problem fragment; again only for facts that it did not have."""
         facts = frozenset(facts)
         for fact in sorted(facts - self._seeded.get(component, frozenset())):
             said = f"the fragment of {component} says so"
-            self._support(fact, Source(SourceKind.FRAGMENT, component, said, at_s))
+            self._take(fact, Source(SourceKind.FRAGMENT, component, said, at_s))
         self._seeded[component] = facts
 
     # What components say
 
     def know(self, fact: str, component: str, at_s: float, *, value: Any = None) -> None:
         """A component says that a fact holds, perhaps with a value."""
-        self._undeny(fact)
         said = f"{component} says so"
-        self._support(fact, Source(SourceKind.OBSERVATION, component, said, at_s, value))
+        self._take(fact, Source(SourceKind.OBSERVATION, component, said, at_s, value))
 
     def forget(self, fact: str, component: str, at_s: float) -> None:
         """A component says that a fact does not hold (any more).
 
-        What others observe and what the host knows stays; what was only assumed goes.
+        What others observe and what the host knows stays; what was only assumed gives way.
         """
-        own = (SourceKind.OBSERVATION, component)
-        self._silence(fact, [v for v in self._voices(fact) if v == own or v[0] in _ASSUMED])
         said = f"{component} says that it does not hold"
-        self._deny(fact, Source(SourceKind.OBSERVATION, component, said, at_s))
+        source = Source(SourceKind.OBSERVATION, component, said, at_s, is_against=True)
+        self._take(fact, source)
 
     def recant(self, fact: str, component: str) -> None:
         """A component takes back what it said against a fact, without saying that it holds."""
-        denial = self._denials.get(fact)
-        if denial and denial.who == component:
-            self._undeny(fact)
+        voice = (SourceKind.OBSERVATION, component)
+        word = self._testimony.of(fact).get(voice)
+        if word and word.is_against:
+            self._drop(fact, voice)
 
     def silence(self, component: str) -> None:
-        """A component can say nothing any more: what it observes and what it runs is unknown."""
+        """A component can say nothing any more: what it observes and what it runs is unknown.
+
+        Its word against a fact stays: nothing comes to be believed because an observer died.
+        """
         voice = (SourceKind.OBSERVATION, component)
-        for fact in [f for f, voices in self._supports.items() if voice in voices]:
-            self._silence(fact, [voice])
+        for fact in self._testimony:
+            word = self._testimony.of(fact).get(voice)
+            if word and not word.is_against:
+                self._drop(fact, voice)
         for name in [n for n, o in self._overlays.items() if o.source.who == component]:
             self.end(name)
 
@@ -197,9 +194,8 @@ class WorldModel:
     ) -> None:
         """The effects of a lasting behaviour hold from now until `end`."""
         added = _positive(add)
-        for fact in added:
-            self._undeny(fact)
-        source = Source(SourceKind.EFFECT, component, f"{name} is established", at_s)
+        said = f"{name} is established"
+        source = self._numbered(Source(SourceKind.LASTING, component, said, at_s, action=name))
         self._overlays[name] = Overlay(added, _positive(delete) - added, source)
         self._changed()
 
@@ -213,71 +209,116 @@ class WorldModel:
     ) -> None:
         """A finishing behaviour succeeded: its effects are believed unless they are observed."""
         added = _positive(add)
-        source = Source(SourceKind.EFFECT, component, f"{name} succeeded", at_s)
-        for fact in _positive(delete) - added:
+        said = f"{name} succeeded"
+        source = Source(SourceKind.EFFECT, component, said, at_s, action=name)
+        ended = replace(source, said=f"{said} and ended it", is_against=True)
+        words = {**dict.fromkeys(_positive(delete), ended), **dict.fromkeys(added, source)}
+        for fact, word in words.items():
             if parts(fact)[0] not in self._observed:
-                self._silence(fact, [v for v in self._voices(fact) if v[0] is not SourceKind.HOST])
-                self._deny(fact, replace(source, said=f"{name} succeeded and ended it"))
-        for fact in added:
-            if parts(fact)[0] not in self._observed:
-                self._undeny(fact)
-                self._support(fact, source)
+                self._take(fact, word)
 
     # What goes away
 
     def remove_component(self, component: str, objects: Collection[str]) -> None:
-        """Retract all that a component supports, denies and runs, and all about its objects."""
-        for fact in list(self._supports):
+        """Retract all that a component says and runs, and all about its objects."""
+        for fact in self._testimony:
             is_about = not set(parts(fact)[1]).isdisjoint(objects)
-            self._silence(fact, [v for v in self._voices(fact) if is_about or v[1] == component])
-        self._denials = {f: s for f, s in self._denials.items() if s.who != component}
+            for voice in [v for v in self._testimony.of(fact) if is_about or v[1] == component]:
+                self._drop(fact, voice)
         self._overlays = {n: o for n, o in self._overlays.items() if o.source.who != component}
         self._seeded.pop(component, None)
         self._changed()
 
-    def _voices(self, fact: str) -> Mapping[Voice, Source]:
-        return self._supports.get(fact, {})
+    # Keeping words
 
-    def _support(self, fact: str, source: Source) -> None:
-        voices = self._supports.setdefault(fact, {})
-        is_new = not voices
-        voices[source.kind, source.who] = source
-        if is_new or fact in self._denials:  # else no other fact is true than before
+    def _take(self, fact: str, source: Source) -> None:
+        is_new_word = (source.kind, source.who) not in self._testimony.of(fact)
+        is_plain = fact in self._testimony and fact not in self._testimony.contested
+        self._testimony.take(fact, self._numbered(source))
+        if is_new_word and self._absent(fact):
+            self._parked.add(fact)
+        if parts(fact)[0] in self._functional:
+            self._leave_newest(fact)
+            is_plain = is_plain and not self._testimony.rivals(fact)
+        overlays = self._overlays.values()
+        if source.is_against or not is_plain or any(fact in o.delete for o in overlays):
+            self._changed()  # else no other fact is true than before
+
+    def _leave_newest(self, fact: str) -> None:
+        """A voice that gives a functional predicate another value takes its earlier one back."""
+        for voice, word in tuple(self._testimony.of(fact).items()):
+            if word.is_against or word.kind is SourceKind.FRAGMENT:
+                continue
+            for rival in tuple(self._testimony.rivals(fact)):
+                other = self._testimony.of(rival).get(voice)
+                if other and not other.is_against:
+                    self._drop(rival if other.moment < word.moment else fact, voice)
+
+    def _drop(self, fact: str, voice: Voice) -> None:
+        if self._testimony.drop(fact, voice):
+            if fact not in self._testimony:
+                self._parked.discard(fact)
             self._changed()
 
-    def _silence(self, fact: str, voices: Collection[Voice]) -> None:
-        for voice in voices:
-            del self._supports[fact][voice]
-        if voices:
-            if not self._supports[fact]:
-                del self._supports[fact]
-            self._changed()
-
-    def _deny(self, fact: str, source: Source) -> None:
-        self._denials[fact] = source
-        self._changed()
-
-    def _undeny(self, fact: str) -> None:
-        if self._denials.pop(fact, None):
-            self._changed()
+    def _numbered(self, source: Source) -> Source:
+        self._words_taken += 1
+        return replace(source, number=self._words_taken)
 
     def _changed(self) -> None:
         self.revision += 1
         self._facts = self._bare = None
 
+    # Working out what holds
+
     def _holding(self, overlays: Iterable[Overlay]) -> frozenset[str]:
         overlays = tuple(overlays)
-        added = frozenset[str]().union(*(o.add for o in overlays)) - self._denials.keys()
-        deleted = frozenset[str]().union(*(o.delete for o in overlays))
-        facts = {fact for fact in self._supports if fact not in deleted} | added
-        for fact in self._denials.keys() & facts:
-            if not any(kind in _FIRM for kind, _ in self._voices(fact)):
-                facts.discard(fact)
-        if self._objects is not None:
-            facts = {fact for fact in facts if not self._unknown_objects(fact)}
+        touched = frozenset[str]().union(*(o.add | o.delete for o in overlays))
+        facts = self._testimony.uncontested() - touched
+        doubtful = touched.union(self._testimony.contested)
+        facts |= {fact for fact in doubtful if self._is_upheld(fact, overlays)}
+        facts -= self._parked
+        facts -= {fact for fact in touched if self._absent(fact)}
+        if self._functional:
+            facts -= outdone(facts, self._functional, lambda f: self._weight(f, overlays))
         return frozenset(facts)
 
-    def _unknown_objects(self, fact: str) -> list[str]:
+    def _is_upheld(self, fact: str, overlays: Iterable[Overlay]) -> bool:
+        return any(True for _ in self._standing(fact, overlays))
+
+    def _standing(self, fact: str, overlays: Iterable[Overlay]) -> Iterator[Source]:
+        """The words for a fact that stand against all those against it."""
+        words = self._words(fact, overlays)
+        cons = [word for word in words if word.is_against]
+        for word in words:
+            if not word.is_against and all(stands(word, con) for con in cons):
+                yield word
+
+    def _words(self, fact: str, overlays: Iterable[Overlay] | None = None) -> list[Source]:
+        words = sorted(self._testimony.of(fact).values(), key=lambda word: word.moment)
+        for overlay in self._overlays.values() if overlays is None else overlays:
+            words += overlay.words(fact)
+        return words
+
+    # Functional predicates
+
+    def _weight(self, fact: str, overlays: Iterable[Overlay]) -> Weight:
+        is_observed = parts(fact)[0] in self._observed
+        words = self._standing(fact, overlays)
+        return max(weight(word, is_observed=is_observed) for word in words)
+
+    def _functional_facts(self) -> Iterator[str]:
+        if self._functional:
+            yield from (f for f in self._testimony if f.partition(" ")[0] in self._functional)
+
+    def _believed_rival(self, fact: str) -> str:
+        if parts(fact)[0] not in self._functional or self.holds(fact):
+            return ""
+        group = group_of(fact)
+        return next((f for f in sorted(self.facts) if group_of(f) == group), "")
+
+    # Parking
+
+    def _absent(self, fact: str) -> list[str]:
         if self._objects is None:
             return []
         return [name for name in parts(fact)[1] if name not in self._objects]
