@@ -85,8 +85,13 @@ class Questions:
         return [stream_row(stream) for stream in self.workers.streams.listing()]
 
     async def facts(self, arguments: Arguments) -> list[Row]:
-        """What is believed, and why."""
-        return self.mind.views.facts(why=arguments.optional_text("why"))
+        """What is believed; or, `parked`, what waits for objects that are not there."""
+        is_parked = arguments.flag("parked")
+        return self.mind.views.parked() if is_parked else self.mind.views.facts()
+
+    async def fact(self, arguments: Arguments) -> Row:
+        """One fact, true or not, and all that bears on it."""
+        return self.mind.views.fact(arguments.text("fact"))
 
     async def goals(self, arguments: Arguments) -> Row:
         """What can be asked for, and what was."""

@@ -18,6 +18,7 @@ def answering(questions: Questions, orders: Orders) -> dict[str, Verb]:
         "behaviours": questions.behaviours,
         "components": questions.components,
         "devices": questions.devices,
+        "fact": questions.fact,
         "facts": questions.facts,
         "goal": orders.goal,
         "goals": questions.goals,

@@ -24,7 +24,7 @@ ROWS: dict[str, set[str]] = {
         "pid",
         "problem",
     },
-    "facts": {"fact", "source", "value"},
+    "facts": {"fact", "age_s", "source", "value"},
     "journal": {
         "id",
         "when",
@@ -98,14 +98,15 @@ STREAM                       TYPE    COMPONENT  FLOWING  CONSUMERS
 panther__beacon__brightness  scalar  beacon     no       -
 """
 FACTS = """\
-FACT                                              SOURCE                                       VALUE
-free panther__beacon__brightness                  nobody uses it                               -
-idle panther__beacon__lamp                        nobody uses it                               -
-on panther__beacon__lamp panther                  beacon is plugged into this host             -
-output panther__beacon__lamp                      beacon declares it                           -
+FACT                                        SINCE  SOURCE                                      VALUE
+free panther__beacon__brightness            AGE    nobody uses it                              -
+idle panther__beacon__lamp                  AGE    nobody uses it                              -
+on panther__beacon__lamp panther            AGE    beacon is plugged into this host            -
+output panther__beacon__lamp                AGE    beacon declares it                          -
 panther__beacon__brightness
-ready panther__beacon__lamp                       beacon is healthy and its devices are there  -
-self panther                                      this is the host that plans                  -
+ready panther__beacon__lamp                 AGE    beacon is healthy and its devices are       -
+                                                   there
+self panther                                AGE    this is the host that plans                 -
 """
 GOALS = """\
 WORDS         GOAL                      KIND
@@ -146,6 +147,7 @@ SHOWN = {
 def normalised(text: str) -> str:
     """What a command printed, without what differs from run to run."""
     text = re.sub(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d", "WHEN", text)
+    text = re.sub(r"(?<=  )\d+ (?:s|min)(?= )", lambda age: "AGE".ljust(len(age[0])), text)
     return re.sub(r"(revision|world model  —|people  —) \d+", r"\1 N", text)
 
 
@@ -215,11 +217,32 @@ def test_the_store_says_who_needs_what(daemon: Daemon) -> None:
 
 
 def test_one_fact_is_explained_whether_it_is_true_or_not(daemon: Daemon) -> None:
-    shown = daemon.run("facts", "--why", f"(ready {LAMP})").ok().out
-    because = "for it: beacon is healthy and its devices are there"
-    assert shown == f"(ready {LAMP}) holds\n{because}\n"
+    shown = re.sub(
+        r"\d+ s ago", "AGE ago", daemon.run("facts", "--why", f"(ready {LAMP})").ok().out
+    )
+    assert shown == (
+        f"(ready {LAMP}) holds\n"
+        "for it: beacon is healthy and its devices are there, AGE ago\n"
+        "note: the host itself says so, or not\n"
+    )
     untrue = daemon.run("facts", "--why", f"flowing {BRIGHTNESS}").ok().out
-    assert untrue.startswith(f"(flowing {BRIGHTNESS}) does not hold\n")
+    assert untrue == (
+        f"(flowing {BRIGHTNESS}) does not hold\n"
+        "nobody has said so\n"
+        "would be made true by: test-beacon.shine\n"
+    )
+
+
+def test_a_fact_amiss_gets_the_nearest_words(daemon: Daemon) -> None:
+    assert "did you mean 'flowing'?" in daemon.run("facts", "--why", "flowin x").ok().out
+    assert "did you mean 'panther'?" in daemon.run("facts", "--why", "(lit panter)").ok().out
+    arity = daemon.run("facts", "--why", "lit", "--json").ok().json
+    assert arity["hint"] == "'lit' takes 1 arguments, not 0"
+
+
+def test_nothing_is_parked(daemon: Daemon) -> None:
+    assert daemon.run("facts", "--parked").ok().out == "nothing waits for an object\n"
+    daemon.run("facts", "--parked", "--why", "lit").refused(2, "choose one")
 
 
 def test_a_stream_that_is_none_is_refused_with_the_nearest(daemon: Daemon) -> None:

@@ -10,7 +10,7 @@ from tests.host.mind.robot import HOST, Robot
 from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT, RECORDED_CAMERA
 
 from nondum.host.catalogue.records import MountPose
-from nondum.sdk.description import Label, PluginDescription
+from nondum.sdk.description import Fragment, Label, PluginDescription
 
 pytestmark = pytest.mark.anyio
 
@@ -58,10 +58,41 @@ async def test_facts_are_explained(robot: Robot) -> None:
     rows = {row["fact"]: row["source"] for row in robot.mind.views.facts()}
     assert rows[f"ready {HEAD}"] == "pan-tilt-unit is healthy and its devices are there"
     assert rows[f"senses {CRYSTAL} radiation-source"] == "the fragment of compton-camera says so"
-    [verdict, reason, against] = robot.mind.views.facts(why=f"(idle {HEAD})")
-    assert verdict["source"] == f"(idle {HEAD}) does not hold"
-    assert reason["source"] == "for it: nobody uses it"
-    assert "is established" in against["source"]
+    found = robot.mind.views.fact(f"(idle {HEAD})")
+    assert (found["fact"], found["holds"]) == (f"idle {HEAD}", False)
+    assert [(w["component"], w["said"]) for w in found["for"]] == [("", "nobody uses it")]
+    [against] = found["against"]
+    assert (against["component"], against["behaviour"]) == ("pan-tilt-unit", "point")
+    assert found["denied_by"] == ["pan-tilt-unit.point"]
+    assert all(word["age_s"] >= 0.0 for word in (*found["for"], against))
+
+
+async def test_fact_of_an_absent_object_is_parked(robot: Robot) -> None:
+    robot.plug(SENSING, POINTING)
+    robot.know("compton-camera", "bearing-known", "moon", "self")
+    [row] = robot.mind.views.parked()
+    assert (row["fact"], row["absent"]) == (f"bearing-known moon {HOST}", ["moon"])
+    found = robot.mind.views.fact("(bearing-known moon self)")
+    assert found["absent"] == ["moon"]
+    assert found["hint"].startswith("there is no object 'moon' now")
+    assert found["assumed_by"] == ["compton-camera.localise"]
+
+
+async def test_observers_that_disagree_are_told_once(robot: Robot) -> None:
+    words = "(define (domain cups) (:predicates (at ?c - class ?p - place)) (:functional at))"
+    places = "(define (problem cups) (:domain cups) (:objects cup - class hall attic - place))"
+    fragments = (Fragment("domain.pddl", words), Fragment("problem.pddl", places))
+    left, right = (PluginDescription(name, "1", fragments=fragments) for name in ("left", "right"))
+    robot.plug(left, right)
+    await robot.until(lambda: robot.mind.beliefs.world.revision > 0)
+    robot.know("left", "at", "cup", "hall")
+    robot.know("right", "at", "cup", "attic")
+    await robot.until(lambda: any("E-FACT-CONFLICT" in text for text in robot.told))
+    robot.know("left", "at", "cup", "hall")
+    await robot.until(lambda: robot.mind.beliefs.world.holds("at cup hall"))
+    assert sum("E-FACT-CONFLICT" in text for text in robot.told) == 1
+    assert any("E-FACT-CONFLICT" in problem for problem in robot.mind.views.why()["problems"])
+    assert robot.mind.views.fact("at cup attic")["instead"] == "at cup hall"
 
 
 async def test_why_tells_what_is_missing(robot: Robot) -> None:

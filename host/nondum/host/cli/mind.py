@@ -2,37 +2,77 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 
 from nondum.host.cli import render
-from nondum.host.cli.body import show
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.table import cell, table
 
 
 @click.command()
 @click.option(
-    "--why",
-    metavar="FACT",
-    help="Only this fact, true or not, with every reason.",
+    "--why", metavar="FACT", help="Only this fact, true or not, and all that bears on it."
 )
+@click.option("--parked", is_flag=True, help="What waits for objects that are not there now.")
 @json_option
 @click.pass_obj
-def facts(session: Session, why: str | None) -> None:
+def facts(session: Session, why: str | None, parked: bool) -> None:
     """What the robot believes, and why.
+
+    A fact's age is the time since somebody first said so. With --why: who speaks for it and against
+    it, whose word counts, and which behaviours would change it.
 
     \b
     Examples: nondum facts
+              nondum facts --parked
               nondum facts --why "(ready panther__eye__camera)"
     """
-    rows = session.ask("facts", why=why)
-    if why is None or session.as_json:
-        show(session, rows, ["fact", "source", "value"], "nothing is believed")
+    if why is not None and parked:
+        raise click.UsageError("--why is of one fact, --parked of those that wait: choose one")
+    if why is not None:
+        _explain(session, session.ask("fact", fact=why))
         return
-    for row in rows:
-        render.sentence(row["source"])
-    if rows and rows[0]["value"] is not None:
-        render.sentence(f"its value: {cell(rows[0]['value'])}")
+    rows = session.ask("facts", parked=parked)
+    if session.as_json:
+        render.as_json(rows)
+        return
+    shown = [{**row, "since": render.age(row["age_s"])} for row in rows]
+    last = "absent" if parked else "value"
+    table(shown, ["fact", "since", "source", last], empty=_NOTHING[parked])
+
+
+_NOTHING = {False: "nothing is believed", True: "nothing waits for an object"}
+
+
+def _explain(session: Session, found: dict[str, Any]) -> None:
+    if session.as_json:
+        render.as_json(found)
+        return
+    render.sentence(f"({found['fact']}) {'holds' if found['holds'] else 'does not hold'}")
+    for side in ("for", "against"):
+        for word in found[side]:
+            behaviour = f" by its behaviour {word['behaviour']}" if word["behaviour"] else ""
+            render.sentence(f"{word['said']}{behaviour}, {_ago(word)}", mark=f"{side} it: ")
+    told = [
+        ("its value", found["value"] and cell(found["value"])),
+        ("instead", found["instead"] and f"({found['instead']}) is believed"),
+        ("parked", found["absent"] and f"there is no object {', '.join(found['absent'])} now"),
+        ("observed by", ", ".join(found["observed_by"])),
+        ("would be made true by", ", ".join(found["assumed_by"])),
+        ("would be made false by", ", ".join(found["denied_by"])),
+        ("note", found["hint"]),
+    ]
+    if not (found["for"] or found["against"]):
+        render.sentence("nobody has said so")
+    for name, text in told:
+        if text:
+            render.sentence(str(text), mark=f"{name}: ")
+
+
+def _ago(word: dict[str, Any]) -> str:
+    return f"{render.age(word['age_s'])} ago"
 
 
 @click.command()

@@ -40,6 +40,20 @@ def clock(wall_s: float) -> str:
     return time.strftime("%F %T", time.localtime(wall_s))
 
 
+def age(seconds: float | None) -> str:
+    """How long something has been so, as people say it.
+
+    >>> age(0.4), age(75), age(7300), age(200_000), age(None)
+    ('0 s', '75 s', '2 h', '2 d', '')
+    """
+    if seconds is None:
+        return ""
+    for unit, length in (("d", 86_400), ("h", 3_600), ("min", 60)):
+        if seconds >= 2 * length:
+            return f"{seconds // length:.0f} {unit}"
+    return f"{seconds // 1:.0f} s"
+
+
 def size(count: int) -> str:
     """Bytes as people read them.
 

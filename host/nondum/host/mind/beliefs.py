@@ -12,6 +12,7 @@ from nondum.planning.core import HOST_PREDICATES
 from nondum.planning.facts import fact
 from nondum.planning.scope import SELF
 from nondum.planning.world import WorldModel
+from nondum.sdk.errors import Problem
 
 log = logging.getLogger(__name__)
 
@@ -25,9 +26,12 @@ class Beliefs:
         self.snapshot = Snapshot(host, revision=0)
         self.flowing: frozenset[str] = frozenset()
         """Streams that messages arrive on."""
-        self._now_s = now_s
+        self.now_s = now_s
+        """The clock, in seconds."""
         self._names: dict[str, Mapping[str, str]] = {}
         self._always: frozenset[str] = frozenset()
+        self._looked_at = -1
+        self._contradicted: frozenset[str] = frozenset()
 
     def see(self, snapshot: Snapshot) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Take over a snapshot; what is gone from it is withdrawn at once.
@@ -44,26 +48,40 @@ class Beliefs:
             self.flowing -= set(objects)
         self._names = {c.id: own_objects(snapshot.host, c) for c in snapshot.components}
         self._always = always_produced(snapshot)
-        self.world.set_host_facts(snapshot.host, body_facts(snapshot), self._now_s())
+        self.world.set_host_facts(snapshot.host, body_facts(snapshot), self.now_s())
         new = (c.id for c in snapshot.components if (c.id, c.payload) not in before)
         return tuple(component.id for component in gone), tuple(new)
 
     def adopt(self, composition: Composition) -> None:
         """Take over what merging made of the snapshot: objects, and what fragments say."""
-        self.world.frame(objects=composition.objects, observed=composition.observed)
-        now_s = self._now_s()
+        predicates = composition.merged.domain.predicates.values()
+        self.world.frame(
+            objects=composition.objects,
+            observed=composition.observed,
+            functional=frozenset(p.name for p in predicates if p.functional),
+        )
+        now_s = self.now_s()
         for component, facts in sorted(composition.seeds().items()):
             self.world.seed(component, facts, now_s)
+
+    def new_conflicts(self) -> tuple[Problem, ...]:
+        """Where components contradict each other and did not when this was last asked."""
+        if self._looked_at == self.world.revision:
+            return ()
+        self._looked_at = self.world.revision
+        before, found = self._contradicted, self.world.conflicts()
+        self._contradicted = frozenset(problem.where for problem in found)
+        return tuple(problem for problem in found if problem.where not in before)
 
     def on_event(self, event: Event) -> bool:
         """Take in news of a worker. Says whether it was news for the world model."""
         match event:
             case FactKnown(component, predicate, arguments, value) if self._may_say(event):
                 text = self._text(component, predicate, arguments)
-                self.world.know(text, component, self._now_s(), value=value)
+                self.world.know(text, component, self.now_s(), value=value)
             case FactForgotten(component, predicate, arguments) if self._may_say(event):
                 text = self._text(component, predicate, arguments)
-                self.world.forget(text, component, self._now_s())
+                self.world.forget(text, component, self.now_s())
             case StreamFlowing(component, stream, flowing) if component in self._names:
                 self._on_flow(component, stream, is_flowing=flowing)
             case WorkerExited(component):
@@ -90,7 +108,7 @@ class Beliefs:
     def _on_flow(self, component: str, stream: str, *, is_flowing: bool) -> None:
         """A stream that a behaviour produces flows while the behaviour is established; news of it
         can only say that it has stalled. One that is always produced flows while it is said to."""
-        text, now_s = fact("flowing", stream), self._now_s()
+        text, now_s = fact("flowing", stream), self.now_s()
         self.flowing = self.flowing | {stream} if is_flowing else self.flowing - {stream}
         if not is_flowing:
             self.world.forget(text, component, now_s)

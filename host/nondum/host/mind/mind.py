@@ -212,7 +212,7 @@ class Mind:
     def _parts(self) -> Parts:
         return Parts(
             monitor=Duty("monitor", self._monitor),
-            world_model=Duty("world model", lambda: f"{len(self.beliefs.world.facts)} facts hold"),
+            world_model=Duty("world model", self._believe),
             goals=Duty("goals", self._choose),
             task=TaskSlot(lambda: self.pursuit.tree, Hold(self._waits_for)),
             people=Duty("people", lambda: f"{self.people.last_number} sentences told"),
@@ -235,6 +235,11 @@ class Mind:
         self.pursuit.adopt(composition)
         for sentence in recomposed(old, composition):
             self.people.tell(sentence)
+
+    def _believe(self) -> str:
+        for problem in self.beliefs.new_conflicts():
+            self.people.tell(str(problem))
+        return f"{len(self.beliefs.world.facts)} facts hold"
 
     def _choose(self) -> str:
         self.pursuit.step()

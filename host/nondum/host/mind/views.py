@@ -8,6 +8,7 @@ from typing import Any, Protocol
 from py_trees.behaviour import Behaviour
 
 from nondum.host.catalogue.records import ComponentRecord
+from nondum.host.mind import evidence
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition, own_objects
 from nondum.host.mind.frames import implausible
@@ -62,22 +63,17 @@ class Views:
         """The whole behaviour tree as it was last ticked: `name`, `status`, `why`, `children`."""
         return _node(self._mind.root)
 
-    def facts(self, *, why: str | None = None) -> list[Row]:
-        """All that is believed: `fact`, `source`, `value`. With `why`, one fact, true or not, with
-        a row for every reason."""
-        world = self._mind.beliefs.world
-        if why is not None:
-            text = " ".join(why.strip().strip("()").split())
-            value = world.value(text)
-            return [{"fact": text, "source": line, "value": value} for line in world.why(text)]
-        return [
-            {
-                "fact": text,
-                "source": "; ".join(source.said for source in world.sources(text)),
-                "value": world.value(text),
-            }
-            for text in sorted(world.facts)
-        ]
+    def facts(self) -> list[Row]:
+        """All that is believed, see `evidence.believed`."""
+        return evidence.believed(self._mind.beliefs)
+
+    def parked(self) -> list[Row]:
+        """The facts that wait for objects, see `evidence.parked`."""
+        return evidence.parked(self._mind.beliefs)
+
+    def fact(self, text: str) -> Row:
+        """One fact, true or not, and all that bears on it, see `evidence.explained`."""
+        return evidence.explained(text, self._mind.beliefs, self._mind.composition)
 
     def goals(self) -> Row:
         """What can be asked for now (`can`: `words`, `goal`, `kind`), and what was (`given`; of
@@ -105,7 +101,7 @@ class Views:
                 problems += [str(problem) for problem in goal.problems]
         return {
             "sentences": sentences or ["nothing is asked for"],
-            "problems": problems + self._quarantined(),
+            "problems": problems + self._quarantined() + self._conflicts(),
             "told": [told.text for told in self._mind.people.since(self._last_few())],
         }
 
@@ -192,6 +188,9 @@ class Views:
         composition = self._mind.composition
         found = composition.merged.quarantined.values() if composition else ()
         return [str(problem) for problems in found for problem in problems]
+
+    def _conflicts(self) -> list[str]:
+        return [str(problem) for problem in self._mind.beliefs.world.conflicts()]
 
 
 _STATES = {"SUCCESS": "done", "RUNNING": "running", "FAILURE": "failed", "INVALID": "to do"}
