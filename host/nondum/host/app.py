@@ -159,6 +159,8 @@ class _Listener:
             snapshot = self._catalogue.snapshot()
             self._workers.remount(mounts_to_wire(snapshot.host, snapshot.mounts))
             self._mind.see(snapshot)
+            if isinstance(event, HostStarted):
+                self._mind.restore(snapshot.goals)
             return
         sentence = announced(event, self._catalogue.snapshot())
         if sentence is not None:

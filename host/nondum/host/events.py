@@ -451,6 +451,9 @@ class GoalGiven(Event):
     text: str
     kind: str
     """`achieve` or `maintain`."""
+    pddl: str
+    """The condition, `self` replaced by the host's name."""
+    priority: int = 0
 
 
 @dataclass(frozen=True, slots=True)

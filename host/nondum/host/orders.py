@@ -16,6 +16,7 @@ from nondum.host.events import MountSet, RetryAsked
 from nondum.host.lifecycle import installed
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.mind.frames import implausible
+from nondum.host.mind.goals import GivenGoal
 from nondum.host.mind.mind import Mind
 from nondum.host.news import News
 from nondum.host.rows import Row, payload_row, unknown
@@ -49,6 +50,7 @@ class Orders:
         highest = HIGHEST_PRIORITY
         priority = arguments.number("priority", 0, at_least=-highest, at_most=highest)
         given = self.mind.give(words=words, pddl=pddl, kind=kind, priority=priority)
+        await self._until(lambda snapshot: self._is_kept(given, snapshot))
         return {**given.to_dict(), "holds": False}
 
     async def halt(self, arguments: Arguments) -> Row:
@@ -141,6 +143,11 @@ class Orders:
         payload_id = arguments.text("payload")
         await installed.uninstall(payload_id, self.catalogue, self.bus)
         return {"payload": payload_id}
+
+    def _is_kept(self, given: GivenGoal, snapshot: Snapshot) -> bool:
+        """Whether a goal would survive the daemon, or has no need to."""
+        is_over = self.mind.queue[given.id].state.is_final
+        return is_over or any(goal.id == given.id for goal in snapshot.goals)
 
     def _payload(self, payload_id: str) -> Row | None:
         """The row of a payload that is known already."""

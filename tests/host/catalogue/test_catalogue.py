@@ -21,6 +21,7 @@ from nondum.host.catalogue.records import (
     DeviceRecord,
     DriveRecord,
     DriveState,
+    GoalRecord,
     JournalEntry,
     Moment,
     MountPose,
@@ -112,6 +113,7 @@ FULL = HostState(
         )
     },
     highwater={("red", "org.example.eye"): Highwater(7, "digest-k1")},
+    goals={"3": GoalRecord("3", "look at the lamp", "(seen lamp)", "achieve", -2)},
 )
 
 
@@ -194,6 +196,21 @@ async def test_file_of_another_version_is_left_alone(tmp_path: Path) -> None:
         async with opened(tmp_path):
             pass
     assert refused.value.code == "CATALOGUE_VERSION"
+
+
+@pytest.mark.anyio
+async def test_file_of_the_version_before_is_taken_over(tmp_path: Path) -> None:
+    before = replace(FULL, goals={})
+    async with opened(tmp_path) as catalogue:
+        await catalogue.commit(before, ())
+    connection = sqlite3.connect(tmp_path / "catalogue.sqlite")
+    connection.executescript("DROP TABLE goals; PRAGMA user_version = 1;")
+    connection.close()
+    async with opened(tmp_path) as catalogue:
+        assert catalogue.state == before
+        await catalogue.commit(FULL, ())
+    async with opened(tmp_path) as catalogue:
+        assert catalogue.state == FULL
 
 
 @pytest.mark.anyio

@@ -241,6 +241,17 @@ def write_config(root: Path, more: str = "") -> Path:
 @contextmanager
 def running(root: Path) -> Iterator[Daemon]:
     """Run a daemon; it must end well when it is told to."""
+    with killed(root) as daemon:
+        yield daemon
+        daemon.process.terminate()
+        _, err = daemon.process.communicate(timeout=PATIENCE_S)
+        assert daemon.process.returncode == 0, err
+        assert "Traceback" not in err, err
+
+
+@contextmanager
+def killed(root: Path) -> Iterator[Daemon]:
+    """Run a daemon, and end it without a warning (SIGKILL)."""
     config = write_config(root)
     process = subprocess.Popen(
         command("host", "run", "--user", "--config", config),
@@ -255,9 +266,5 @@ def running(root: Path) -> Iterator[Daemon]:
                 if "listens at" in line:
                     break
             yield Daemon(root, process)
-            process.terminate()
-            _, err = process.communicate(timeout=PATIENCE_S)
-            assert process.returncode == 0, err
-            assert "Traceback" not in err, err
         finally:
             process.kill()

@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-from nondum.host.events import DriveRemoved, Event, GoalReached
+from nondum.host.events import DriveRemoved, Event, PlanMissing
 from nondum.host.lifecycle.bus import Bus
 
 pytestmark = pytest.mark.anyio
@@ -21,8 +21,8 @@ async def test_faulty_listener_is_nobody_elses_trouble(caplog: pytest.LogCapture
     bus.subscribe(faulty)
     bus.subscribe(heard.append)
     with caplog.at_level(logging.ERROR):
-        bus.emit(GoalReached("1"))
-    assert heard == [GoalReached("1")]
+        bus.emit(PlanMissing("1", ()))
+    assert heard == [PlanMissing("1", ())]
     assert [record.message for record in caplog.records] == [
         f"a listener is at fault over {heard[0].name}"
     ]
@@ -32,14 +32,14 @@ async def test_what_changes_the_catalogue_waits_for_its_commit() -> None:
     bus, heard = Bus(), list[Event]()
     bus.subscribe(heard.append)
     bus.emit(DriveRemoved("a"))
-    bus.emit(GoalReached("1"))
-    assert heard == [GoalReached("1")]
-    assert [event for event, _ in await bus.batch()] == [DriveRemoved("a"), GoalReached("1")]
+    bus.emit(PlanMissing("1", ()))
+    assert heard == [PlanMissing("1", ())]
+    assert [event for event, _ in await bus.batch()] == [DriveRemoved("a"), PlanMissing("1", ())]
 
 
 async def test_who_has_left_hears_no_more() -> None:
     bus, heard = Bus(), list[Event]()
     leave = bus.subscribe(heard.append)
     leave()
-    bus.emit(GoalReached("1"))
+    bus.emit(PlanMissing("1", ()))
     assert heard == []

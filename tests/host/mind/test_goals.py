@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from nondum.host.catalogue.records import GoalRecord
 from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState
 from nondum.planning.goal import GoalKind
 from nondum.sdk.errors import GoalRefused
@@ -90,3 +91,20 @@ def test_old_ends_are_forgotten(queue: GoalQueue) -> None:
     for _ in range(200):
         queue.put(give(queue), GoalState.REACHED)
     assert len(list(queue)) < 60
+
+
+def test_goals_of_an_earlier_run_keep_their_ids_and_order(queue: GoalQueue) -> None:
+    kept = [
+        GoalRecord("7", "follow me", "(following rover person)", "maintain", 1),
+        GoalRecord("4", "report", "(reported person rover)", "achieve", 0),
+    ]
+    queue.restore(kept)
+    queue.restore(kept)
+    assert [(g.id, g.text, g.kind, g.priority) for g in queue] == [
+        ("7", "follow me", "maintain", 1),
+        ("4", "report", "achieve", 0),
+    ]
+    assert {goal.state for goal in queue} == {GoalState.QUEUED}
+    newer = queue[give(queue)]
+    assert int(newer.id) > 7
+    assert all(newer.number > goal.number for goal in queue if goal is not newer)

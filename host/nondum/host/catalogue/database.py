@@ -16,7 +16,13 @@ from nondum.host.catalogue.records import ComponentRecord, JournalEntry
 from nondum.host.catalogue.state import Highwater, HostState
 from nondum.sdk.errors import ConfigRefused, Problem
 
-SCHEMA = 1
+SCHEMA = 2
+
+_UPGRADES = {
+    1: "CREATE TABLE goals (id TEXT PRIMARY KEY, text TEXT NOT NULL, pddl TEXT NOT NULL,"
+    " kind TEXT NOT NULL, priority INTEGER NOT NULL) STRICT;"
+}
+"""Schema → what makes the next one of it."""
 
 _PRAGMAS = (
     "PRAGMA journal_mode = WAL",
@@ -60,6 +66,9 @@ def _damaged(verdict: str) -> sqlite3.DatabaseError:
 
 def _prepare(connection: sqlite3.Connection) -> None:
     (version,) = connection.execute("PRAGMA user_version").fetchone()
+    while version in _UPGRADES:
+        _run_script(connection, _UPGRADES[version], version + 1)
+        version += 1
     if version == SCHEMA:
         return
     if version != 0:
@@ -73,7 +82,12 @@ def _prepare(connection: sqlite3.Connection) -> None:
             )
         )
     script = resources.files(__package__).joinpath("schema.sql").read_text(encoding="utf-8")
-    connection.executescript(f"BEGIN IMMEDIATE; {script} PRAGMA user_version = {SCHEMA}; COMMIT;")
+    _run_script(connection, script, SCHEMA)
+
+
+def _run_script(connection: sqlite3.Connection, script: str, version: int) -> None:
+    """Bring the file to a schema, or leave it as it was."""
+    connection.executescript(f"BEGIN IMMEDIATE; {script} PRAGMA user_version = {version}; COMMIT;")
 
 
 def load(connection: sqlite3.Connection, host: str) -> HostState:
@@ -100,6 +114,7 @@ def load(connection: sqlite3.Connection, host: str) -> HostState:
         components={c.id: c for c in components},
         devices={d.id: d for d in map(rows.device, every("devices"))},
         mounts={m.unit: m for m in map(rows.mount, every("mounts"))},
+        goals={g.id: g for g in map(rows.goal, every("goals"))},
         highwater={
             (row["fleet"], row["payload_id"]): Highwater(row["release"], row["digest"])
             for row in every("highwater")
@@ -144,6 +159,7 @@ def _write_state(connection: sqlite3.Connection, before: HostState, after: HostS
     simple: Iterable[tuple[str, str, Any, Any, Callable[[Any], rows.Row]]] = (
         ("drives", "id", before.drives, after.drives, rows.drive_row),
         ("mounts", "unit", before.mounts, after.mounts, rows.mount_row),
+        ("goals", "id", before.goals, after.goals, rows.goal_row),
     )
     for table, key, old, new, as_row in simple:
         _difference(connection, table, key, old, new, as_row)

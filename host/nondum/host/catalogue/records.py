@@ -8,6 +8,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
+from nondum.planning.goal import GoalKind
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
 
@@ -187,6 +188,18 @@ class PayloadRecord:
 
 
 @dataclass(frozen=True, slots=True)
+class GoalRecord:
+    """A goal that was given and is not over: a daemon that starts takes it up again."""
+
+    id: str
+    text: str
+    """As the person gave it."""
+    pddl: str
+    kind: GoalKind
+    priority: int
+
+
+@dataclass(frozen=True, slots=True)
 class Snapshot:
     """The catalogue at one revision."""
 
@@ -198,6 +211,8 @@ class Snapshot:
     drives: tuple[DriveRecord, ...] = ()
     devices: tuple[DeviceRecord, ...] = ()
     mounts: tuple[MountPose, ...] = ()
+    goals: tuple[GoalRecord, ...] = ()
+    """In the order they were given."""
 
     def component(self, id: str) -> ComponentRecord | None:
         """The component of that id, if it is active."""

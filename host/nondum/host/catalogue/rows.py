@@ -15,6 +15,7 @@ from nondum.host.catalogue.records import (
     DeviceRecord,
     DriveRecord,
     DriveState,
+    GoalRecord,
     JournalEntry,
     Moment,
     MountPose,
@@ -204,6 +205,22 @@ def mount(row: sqlite3.Row) -> MountPose:
     """A mount pose of its row."""
     x, y, z, roll, pitch, yaw = json.loads(row["pose"])
     return MountPose(row["unit"], (x, y, z), (roll, pitch, yaw), row["origin"])
+
+
+def goal_row(goal: GoalRecord) -> Row:
+    """A row of `goals`."""
+    return {
+        "id": goal.id,
+        "text": goal.text,
+        "pddl": goal.pddl,
+        "kind": goal.kind,
+        "priority": goal.priority,
+    }
+
+
+def goal(row: sqlite3.Row) -> GoalRecord:
+    """A goal of its row."""
+    return GoalRecord(row["id"], row["text"], row["pddl"], row["kind"], row["priority"])
 
 
 def entry_row(entry: JournalEntry) -> Row:

@@ -89,6 +89,14 @@ CREATE TABLE highwater (                 -- never pruned
     PRIMARY KEY (fleet, payload_id)
 ) STRICT;
 
+CREATE TABLE goals (                     -- those that are not over
+    id        TEXT PRIMARY KEY,
+    text      TEXT NOT NULL,
+    pddl      TEXT NOT NULL,
+    kind      TEXT NOT NULL,
+    priority  INTEGER NOT NULL
+) STRICT;
+
 CREATE TABLE journal (
     id           INTEGER PRIMARY KEY AUTOINCREMENT,
     monotonic_s  REAL NOT NULL,

@@ -9,6 +9,7 @@ from nondum.host.catalogue.records import (
     ComponentRecord,
     DeviceRecord,
     DriveRecord,
+    GoalRecord,
     MountPose,
     PayloadRecord,
     Snapshot,
@@ -36,6 +37,8 @@ class HostState:
     mounts: Mapping[str, MountPose] = field(default_factory=dict)
     highwater: Mapping[tuple[str, str], Highwater] = field(default_factory=dict)
     """(fleet, payload id) → newest release."""
+    goals: Mapping[str, GoalRecord] = field(default_factory=dict)
+    """Those that are not over."""
 
     def snapshot(self) -> Snapshot:
         """The state as readers get it."""
@@ -47,4 +50,5 @@ class HostState:
             drives=tuple(self.drives.values()),
             devices=tuple(self.devices.values()),
             mounts=tuple(self.mounts.values()),
+            goals=tuple(self.goals.values()),
         )

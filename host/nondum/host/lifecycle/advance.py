@@ -13,7 +13,7 @@ from nondum.host import events
 from nondum.host.catalogue.records import Moment
 from nondum.host.catalogue.state import HostState
 from nondum.host.events import Event
-from nondum.host.lifecycle import claims, component_rules, drive_rules, payload_rules
+from nondum.host.lifecycle import claims, component_rules, drive_rules, goal_rules, payload_rules
 from nondum.host.lifecycle.turn import Outcome, Turn
 from nondum.host.transitions import TRANSITIONS
 
@@ -35,6 +35,9 @@ RULES: Mapping[type[Event], _Rule] = {
     events.DeviceAppeared: component_rules.on_device_appeared,
     events.DeviceRemoved: component_rules.on_device_removed,
     events.MountSet: component_rules.on_mount_set,
+    events.GoalGiven: goal_rules.on_goal_given,
+    events.GoalReached: goal_rules.on_goal_over,
+    events.GoalEnded: goal_rules.on_goal_over,
 }
 """Event → rule. Other events change nothing here; the journal keeps those that ask for it."""
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import Enum
 
+from nondum.host.catalogue.records import GoalRecord
 from nondum.planning.goal import GoalKind
 from nondum.sdk.errors import GoalRefused, Problem
 
@@ -65,6 +66,10 @@ class GivenGoal:
         }
 
 
+def _number(id: str) -> int:
+    return int(id) if id.isdecimal() else 0
+
+
 def urgency(goal: GivenGoal) -> tuple[int, bool, int]:
     """Sort key: by priority; what can be finished before what never ends; of goals to achieve the
     first, of goals to maintain the last, for it is what the person wants now."""
@@ -73,7 +78,7 @@ def urgency(goal: GivenGoal) -> tuple[int, bool, int]:
 
 
 class GoalQueue:
-    """The goals given to one host since it started."""
+    """The goals given to one host since it started, and those that it had not done before."""
 
     def __init__(self) -> None:
         self._goals: dict[str, GivenGoal] = {}
@@ -99,6 +104,19 @@ class GoalQueue:
         self._goals[goal.id] = goal
         self._forget_oldest()
         return goal
+
+    def restore(self, goals: Iterable[GoalRecord]) -> tuple[GivenGoal, ...]:
+        """Take up the goals of an earlier run, under their ids; none that is here already."""
+        restored = []
+        for kept in goals:
+            if kept.id not in self._goals:
+                self._given = max(self._given + 1, _number(kept.id))
+                goal = GivenGoal(
+                    kept.id, kept.text, kept.pddl, kept.kind, kept.priority, self._given
+                )
+                self._goals[goal.id] = goal
+                restored.append(goal)
+        return tuple(restored)
 
     def wanted(self, is_worth_a_try: Callable[[GivenGoal], bool]) -> GivenGoal | None:
         """The most urgent goal that is not over. Suspended ones count if they are worth a try."""

@@ -10,12 +10,12 @@ import asyncio
 import contextlib
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from nondum.host.catalogue.records import Snapshot
+from nondum.host.catalogue.records import GoalRecord, Snapshot
 from nondum.host.events import Emit, Event, GoalEnded, GoalGiven
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition, compose
@@ -129,9 +129,15 @@ class Mind:
         goal = self._understood(words, pddl, kind)
         text = words if words is not None else goal.text
         given = self.queue.give(text, goal_text(goal.expr), goal.kind, priority=priority)
-        self._emit(GoalGiven(given.id, given.text, given.kind))
+        self._emit(GoalGiven(given.id, given.text, given.kind, given.pddl, priority))
         self.wake()
         return given
+
+    def restore(self, goals: Iterable[GoalRecord]) -> None:
+        """Go on with what an earlier run of the host had not done."""
+        for goal in self.queue.restore(goals):
+            self.people.tell(f"goal {goal.id} is taken up again: {goal.text}")
+        self.wake()
 
     def halt(self, *, id: str | None = None, now: bool = False) -> tuple[str, ...]:
         """Halt a goal, or all of them; with `now` every behaviour that runs is halted directly.
@@ -189,9 +195,9 @@ class Mind:
         return self.version
 
     async def close(self) -> None:
-        """Halt everything and end the planners."""
-        self.halt(now=True)
+        """Halt all that runs and end the planners; what is wanted is still wanted."""
         await self.pursuit.close()
+        self.runner.halt_all()
         if self._composing is not None:
             self._composing.cancel()
             await asyncio.gather(self._composing, return_exceptions=True)
