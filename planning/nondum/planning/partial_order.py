@@ -41,6 +41,10 @@ class PartialOrder:
         """The steps of a set that wait for no other of the set, in the plan's order."""
         return (index for index in bits(steps) if not self.before[index] & steps)
 
+    def last_of(self, steps: int) -> Iterator[int]:
+        """The steps of a set that no other of the set waits for, in the plan's order."""
+        return (index for index in bits(steps) if not self.after[index] & steps)
+
 
 @dataclass(frozen=True, slots=True)
 class Threat:

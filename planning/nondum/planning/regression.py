@@ -36,6 +36,8 @@ class Stuck:
     """No rest of the plan is supported: these facts are needed and no step of it gives them."""
 
     missing: tuple[CausalLink, ...]
+    steps: int
+    """The steps that would be left if somebody gave them."""
 
     @property
     def facts(self) -> frozenset[str]:
@@ -53,8 +55,11 @@ class Regression:
         self.order: PartialOrder = partial_order(self.steps, self.links)
         self._needs_of: dict[int, list[CausalLink]] = {i: [] for i in range(len(self.steps))}
         self._needs_of[GOAL] = []
+        self._uses_of: dict[int, list[CausalLink]] = {i: [] for i in range(len(self.steps))}
         for link in self.links:
             self._needs_of[link.consumer].append(link)
+            if link.provider is not None:
+                self._uses_of[link.provider].append(link)
 
     def rest(self, facts: Set[str]) -> Rest | Stuck:
         """The least rest of the plan that `facts` support."""
@@ -73,7 +78,8 @@ class Regression:
                 for index in bits(fresh):
                     pending += self._needs_of[index]
         if missing:
-            return Stuck(tuple(sorted(missing, key=lambda link: (link.consumer, link.fact))))
+            missing.sort(key=lambda link: (link.consumer, link.fact))
+            return Stuck(tuple(missing), todo)
         return Rest(todo, self.needs(todo))
 
     def needs(self, todo: int) -> frozenset[str]:
@@ -89,3 +95,7 @@ class Regression:
     def needs_of(self, step: int) -> tuple[CausalLink, ...]:
         """Where each precondition of a step (of the goal for `GOAL`) comes from."""
         return tuple(self._needs_of[step])
+
+    def uses_of(self, step: int) -> tuple[CausalLink, ...]:
+        """What a step gives that a later one, or the goal, needs."""
+        return tuple(self._uses_of[step])

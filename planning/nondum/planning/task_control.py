@@ -6,6 +6,7 @@ Pure but for the `Runner`: the same world at the same time gives the same decisi
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from dataclasses import dataclass
 from enum import Enum
 
 from nondum.planning.attempts import Attempts, Patience
@@ -33,6 +34,16 @@ class Phase(Enum):
     """The plan does not fit the world any more, or one of its actions keeps failing."""
 
 
+@dataclass(frozen=True, slots=True)
+class Past:
+    """A run that has ended."""
+
+    state: RunState
+    """How it ended."""
+    started_s: float
+    ended_s: float
+
+
 class TaskControl:
     """Carries a plan out by regression. One `decide` is one tick."""
 
@@ -57,8 +68,10 @@ class TaskControl:
         """Actions that were given up and should not be in the next plan."""
         self.runs: dict[str, Run] = {run.step.name: run for run in runs}
         self.attempts = Attempts(patience or Patience())
+        self.past: dict[str, Past] = {}
+        """The last run of each action that has ended while this task was carried out."""
+        self.exclusive = exclusive
         self._runner = runner
-        self._exclusive = exclusive
         self.decisions = 0
         """How often the world asked for a new decision."""
         self._seen: frozenset[str] | None = None
@@ -123,6 +136,7 @@ class TaskControl:
                 run.established_s = now_s
             if state.has_ended:
                 del self.runs[name]
+                self.past[name] = Past(state, run.started_s, now_s)
                 if not run.is_halting:
                     self._judge(run, state, now_s)
 
@@ -176,6 +190,7 @@ class TaskControl:
 
     def _stay(self, ground: Footing, stuck: Stuck) -> Phase:
         """Let what runs go on if its success would help; otherwise ask for another plan."""
+        self.rest = Rest(stuck.steps, self.regression.needs(stuck.steps))
         pending = [run for run in self.runs.values() if run.is_pending]
         gone = frozenset[str]().union(*(run.step.delete for run in pending))
         come = frozenset[str]().union(*(run.step.add for run in pending))
@@ -190,7 +205,7 @@ class TaskControl:
         """Hold safely until there is another plan: nothing that moves the body goes on."""
         self.needs_replan = why
         for run in self.runs.values():
-            if run.step.actor in self._exclusive:
+            if run.step.actor in self.exclusive:
                 run.halt(f"the plan is stuck: {why}")
         return Phase.STUCK
 
@@ -263,7 +278,7 @@ class TaskControl:
         if lacking := step.precondition - ground.facts:
             return f"waits for {in_words(lacking)}"
         for run in self.runs.values():
-            if step.actor == run.step.actor and step.actor in self._exclusive:
+            if step.actor == run.step.actor and step.actor in self.exclusive:
                 return f"waits for {step.actor}, which {run.step.name} uses"
             if run.is_pending and interferes(step, run.step):
                 return f"waits for {run.step.name} to end"

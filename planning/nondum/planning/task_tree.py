@@ -17,11 +17,11 @@ from py_trees.composites import Composite
 
 from nondum.planning.attempts import Patience
 from nondum.planning.goal import GoalKind
-from nondum.planning.partial_order import GOAL
 from nondum.planning.regression import Regression
-from nondum.planning.running import Run, Runner, RunState, World
+from nondum.planning.running import Run, Runner, World
 from nondum.planning.step import steps_of, words
 from nondum.planning.task_control import Phase, TaskControl
+from nondum.planning.whereabouts import Whereabouts, whereabouts
 from nondum.sdk.planner import GroundTask, Plan
 
 Sight: TypeAlias = Callable[[], tuple[World, float]]
@@ -43,50 +43,24 @@ class StepLeaf(Behaviour):
         super().__init__(name=step.name)
         self.step = step
         self.index = index
-        self._control = control
+        self.control = control
 
     def update(self) -> Status:
         """Where the step is: done or standing, under way, given up, or still to come."""
-        run = self._control.runs.get(self.step.name)
+        run = self.control.runs.get(self.step.name)
         if run is not None and not run.is_halting:
             return Status.RUNNING
-        if not self._control.rest.steps >> self.index & 1:
+        if not self.control.rest.steps >> self.index & 1:
             return Status.SUCCESS
-        return Status.FAILURE if self.step.name in self._control.exhausted else Status.INVALID
+        return Status.FAILURE if self.step.name in self.control.exhausted else Status.INVALID
 
     def why(self) -> str:
         """Why the step is where it is, in one sentence."""
-        control, name = self._control, self.step.name
-        run = control.runs.get(name)
-        if run is not None:
-            return self._why_running(run)
-        if not control.rest.steps >> self.index & 1:
-            return "done: what the rest of the plan needs of it holds"
-        waits = control.waits_for(self.index) or self._predecessors()
-        failure = control.attempts.last_failure(name)
-        return f"{waits}; last time: {failure}" if failure else waits
+        return self.where().why
 
-    def _why_running(self, run: Run) -> str:
-        if run.is_halting:
-            return f"being halted: {run.halted_because}"
-        if run.action.state is RunState.ESTABLISHED:
-            return f"runs for {', '.join(self._needed_by())}"
-        return "is starting" if self.step.lasting else "is running"
-
-    def _needed_by(self) -> list[str]:
-        regression = self._control.regression
-        users = dict.fromkeys(
-            "the goal" if link.consumer == GOAL else regression.steps[link.consumer].name
-            for link in regression.links
-            if link.provider == self.index
-        )
-        return list(users) or ["nothing"]
-
-    def _predecessors(self) -> str:
-        regression = self._control.regression
-        mask = regression.order.before[self.index] & self._control.rest.steps
-        names = [s.name for i, s in enumerate(regression.steps) if mask >> i & 1]
-        return f"comes after {', '.join(names)}" if names else "is next"
+    def where(self) -> Whereabouts:
+        """Where the step is, and why, as data."""
+        return whereabouts(self.control, self.index)
 
 
 class TaskTree(Composite):

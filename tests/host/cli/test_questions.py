@@ -54,7 +54,7 @@ VIEWS: dict[str, set[str]] = {
         "goals",
         "told",
     },
-    "tree": {"name", "status", "why", "children"},
+    "tree": {"name", "kind", "status", "why", "policy", "children"},
     "why": {"sentences", "problems", "told"},
 }
 PAYLOAD_KEYS = {
@@ -250,7 +250,9 @@ def test_a_stream_that_is_none_is_refused_with_the_nearest(daemon: Daemon) -> No
     ran.refused(1, "STREAM_UNKNOWN").refused(1, f"did you mean '{BRIGHTNESS}'?")
 
 
-@pytest.mark.parametrize("follow", [["status", "-f"], ["tree", "-f"]], ids=" ".join)
+@pytest.mark.parametrize(
+    "follow", [["status", "-f"], ["tree", "-f"], ["tree", "--watch"]], ids=" ".join
+)
 def test_following_draws_what_asking_does(daemon: Daemon, follow: list[str]) -> None:
     with daemon.started(*follow) as process:
         assert process.stdout is not None

@@ -40,7 +40,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "status": ("status", "The host, its payloads and its goals at a glance."),
     "store": ("body", "The wheels that this host keeps."),
     "streams": ("streams", "Who sends what to whom, and what is sent."),
-    "tree": ("mind", "The behaviour tree as it is being ticked."),
+    "tree": ("tree", "The behaviour tree as it is being ticked, and why."),
     "units": ("body", "What the robot has to act with."),
     "why": ("mind", "Why the robot does what it does, or why it cannot."),
 }

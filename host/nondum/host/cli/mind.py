@@ -111,29 +111,6 @@ def plan(session: Session) -> None:
 
 
 @click.command()
-@click.option("--follow", "-f", is_flag=True, help="Draw it again whenever it changes.")
-@json_option
-@click.pass_obj
-def tree(session: Session, follow: bool) -> None:
-    """The behaviour tree as it is being ticked.
-
-    \b
-    Examples: nondum tree
-              nondum tree --follow
-    """
-    if not follow:
-        view = session.ask("tree")
-        render.as_json(view) if session.as_json else click.echo("\n".join(render.tree_lines(view)))
-        return
-    for view in session.follow("follow_tree"):
-        if session.as_json:
-            render.as_json_line(view)
-        else:
-            click.clear()
-            click.echo("\n".join(render.tree_lines(view)))
-
-
-@click.command()
 @json_option
 @click.pass_obj
 def why(session: Session) -> None:

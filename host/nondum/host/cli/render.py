@@ -1,4 +1,4 @@
-"""Everything that is printed but tables: JSON, trees, times, sizes, sentences."""
+"""Everything that is printed but tables and trees: JSON, times, sizes, sentences."""
 
 from __future__ import annotations
 
@@ -9,10 +9,7 @@ from typing import Any
 
 import click
 
-from nondum.host.printable import printable, printable_text
-
-STATUS_MARK = {"SUCCESS": "✓", "FAILURE": "✗", "RUNNING": "▶", "INVALID": "·"}
-STATUS_COLOUR = {"SUCCESS": "green", "FAILURE": "red", "RUNNING": "yellow"}
+from nondum.host.printable import printable_text
 
 
 def as_json(data: Any) -> None:
@@ -75,14 +72,3 @@ def progress(made: Mapping[str, Any] | None) -> str:
     ('copy 25 %', '')
     """
     return f"{made['phase']} {100 * made['fraction']:.0f} %" if made else ""
-
-
-def tree_lines(node: Mapping[str, Any], depth: int = 0) -> list[str]:
-    """A behaviour tree as indented lines: status, name, and why it is where it is."""
-    status = str(node.get("status"))
-    mark = click.style(STATUS_MARK.get(status, "·"), fg=STATUS_COLOUR.get(status))
-    why = f"  — {printable(str(node['why']))}" if node.get("why") else ""
-    lines = [f"{'  ' * depth}{mark} {printable(str(node['name']))}{why}"]
-    for child in node.get("children", ()):
-        lines.extend(tree_lines(child, depth + 1))
-    return lines

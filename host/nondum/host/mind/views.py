@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any, Protocol
+import time
+from collections.abc import Callable, Iterator
+from typing import Protocol
 
 from py_trees.behaviour import Behaviour
 
@@ -16,12 +17,11 @@ from nondum.host.mind.goals import GoalQueue, GoalState
 from nondum.host.mind.people import People
 from nondum.host.mind.pursuit import Pursuit
 from nondum.host.mind.runner import BehaviourRunner
+from nondum.host.mind.tree_view import Row, TreeView
 from nondum.planning.goal import goal_text
 from nondum.planning.task_control import Phase
 from nondum.planning.task_tree import StepLeaf
 from nondum.sdk.errors import GoalRefused
-
-Row = dict[str, Any]
 
 
 class Shown(Protocol):
@@ -39,8 +39,23 @@ class Shown(Protocol):
 class Views:
     """Looks at a mind and changes nothing."""
 
-    def __init__(self, mind: Shown) -> None:
+    def __init__(
+        self,
+        mind: Shown,
+        *,
+        now_s: Callable[[], float] = time.monotonic,
+        wall_s: Callable[[], float] = time.time,
+    ) -> None:
+        """`now_s` is the mind's own clock, `wall_s` gives seconds since 1970."""
         self._mind = mind
+        self._tree = TreeView(
+            queue=mind.queue,
+            pursuit=mind.pursuit,
+            runner=mind.runner,
+            composition=lambda: mind.composition,
+            now_s=now_s,
+            wall_s=wall_s,
+        )
 
     def plan(self) -> Row:
         """The goal pursued, and each step of its plan: `step`, `action`, `state`, `why`."""
@@ -60,8 +75,8 @@ class Views:
         return {"goal": goal.pddl, "id": goal.id, "kind": goal.kind, "steps": steps}
 
     def tree(self) -> Row:
-        """The whole behaviour tree as it was last ticked: `name`, `status`, `why`, `children`."""
-        return _node(self._mind.root)
+        """The whole behaviour tree as it was last ticked, see `tree_view`."""
+        return self._tree.row(self._mind.root)
 
     def facts(self) -> list[Row]:
         """All that is believed, see `evidence.believed`."""
@@ -194,13 +209,3 @@ class Views:
 
 
 _STATES = {"SUCCESS": "done", "RUNNING": "running", "FAILURE": "failed", "INVALID": "to do"}
-
-
-def _node(node: Behaviour) -> Row:
-    why = getattr(node, "why", None)
-    return {
-        "name": node.name,
-        "status": node.status.value,
-        "why": why() if why else node.feedback_message,
-        "children": [_node(child) for child in node.children],
-    }

@@ -1,0 +1,107 @@
+"""`nondum tree` asked of a real host that pursues a goal."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import click
+import pytest
+from tests.host.cli import pictures
+from tests.host.cli.btcpp import refusals
+from tests.host.cli.daemon import BEACON_ID, BRIGHTNESS, LAMP, Daemon, command, quiet_environment
+from tests.host.cli.dot import read_dot
+
+
+@pytest.fixture
+def shining(daemon: Daemon) -> Iterator[dict[str, Any]]:
+    """The host's tree while it shines for people."""
+    daemon.run("goal", "shine", "--wait").ok()
+    yield daemon.run("tree", "--json").ok().json
+    daemon.run("halt", "--now").ok()
+    daemon.until(lambda view: not any(stream["flowing"] for stream in view["streams"]))
+
+
+def test_a_kept_step_says_why(shining: dict[str, Any]) -> None:
+    (step,) = pictures.steps(shining)
+    assert step["schema"] == "test-beacon.shine"
+    assert (step["state"], step["component"], step["lasting"]) == ("kept", "beacon", True)
+    assert step["arguments"] == {"u": LAMP, "o": BRIGHTNESS, "h": "panther"}
+    assert step["needed_by"] == [{"fact": "lit panther", "step": None, "action": None}]
+    assert step["locks"] == {"unit": None, "takes": [f"free {BRIGHTNESS}"]}
+    assert step["chosen"]["why"] == "nothing else could do it"
+    assert step["started"] > 1.7e9
+    assert step["ended"] is None
+
+
+def test_eighty_columns_show_it(daemon: Daemon, shining: dict[str, Any]) -> None:
+    shown = daemon.run("tree", COLUMNS="80").ok().out
+    assert "∞ 1 test-beacon.shine  kept since " in shown
+    assert "kept for: the goal: (lit panther)" in shown
+    assert max(map(len, shown.splitlines())) <= 80
+
+
+def test_graphviz_and_groot_can_read_it(daemon: Daemon, shining: dict[str, Any]) -> None:
+    nodes = read_dot(daemon.run("tree", "--graphviz").ok().out).nodes.values()
+    assert "1 test-beacon.shine\nkept" in {node["label"] for node in nodes}
+    assert refusals(daemon.run("tree", "--groot").ok().out) == []
+
+
+def test_one_way_of_drawing_at_a_time(daemon: Daemon) -> None:
+    for wrong in (["--graphviz", "--groot"], ["--watch", "--groot"], ["--graphviz", "--json"]):
+        daemon.run("tree", *wrong).refused(2, "one way of drawing at a time")
+
+
+def test_watching_prints_a_line_of_json_for_each_change(daemon: Daemon) -> None:
+    with daemon.started("tree", "--watch", "--json") as process:
+        assert process.stdout is not None
+        assert not pictures.steps(json.loads(process.stdout.readline()))
+        daemon.run("goal", "shine").ok()
+        states = [step["state"] for step in next(_with_steps(process))]
+        assert states == ["running"]
+    daemon.run("halt", "--now").ok()
+
+
+def _with_steps(process: subprocess.Popen[str]) -> Iterator[list[dict[str, Any]]]:
+    assert process.stdout is not None
+    for line in process.stdout:
+        if steps := pictures.steps(json.loads(line)):
+            yield steps
+
+
+def test_watching_on_a_terminal_draws_in_one_place(daemon: Daemon) -> None:
+    with _terminal("--control", daemon.control, "tree", "--watch") as terminal:
+        first = _until(terminal, b"sentences told")
+        assert first.startswith("\x1b[H")
+        daemon.run("goal", "shine").ok()
+        shown = _until(terminal, b"kept since")
+        assert "\x1b[2J" not in shown  # nothing is blanked, so nothing flickers
+        assert BEACON_ID not in click.unstyle(shown)
+    daemon.run("halt", "--now").ok()
+
+
+@contextmanager
+def _terminal(*arguments: Any) -> Iterator[int]:
+    """The end of a terminal that a person looks at, while a command runs at the other one."""
+    ours, theirs = pty.openpty()
+    environment = quiet_environment() | {"TERM": "xterm", "COLUMNS": "80", "LINES": "60"}
+    process = subprocess.Popen(command(*arguments), stdout=theirs, stderr=theirs, env=environment)
+    os.close(theirs)
+    with process:
+        try:
+            yield ours
+        finally:
+            process.kill()
+    os.close(ours)
+
+
+def _until(terminal: int, words: bytes) -> str:
+    shown = b""
+    while words not in shown:
+        shown += os.read(terminal, 65536)
+    return shown.decode(errors="replace")
