@@ -82,7 +82,7 @@ class Mind:
             wake=self.wake,
         )
         self.root: Behaviour = system_tree(self._parts())
-        self.views = Views(self)
+        self.views = Views(self, now_s=now_s, wall_s=wall_s)
 
     # News
 
