@@ -42,6 +42,7 @@ class SimulatedAction:
     takes: int
     state: RunState = RunState.STARTING
     reason: str = ""
+    progress: str = ""
 
     def halt(self) -> None:
         if not self.state.has_ended:

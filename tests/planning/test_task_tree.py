@@ -165,6 +165,45 @@ def test_achieved_steps_are_skipped() -> None:
     assert robot.started == ["move a b", "drop ball0 b"]
 
 
+def hang(robot: Robot, tree: TaskTree, moments: int) -> None:
+    """Let time pass in which nothing that was started comes to anything."""
+    for _ in range(moments):
+        tree.tick_once()
+        for running in robot.running:
+            running.takes = 1000
+        robot.moment()
+    tree.tick_once()
+
+
+@pytest.mark.parametrize(
+    ("lasting", "key"), [(FOLLOW_LASTING, "establish_s"), (frozenset[str](), "finish_s")]
+)
+def test_behaviour_that_comes_to_nothing_has_failed(lasting: frozenset[str], key: str) -> None:
+    robot = Robot(follow_task(), lasting)
+    patience = Patience(settle_s=0.0, establish_s=5.0, finish_s=5.0)
+    tree = task_tree(robot, plan_of(robot.task, *FOLLOW_PLAN), patience=patience)
+    hang(robot, tree, 4)
+    assert tree.control.phase is Phase.UNDER_WAY
+    hang(robot, tree, 30)
+    assert robot.started == [CAMERA] * 3
+    assert tree.control.exhausted == (CAMERA,)
+    assert tree.needs_replan is not None
+    assert "BEHAVIOUR_OVERDUE" in tree.needs_replan
+    assert f"raise planning.{key}" in tree.needs_replan
+
+
+def test_behaviour_that_gets_on_is_waited_for() -> None:
+    robot = Robot(follow_task(), FOLLOW_LASTING)
+    patience = Patience(settle_s=0.0, establish_s=5.0)
+    tree = task_tree(robot, plan_of(robot.task, *FOLLOW_PLAN), patience=patience)
+    hang(robot, tree, 4)
+    for percent in range(10):
+        robot.running[0].progress = f"{percent} %"
+        hang(robot, tree, 4)
+    assert robot.started == [CAMERA]
+    assert tree.control.phase is Phase.UNDER_WAY
+
+
 def test_failing_action_is_given_up_after_tries() -> None:
     robot = Robot(gripper_task(1), frozenset(), troubles=Troubles(fails=1.0))
     tree = task_tree(robot, plan_of(robot.task, "pick ball0 a", "move a b", "drop ball0 b"))

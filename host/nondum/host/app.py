@@ -39,6 +39,7 @@ from nondum.host.orders import Orders
 from nondum.host.questions import Questions
 from nondum.host.workers.spec import Limits, Timing
 from nondum.host.workers.workers import Workers
+from nondum.planning.attempts import Patience
 from nondum.sdk.errors import ConfigRefused, Problem
 from nondum.wheelhouse.signatures import UnsignedAllowed
 
@@ -84,6 +85,9 @@ async def _run(
         Planners.installed(memory_mb=config.planning.memory_mb),
         emit=bus.emit,
         deadline_s=config.planning.deadline_s,
+        patience=Patience(
+            establish_s=config.planning.establish_s, finish_s=config.planning.finish_s
+        ),
         system_tree=load_system_tree(config.host.system_tree),
     )
     bus.subscribe(_Listener(catalogue, mind, workers).on_event)

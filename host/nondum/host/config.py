@@ -89,6 +89,12 @@ class PlanningSection:
     """Time that a search for a plan is given."""
     memory_mb: int = 512
     """Memory of a planner's process."""
+    establish_s: float = 30.0
+    """Time that a lasting behaviour is given, from its start or its last sign of progress, until
+    its effects hold; then it has failed."""
+    finish_s: float = 600.0
+    """Time that a finishing behaviour is given, from its start or its last sign of progress; then
+    it has failed."""
 
 
 @dataclass(frozen=True, slots=True)

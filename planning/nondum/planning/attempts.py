@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from nondum.planning.running import Run
+from nondum.sdk.errors import Problem
+
 
 @dataclass(frozen=True, slots=True)
 class Patience:
@@ -13,6 +16,10 @@ class Patience:
     """Failures of one action, without its effects ever holding, before it is given up."""
     settle_s: float = 2.0
     """How long effects may take to be seen after an action has succeeded or is established."""
+    establish_s: float = 30.0
+    """How long a lasting behaviour may show no progress before its effects hold."""
+    finish_s: float = 600.0
+    """How long a finishing behaviour may show no progress."""
     steady_s: float = 10.0
     """A lasting behaviour that held this long starts with a clean slate when it dies."""
 
@@ -47,6 +54,19 @@ class Attempts:
             return True
         self.failed(name, "it ended in success, but its effects do not hold")
         return False
+
+    def overdue(self, run: Run, now_s: float) -> Problem | None:
+        """What is wrong with a run that has neither come to anything nor got on for too long."""
+        key = "establish_s" if run.step.lasting else "finish_s"
+        limit_s: float = getattr(self.patience, key)
+        if not run.is_pending or now_s - run.progressed_s < limit_s:
+            return None
+        due = "established" if run.step.lasting else "finished"
+        return Problem(
+            "BEHAVIOUR_OVERDUE",
+            f"it is not {due} {limit_s:g} s after its start or its last progress",
+            fix=f"see `nondum logs`; have it tell progress, or raise planning.{key}",
+        )
 
     @property
     def is_anything_settling(self) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
 
@@ -39,6 +39,11 @@ class RunningAction(Protocol):
     @property
     def reason(self) -> str:
         """Why it failed or was halted, in the author's words; empty otherwise."""
+        ...
+
+    @property
+    def progress(self) -> str:
+        """How far it says it is; whenever that changes, it has got on."""
         ...
 
     def halt(self) -> None:
@@ -82,6 +87,12 @@ class Run:
     """Why it was asked to end; from then on nothing counts on it."""
     ineffective_s: float | None = None
     """Since when it is established and yet its effects do not hold."""
+    progressed_s: float = field(init=False)
+    """When it was started, or last seen to get on."""
+    _progress: str = field(init=False, default="")
+
+    def __post_init__(self) -> None:
+        self.progressed_s = self.started_s
 
     @property
     def is_halting(self) -> bool:
@@ -97,6 +108,11 @@ class Run:
     def is_established(self) -> bool:
         """Whether its effects are there to be counted on."""
         return not self.is_halting and self.action.state is RunState.ESTABLISHED
+
+    def watch(self, now_s: float) -> None:
+        """Take notice of how far it says it is."""
+        if self.action.progress != self._progress:
+            self._progress, self.progressed_s = self.action.progress, now_s
 
     def halt(self, because: str) -> None:
         """Ask it to end, once."""

@@ -12,7 +12,7 @@ from enum import Enum
 from nondum.planning.attempts import Attempts, Patience
 from nondum.planning.goal import GoalKind
 from nondum.planning.guards import Footing, facts_after, footing, twins_in
-from nondum.planning.partial_order import GOAL, bits
+from nondum.planning.partial_order import GOAL
 from nondum.planning.regression import Regression, Rest, Stuck
 from nondum.planning.running import Run, Runner, RunState, World
 from nondum.planning.step import Step
@@ -62,7 +62,7 @@ class TaskControl:
         self.regression = regression
         self.kind = kind
         self.phase = Phase.UNDER_WAY
-        self.rest = Rest((1 << len(regression.steps)) - 1, frozenset())
+        self.rest = Rest((1 << len(regression.steps)) - 1)
         self.needs_replan: str | None = None
         self.exhausted: tuple[str, ...] = ()
         """Actions that were given up and should not be in the next plan."""
@@ -71,6 +71,10 @@ class TaskControl:
         self.past: dict[str, Past] = {}
         """The last run of each action that has ended while this task was carried out."""
         self.exclusive = exclusive
+        self._places: dict[str, int] = {}
+        """Action → the mask of its steps."""
+        for index, step in enumerate(regression.steps):
+            self._places[step.name] = self._places.get(step.name, 0) | 1 << index
         self._runner = runner
         self.decisions = 0
         """How often the world asked for a new decision."""
@@ -81,7 +85,9 @@ class TaskControl:
 
     def decide(self, world: World, now_s: float) -> Phase:
         """Look at the world, halt and start what that asks for, and say where the task is."""
-        if self._is_as_before(world):
+        for run in self.runs.values():
+            run.watch(now_s)
+        if self._is_as_before(world, now_s):
             return self.phase
         self.decisions += 1
         self._collect(now_s)
@@ -100,14 +106,19 @@ class TaskControl:
             return self._stay(ground, rest)
         return self._pursue(rest, ground, now_s)
 
-    def _is_as_before(self, world: World) -> bool:
+    def _is_as_before(self, world: World, now_s: float) -> bool:
         """Whether nothing has changed since the last decision, and nothing waits for time."""
         return (
             self._seen is world.facts
             and self._run_states == self._states()
             and not self.attempts.is_anything_settling
-            and not any(run.ineffective_s is not None for run in self.runs.values())
+            and not any(self._wants_a_look(run, now_s) for run in self.runs.values())
         )
+
+    def _wants_a_look(self, run: Run, now_s: float) -> bool:
+        """Whether a run has ended, or is waited for and time may be up."""
+        is_over = run.action.state.has_ended or run.ineffective_s is not None
+        return is_over or self.attempts.overdue(run, now_s) is not None
 
     def _states(self) -> list[tuple[str, RunState, bool]]:
         return [(name, run.action.state, run.is_halting) for name, run in self.runs.items()]
@@ -139,6 +150,9 @@ class TaskControl:
                 self.past[name] = Past(state, run.started_s, now_s)
                 if not run.is_halting:
                     self._judge(run, state, now_s)
+            elif problem := self.attempts.overdue(run, now_s):
+                self.attempts.failed(name, str(problem))
+                run.halt(str(problem))
 
     def _judge(self, run: Run, state: RunState, now_s: float) -> None:
         name, since_s = run.step.name, run.established_s
@@ -179,7 +193,7 @@ class TaskControl:
 
     def _is_out_of_patience(self, run: Run, now_s: float) -> bool:
         """Whether a run that does not do its part of the plan has had its time."""
-        if run.step.name not in {step.name for step in self.regression.steps}:
+        if run.step.name not in self._places:
             return True
         if run.ineffective_s is None:
             run.ineffective_s = now_s
@@ -190,7 +204,7 @@ class TaskControl:
 
     def _stay(self, ground: Footing, stuck: Stuck) -> Phase:
         """Let what runs go on if its success would help; otherwise ask for another plan."""
-        self.rest = Rest(stuck.steps, self.regression.needs(stuck.steps))
+        self.rest = Rest(stuck.steps)
         pending = [run for run in self.runs.values() if run.is_pending]
         gone = frozenset[str]().union(*(run.step.delete for run in pending))
         come = frozenset[str]().union(*(run.step.add for run in pending))
@@ -213,9 +227,8 @@ class TaskControl:
 
     def _pursue(self, rest: Rest, ground: Footing, now_s: float) -> Phase:
         self.rest = rest
-        left = {self.regression.steps[index].name for index in bits(rest.steps)}
         for name in self.attempts.names():
-            if name not in left:
+            if not self._is_left(name):
                 self.attempts.effective(name)
         for run in self.runs.values():
             if run.step.add <= ground.facts:
@@ -223,16 +236,24 @@ class TaskControl:
         if not rest.steps and self.kind == "achieve":
             self.halt(GOAL_REACHED)
             return Phase.REACHED
-        self._halt_unneeded(rest, left)
+        self._halt_unneeded()
         if not rest.steps:
             return Phase.HOLDING
         return self._advance(rest, ground, now_s)
 
-    def _halt_unneeded(self, rest: Rest, left: Collection[str]) -> None:
+    def _is_left(self, name: str) -> bool:
+        """Whether an action is to be done, or done again."""
+        return bool(self._places.get(name, 0) & self.rest.steps)
+
+    def _halt_unneeded(self) -> None:
         """Keep what the rest or a kept run needs, along causal links; halt all other runs."""
-        kept = [run for name, run in self.runs.items() if name in left and not run.is_halting]
-        needed = set(rest.needs).union(*(run.step.guard for run in kept))
-        others = [r for r in self.runs.values() if not r.is_halting and r not in kept]
+        kept, others = [], []
+        for name, run in self.runs.items():
+            if not run.is_halting:
+                (kept if self._is_left(name) else others).append(run)
+        if not others:
+            return
+        needed = set(self.regression.needs(self.rest.steps)).union(*(r.step.guard for r in kept))
         while wanted := [r for r in others if r.is_established and r.step.add & needed]:
             for run in wanted:
                 needed |= run.step.guard

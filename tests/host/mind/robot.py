@@ -22,6 +22,7 @@ from nondum.host.mind.mind import Mind
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.runner import FactValue
 from nondum.host.mind.system_tree import SystemTree, default_tree
+from nondum.planning.attempts import Patience
 from nondum.planning.running import RunState
 from nondum.sdk.description import PluginDescription
 
@@ -68,11 +69,12 @@ class Robot:
     events: list[Event] = field(default_factory=list)
     told_values: list[tuple[str, FactValue]] = field(default_factory=list)
     stubborn: set[str] = field(default_factory=set)
-    """Behaviours that never get anywhere."""
+    """Behaviours, of all components or of one, that never get anywhere."""
     broken: set[str] = field(default_factory=set)
     """Components whose behaviours fail."""
     early_news: dict[str, list[Event]] = field(default_factory=dict)
     """What components say before they are in the catalogue."""
+    patience: Patience | None = None
     revision: int = 0
     mind: Mind = field(init=False)
 
@@ -84,6 +86,7 @@ class Robot:
             self.planners,
             emit=self.events.append,
             deadline_s=10.0,
+            patience=self.patience,
             system_tree=self.system_tree,
         )
         self.see()
@@ -104,7 +107,7 @@ class Robot:
         loop = asyncio.get_running_loop()
         if component in self.broken:
             loop.call_soon(call.end, RunState.FAILED, "no light")
-        elif behaviour in self.stubborn:
+        elif self.stubborn & {behaviour, f"{component}.{behaviour}"}:
             pass
         elif lasting:
             loop.call_soon(call.establish)

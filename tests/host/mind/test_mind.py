@@ -7,6 +7,7 @@ import itertools
 from dataclasses import replace
 
 import pytest
+from tests.host.mind.conftest import at_work
 from tests.host.mind.robot import HOST, Robot
 from tests.planning.strangers import (
     COMPTON_CAMERA,
@@ -22,6 +23,8 @@ from tests.planning.strangers import (
 from nondum.host.catalogue.records import ComponentState
 from nondum.host.events import FactKnown, GoalReached, PlanMade, PlanMissing
 from nondum.host.mind.mind import PAUSE_S
+from nondum.host.mind.planners import Planners
+from nondum.planning.attempts import Patience
 from nondum.planning.running import RunState
 from nondum.sdk.description import Fragment, Output, Unit
 from nondum.sdk.errors import GoalRefused
@@ -168,6 +171,22 @@ async def test_alternative_is_used_after_failures(robot: Robot) -> None:
     robot.plug(THERMAL_CAMERA)
     await robot.until_holding()
     assert "thermal-camera.stream" in robot.running
+
+
+async def test_behaviour_that_never_establishes_makes_way_for_another() -> None:
+    patience = Patience(establish_s=0.1)
+    async with at_work(Robot(Planners.installed(memory_mb=512), patience=patience)) as robot:
+        robot.stubborn = {"recorded-camera.stream"}
+        plug_followers(robot)
+        robot.plug(THERMAL_CAMERA)
+        robot.set_state("thermal-camera", ComponentState.RESTARTING)
+        robot.mind.give(pddl=FOLLOW, kind="maintain")
+        await robot.until(lambda: robot.started.count("recorded-camera.stream") == 3)
+        await robot.until_goal("suspended")
+        robot.set_state("thermal-camera", ComponentState.READY)
+        await robot.until_holding()
+        assert "thermal-camera.stream" in robot.running
+        assert any("BEHAVIOUR_OVERDUE" in text for text in robot.told)
 
 
 async def test_valued_preconditions_travel_along(robot: Robot) -> None:

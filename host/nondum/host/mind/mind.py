@@ -27,6 +27,7 @@ from nondum.host.mind.runner import BehaviourRunner, Calls
 from nondum.host.mind.search import SMALL
 from nondum.host.mind.system_tree import Duty, Hold, Parts, SystemTree, TaskSlot, default_tree
 from nondum.host.mind.views import Views
+from nondum.planning.attempts import Patience
 from nondum.planning.goal import Goal, GoalKind, goal_text, parse_goal
 from nondum.sdk.errors import GoalRefused, Problem
 
@@ -51,11 +52,13 @@ class Mind:
         *,
         emit: Emit,
         deadline_s: float = 10.0,
+        patience: Patience | None = None,
         system_tree: SystemTree = default_tree,
         now_s: Callable[[], float] = time.monotonic,
         wall_s: Callable[[], float] = time.time,
     ) -> None:
-        """`emit` is told of goals and plans; `deadline_s` bounds a search for a plan."""
+        """`emit` is told of goals and plans; `deadline_s` bounds a search for a plan, `patience`
+        what behaviours are waited for."""
         self.beliefs = Beliefs(host, now_s)
         self.queue = GoalQueue()
         self.people = People(wall_s)
@@ -79,6 +82,7 @@ class Mind:
             emit=emit,
             now_s=now_s,
             deadline_s=deadline_s,
+            patience=patience or Patience(),
             wake=self.wake,
         )
         self.root: Behaviour = system_tree(self._parts())

@@ -19,6 +19,7 @@ from nondum.host.mind.people import People
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.runner import BehaviourRunner
 from nondum.host.mind.search import NoPlan, Planned, Situation, search, task_of
+from nondum.planning.attempts import Patience
 from nondum.planning.contribution import Contribution
 from nondum.planning.goal import parse_goal
 from nondum.planning.replay import replayed
@@ -68,6 +69,7 @@ class Pursuit:
         emit: Emit,
         now_s: Callable[[], float],
         deadline_s: float,
+        patience: Patience,
         wake: Callable[[], None],
     ) -> None:
         """`wake` asks for a tick: a search has ended."""
@@ -80,6 +82,7 @@ class Pursuit:
         self._emit = emit
         self._now_s = now_s
         self._deadline_s = deadline_s
+        self._patience = patience
         self._wake = wake
         self._composition: Composition | None = None
         self._seen: dict[str, Contribution] = {}
@@ -313,6 +316,7 @@ class Pursuit:
             sight=lambda: (self._beliefs.world, self._now_s()),
             exclusive=self._composition.exclusive,
             runs=(*runs, *self._left_over),
+            patience=self._patience,
             name=f"goal {goal.id}",
         )
         self._left_over = ()
