@@ -1,0 +1,1 @@
+"""nondum's own planner: ground tasks in, typed answers out."""

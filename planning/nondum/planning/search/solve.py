@@ -1,0 +1,72 @@
+"""The planner as one function: strategies take turns until one of them has a plan or a proof."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+from nondum.planning.relaxed import quick_answer
+from nondum.planning.search.encoding import Encoded, encode
+from nondum.planning.search.greedy import Greedy
+from nondum.planning.search.improvement import Improvement, eliminated
+from nondum.planning.search.relaxation import Relaxation
+from nondum.planning.search.tree import Moves, Standing
+from nondum.planning.search.widths import Widths
+from nondum.sdk.planner import Answer, GaveUp, GroundTask, Plan, Unsolvable
+
+IsOver: TypeAlias = Callable[[], bool]
+"""Whether the time is up."""
+_SLICE = 400_000
+"""Work between two looks at the clock: some tens of milliseconds."""
+_FIRST_TURN = 8
+"""Slices of the first turn; each later one is half as long again."""
+
+_IMPROVED_MOVES = 1_000
+"""A plan of a task with so many moves is worth looking for a cheaper one, …"""
+_IMPROVED_SLICES = 2
+"""… for so long."""
+
+
+def solve(task: GroundTask, is_over: IsOver) -> Answer:
+    """Find a plan, or a proof that there is none.
+
+    The answer does not depend on the clock, unless it is that time ran out.
+    """
+    if (known := quick_answer(task)) is not None:
+        return known
+    encoded = encode(task)
+    found = _searched(encoded, is_over)
+    match found:
+        case Standing.EXHAUSTED:
+            return Unsolvable("exhausted")
+        case Standing.OPEN:
+            return GaveUp("the time was up")
+    plan = _improved(encoded, eliminated(encoded, found), is_over)
+    steps = tuple(encoded.moves[index].action for index in plan)
+    return Plan(steps, sum(task.actions[step].cost for step in steps))
+
+
+def _searched(encoded: Encoded, is_over: IsOver) -> Moves | Standing:
+    relaxation = Relaxation(encoded)
+    greedy = Greedy(encoded, relaxation)
+    widths: Widths | None = None
+    turn = _FIRST_TURN
+    while True:
+        for search in (greedy, widths or (widths := Widths(encoded, relaxation))):
+            for _ in range(turn):
+                if is_over():
+                    return Standing.OPEN
+                found = search.advance(_SLICE)
+                if found is not Standing.OPEN:
+                    return found
+        turn += (turn + 1) // 2
+
+
+def _improved(encoded: Encoded, plan: Moves, is_over: IsOver) -> Moves:
+    if len(encoded.moves) > _IMPROVED_MOVES:
+        return plan
+    search = Improvement(encoded, plan)
+    for _ in range(_IMPROVED_SLICES):
+        if is_over() or search.advance(_SLICE):
+            break
+    return search.plan

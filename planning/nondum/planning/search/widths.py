@@ -1,0 +1,85 @@
+"""Best-first width search: states with a fact that is new among their like first, and among them
+those that meet more of the goal. Cheap: few states are estimated.
+
+Source: Lipovetzky and Geffner 2017, BFWS(f5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from heapq import heappop, heappush
+
+from nondum.planning.search.encoding import Encoded, State
+from nondum.planning.search.relaxation import Relaxation
+from nondum.planning.search.successors import Successors
+from nondum.planning.search.tree import Moves, Standing, Tree
+
+_PER_STATE = 60
+"""Work of making a state and looking whether it is new, in terms of `Relaxation.effort`."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """How far a state has come."""
+
+    unmet: int
+    """Goal facts that do not hold."""
+    wanted: int
+    """The facts that a relaxed plan makes true, from where `unmet` was last lowered."""
+    met: int
+    """Those of them that held since."""
+
+
+class Widths:
+    """A search that can be gone on with."""
+
+    def __init__(self, encoded: Encoded, relaxation: Relaxation) -> None:
+        self._encoded = encoded
+        self._relaxation = relaxation
+        self._successors = Successors(encoded)
+        self._tree = Tree()
+        self._open: list[tuple[bool, int, int, State, _Way]] = []
+        self._seen: dict[tuple[int, int], int] = {}
+        """Facts that held in some state, by goal facts unmet and wanted facts met."""
+        self._per_state = _PER_STATE + 2 * sum(len(stage.clauses) for stage in encoded.stages)
+        self._count = 0
+        self._effort = 0
+        self._reach(encoded.init, None, None)
+
+    def advance(self, effort: int) -> Moves | Standing:
+        """Go on for about so much work. A search that has ended must not be gone on with."""
+        self._effort = effort
+        moves, after, tree = self._encoded.moves, self._encoded.after, self._tree
+        while self._open:
+            *_, state, way = heappop(self._open)
+            applicable = self._successors.of(state)
+            for index in applicable:
+                reached = after(state, moves[index])
+                if reached not in tree:
+                    self._reach(reached, (state, index), way)
+                    if self._encoded.is_goal(reached):
+                        return tree.moves_to(reached)
+            self._effort -= self._per_state * (len(applicable) + 1)
+            if self._effort < 0:
+                return Standing.OPEN
+        return Standing.EXHAUSTED
+
+    def _reach(self, state: State, before: tuple[State, int] | None, way: _Way | None) -> None:
+        self._tree.add(state, before)
+        unmet = (self._encoded.goal & ~state).bit_count()
+        if way is None or unmet < way.unmet:
+            estimate = self._relaxation.estimate(state)
+            self._effort -= self._relaxation.effort
+            if estimate is None:
+                return
+            wanted = self._relaxation.mask(estimate.wanted)
+            way = _Way(unmet, wanted, 0)
+        else:
+            way = _Way(unmet, way.wanted, way.met | state & way.wanted)
+        like = (unmet, way.met.bit_count())
+        seen = self._seen.get(like, 0)
+        is_known = not state & ~seen
+        if not is_known:
+            self._seen[like] = seen | state
+        self._count += 1
+        heappush(self._open, (is_known, unmet, self._count, state, way))
