@@ -95,7 +95,8 @@ class _Encoder:
         asked = task.goal.union(
             (fact for fact, _ in pairs), *(rule.body for rules in self._rules for rule in rules)
         ).union(*map(_asked, (a for _, a in self._actions)))
-        self._facts = sorted((asked & reached) - (task.init - deleted - derived))
+        fluent = (asked & reached) - (task.init - deleted - derived)
+        self._facts = sorted(fluent, key=task.facts.__getitem__)
         self._bit = {fact: 1 << bit for bit, fact in enumerate(self._facts, 1)}
         self._full = (2 << len(self._facts)) - 1
         self._basic = self._full ^ self._mask(derived)
