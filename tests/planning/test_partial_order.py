@@ -17,6 +17,7 @@ from tests.planning.tasks import (
 from nondum.planning.partial_order import (
     GOAL,
     CausalLink,
+    PartialOrder,
     bits,
     causal_links,
     partial_order,
@@ -66,6 +67,22 @@ def test_order_is_kept_between_reader_and_deleter() -> None:
     steps = steps_of(task, plan_of(task, "read", "take"), frozenset())
     order = partial_order(steps, causal_links(steps, frozenset({"q", "r"})))
     assert order.before == (0, 0b01)
+
+
+@given(st.lists(st.integers(0, 2**7 - 1), max_size=7), st.integers(0, 2**7 - 1))
+def test_ends_of_a_set_are_those_that_no_other_of_it_precedes_or_follows(
+    wishes: list[int], some: int
+) -> None:
+    before: list[int] = []
+    for index, wish in enumerate(wishes):
+        closed = wish & ((1 << index) - 1)
+        for earlier in bits(closed):
+            closed |= before[earlier]
+        before.append(closed)
+    after = [sum(1 << j for j, b in enumerate(before) if b >> i & 1) for i in range(len(before))]
+    order, some = PartialOrder(tuple(before), tuple(after)), some & ((1 << len(before)) - 1)
+    assert list(order.first_of(some)) == [i for i in bits(some) if not before[i] & some]
+    assert list(order.last_of(some)) == [i for i in bits(some) if not after[i] & some]
 
 
 def lasting_and_breaker(*names: str, goal: str) -> tuple[Step, ...]:

@@ -39,7 +39,11 @@ class PartialOrder:
 
     def first_of(self, steps: int) -> Iterator[int]:
         """The steps of a set that wait for no other of the set, in the plan's order."""
-        return (index for index in bits(steps) if not self.before[index] & steps)
+        while steps:
+            # Of those that are left, the lowest waits for none: what comes after others is gone.
+            index = (steps & -steps).bit_length() - 1
+            yield index
+            steps &= ~(self.after[index] | 1 << index)
 
     def last_of(self, steps: int) -> Iterator[int]:
         """The steps of a set that no other of the set waits for, in the plan's order."""

@@ -24,11 +24,10 @@ from nondum.planning.step import Step
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """The steps that are still to do, and what must hold for them to reach the goal."""
+    """The steps that are still to do; they reach the goal from here."""
 
     steps: int
     """Bit mask over the plan's steps; 0: the goal holds."""
-    needs: frozenset[str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +79,7 @@ class Regression:
         if missing:
             missing.sort(key=lambda link: (link.consumer, link.fact))
             return Stuck(tuple(missing), todo)
-        return Rest(todo, self.needs(todo))
+        return Rest(todo)
 
     def needs(self, todo: int) -> frozenset[str]:
         """What a rest needs from outside itself."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from nondum.planning.attempts import Attempts, Patience
+from nondum.planning.attention import Attention
 from nondum.planning.goal import GoalKind
 from nondum.planning.guards import Footing, facts_after, footing, twins_in
 from nondum.planning.partial_order import GOAL
@@ -78,10 +79,12 @@ class TaskControl:
         self._runner = runner
         self.decisions = 0
         """How often the world asked for a new decision."""
-        self._seen: frozenset[str] | None = None
         self._run_states: list[tuple[str, RunState, bool]] = []
         self._waiting: dict[int, str] = {}
         self._twins = twins_in(regression.goal, *(s.precondition | s.add for s in regression.steps))
+        taken_over = (run.step for run in self.runs.values())
+        self._attention = Attention((*regression.steps, *taken_over), regression.goal)
+        self._is_supported = False
 
     def decide(self, world: World, now_s: float) -> Phase:
         """Look at the world, halt and start what that asks for, and say where the task is."""
@@ -93,13 +96,15 @@ class TaskControl:
         self._collect(now_s)
         if self.phase is not Phase.REACHED:  # done is done, though what reached it is halted again
             self.phase = self._decide(world, now_s)
-        self._seen, self._run_states = world.facts, self._states()
+        self._run_states = self._states()
+        self._attention.keep(world, self._established(), closely=not self._is_supported)
         return self.phase
 
     def _decide(self, world: World, now_s: float) -> Phase:
         ground = self._uphold(world)
         self.needs_replan, self.exhausted, self._waiting = None, (), {}
         rest = self.regression.rest(ground.facts)
+        self._is_supported = isinstance(rest, Rest)
         if isinstance(rest, Stuck):
             rest = self._unlock(world, rest, now_s)
         if isinstance(rest, Stuck):
@@ -109,16 +114,19 @@ class TaskControl:
     def _is_as_before(self, world: World, now_s: float) -> bool:
         """Whether nothing has changed since the last decision, and nothing waits for time."""
         return (
-            self._seen is world.facts
-            and self._run_states == self._states()
+            self._run_states == self._states()
             and not self.attempts.is_anything_settling
             and not any(self._wants_a_look(run, now_s) for run in self.runs.values())
+            and self._attention.is_as_before(world, self._established())
         )
 
     def _wants_a_look(self, run: Run, now_s: float) -> bool:
         """Whether a run has ended, or is waited for and time may be up."""
         is_over = run.action.state.has_ended or run.ineffective_s is not None
         return is_over or self.attempts.overdue(run, now_s) is not None
+
+    def _established(self) -> list[str]:
+        return [n for n, r in self.runs.items() if r.action.state is RunState.ESTABLISHED]
 
     def _states(self) -> list[tuple[str, RunState, bool]]:
         return [(name, run.action.state, run.is_halting) for name, run in self.runs.items()]
@@ -133,6 +141,13 @@ class TaskControl:
         runs = tuple(self.runs.values())
         self.runs = {}
         return runs
+
+    def places_of(self, names: Iterable[str]) -> int:
+        """The mask of the steps with these actions."""
+        mask = 0
+        for name in names:
+            mask |= self._places.get(name, 0)
+        return mask
 
     def waits_for(self, index: int) -> str:
         """Why a step that could be next was not started at the last decision, or nothing."""
@@ -243,7 +258,7 @@ class TaskControl:
 
     def _is_left(self, name: str) -> bool:
         """Whether an action is to be done, or done again."""
-        return bool(self._places.get(name, 0) & self.rest.steps)
+        return bool(self.places_of((name,)) & self.rest.steps)
 
     def _halt_unneeded(self) -> None:
         """Keep what the rest or a kept run needs, along causal links; halt all other runs."""

@@ -17,6 +17,7 @@ from py_trees.composites import Composite
 
 from nondum.planning.attempts import Patience
 from nondum.planning.goal import GoalKind
+from nondum.planning.partial_order import bits
 from nondum.planning.regression import Regression
 from nondum.planning.running import Run, Runner, World
 from nondum.planning.step import steps_of, words
@@ -97,6 +98,7 @@ class TaskTree(Composite):
         )
         self._sight = sight
         self._shown = 0
+        self._left = self._active = 0
         self._leaves = [StepLeaf(self.control, index) for index in range(len(steps))]
         super().__init__(name, self._leaves)
 
@@ -142,7 +144,8 @@ class TaskTree(Composite):
 
     def _show(self) -> Iterator[Behaviour]:
         self.current_child = None
-        for leaf in self._leaves:
+        for index in bits(self._may_have_moved()):
+            leaf = self._leaves[index]
             status = leaf.update()
             if status is Status.RUNNING:
                 self.current_child = leaf
@@ -150,6 +153,15 @@ class TaskTree(Composite):
             elif status is not leaf.status:
                 leaf.stop(status)
                 yield leaf
+
+    def _may_have_moved(self) -> int:
+        """The mask of the steps that were or are left, run or have been given up, but not both."""
+        control = self.control
+        left = control.rest.steps
+        active = control.places_of((*control.runs, *control.exhausted))
+        moved = active | self._active | (left ^ self._left)
+        self._left, self._active = left, active
+        return moved
 
     def terminate(self, new_status: Status) -> None:
         """Halt everything when something of higher priority interrupts the task."""
