@@ -30,7 +30,8 @@ WRONG = {
     "object": ("(pointing self radiation-sauce)", "E-UNDECL", "did you mean 'radiation-source'?"),
     "type": ("(pointing radiation-source self)", "E-TYPE", "expected host"),
     "arity": ("(pointing self)", "E-PRED-ARITY", "(pointing self) has 1 arguments"),
-    "disjunction": ("(or (pointing self radiation-source) (ready x))", "E-UNSUPPORTED", "'or'"),
+    "disjunction": ("(or (pointing self radiation-source) (ready x))", "E-UNDECL", "'x'"),
+    "number": ("(> (dose self) 3)", "E-UNSUPPORTED", "the numeric condition (> (dose self) 3)"),
     "variable": ("(pointing self ?x)", "E-UNDECL", "?x is not a parameter"),
 }
 

@@ -140,11 +140,11 @@ def test_negative_condition_becomes_a_twin() -> None:
         MOVE + CLOSE, [*ROAD, f"at {LEFT} a", f"at {RIGHT} c", "open a"], "(not (open a))"
     )
     shut = next(a for a in grounded.actions if a.name == f"drive.shut {LEFT} a")
-    assert facts_of(grounded, shut.precondition) == {f"not-at {LEFT} a"}
-    assert facts_of(grounded, shut.add) == {"not-open a"}
-    assert facts_of(grounded, grounded.goal) == {"not-open a"}
+    assert facts_of(grounded, shut.precondition) == {f"!at {LEFT} a"}
+    assert facts_of(grounded, shut.add) == {"!open a"}
+    assert facts_of(grounded, grounded.goal) == {"!open a"}
     leave = next(a for a in grounded.actions if a.name == f"drive.move {LEFT} a b")
-    assert f"not-at {LEFT} a" in facts_of(grounded, leave.add)
+    assert f"!at {LEFT} a" in facts_of(grounded, leave.add)
     assert f"at {LEFT} b" in facts_of(grounded, leave.add)
 
 

@@ -103,23 +103,61 @@ ALONE = {
         "wheels",
         "'wheels' names one instance",
     ),
-    "disjunction": (
-        "(:action go :parameters (?u - base) :precondition (or (ready ?u) (idle ?u)))",
-        "E-UNSUPPORTED",
-        "or",
-        "'or' is not handled",
+    "unknown word in a disjunction": (
+        "(:action go :parameters (?u - base) :precondition (or (ready ?u) (idel ?u)))",
+        "E-UNDECL",
+        "idel",
+        "nobody declares predicate 'idel'",
     ),
-    "quantifier": (
-        "(:action go :parameters (?u - base) :precondition (forall (?x - unit) (idle ?x)))",
-        "E-UNSUPPORTED",
-        "forall",
-        "'forall' is not handled",
+    "unknown type of a quantified variable": (
+        "(:action go :parameters (?u - base) :precondition (forall (?x - unti) (idle ?x)))",
+        "E-UNDECL",
+        "?x",
+        "nobody declares type 'unti'",
     ),
-    "conditional effect": (
-        "(:predicates (up)) (:action go :parameters (?u - base) :effect (when (up) (up)))",
+    "variable outside its quantifier": (
+        "(:action go :parameters (?u - base) :precondition"
+        " (and (exists (?x - unit) (idle ?x)) (ready ?x)))",
+        "E-UNDECL",
+        "?x",
+        "?x is not a parameter",
+    ),
+    "host's word under a condition": (
+        "(:action go :parameters (?u - base) :effect (when (idle ?u) (ready ?u)))",
+        "E-OWNED",
+        "ready",
+        "'ready' is the host's to say",
+    ),
+    "cost under a condition": (
+        "(:action go :parameters (?u - base) :effect (when (ready ?u) (increase (total-cost) 1)))",
         "E-UNSUPPORTED",
-        "when",
-        "'when' is not handled",
+        "increase",
+        "a cost that depends on a condition",
+    ),
+    "rule for the host's word": (
+        "(:derived (ready ?u - unit) (idle ?u))",
+        "E-OWNED",
+        "ready",
+        "'ready' is the host's to say",
+    ),
+    "rule and action for one word": (
+        "(:predicates (up ?u - unit)) (:derived (up ?v - unit) (idle ?v))"
+        " (:action go :parameters (?u - base) :effect (up ?u))",
+        "E-DERIVED",
+        "up ?v",
+        "'up' follows from rules in one place and is written in another",
+    ),
+    "word that holds if it does not": (
+        "(:predicates (up ?u - unit)) (:derived (up ?v - unit) (not (up ?v)))",
+        "E-DERIVED",
+        "up ?v",
+        "these hold only if they do not: up",
+    ),
+    "function that nobody declares": (
+        "(:action go :parameters (?u - base) :effect (increase (total-cost) (weight ?u)))",
+        "E-UNDECL",
+        "weight",
+        "nobody declares function 'weight'",
     ),
     "numeric effect": (
         "(:action go :parameters (?u - base) :effect (decrease (fuel) 1))",
@@ -170,12 +208,6 @@ ALONE = {
         "ready",
         "argument 1: place, unit as nondum-core",
     ),
-    "name of a twin": (
-        "(:predicates (not-done ?u))",
-        "E-RESERVED",
-        "not-done",
-        "names that begin with 'not-'",
-    ),
     "value of nothing": (
         "(:valued dose)",
         "E-UNDECL",
@@ -213,6 +245,9 @@ def test_wrong_fragment_keeps_its_component_out(
 INITS = {
     "host's word": ("(:init (ready wheels))", "E-OWNED", "'ready' is the host's to say"),
     "no fact": ("(:init (not (found goose self)))", "E-INIT", "is not a fact"),
+    "half a number": ("(:init (= (weight wheels) 1.5))", "E-INIT", "only whole numbers"),
+    "number of nothing": ("(:init (= wheels 1))", "E-INIT", "gives no function a number"),
+    "unknown function": ("(:init (= (wait wheels) 1))", "E-UNDECL", "function 'wait'"),
     "wrong type": ("(:init (found self self))", "E-TYPE", "expected class, self is host"),
     "variable": ("(:init (recognises ?u person))", "E-UNDECL", "?u is not a parameter"),
     "stranger's unit": (
@@ -229,6 +264,49 @@ def test_wrong_problem_keeps_its_component_out(init: str, code: str, message: st
     found = refused(brings("drive", init=init, units={"wheels": "base"}))
     assert found.code == code
     assert message in found.message
+
+
+def test_lasting_behaviour_has_no_effects_under_conditions() -> None:
+    body = """(:predicates (up)) (:action go :parameters (?u - base)
+              :effect (and (not (idle ?u)) (when (ready ?u) (up))))"""
+    behaviour = Behaviour("go", "(go ?u - base)", lasting=True)
+    found = refused(brings("drive", body, units={"wheels": "base"}, behaviours=(behaviour,)))
+    assert found.code == "E-UNSUPPORTED"
+    assert "'go' is lasting, and has effects under conditions" in found.message
+
+
+def test_stranger_may_not_write_what_follows_from_another_ones_rules() -> None:
+    rule = "(:predicates (up ?u - unit)) (:derived (up ?u - unit) (idle ?u))"
+    writer = "(:predicates (up ?u - unit)) (:action go :parameters (?u - base) :effect (up ?u))"
+    result = merge([brings("arm", rule), brings("base", writer)], HOST)
+    [problem] = result.quarantined["base"]
+    assert problem.code == "E-DERIVED"
+    assert problem.where.startswith("base 1.0 domain.pddl:1:")
+    assert "arm 1.0 domain.pddl:1:" in problem.message
+
+
+def test_circle_through_two_strangers_rules_keeps_the_later_one_out() -> None:
+    words = "(:predicates (up) (down))"
+    first = brings("arm", words + "(:derived (up) (not (down)))")
+    second = brings("base", words + "(:derived (down) (not (up)))")
+    assert merge([first], HOST).quarantined == {}
+    result = merge([second, first], HOST)
+    [problem] = result.quarantined["base"]
+    assert problem.code == "E-DERIVED"
+    assert "these hold only if they do not" in problem.message
+
+
+def test_values_of_functions_are_kept() -> None:
+    functions = "(:functions (weight ?u - unit) (total-cost))"
+    result = merge(
+        [
+            brings(
+                "drive", functions, init="(:init (= (weight wheels) 7))", units={"wheels": "base"}
+            )
+        ],
+        HOST,
+    )
+    assert result.values == {"weight rover__drive__wheels": 7}
 
 
 def test_all_problems_are_told_at_once() -> None:

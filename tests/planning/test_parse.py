@@ -168,7 +168,8 @@ def test_nearest_keyword_is_suggested() -> None:
     ("text", "message"),
     [
         ("(define (domain d) (:durative-action a))", "durative actions are not handled"),
-        ("(define (domain d) (:derived (a) (b)))", "derived predicates are not handled"),
+        ("(define (domain d) (:constraints (and)))", "trajectory constraints are not handled"),
+        ("(define (problem d) (:metric minimize (total-time)))", "metric 'total-time' is not"),
         ("(define (problem d) (:metric maximize (x)))", "metrics that maximize are not handled"),
     ],
 )

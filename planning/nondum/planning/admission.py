@@ -6,12 +6,14 @@ say, and what contradicts it is kept out, with both places named.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 from nondum.planning.claims import Claims
 from nondum.planning.core import CORE_NAME, CORE_VERSION, core, core_graph, core_predicates
-from nondum.planning.domain import Action, Object, Origin, Predicate
+from nondum.planning.derivation import strata_of
+from nondum.planning.domain import Action, DerivedRule, Object, Origin, Predicate
+from nondum.planning.facts import parts
 from nondum.planning.scope import Report
 from nondum.planning.syntax import Place, type_text
 from nondum.planning.typegraph import ROOT, TypeGraph
@@ -29,6 +31,10 @@ class Agreement:
     predicates: dict[str, Predicate] = field(default_factory=dict)
     objects: dict[str, Object] = field(default_factory=dict)
     actions: dict[str, Action] = field(default_factory=dict)
+    functions: dict[str, Predicate] = field(default_factory=dict)
+    derived: tuple[DerivedRule, ...] = ()
+    asserted: dict[str, Origin] = field(default_factory=dict)
+    """Predicates that problem fragments assert facts of, each with the first who did."""
 
     @classmethod
     def of_core(cls, hosts: Iterable[str]) -> Agreement:
@@ -53,13 +59,18 @@ class Agreement:
             dict(self.predicates),
             dict(self.objects),
             dict(self.actions),
+            dict(self.functions),
+            self.derived,
+            dict(self.asserted),
         )
         _join_types(wider, claims, report)
         if not report.problems:
             graph = TypeGraph(wider.parents)
-            _join_predicates(wider, claims, graph, report)
+            _join_signatures(wider.predicates, "predicate", claims.predicates, graph, report)
+            _join_signatures(wider.functions, "function", claims.functions, graph, report)
             _join_objects(wider, claims, graph, report)
             _join_actions(wider, claims, report)
+            _join_derived(wider, claims, report)
         return wider
 
 
@@ -98,22 +109,28 @@ def _says_no_less(graph: TypeGraph, parents: frozenset[str], known: frozenset[st
     return known <= above
 
 
-def _join_predicates(agreed: Agreement, claims: Claims, graph: TypeGraph, report: Report) -> None:
-    for claim in claims.predicates:
-        known = agreed.predicates.get(claim.name)
+def _join_signatures(
+    agreed: dict[str, Predicate],
+    kind: str,
+    claims: Iterable[Predicate],
+    graph: TypeGraph,
+    report: Report,
+) -> None:
+    for claim in claims:
+        known = agreed.get(claim.name)
         if known is None:
-            agreed.predicates[claim.name] = claim
+            agreed[claim.name] = claim
             continue
         if known.arity != claim.arity:
             message = (
-                f"predicate {claim.name!r}: {claim.arity} arguments here,"
+                f"{kind} {claim.name!r}: {claim.arity} arguments here,"
                 f" {known.arity} in {_places(known.origins)}"
             )
             report.problem("E-PRED-ARITY", message, _place(claim.origins[0]), "choose another name")
             continue
-        agreed.predicates[claim.name] = replace(
+        agreed[claim.name] = replace(
             known,
-            parameters=_wider(known, claim, graph, report),
+            parameters=_wider(known, claim, kind, graph, report),
             valued=known.valued or claim.valued,
             functional=known.functional or claim.functional,
             origins=known.origins + claim.origins,
@@ -121,13 +138,13 @@ def _join_predicates(agreed: Agreement, claims: Claims, graph: TypeGraph, report
 
 
 def _wider(
-    known: Predicate, claim: Predicate, graph: TypeGraph, report: Report
+    known: Predicate, claim: Predicate, kind: str, graph: TypeGraph, report: Report
 ) -> tuple[Types, ...]:
     wider = []
     pairs = zip(known.parameters, claim.parameters, strict=True)
     for position, (theirs, mine) in enumerate(pairs, 1):
         difference = (
-            f"predicate {claim.name!r}, argument {position}: {type_text(mine)} here,"
+            f"{kind} {claim.name!r}, argument {position}: {type_text(mine)} here,"
             f" {type_text(theirs)} in {_places(known.origins)}"
         )
         place = _place(claim.origins[0])
@@ -171,6 +188,35 @@ def _join_actions(agreed: Agreement, claims: Claims, report: Report) -> None:
             report.problem("E-VERSION", message, _place(action.origins[0]), fix)
             continue
         agreed.actions[action.name] = replace(known, origins=known.origins + action.origins)
+
+
+def _join_derived(agreed: Agreement, claims: Claims, report: Report) -> None:
+    """Derived predicates are written by rules alone, whoever brings them."""
+    agreed.derived += claims.derived
+    for claim in claims.facts:
+        agreed.asserted.setdefault(parts(claim.fact)[0], claim.origin)
+    derived = {rule.head.predicate: rule for rule in reversed(agreed.derived)}
+    for name, writer in _writers(agreed):
+        rule = derived.get(name)
+        own = rule is not None and rule in claims.derived
+        if rule and (own or writer.component == report.by.component):
+            mine, other = (rule.origins[0], writer) if own else (writer, rule.origins[0])
+            message = f"{name!r} follows from rules in one place and is written in another: {other}"
+            fix = "use another predicate for what is written"
+            report.problem("E-DERIVED", message, _place(mine), fix)
+    if claims.derived and (circle := strata_of(agreed.derived).circle):
+        message = f"these hold only if they do not: {', '.join(circle)}"
+        fix = "take a negation out of the circle"
+        report.problem("E-DERIVED", message, _place(claims.derived[0].origins[0]), fix)
+
+
+def _writers(agreed: Agreement) -> Iterator[tuple[str, Origin]]:
+    """Every predicate that an action or fact writes, once."""
+    writers = dict(agreed.asserted)
+    for action in agreed.actions.values():
+        for atom in (*action.effect.added(), *action.effect.deleted()):
+            writers.setdefault(atom.predicate, action.origins[0])
+    yield from sorted(writers.items(), key=lambda writer: writer[0])
 
 
 def _place(origin: Origin) -> Place:

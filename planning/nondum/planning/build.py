@@ -17,6 +17,7 @@ from nondum.planning.syntax import (
     ActionDeclaration,
     And,
     Atom,
+    DerivedDeclaration,
     DomainFragment,
     Equal,
     Formula,
@@ -52,14 +53,16 @@ class _Section:
 
 
 class Builder(Transformer[Token, Any]):
-    """Makes syntax of one file's tree, bottom up. Raises `Misplaced`, wrapped by lark."""
+    """Makes syntax of what is parsed, bottom up. Raises `Misplaced`."""
 
-    def __init__(self, file: str) -> None:
+    file = ""
+    """The name that places give."""
+
+    def __init__(self) -> None:
         super().__init__(visit_tokens=False)
-        self._file = file
 
     def _place(self, token: Token) -> Place:
-        return Place(self._file, token.line or 1, token.column or 1)
+        return Place(self.file, token.line or 1, token.column or 1)
 
     # Names and terms
 
@@ -165,7 +168,12 @@ class Builder(Transformer[Token, Any]):
             raise Misplaced(
                 "E-UNSUPPORTED", "metrics that maximize are not handled", self._place(children[1])
             )
-        return self._section(children, None)
+        wanted = children[2]
+        name = wanted.predicate if isinstance(wanted, Atom) else str(wanted)
+        if name != "total-cost":
+            message = f"metric {name!r} is not handled, only total-cost"
+            raise Misplaced("E-UNSUPPORTED", message, self._place(children[1]))
+        return self._section(children, name)
 
     def _section(self, children: Sequence[Any], content: Any) -> _Section:
         return _Section(str(children[0]).lstrip(":"), content, self._place(children[0]))
@@ -185,18 +193,25 @@ class Builder(Transformer[Token, Any]):
             place=place,
         )
 
+    def derived(self, children: list[Any]) -> DerivedDeclaration:
+        _, head, condition = children
+        _refuse_repeated(head.parameters, "variable")
+        return DerivedDeclaration(head.name, head.parameters, condition, head.place)
+
     def domain(self, children: list[Any]) -> DomainFragment:
         name, *items = children
+        derived = tuple(item for item in items if isinstance(item, DerivedDeclaration))
         actions = tuple(item for item in items if isinstance(item, ActionDeclaration))
         sections = _once(item for item in items if isinstance(item, _Section))
-        return DomainFragment(name=str(name), file=self._file, actions=actions, **sections)
+        return DomainFragment(
+            name=str(name), file=self.file, derived=derived, actions=actions, **sections
+        )
 
     def problem(self, children: list[Any]) -> ProblemFragment:
         name, *items = children
         sections = _once(items)
-        sections.pop("metric", None)
         domain = str(sections.pop("domain", ""))
-        return ProblemFragment(name=str(name), file=self._file, domain=domain, **sections)
+        return ProblemFragment(name=str(name), file=self.file, domain=domain, **sections)
 
 
 def _once(sections: Iterable[_Section]) -> dict[str, Any]:

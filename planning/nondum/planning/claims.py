@@ -8,14 +8,23 @@ from functools import lru_cache
 
 from nondum.planning.contribution import Contribution
 from nondum.planning.core import core_graph, core_predicates
-from nondum.planning.domain import Action, Origin, Predicate
+from nondum.planning.derivation import derived_of
+from nondum.planning.domain import Action, DerivedRule, Origin, Predicate
 from nondum.planning.execution import behaviours_of
-from nondum.planning.inventory import FactClaim, ObjectClaim, facts_of, objects_of, own_objects
+from nondum.planning.inventory import (
+    FactClaim,
+    ObjectClaim,
+    ValueClaim,
+    facts_of,
+    objects_of,
+    own_objects,
+    values_of,
+)
 from nondum.planning.parse import parse_fragment
 from nondum.planning.schema import schema_of
 from nondum.planning.scope import Report, Scope, TooManyProblems
 from nondum.planning.syntax import DomainFragment, FragmentSyntax, ProblemFragment
-from nondum.planning.vocabulary import TypeClaim, predicates_of, types_of
+from nondum.planning.vocabulary import TypeClaim, functions_of, predicates_of, types_of
 from nondum.sdk.errors import FragmentRefused, Problem
 
 
@@ -29,6 +38,9 @@ class Claims:
     objects: tuple[ObjectClaim, ...] = ()
     actions: tuple[Action, ...] = ()
     facts: tuple[FactClaim, ...] = ()
+    derived: tuple[DerivedRule, ...] = ()
+    functions: tuple[Predicate, ...] = ()
+    values: tuple[ValueClaim, ...] = ()
     problems: tuple[Problem, ...] = ()
     warnings: tuple[Problem, ...] = ()
 
@@ -56,6 +68,8 @@ def _claims(contribution: Contribution, report: Report) -> Claims:
     scope.predicates.update(core_predicates())
     predicates = predicates_of(domains, scope)
     scope.predicates.update({predicate.name: predicate for predicate in predicates})
+    functions = functions_of(domains, scope)
+    scope.functions.update({function.name: function for function in functions})
     scope.objects.update(own_objects(contribution, scope))
     objects = objects_of(fragments, scope)
     scope.objects.update({claim.name: claim.types for claim in objects})
@@ -66,6 +80,9 @@ def _claims(contribution: Contribution, report: Report) -> Claims:
         objects=objects,
         actions=_actions(domains, contribution, scope),
         facts=facts_of(fragments, scope),
+        derived=derived_of(domains, scope),
+        functions=functions,
+        values=values_of(fragments, scope),
         warnings=tuple(report.warnings),
     )
 

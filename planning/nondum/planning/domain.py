@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from nondum.planning.effect import Effect
 from nondum.planning.facts import fact
-from nondum.planning.normal import Condition, Effect
+from nondum.planning.normal import Condition
 from nondum.planning.syntax import Atom, Place, PredicateDeclaration, TypedName
 from nondum.planning.typegraph import TypeGraph, types_or_root
 from nondum.sdk.errors import Problem
@@ -101,6 +102,16 @@ class Action:
 
 
 @dataclass(frozen=True, slots=True)
+class DerivedRule:
+    """`head` holds for every binding of its parameters for which the condition does."""
+
+    head: Atom
+    parameters: tuple[TypedName, ...]
+    condition: Condition
+    origins: tuple[Origin, ...] = field(default=(), compare=False)
+
+
+@dataclass(frozen=True, slots=True)
 class Domain:
     """The words and actions known now."""
 
@@ -108,6 +119,9 @@ class Domain:
     type_origins: Mapping[str, tuple[Origin, ...]]
     predicates: Mapping[str, Predicate]
     actions: Mapping[str, Action]
+    derived: tuple[DerivedRule, ...] = ()
+    functions: Mapping[str, Predicate] = field(default_factory=dict)
+    """Functions of objects to numbers, which costs are added up from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +135,10 @@ class Merged:
     self_host: str
     parked: Mapping[str, tuple[Origin, ...]] = field(default_factory=dict)
     """Facts that name an object which is not there."""
+    values: Mapping[str, int] = field(default_factory=dict)
+    """What functions give: `distance hall kitchen` → 12."""
+    is_closed: bool = False
+    """Nothing but actions changes facts: true of a problem in a file, not of a robot."""
     quarantined: Mapping[str, tuple[Problem, ...]] = field(default_factory=dict)
     """Components that were left out, and why."""
     warnings: tuple[Problem, ...] = ()

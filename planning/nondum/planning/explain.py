@@ -14,7 +14,7 @@ from nondum.planning.exploration import explore
 from nondum.planning.facts import parts
 from nondum.planning.goal import GoalExpr
 from nondum.planning.ground import ground
-from nondum.planning.join import Pattern
+from nondum.planning.matching import Pattern
 from nondum.planning.tracing import Cause, Lack, Tracer, distinct
 from nondum.sdk.errors import Problem
 from nondum.sdk.planner import GroundTask
@@ -89,7 +89,7 @@ def _supplies(contribution: Contribution, cause: Cause) -> bool:
     claims = claims_of(contribution)
     if cause.lack is Lack.ACTION:
         predicate, _ = parts(cause.fact)
-        added = (atom.predicate for action in claims.actions for atom in action.effect.add)
+        added = (atom.predicate for action in claims.actions for atom in action.effect.added())
         return not claims.problems and predicate in added
     if cause.lack is Lack.OBJECT:
         graph = core_graph().with_parents({claim.name: claim.parents for claim in claims.types})

@@ -3,108 +3,303 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 
-from nondum.planning.domain import Action, Merged, bind
+from nondum.planning.domain import Action, DerivedRule, Merged
+from nondum.planning.effect import ConditionalChange
 from nondum.planning.facts import parts
-from nondum.planning.join import Binding, Pattern, Relations, Rule, bindings, unconditional
-from nondum.planning.syntax import Atom, Equal
+from nondum.planning.flat import Flat, flat
+from nondum.planning.join import Join, Rule, Values
+from nondum.planning.matching import Pattern
+from nondum.planning.normal import Condition
+from nondum.planning.relations import FactTable, Relations, Row
+from nondum.planning.static import static_facts
+from nondum.planning.syntax import Atom, TypedName
+from nondum.planning.typegraph import ROOT
 from nondum.sdk.errors import FragmentRefused, Problem
 
 INSTANCES_LIMIT = 100_000
 """Ground actions that a domain may have."""
 
+Types = Mapping[str, tuple[str, ...]]
+"""Object → its types."""
+
+
+@dataclass(slots=True)
+class Change:
+    """One binding of a conditional effect, in numbers of facts."""
+
+    condition: Condition
+    names: Mapping[str, str]
+    """What the variables of `condition.further` stand for."""
+    positive: frozenset[int]
+    negative: frozenset[int]
+    add: frozenset[int]
+    delete: frozenset[int]
+
+
+@dataclass(slots=True)
+class Instance:
+    """An action with its parameters bound, in numbers of facts."""
+
+    action: Action
+    row: Row
+    """The objects, in the order of the parameters."""
+    positive: frozenset[int]
+    negative: frozenset[int]
+    """Facts that must be false."""
+    add: frozenset[int]
+    delete: frozenset[int]
+    """Without what it also adds: adding wins."""
+    changes: list[Change] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        """`plugin.action object …`."""
+        return " ".join((self.action.name, *self.row))
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Parameter → object."""
+        parameters = (parameter.name for parameter in self.action.parameters)
+        return dict(zip(parameters, self.row, strict=True))
+
 
 @dataclass(frozen=True, slots=True)
-class Instance:
-    """An action with its parameters bound, in facts."""
+class Derivation:
+    """A rule with its variables bound, in numbers of facts."""
 
-    name: str
-    """`plugin.action object …`."""
-    positive: frozenset[str]
-    negative: frozenset[str]
-    """Facts that must be false."""
-    add: frozenset[str]
-    delete: frozenset[str]
-    """Without what it also adds: adding wins."""
-    cost: int
+    rule: DerivedRule
+    names: Mapping[str, str]
+    head: int
+    positive: frozenset[int]
+    negative: frozenset[int]
 
 
 @dataclass(frozen=True, slots=True)
 class Exploration:
     """The delete-relaxed reachable part of a domain."""
 
-    believed: frozenset[str]
+    table: FactTable
+    believed: frozenset[int]
     """The facts it began with, those about objects that are not there left out."""
-    reachable: frozenset[str]
+    reached: frozenset[int]
     instances: tuple[Instance, ...]
     """Sorted by name."""
+    derivations: tuple[Derivation, ...]
+    members: Mapping[str, frozenset[str]]
+    """Type → the objects of it."""
+
+    @property
+    def reachable(self) -> frozenset[str]:
+        """The facts that can become true, as text."""
+        return frozenset(map(self.table.text, self.reached))
 
 
 def explore(
     merged: Merged,
     facts: Iterable[str],
-    objects: Mapping[str, tuple[str, ...]] | None = None,
+    objects: Types | None = None,
     *,
     limit: int = INSTANCES_LIMIT,
 ) -> Exploration:
     """Explore from where exactly `facts` hold; `objects` exist beside the merged ones.
 
     A condition that something is false counts as reachable, unless it is true and nothing can ever
-    make it false. Raises `FragmentRefused` (PDDL_TOO_MANY) that names the action with most
-    bindings when there are more than `limit`: to leave some out would make a wrong proof.
+    make it false; disjunctions and quantifiers are decided as far as facts that never change do.
+    Raises `FragmentRefused` (PDDL_TOO_MANY) that names the action with most bindings when there are
+    more than `limit`: to leave some out would make a wrong proof.
     """
     types = {name: found.types for name, found in merged.objects.items()} | dict(objects or {})
-    believed = frozenset(f for f in facts if all(o in types for o in parts(f)[1]))
-    deletable = {a.predicate for action in _actions(merged) for a in action.effect.delete}
     members = members_of(merged, types)
-    rules = [(action, _rule(action, members)) for action in _actions(merged)]
-    return _Fixpoint(rules, believed, frozenset(deletable), limit).run()
+    believed = [parts(text) for text in sorted(facts)]
+    known = [(predicate, row) for predicate, row in believed if all(o in types for o in row)]
+    return _Fixpoint(merged, known, members, limit).run()
 
 
-def _actions(merged: Merged) -> Iterable[Action]:
-    return merged.domain.actions.values()
-
-
-def members_of(merged: Merged, types: Mapping[str, tuple[str, ...]]) -> defaultdict[str, set[str]]:
+def members_of(merged: Merged, types: Types) -> dict[str, frozenset[str]]:
     """Type → the objects of it; `types` are the types of every object."""
     members: defaultdict[str, set[str]] = defaultdict(set)
+    above: dict[str, frozenset[str]] = {}
     for name, of in types.items():
         for type_ in of:
-            for above in merged.domain.types.ancestors(type_):
-                members[above].add(name)
-    return members
+            if type_ not in above:
+                above[type_] = frozenset(merged.domain.types.ancestors(type_))
+            for ancestor in above[type_]:
+                members[ancestor].add(name)
+    return {type_: frozenset(names) for type_, names in members.items()}
 
 
-def domains_of(action: Action, members: Mapping[str, set[str]]) -> dict[str, frozenset[str]]:
-    """Parameter → the objects that it may stand for."""
+def domains_of(
+    variables: Iterable[TypedName], members: Mapping[str, frozenset[str]]
+) -> dict[str, frozenset[str]]:
+    """Variable → the objects that it may stand for."""
     return {
-        parameter.name: frozenset().union(*(members.get(t, ()) for t in parameter.types))
-        for parameter in action.parameters
+        variable.name: frozenset().union(
+            *(members.get(type_, ()) for type_ in variable.types or (ROOT,))
+        )
+        for variable in variables
     }
 
 
-def _rule(action: Action, members: Mapping[str, set[str]]) -> Rule:
-    return Rule(
-        variables=tuple(parameter.name for parameter in action.parameters),
-        domains=domains_of(action, members),
-        patterns=patterns_of(action),
-        equal=_pairs(action.precondition.equal),
-        unequal=_pairs(action.precondition.unequal),
-    )
-
-
-def patterns_of(action: Action) -> tuple[Pattern, ...]:
+def patterns_of(condition: Condition) -> tuple[Pattern, ...]:
     """The conditions that facts must match."""
-    return tuple(
-        Pattern(atom.predicate, tuple(term.name for term in atom.terms))
-        for atom in action.precondition.positive
-    )
+    return tuple(map(pattern_of, condition.positive))
 
 
-def _pairs(pairs: Iterable[Equal]) -> tuple[tuple[str, str], ...]:
-    return tuple((pair.left.name, pair.right.name) for pair in pairs)
+def pattern_of(atom: Atom) -> Pattern:
+    """An atom for matching."""
+    return Pattern(atom.predicate, tuple(term.name for term in atom.terms))
+
+
+class _Template:
+    """Atoms that become facts when a rule's variables have values."""
+
+    def __init__(self, atoms: Iterable[Atom], variables: Row, table: FactTable) -> None:
+        at = {name: index for index, name in enumerate(variables)}
+        self._atoms = tuple(
+            (atom.predicate, tuple((at.get(term.name, -1), term.name) for term in atom.terms))
+            for atom in atoms
+        )
+        self._table = table
+
+    def numbers(self, values: Values) -> frozenset[int]:
+        """The facts."""
+        number = self._table.number
+        return frozenset(
+            [
+                number(predicate, tuple([values[i] if i >= 0 else name for i, name in terms]))
+                for predicate, terms in self._atoms
+            ]
+        )
+
+
+class _Head:
+    """A rule of the join, and what happens when it fires."""
+
+    def __init__(self, found: Flat, fixpoint: _Fixpoint) -> None:
+        self._flat = found
+        self._fixpoint = fixpoint
+        self.variables = tuple(variable.name for variable in found.variables)
+        self.rule = Rule(
+            variables=self.variables,
+            domains=fixpoint.domains_of(found.variables),
+            patterns=tuple(map(pattern_of, found.positive)),
+            equal=tuple((pair.left.name, pair.right.name) for pair in found.equal),
+            unequal=tuple((pair.left.name, pair.right.name) for pair in found.unequal),
+        )
+        self._negative = self.template(found.negative)
+
+    def template(self, atoms: Iterable[Atom]) -> _Template:
+        """What atoms become when the rule fires."""
+        return _Template(atoms, self.variables, self._fixpoint.table)
+
+    def is_excluded(self, values: Values) -> bool:
+        """Whether something keeps a binding from ever being possible."""
+        if self._flat.negative and self._fixpoint.excludes(self._negative.numbers(values)):
+            return True
+        if not self._flat.rest:
+            return False
+        names = self.names(values)
+        return not all(self._fixpoint.static.may_hold(part, names) for part in self._flat.rest)
+
+    def names(self, values: Values) -> dict[str, str]:
+        """Variable → object."""
+        return dict(zip(self.variables, values, strict=False))
+
+    def fire(self, values: Values) -> None:
+        """Record one binding."""
+        raise NotImplementedError
+
+
+class _ActionHead(_Head):
+    def __init__(self, action: Action, fixpoint: _Fixpoint) -> None:
+        super().__init__(flat(action.parameters, action.precondition), fixpoint)
+        self._action = action
+        self._arity = len(action.parameters)
+        self._positive = self.template(action.precondition.positive)
+        self._negative_own = self.template(action.precondition.negative)
+        self._add = self.template(action.effect.add)
+        self._delete = self.template(action.effect.delete)
+
+    def fire(self, values: Values) -> None:
+        row = tuple(values[: self._arity])
+        key = (self._action.name, row)
+        if key in self._fixpoint.instances or self.is_excluded(values):
+            return
+        add = self._add.numbers(values)
+        self._fixpoint.instances[key] = Instance(
+            action=self._action,
+            row=row,
+            positive=self._positive.numbers(values),
+            negative=self._negative_own.numbers(values),
+            add=add,
+            delete=self._delete.numbers(values) - add,
+        )
+        self._fixpoint.count(self._action)
+        self._fixpoint.reach(add)
+
+
+class _ChangeHead(_Head):
+    def __init__(self, action: Action, change: ConditionalChange, fixpoint: _Fixpoint) -> None:
+        variables = (*action.parameters, *change.variables)
+        super().__init__(flat(variables, action.precondition, change.condition), fixpoint)
+        self._action = action
+        self._change = change
+        self._arity = len(action.parameters)
+        self._size = len(variables)
+        self._positive = self.template(change.condition.positive)
+        self._negative_own = self.template(change.condition.negative)
+        self._add = self.template(change.add)
+        self._delete = self.template(change.delete)
+        self._seen: set[Row] = set()
+
+    def fire(self, values: Values) -> None:
+        row = tuple(values[: self._size])
+        instance = self._fixpoint.instances.get((self._action.name, row[: self._arity]))
+        if instance is None or row in self._seen or self.is_excluded(values):
+            return
+        self._seen.add(row)
+        add = self._add.numbers(values)
+        change = Change(
+            condition=self._change.condition,
+            names=self.names(values),
+            positive=self._positive.numbers(values),
+            negative=self._negative_own.numbers(values),
+            add=add,
+            delete=self._delete.numbers(values) - add,
+        )
+        instance.changes.append(change)
+        self._fixpoint.count(self._action)
+        self._fixpoint.reach(add)
+
+
+class _DerivedHead(_Head):
+    def __init__(self, derived: DerivedRule, fixpoint: _Fixpoint) -> None:
+        super().__init__(flat(derived.parameters, derived.condition), fixpoint)
+        self._derived = derived
+        self._arity = len(derived.parameters)
+        self._positive = self.template(derived.condition.positive)
+        self._negative_own = self.template(derived.condition.negative)
+        self._head = self.template((derived.head,))
+        self._seen: set[Row] = set()
+
+    def fire(self, values: Values) -> None:
+        row = tuple(values[: self._arity])
+        if row in self._seen or self.is_excluded(values):
+            return
+        self._seen.add(row)
+        head = self._head.numbers(values)
+        derivation = Derivation(
+            rule=self._derived,
+            names=self.names(values),
+            head=next(iter(head)),
+            positive=self._positive.numbers(values),
+            negative=self._negative_own.numbers(values),
+        )
+        self._fixpoint.derivations.append(derivation)
+        self._fixpoint.reach(head)
 
 
 class _Fixpoint:
@@ -112,72 +307,113 @@ class _Fixpoint:
 
     def __init__(
         self,
-        rules: Iterable[tuple[Action, Rule]],
-        believed: frozenset[str],
-        deletable: frozenset[str],
+        merged: Merged,
+        believed: Iterable[tuple[str, Row]],
+        members: Mapping[str, frozenset[str]],
         limit: int,
     ) -> None:
-        self._rules = tuple(rules)
+        self._domain = merged.domain
+        self._members = members
         self._limit = limit
-        self._believed = believed
-        self._deletable = deletable
-        self._triggers: defaultdict[str, list[tuple[Action, Rule, int]]] = defaultdict(list)
-        for action, rule in self._rules:
-            for index, pattern in enumerate(rule.patterns):
-                self._triggers[pattern.predicate].append((action, rule, index))
-        self._reached = set(believed)
-        self._waiting = sorted(believed)
-        self._relations = Relations()
-        self._instances: dict[str, Instance] = {}
-
-    def run(self) -> Exploration:
-        for action, rule in self._rules:
-            if not rule.patterns:
-                for binding in unconditional(rule):
-                    self._fire(action, binding)
-        while self._waiting:
-            predicate, arguments = parts(self._waiting.pop())
-            if predicate in self._triggers:
-                self._relations.add(predicate, arguments)
-                for action, rule, index in self._triggers[predicate]:
-                    for binding in bindings(rule, self._relations, index, arguments):
-                        self._fire(action, binding)
-        instances = tuple(self._instances[name] for name in sorted(self._instances))
-        return Exploration(self._believed, frozenset(self._reached), instances)
-
-    def _fire(self, action: Action, binding: Binding) -> None:
-        name = " ".join((action.name, *(binding[p.name] for p in action.parameters)))
-        if name in self._instances:
-            return
-        negative = _bound(action.precondition.negative, binding)
-        if any(f in self._believed and parts(f)[0] not in self._deletable for f in negative):
-            return
-        instance = Instance(
-            name=name,
-            positive=_bound(action.precondition.positive, binding),
-            negative=negative,
-            add=(add := _bound(action.effect.add, binding)),
-            delete=_bound(action.effect.delete, binding) - add,
-            cost=action.effect.cost,
+        self._counts: Counter[str] = Counter()
+        self._total = 0
+        self.table = FactTable()
+        self._believed = frozenset(self.table.number(*fact) for fact in believed)
+        self._reached = set(self._believed)
+        self._waiting: list[int] = []
+        effects = [action.effect for action in merged.domain.actions.values()]
+        derived = {rule.head.predicate for rule in merged.domain.derived}
+        added = {atom.predicate for effect in effects for atom in effect.added()}
+        self._deleted = {atom.predicate for effect in effects for atom in effect.deleted()}
+        self._added = frozenset(added | derived)
+        self.static = static_facts(
+            map(self.table.facts.__getitem__, self._believed),
+            frozenset(self._added | self._deleted),
+            members,
         )
-        self._instances[name] = instance
-        if len(self._instances) > self._limit:
-            raise self._too_many()
-        new = add - self._reached
+        self.instances: dict[tuple[str, Row], Instance] = {}
+        self.derivations: list[Derivation] = []
+
+    def domains_of(self, variables: Iterable[TypedName]) -> dict[str, frozenset[str]]:
+        return domains_of(variables, self._members)
+
+    def excludes(self, negative: frozenset[int]) -> bool:
+        """Whether a fact that must be false is true, and stays so."""
+        facts = self.table.facts
+        return any(facts[n][0] not in self._deleted for n in negative & self._believed)
+
+    def reach(self, facts: frozenset[int]) -> None:
+        """Put the facts that are new in line."""
+        new = facts - self._reached
         self._reached |= new
         self._waiting += sorted(new)
 
+    def count(self, action: Action) -> None:
+        """Count a binding. Raises `FragmentRefused` where there are too many."""
+        self._counts[action.name] += 1
+        self._total += 1
+        if self._total > self._limit:
+            raise self._too_many()
+
+    def run(self) -> Exploration:
+        joins = [
+            (join, trigger, head) for head in self._heads() for trigger, join in self._of(head)
+        ]
+        relations = Relations()
+        triggered: defaultdict[str, list[tuple[Join, _Head]]] = defaultdict(list)
+        for join, trigger, head in joins:
+            if trigger:
+                triggered[trigger].append((join, head))
+        for number in sorted(self._believed):
+            predicate, row = self.table.facts[number]
+            if predicate in self._added:
+                self._waiting.append(number)
+            else:
+                relations.add(predicate, row)
+        for join, trigger, head in joins:
+            if not trigger:
+                join.run(relations, head.fire)
+        while self._waiting:
+            predicate, row = self.table.facts[self._waiting.pop()]
+            relations.add(predicate, row)
+            for join, head in triggered.get(predicate, ()):
+                join.run(relations, head.fire, row)
+        return Exploration(
+            self.table,
+            self._believed,
+            frozenset(self._reached),
+            tuple(sorted(self.instances.values(), key=lambda i: (i.action.name, i.row))),
+            tuple(self.derivations),
+            self._members,
+        )
+
+    def _heads(self) -> Iterator[_Head]:
+        """Each action before its changes, so that these find the instance that they belong to."""
+        for action in self._domain.actions.values():
+            yield _ActionHead(action, self)
+            for change in action.effect.conditional:
+                yield _ChangeHead(action, change, self)
+        for rule in self._domain.derived:
+            yield _DerivedHead(rule, self)
+
+    def _of(self, head: _Head) -> Iterator[tuple[str, Join]]:
+        """The joins of a rule, each with the predicate that triggers it; empty: it runs once.
+
+        Facts of predicates that nothing adds are all there from the beginning.
+        """
+        patterns = head.rule.patterns
+        growing = [i for i, pattern in enumerate(patterns) if pattern.predicate in self._added]
+        for index in growing:
+            yield patterns[index].predicate, Join(head.rule, index)
+        if not growing:
+            yield "", Join(head.rule)
+
     def _too_many(self) -> FragmentRefused:
-        count = Counter(name.split(" ", 1)[0] for name in self._instances)
-        widest = max((action for action, _ in self._rules), key=lambda action: count[action.name])
+        name, count = max(self._counts.items(), key=lambda counted: (counted[1], counted[0]))
+        widest = self._domain.actions[name]
         message = (
-            f"more than {self._limit} ways to bind the actions,"
-            f" {count[widest.name]} of them of {widest.name!r}"
+            f"more than {self._limit} ways to bind the actions, {count} of them of {widest.name!r}"
         )
         where = " and ".join(map(str, widest.origins))
         fix = "add preconditions that say which objects belong together"
         return FragmentRefused(Problem("PDDL_TOO_MANY", message, where, fix=fix))
-
-
-def _bound(atoms: Iterable[Atom], binding: Binding) -> frozenset[str]:
-    return frozenset(bind(atom, binding) for atom in atoms)

@@ -1,14 +1,14 @@
 """Facts as text: `predicate object …`, the same in world models, ground tasks and on the wire.
 
-A fact that a plan needs to be false has a twin, `not-predicate object …`, that is true when the
-fact is not. Only ground tasks know twins; no predicate's own name may begin with `not-`.
+A fact that a plan needs to be false has a twin, `!predicate object …`, that is true when the fact
+is not. Only ground tasks know twins; no name in PDDL begins with `!`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Container
 
-_NEGATION = "not-"
+_NEGATION = "!"
 
 
 def fact(predicate: str, *arguments: str) -> str:
@@ -33,8 +33,8 @@ def parts(text: str) -> tuple[str, tuple[str, ...]]:
 def twin(text: str) -> str:
     """The fact that is true when this one is not; of a twin, the fact itself.
 
-    >>> twin("idle base"), twin("not-idle base")
-    ('not-idle base', 'idle base')
+    >>> twin("idle base"), twin("!idle base")
+    ('!idle base', 'idle base')
     """
     return text.removeprefix(_NEGATION) if is_twin(text) else _NEGATION + text
 
@@ -47,7 +47,7 @@ def is_twin(text: str) -> bool:
 def holds(text: str, believed: Container[str]) -> bool:
     """Whether a fact or twin is true where exactly the facts in `believed` are.
 
-    >>> holds("not-idle base", {"on base rover"})
+    >>> holds("!idle base", {"on base rover"})
     True
     """
     return (twin(text) not in believed) if is_twin(text) else (text in believed)

@@ -12,8 +12,6 @@ from nondum.planning.domain import Merged, Origin
 from nondum.planning.normal import Condition, condition_of
 from nondum.planning.parse import parse_formula
 from nondum.planning.scope import SELF, Report, Scope, TooManyProblems
-from nondum.planning.syntax import Not
-from nondum.planning.typegraph import ROOT
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
 
 GoalExpr: TypeAlias = Condition
@@ -64,14 +62,8 @@ def goal_problems(goal: Goal, merged: Merged) -> tuple[Problem, ...]:
 
 def goal_text(expr: GoalExpr) -> str:
     """The condition in PDDL."""
-    literals = (
-        *expr.positive,
-        *(Not(atom, atom.place) for atom in expr.negative),
-        *expr.equal,
-        *(Not(pair, pair.place) for pair in expr.unequal),
-    )
-    written = " ".join(map(str, literals))
-    return written if len(literals) == 1 else f"(and {written})"
+    parts = tuple(map(str, expr.parts()))
+    return parts[0] if len(parts) == 1 else f"(and{''.join(f' {part}' for part in parts)})"
 
 
 def condition_problems(
@@ -89,9 +81,6 @@ def condition_problems(
     scope.predicates.update(merged.domain.predicates)
     scope.objects.update({name: found.types for name, found in merged.objects.items()})
     with suppress(TooManyProblems):
-        for atom in condition.atoms():
-            scope.check_atom(atom, variables or {})
-        for pair in condition.pairs():
-            for term in (pair.left, pair.right):
-                scope.check_term(term, (ROOT,), variables or {})
+        for part in condition.parts():
+            scope.check_formula(part, variables or {})
     return tuple(report.problems)

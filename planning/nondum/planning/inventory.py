@@ -32,6 +32,16 @@ class ObjectClaim:
 
 
 @dataclass(frozen=True, slots=True)
+class ValueClaim:
+    """A number given to a function of objects."""
+
+    function: str
+    """`distance hall kitchen`."""
+    value: int
+    origin: Origin
+
+
+@dataclass(frozen=True, slots=True)
 class FactClaim:
     """A fact of a problem fragment."""
 
@@ -116,8 +126,8 @@ def facts_of(fragments: Sequence[FragmentSyntax], scope: Scope) -> tuple[FactCla
         for formula in fragment.init if isinstance(fragment, ProblemFragment) else ():
             atom = _asserted(formula, scope)
             if atom and _is_sound(atom, scope):
-                bound = {term.name: scope.resolve(term.name) for term in atom.terms}
-                claims.append(FactClaim(bind(atom, bound), scope.report.origin(atom.place)))
+                text = bind(atom, _resolved(atom, scope))
+                claims.append(FactClaim(text, scope.report.origin(atom.place)))
     return tuple(claims)
 
 
@@ -127,6 +137,35 @@ def _asserted(formula: Formula, scope: Scope) -> Atom | None:
     if not isinstance(formula, Numeric) or formula.operator != "=":
         scope.report.problem("E-INIT", f"{formula} is not a fact", formula.place)
     return None
+
+
+def values_of(fragments: Sequence[FragmentSyntax], scope: Scope) -> tuple[ValueClaim, ...]:
+    """The values given to functions (E-UNDECL, E-TYPE, E-PRED-ARITY, E-INIT).
+
+    `total-cost` is a plan's own, and begins with 0 whatever is said.
+    """
+    claims = []
+    for fragment in fragments:
+        for formula in fragment.init if isinstance(fragment, ProblemFragment) else ():
+            match formula:
+                case Numeric("=", Atom("total-cost")):
+                    continue
+                case Numeric("=", Atom() as function, float(value)):
+                    if value.is_integer() and scope.check_function(function, {}):
+                        text = bind(function, _resolved(function, scope))
+                        origin = scope.report.origin(formula.place)
+                        claims.append(ValueClaim(text, int(value), origin))
+                    elif not value.is_integer():
+                        message = f"{formula}: only whole numbers are handled"
+                        scope.report.problem("E-INIT", message, formula.place)
+                case Numeric(operator="="):
+                    message = f"{formula} gives no function a number"
+                    scope.report.problem("E-INIT", message, formula.place)
+    return tuple(claims)
+
+
+def _resolved(atom: Atom, scope: Scope) -> dict[str, str]:
+    return {term.name: scope.resolve(term.name) for term in atom.terms}
 
 
 def _is_sound(atom: Atom, scope: Scope) -> bool:

@@ -98,11 +98,14 @@ def _merged(
             type_origins=dict(sorted(agreement.type_origins.items())),
             predicates=dict(sorted(agreement.predicates.items())),
             actions=actions,
+            derived=agreement.derived,
+            functions=dict(sorted(agreement.functions.items())),
         ),
         objects=dict(sorted(objects.items())),
         init=init,
         self_host=self_host,
         parked=parked,
+        values=_values(admitted),
         quarantined=dict(sorted(quarantined.items())),
         warnings=warnings,
     )
@@ -155,3 +158,12 @@ def _facts(
         is_whole = all(argument in objects for argument in parts(text)[1])
         (init if is_whole else parked)[text] = origins
     return init, parked
+
+
+def _values(admitted: Iterable[Claims]) -> dict[str, int]:
+    """What functions give; of two who differ, the one that takes precedence has the say."""
+    values: dict[str, int] = {}
+    for claims in admitted:
+        for claim in claims.values:
+            values.setdefault(claim.function, claim.value)
+    return dict(sorted(values.items()))

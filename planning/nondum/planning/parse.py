@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 from importlib import resources
+from threading import Lock
 from typing import cast
 
 from lark import Lark, Token, UnexpectedCharacters, UnexpectedInput
-from lark.exceptions import VisitError
 
 from nondum.planning.build import Builder
 from nondum.planning.caret import Misplaced, nearest, refusal
@@ -23,7 +23,6 @@ _WORD = re.compile(r"[^\s()]+|.", re.DOTALL)
 _LOWER = {upper: upper + 32 for upper in range(ord("A"), ord("Z") + 1)}
 _SECTIONS_NOT_HANDLED = {
     ":durative-action": "durative actions",
-    ":derived": "derived predicates",
     ":constraints": "trajectory constraints",
 }
 _SAID = {
@@ -68,28 +67,46 @@ def parse_signature(text: str, file: str) -> PredicateDeclaration:
     return cast(PredicateDeclaration, _parse(text, file, "signature"))
 
 
+class _Parser:
+    """The grammar, prepared once. It builds while it parses, which spares it a tree."""
+
+    def __init__(self) -> None:
+        grammar = resources.files("nondum.planning") / "grammar" / "pddl.lark"
+        self._builder = Builder()
+        self._one_at_a_time = Lock()
+        self._lark = Lark(
+            grammar.read_text(encoding="utf-8"),
+            parser="lalr",
+            start=["fragment", "formula", "signature"],
+            maybe_placeholders=False,
+            transformer=self._builder,
+        )
+
+    def parse(self, text: str, file: str, start: str) -> object:
+        """Raises `UnexpectedInput` or `Misplaced`."""
+        with self._one_at_a_time:
+            self._builder.file = file
+            return self._lark.parse(text, start=start)
+
+    def pattern(self, terminal: str) -> str:
+        """What a terminal matches."""
+        return next(t.pattern.value for t in self._lark.terminals if t.name == terminal)
+
+
 @lru_cache(maxsize=1)
-def _parser() -> Lark:
-    grammar = resources.files("nondum.planning") / "grammar" / "pddl.lark"
-    return Lark(
-        grammar.read_text(encoding="utf-8"),
-        parser="lalr",
-        start=["fragment", "formula", "signature"],
-        maybe_placeholders=False,
-    )
+def _parser() -> _Parser:
+    return _Parser()
 
 
 def _parse(text: str, file: str, start: str) -> object:
     clean = _COMMENT.sub(lambda comment: " " * len(comment[0]), text).translate(_LOWER)
     _check_depth(clean, text, file)
     try:
-        return Builder(file).transform(_parser().parse(clean, start=start))
+        return _parser().parse(clean, file, start)
     except UnexpectedInput as error:
         raise FragmentRefused(_unexpected(error, clean, text, file)) from error
-    except VisitError as error:
-        if not isinstance(error.orig_exc, Misplaced):
-            raise
-        raise FragmentRefused(error.orig_exc.problem(text)) from error
+    except Misplaced as error:
+        raise FragmentRefused(error.problem(text)) from error
 
 
 def _check_depth(clean: str, text: str, file: str) -> None:
@@ -140,5 +157,4 @@ def _said(terminal: str) -> str:
     """A terminal in a person's words; keywords are named after what they match."""
     if terminal in _SAID:
         return _SAID[terminal]
-    pattern = next(t.pattern.value for t in _parser().terminals if t.name == terminal)
-    return f"'{pattern.split('(?!')[0]}'"
+    return f"'{_parser().pattern(terminal).split('(?!')[0]}'"

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from itertools import chain
 
 from nondum.planning.caret import Misplaced
+from nondum.planning.derivation import typed
 from nondum.planning.domain import Action
-from nondum.planning.normal import Condition, Effect, condition_of, effect_of
+from nondum.planning.effect import Effect, effect_of
+from nondum.planning.normal import Condition, condition_of
 from nondum.planning.scope import SELF, Scope
-from nondum.planning.syntax import ActionDeclaration, TypedName
-from nondum.planning.typegraph import types_or_root
+from nondum.planning.syntax import ActionDeclaration, TypedName, terms_of
 from nondum.sdk.description import Behaviour
 
 ACTOR_TYPE = "unit"
@@ -26,25 +26,21 @@ def schema_of(
     Without a behaviour it counts as lasting when it takes something (deletes `idle` or `free`).
     """
     problems_before = len(scope.report.problems)
-    if len(declared.parameters) > PARAMETERS_LIMIT:
-        message = f"action {declared.name!r} has more than {PARAMETERS_LIMIT} parameters"
-        scope.report.problem("PDDL_TOO_MANY", message, declared.place)
+    _check_actor(declared, scope)
+    _check_instances(declared, scope)
+    read = read_action(declared, scope)
+    if read is None:
         return None
-    variables = _variables(declared, scope)
-    try:
-        precondition, effect = condition_of(declared.precondition), effect_of(declared.effect)
-    except Misplaced as wrong:
-        scope.report.problem(wrong.code, wrong.message, wrong.place, wrong.fix)
-        return None
+    parameters, precondition, effect = read
     lasting = behaviour.lasting if behaviour else True
-    _check_names(precondition, effect, variables, scope)
+    _check_lasting(declared, effect, scope, lasting=lasting and behaviour is not None)
     scope.check_ownership(effect, lasting=lasting)
     if len(scope.report.problems) > problems_before:
         return None
     return Action(
         name=f"{plugin}.{declared.name}",
         plugin=plugin,
-        parameters=_typed(declared),
+        parameters=parameters,
         precondition=precondition,
         effect=effect,
         lasting=behaviour.lasting if behaviour else _takes_something(effect),
@@ -53,39 +49,58 @@ def schema_of(
     )
 
 
-def _typed(declared: ActionDeclaration) -> tuple[TypedName, ...]:
-    return tuple(
-        TypedName(parameter.name, types_or_root(parameter.types), parameter.place)
-        for parameter in declared.parameters
-    )
-
-
-def _variables(declared: ActionDeclaration, scope: Scope) -> dict[str, tuple[str, ...]]:
-    parameters = _typed(declared)
+def read_action(
+    declared: ActionDeclaration, scope: Scope
+) -> tuple[tuple[TypedName, ...], Condition, Effect] | None:
+    """Parameters, precondition and effect, all names checked; None if something is wrong."""
+    problems_before = len(scope.report.problems)
+    if len(declared.parameters) > PARAMETERS_LIMIT:
+        message = f"action {declared.name!r} has more than {PARAMETERS_LIMIT} parameters"
+        scope.report.problem("PDDL_TOO_MANY", message, declared.place)
+        return None
+    parameters = typed(declared.parameters)
     known = [scope.known_types(p.types, p.place) for p in parameters]
-    if not parameters or (
-        known[0] and not scope.graph.all_kind_of(parameters[0].types, (ACTOR_TYPE,))
-    ):
-        message = f"the first parameter of {declared.name!r} is not a unit"
-        fix = "the first parameter is the actor: add one, such as ?u - camera"
-        place = parameters[0].place if parameters else declared.place
-        scope.report.problem("E-ACTOR", message, place, fix)
-    return {p.name: p.types for p, ok in zip(parameters, known, strict=True) if ok}
+    variables = {p.name: p.types for p, ok in zip(parameters, known, strict=True) if ok}
+    try:
+        precondition = condition_of(declared.precondition)
+        effect = effect_of(declared.effect, variables)
+    except Misplaced as wrong:
+        scope.report.problem(wrong.code, wrong.message, wrong.place, wrong.fix)
+        return None
+    scope.check_formula(declared.precondition, variables)
+    scope.check_formula(declared.effect, variables)
+    if len(scope.report.problems) > problems_before:
+        return None
+    return parameters, precondition, effect
 
 
-def _check_names(
-    condition: Condition, effect: Effect, variables: Mapping[str, tuple[str, ...]], scope: Scope
-) -> None:
-    for term in chain(condition.terms(), (t for atom in effect.atoms() for t in atom.terms)):
+def _check_actor(declared: ActionDeclaration, scope: Scope) -> None:
+    actor = typed(declared.parameters[:1])
+    is_known = all(type_ in scope.graph for p in actor for type_ in p.types)
+    if actor and (not is_known or scope.graph.all_kind_of(actor[0].types, (ACTOR_TYPE,))):
+        return
+    message = f"the first parameter of {declared.name!r} is not a unit"
+    fix = "the first parameter is the actor: add one, such as ?u - camera"
+    place = actor[0].place if actor else declared.place
+    scope.report.problem("E-ACTOR", message, place, fix)
+
+
+def _check_instances(declared: ActionDeclaration, scope: Scope) -> None:
+    for term in chain(terms_of(declared.precondition), terms_of(declared.effect)):
         if term.name == SELF or term.name in scope.locals:
             message = f"{term.name!r} names one instance, and an action serves all of them"
             fix = "use a parameter, such as ?h - host with (on ?u ?h)"
             scope.report.problem("E-INSTANCE", message, term.place, fix)
-    for atom in condition.atoms() + effect.atoms():
-        scope.check_atom(atom, variables)
-    for pair in condition.pairs():
-        for term in (pair.left, pair.right):
-            scope.check_term(term, ("object",), variables)
+
+
+def _check_lasting(
+    declared: ActionDeclaration, effect: Effect, scope: Scope, *, lasting: bool
+) -> None:
+    """What holds only while a behaviour runs cannot depend on how things were when it began."""
+    if lasting and effect.conditional:
+        message = f"{declared.name!r} is lasting, and has effects under conditions"
+        fix = "make an action of its own for each case"
+        scope.report.problem("E-UNSUPPORTED", message, declared.place, fix)
 
 
 def _takes_something(effect: Effect) -> bool:

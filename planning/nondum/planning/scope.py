@@ -8,13 +8,28 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
 from nondum.planning.caret import nearest, refusal
 from nondum.planning.core import HOST_PREDICATES, TAKEN_PREDICATES
 from nondum.planning.domain import Origin, Predicate
-from nondum.planning.normal import Effect
-from nondum.planning.syntax import Atom, Place, Term, type_text
-from nondum.planning.typegraph import TypeGraph
+from nondum.planning.effect import Effect
+from nondum.planning.syntax import (
+    And,
+    Atom,
+    Equal,
+    Formula,
+    Imply,
+    Not,
+    Numeric,
+    Or,
+    Place,
+    Quantified,
+    Term,
+    When,
+    type_text,
+)
+from nondum.planning.typegraph import ROOT, TypeGraph, types_or_root
 from nondum.sdk.errors import Problem
 
 SELF = "self"
@@ -23,6 +38,9 @@ SELF = "self"
 OWNED_MARK = "__"
 """Only names of units and streams contain it."""
 
+
+Variables: TypeAlias = Mapping[str, tuple[str, ...]]
+"""The variables that may be used, with their types."""
 
 PROBLEMS_LIMIT = 50
 """So many problems of one component are told at once."""
@@ -77,6 +95,9 @@ class Scope:
     predicates: dict[str, Predicate] = field(default_factory=dict)
     objects: dict[str, tuple[str, ...]] = field(default_factory=dict)
     """Object → types."""
+    functions: dict[str, Predicate] = field(default_factory=dict)
+    of_host: frozenset[str] = HOST_PREDICATES
+    """The predicates that are the host's to say."""
 
     def resolve(self, name: str) -> str:
         """The object that a local name, `self` or a shared name stands for."""
@@ -90,12 +111,48 @@ class Scope:
             self.report.problem("E-UNDECL", f"nobody declares type {name!r}", place, fix)
         return not unknown
 
-    def check_atom(self, atom: Atom, variables: Mapping[str, tuple[str, ...]]) -> bool:
+    def check_formula(self, formula: Formula, variables: Variables) -> None:
+        """Check every name in a condition or effect (E-UNDECL, E-PRED-ARITY, E-TYPE, E-TWICE)."""
+        match formula:
+            case Atom():
+                self.check_atom(formula, variables)
+            case Equal():
+                for term in (formula.left, formula.right):
+                    self.check_term(term, (ROOT,), variables)
+            case Not():
+                self.check_formula(formula.part, variables)
+            case And() | Or():
+                for part in formula.parts:
+                    self.check_formula(part, variables)
+            case Imply():
+                self.check_formula(formula.condition, variables)
+                self.check_formula(formula.part, variables)
+            case When():
+                self.check_formula(formula.condition, variables)
+                self.check_formula(formula.effect, variables)
+            case Quantified():
+                own = {v.name: types_or_root(v.types) for v in formula.variables}
+                known = [self.known_types(own[v.name], v.place) for v in formula.variables]
+                if all(known):
+                    self.check_formula(formula.part, {**variables, **own})
+            case Numeric(right=Atom() as function):
+                self.check_function(function, variables)
+
+    def check_atom(self, atom: Atom, variables: Variables) -> bool:
         """Check predicate, arity, names and types of an atom (E-UNDECL, E-PRED-ARITY, E-TYPE)."""
-        predicate = self.predicates.get(atom.predicate)
+        return self._check_use(atom, "predicate", self.predicates, variables)
+
+    def check_function(self, atom: Atom, variables: Variables) -> bool:
+        """Check the use of a function as that of a predicate."""
+        return self._check_use(atom, "function", self.functions, variables)
+
+    def _check_use(
+        self, atom: Atom, kind: str, declared: Mapping[str, Predicate], variables: Variables
+    ) -> bool:
+        predicate = declared.get(atom.predicate)
         if predicate is None:
-            fix = nearest(atom.predicate, self.predicates) or "declare it in :predicates"
-            message = f"nobody declares predicate {atom.predicate!r}"
+            fix = nearest(atom.predicate, declared) or f"declare it in :{kind}s"
+            message = f"nobody declares {kind} {atom.predicate!r}"
             self.report.problem("E-UNDECL", message, atom.place, fix)
             return False
         if len(atom.terms) != predicate.arity:
@@ -109,9 +166,7 @@ class Scope:
             ]
         )
 
-    def check_term(
-        self, term: Term, types: tuple[str, ...], variables: Mapping[str, tuple[str, ...]]
-    ) -> bool:
+    def check_term(self, term: Term, types: tuple[str, ...], variables: Variables) -> bool:
         """Check that a term means something that can be one of `types` (E-UNDECL, E-TYPE)."""
         found = variables.get(term.name) or self.objects.get(self.resolve(term.name))
         if found is None:
@@ -134,9 +189,9 @@ class Scope:
 
         A lasting action may delete `idle` and `free`: so it takes them for as long as it runs.
         """
-        for atom in effect.add:
+        for atom in effect.added():
             self.check_writable(atom)
-        for atom in effect.delete:
+        for atom in effect.deleted():
             if atom.predicate not in TAKEN_PREDICATES:
                 self.check_writable(atom)
             elif not lasting:
@@ -146,7 +201,7 @@ class Scope:
 
     def check_writable(self, atom: Atom) -> None:
         """Check that a plugin may write an atom (E-OWNED)."""
-        if atom.predicate in HOST_PREDICATES:
+        if atom.predicate in self.of_host:
             message = f"{atom.predicate!r} is the host's to say; plugins may only read it"
             self.report.problem("E-OWNED", message, atom.place)
 

@@ -6,7 +6,7 @@ they say the same; where they were written does not count.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -205,6 +205,54 @@ def terms_of(formula: Formula) -> Iterator[Term]:
                     yield from value.terms
 
 
+def renamed(formula: Formula, names: Mapping[str, str]) -> Formula:
+    """A formula with terms replaced by others' names; those not in `names` and variables that are
+    bound inside stay."""
+    match formula:
+        case Atom():
+            return renamed_atom(formula, names)
+        case Equal():
+            return Equal(_term(formula.left, names), _term(formula.right, names), formula.place)
+        case Not():
+            return Not(renamed(formula.part, names), formula.place)
+        case And() | Or():
+            parts = tuple(renamed(part, names) for part in formula.parts)
+            return type(formula)(parts, formula.place)
+        case Imply():
+            condition = renamed(formula.condition, names)
+            return Imply(condition, renamed(formula.part, names), formula.place)
+        case When():
+            condition = renamed(formula.condition, names)
+            return When(condition, renamed(formula.effect, names), formula.place)
+        case Quantified():
+            own = {variable.name for variable in formula.variables}
+            free = {name: to for name, to in names.items() if name not in own}
+            part = renamed(formula.part, free)
+            return Quantified(formula.quantifier, formula.variables, part, formula.place)
+        case Numeric():
+            left, right = _value(formula.left, names), _value(formula.right, names)
+            return Numeric(formula.operator, left, right, formula.place)
+
+
+def renamed_atom(atom: Atom, names: Mapping[str, str]) -> Atom:
+    """An atom with terms replaced by others' names; those not in `names` stay."""
+    return Atom(atom.predicate, tuple(_term(term, names) for term in atom.terms), atom.place)
+
+
+def _term(term: Term, names: Mapping[str, str]) -> Term:
+    return Term(names.get(term.name, term.name), term.place)
+
+
+def _value(value: Atom | Term | float, names: Mapping[str, str]) -> Atom | Term | float:
+    match value:
+        case Atom():
+            return renamed_atom(value, names)
+        case Term():
+            return _term(value, names)
+        case _:
+            return value
+
+
 @dataclass(frozen=True, slots=True)
 class PredicateDeclaration:
     """`(predicate ?parameter - type …)`, also used for functions."""
@@ -229,6 +277,22 @@ class ActionDeclaration:
 
 
 @dataclass(frozen=True, slots=True)
+class DerivedDeclaration:
+    """`(:derived (predicate ?x - type …) condition)`: holds wherever the condition does."""
+
+    name: str
+    parameters: tuple[TypedName, ...]
+    condition: Formula
+    place: Place = field(compare=False)
+
+    @property
+    def head(self) -> Atom:
+        """What follows from the condition."""
+        terms = tuple(Term(parameter.name, parameter.place) for parameter in self.parameters)
+        return Atom(self.name, terms, self.place)
+
+
+@dataclass(frozen=True, slots=True)
 class DomainFragment:
     """What one `(define (domain …) …)` says."""
 
@@ -243,6 +307,7 @@ class DomainFragment:
     """Names of predicates that carry a value beside the fact: `(:valued bearing-known)`."""
     functional: tuple[Term, ...] = ()
     """Names of predicates with one last argument for each of the others: `(:functional at)`."""
+    derived: tuple[DerivedDeclaration, ...] = ()
     actions: tuple[ActionDeclaration, ...] = ()
 
 
@@ -256,6 +321,8 @@ class ProblemFragment:
     objects: tuple[TypedName, ...] = ()
     init: tuple[Formula, ...] = ()
     goal: Formula | None = None
+    metric: str = ""
+    """What is to be minimised: `total-cost`, or nothing said."""
 
 
 FragmentSyntax: TypeAlias = DomainFragment | ProblemFragment

@@ -10,7 +10,7 @@ from nondum.planning.core import HOST_PREDICATES
 from nondum.planning.domain import Action, Merged
 from nondum.planning.exploration import domains_of, members_of, patterns_of
 from nondum.planning.facts import parts
-from nondum.planning.join import Binding, Pattern, Relations, matched
+from nondum.planning.matching import Binding, Pattern, Relations, matched
 from nondum.planning.syntax import Atom, type_text
 from nondum.sdk.errors import Problem
 
@@ -76,7 +76,9 @@ class Tracer:
     ) -> None:
         members = members_of(merged, types)
         self._actions = tuple(merged.domain.actions.values())
-        self._domains = {action.name: domains_of(action, members) for action in self._actions}
+        self._domains = {
+            action.name: domains_of(action.parameters, members) for action in self._actions
+        }
         self._relations = Relations()
         for text in sorted(reachable):
             self._relations.add(*parts(text))
@@ -104,7 +106,7 @@ class Tracer:
         chains = [
             chain
             for action in self._actions
-            for atom in action.effect.add
+            for atom in action.effect.added()
             if (binding := self._bound_by(action, atom, wanted)) is not None
             if (chain := self._through(action, binding, text))
         ]
@@ -150,7 +152,7 @@ class _Search:
     def __init__(
         self, action: Action, domains: Mapping[str, frozenset[str]], relations: Relations
     ) -> None:
-        self._patterns = patterns_of(action)
+        self._patterns = patterns_of(action.precondition)
         self._domains = domains
         self._relations = relations
         self._best: tuple[Pattern, ...] = self._patterns

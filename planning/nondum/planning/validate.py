@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from nondum.planning.progression import progress, start
 from nondum.sdk.errors import Problem
 from nondum.sdk.planner import GroundTask, Plan
 
@@ -11,7 +12,7 @@ def validate(task: GroundTask, plan: Plan) -> tuple[Problem, ...]:
 
     Codes: PLAN_STEP_UNKNOWN, PLAN_STEP_IMPOSSIBLE, PLAN_GOAL_MISSED, PLAN_COST.
     """
-    state = task.init
+    state = start(task)
     for position, index in enumerate(plan.steps, 1):
         if not 0 <= index < len(task.actions):
             message = f"step {position} is action {index} of {len(task.actions)}"
@@ -21,7 +22,7 @@ def validate(task: GroundTask, plan: Plan) -> tuple[Problem, ...]:
         if missing:
             message = f"step {position}, {action.name}, needs {_named(task, missing)}"
             return (Problem("PLAN_STEP_IMPOSSIBLE", message),)
-        state = (state - action.delete) | action.add
+        state = progress(task, state, action)
     problems = []
     if task.goal - state:
         message = f"at the end {_named(task, task.goal - state)} does not hold"

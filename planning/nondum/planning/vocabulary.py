@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from nondum.planning.caret import nearest
 from nondum.planning.core import core_graph, core_predicates
 from nondum.planning.domain import Origin, Predicate
-from nondum.planning.facts import is_twin
 from nondum.planning.scope import Report, Scope
 from nondum.planning.syntax import DomainFragment, PredicateDeclaration, TypedName, type_text
 from nondum.planning.typegraph import ROOT, TypeGraph
@@ -88,7 +87,7 @@ def cycle_text(cycle: tuple[str, ...]) -> str:
 
 
 def predicates_of(domains: Sequence[DomainFragment], scope: Scope) -> tuple[Predicate, ...]:
-    """The predicates beyond the core's (E-RESERVED, E-UNDECL, E-PRED-ARITY, E-PRED-TYPE)."""
+    """The predicates beyond the core's (E-UNDECL, E-PRED-ARITY, E-PRED-TYPE)."""
     valued = set(_marked("valued", domains, scope))
     functional = set(_marked("functional", domains, scope))
     found: dict[str, Predicate] = {}
@@ -102,13 +101,24 @@ def predicates_of(domains: Sequence[DomainFragment], scope: Scope) -> tuple[Pred
         known = core_predicates().get(declared.name) or found.get(declared.name)
         if not _types_known(declared, scope):
             continue
-        if is_twin(declared.name):
-            message = "names that begin with 'not-' stand for negated facts"
-            scope.report.problem("E-RESERVED", message, declared.place, "choose another name")
-        elif known is None:
+        if known is None:
             found[declared.name] = predicate
         else:
             _compare(predicate, known, declared, scope)
+    return tuple(found.values())
+
+
+def functions_of(domains: Sequence[DomainFragment], scope: Scope) -> tuple[Predicate, ...]:
+    """The functions declared, `total-cost` included (E-UNDECL, E-TWICE)."""
+    found: dict[str, Predicate] = {}
+    for declared in (function for domain in domains for function in domain.functions):
+        if not _types_known(declared, scope):
+            continue
+        function = Predicate.declared(declared, scope.report.origin(declared.place))
+        known = found.setdefault(declared.name, function)
+        if known.parameters != function.parameters:
+            message = f"function {declared.name!r} has other parameters at {known.origins[0].place}"
+            scope.report.problem("E-TWICE", message, declared.place)
     return tuple(found.values())
 
 

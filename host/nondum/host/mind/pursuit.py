@@ -22,7 +22,8 @@ from nondum.host.mind.search import NoPlan, Planned, Situation, search, task_of
 from nondum.planning.attempts import Patience
 from nondum.planning.contribution import Contribution
 from nondum.planning.goal import parse_goal
-from nondum.planning.replay import replayed
+from nondum.planning.plain import plain
+from nondum.planning.replay import beginning_at, replayed
 from nondum.planning.running import Run
 from nondum.planning.task_control import Phase
 from nondum.planning.task_tree import TaskTree
@@ -337,4 +338,4 @@ class Pursuit:
             task = current.task
         believed = self._beliefs.world.facts
         plan = replayed(task, current.names, believed, composition.merged.lasting())
-        return None if plan is None else (task, plan)
+        return None if plan is None else plain(beginning_at(task, believed), plan)

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.goals import GivenGoal
@@ -18,6 +18,7 @@ from nondum.planning.exploration import INSTANCES_LIMIT
 from nondum.planning.goal import Goal, parse_goal
 from nondum.planning.ground import ground
 from nondum.planning.partial_order import causal_links, threats
+from nondum.planning.plain import plain
 from nondum.planning.step import steps_of, words
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
 from nondum.sdk.planner import AlreadyTrue, GaveUp, GroundTask, Plan, Unsolvable
@@ -83,7 +84,7 @@ def task_of(
     """
     task = ground(composition.merged, situation.facts, goal.expr, limit=limit)
     kept = tuple(a for a in task.actions if a.name not in situation.excluded)
-    return GroundTask(task.facts, task.init, task.goal, kept)
+    return replace(task, actions=kept)
 
 
 async def search(
@@ -110,10 +111,12 @@ async def search(
     found = await planners.plan(task, deadline_s)
     match found.answer:
         case AlreadyTrue():
-            return Planned(situation, task, Plan((), 0), took_s=found.took_s)
-        case Plan() as plan if problem := cut_short(composition, task, plan):
-            return NoPlan(situation, (problem,))
+            task, nothing = plain(task, Plan((), 0))
+            return Planned(situation, task, nothing, took_s=found.took_s)
         case Plan() as plan:
+            task, plan = plain(task, plan)
+            if problem := cut_short(composition, task, plan):
+                return NoPlan(situation, (problem,))
             return Planned(situation, task, plan, found.planner, found.took_s)
         case GaveUp(why):
             fix = "ask again with a longer planning.deadline_s, or for less"

@@ -1,0 +1,81 @@
+"""Deciding conditions as far as facts that nothing ever changes do."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import product
+
+from nondum.planning.relations import Row
+from nondum.planning.syntax import And, Atom, Equal, Formula, Not, Or, Quantified, Term, TypedName
+from nondum.planning.typegraph import ROOT
+
+Names = Mapping[str, str]
+"""Variable → object."""
+
+
+@dataclass(frozen=True, slots=True)
+class StaticFacts:
+    """The facts that no action and no rule writes."""
+
+    rows: Mapping[str, frozenset[Row]]
+    """Predicate → its facts."""
+    written: frozenset[str]
+    """The predicates that something writes: of these it knows nothing."""
+    domains: Mapping[str, frozenset[str]]
+    """Type → the objects of it."""
+
+    def may_hold(self, formula: Formula, names: Names) -> bool:
+        """Whether a normal condition can hold, for all that static facts say."""
+        match formula:
+            case Atom():
+                return formula.predicate in self.written or self._holds(formula, names)
+            case Not(part=Atom() as atom):
+                return atom.predicate in self.written or not self._holds(atom, names)
+            case Equal():
+                return value_of(formula.left, names) == value_of(formula.right, names)
+            case Not(part=Equal() as pair):
+                return value_of(pair.left, names) != value_of(pair.right, names)
+            case And():
+                return all(self.may_hold(part, names) for part in formula.parts)
+            case Or():
+                return any(self.may_hold(part, names) for part in formula.parts)
+            case Quantified(quantifier="forall"):
+                return all(self.may_hold(formula.part, n) for n in self._bindings(formula, names))
+            case Quantified():
+                return any(self.may_hold(formula.part, n) for n in self._bindings(formula, names))
+        raise AssertionError(f"not in normal form: {formula}")
+
+    def _holds(self, atom: Atom, names: Names) -> bool:
+        row = tuple(value_of(term, names) for term in atom.terms)
+        return row in self.rows.get(atom.predicate, ())
+
+    def _bindings(self, formula: Quantified, names: Names) -> Iterator[Names]:
+        domains = [sorted(self.objects(variable)) for variable in formula.variables]
+        for values in product(*domains):
+            own = {v.name: value for v, value in zip(formula.variables, values, strict=True)}
+            yield {**names, **own}
+
+    def objects(self, variable: TypedName) -> frozenset[str]:
+        """What a variable may stand for."""
+        types = variable.types or (ROOT,)
+        return frozenset().union(*(self.domains.get(name, frozenset()) for name in types))
+
+
+def static_facts(
+    believed: Iterable[tuple[str, Row]],
+    written: frozenset[str],
+    domains: Mapping[str, frozenset[str]],
+) -> StaticFacts:
+    """Those of the believed facts that nothing writes."""
+    rows: defaultdict[str, set[Row]] = defaultdict(set)
+    for predicate, row in believed:
+        if predicate not in written:
+            rows[predicate].add(row)
+    return StaticFacts({name: frozenset(found) for name, found in rows.items()}, written, domains)
+
+
+def value_of(term: Term, names: Names) -> str:
+    """The object that a term stands for."""
+    return names.get(term.name, term.name)
