@@ -96,7 +96,7 @@ async def _run(
     listing = executor.installation.listing
     warnings = tuple(_warnings(config, catalogue))
     questions = Questions(catalogue, mind, workers, news, listing, warnings)
-    orders = Orders(catalogue, mind, workers, news, bus)
+    orders = Orders(catalogue, mind, workers, news, bus, config.planning.translate_s)
     control = ControlServer(
         config.host.control, verbs.answering(questions, orders), verbs.following(questions, orders)
     )

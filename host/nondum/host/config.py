@@ -89,6 +89,8 @@ class PlanningSection:
     """Time that a search for a plan is given."""
     memory_mb: int = 512
     """Memory of a planner's process."""
+    translate_s: float = 10.0
+    """Time that components have to translate words which match no phrase."""
     establish_s: float = 30.0
     """Time that a lasting behaviour is given, from its start or its last sign of progress, until
     its effects hold; then it has failed."""

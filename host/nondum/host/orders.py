@@ -15,9 +15,11 @@ from nondum.host.control.arguments import Arguments, Triple
 from nondum.host.events import MountSet, RetryAsked
 from nondum.host.lifecycle import installed
 from nondum.host.lifecycle.bus import Bus
+from nondum.host.mind.composition import Composition
 from nondum.host.mind.frames import implausible
 from nondum.host.mind.goals import GivenGoal
 from nondum.host.mind.mind import Mind
+from nondum.host.mind.translation import Understood, translated
 from nondum.host.news import News
 from nondum.host.rows import Row, payload_row, unknown
 from nondum.host.workers.workers import Workers
@@ -40,18 +42,38 @@ class Orders:
     workers: Workers
     news: News
     bus: Bus
+    translate_s: float
+    """Time that components have to translate words."""
 
     async def goal(self, arguments: Arguments) -> Row:
-        """Give a goal, in `words` or in `pddl`. Raises `GoalRefused`."""
+        """Give a goal, in `words` or in `pddl` (then `said` are the words it was understood from).
+
+        Words that match no phrase are translated; with `yes` the goal is given as it was
+        understood, else the answer has `understood` only, for the person to confirm.
+        Raises `GoalRefused`.
+        """
         words, pddl = arguments.optional_text("words"), arguments.optional_text("pddl")
         if (words is None) == (pddl is None):
             raise GoalRefused(Problem("GOAL_AMISS", "a goal is given in words, or in PDDL"))
         kind = cast(GoalKind | None, arguments.choice("kind", "achieve", "maintain"))
         highest = HIGHEST_PRIORITY
         priority = arguments.number("priority", 0, at_least=-highest, at_most=highest)
-        given = self.mind.give(words=words, pddl=pddl, kind=kind, priority=priority)
+        said, understood = arguments.optional_text("said"), None
+        try:
+            given = self.mind.give(words=words, pddl=pddl, kind=kind, priority=priority, said=said)
+        except GoalRefused as refused:
+            if words is None or self.mind.composition is None:
+                raise
+            understood = await self._translated(words, refused)
+            if not arguments.flag("yes"):
+                return {"understood": understood.to_dict()}
+            self.mind.people.tell(f"{words!r} is {understood}")
+            given = self.mind.give(
+                pddl=understood.pddl, kind=understood.kind, priority=priority, said=words
+            )
         await self._until(lambda snapshot: self._is_kept(given, snapshot))
-        return {**given.to_dict(), "holds": False}
+        row = {**given.to_dict(), "holds": False}
+        return row | ({"understood": understood.to_dict()} if understood else {})
 
     async def halt(self, arguments: Arguments) -> Row:
         """Halt a goal, or everything: the goals that were open, the behaviours that ran."""
@@ -143,6 +165,19 @@ class Orders:
         payload_id = arguments.text("payload")
         await installed.uninstall(payload_id, self.catalogue, self.bus)
         return {"payload": payload_id}
+
+    async def _translated(self, words: str, refused: GoalRefused) -> Understood:
+        def composition() -> Composition:
+            assert self.mind.composition is not None, "there is always another one"
+            return self.mind.composition
+
+        return await translated(
+            words,
+            refused,
+            lambda vocabulary: self.workers.translations(words, vocabulary),
+            composition,
+            deadline_s=self.translate_s,
+        )
 
     def _is_kept(self, given: GivenGoal, snapshot: Snapshot) -> bool:
         """Whether a goal would survive the daemon, or has no need to."""

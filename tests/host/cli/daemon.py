@@ -186,11 +186,13 @@ def nondum(*arguments: str | Path, **environment: str) -> Ran:
     return Ran(done.returncode, done.stdout, done.stderr)
 
 
-def in_terminal(*arguments: str | Path, **environment: str) -> str:
-    """Run `nondum` in a terminal, and give everything that it shows there."""
+def in_terminal(*arguments: str | Path, typed: str = "", code: int = 0, **environment: str) -> str:
+    """Run `nondum` in a terminal where a person types, and give everything that it shows there."""
     ours, theirs = pty.openpty()
+    os.write(ours, typed.encode())
     process = subprocess.Popen(
         command(*arguments),
+        stdin=theirs,
         stdout=theirs,
         stderr=theirs,
         env=quiet_environment() | {"TERM": "xterm"} | environment,
@@ -201,7 +203,7 @@ def in_terminal(*arguments: str | Path, **environment: str) -> str:
         while some := _read(ours):
             shown += some
     os.close(ours)
-    assert process.returncode == 0, shown
+    assert process.returncode == code, shown
     return shown.decode()
 
 
@@ -239,9 +241,9 @@ def write_config(root: Path, more: str = "") -> Path:
 
 
 @contextmanager
-def running(root: Path) -> Iterator[Daemon]:
+def running(root: Path, more: str = "") -> Iterator[Daemon]:
     """Run a daemon; it must end well when it is told to."""
-    with killed(root) as daemon:
+    with killed(root, more) as daemon:
         yield daemon
         daemon.process.terminate()
         _, err = daemon.process.communicate(timeout=PATIENCE_S)
@@ -250,9 +252,9 @@ def running(root: Path) -> Iterator[Daemon]:
 
 
 @contextmanager
-def killed(root: Path) -> Iterator[Daemon]:
-    """Run a daemon, and end it without a warning (SIGKILL)."""
-    config = write_config(root)
+def killed(root: Path, more: str = "") -> Iterator[Daemon]:
+    """Run a daemon, `more` in its configuration, and end it without a warning (SIGKILL)."""
+    config = write_config(root, more)
     process = subprocess.Popen(
         command("host", "run", "--user", "--config", config),
         stderr=subprocess.PIPE,

@@ -42,20 +42,30 @@ async def test_describing_hooks_answer_at_once(house: House) -> None:
 async def test_acting_hooks_are_gathered(house: House) -> None:
     await talker(house)
     await house.start("quiet", "'''Says nothing.'''", summary="Says nothing.")
-    answers = await asyncio.gather(*house.workers.hook.translate_goal(ctx=None, words="hello"))
+    answers = await asyncio.gather(
+        *house.workers.hook.translate_goal(ctx=None, words="hello", vocabulary={})
+    )
     assert sorted(answers, key=str) == [{"pddl": "(said hello)"}, {}]
     assert await asyncio.gather(*house.workers.hook.speak(ctx=None, text="hi")) == [{}, {}]
 
 
+async def test_every_component_is_asked_to_translate(house: House) -> None:
+    await talker(house)
+    await house.start("quiet", "'''Says nothing.'''", summary="Says nothing.")
+    asked = house.workers.translations("hello", {"host": "rover"})
+    answers = dict(zip(asked, await asyncio.gather(*asked.values()), strict=True))
+    assert answers == {"talker": {"pddl": "(said hello)"}, "quiet": {}}
+
+
 async def test_failing_hook_comes_to_nothing(house: House) -> None:
     await talker(house)
-    (answer,) = house.workers.hook.translate_goal(ctx=None, words="boom")
+    (answer,) = house.workers.hook.translate_goal(ctx=None, words="boom", vocabulary={})
     assert await answer is None
 
 
 async def test_hook_of_a_worker_that_goes_comes_to_nothing(house: House) -> None:
     await talker(house)
-    (answer,) = house.workers.hook.translate_goal(ctx=None, words="hello")
+    (answer,) = house.workers.hook.translate_goal(ctx=None, words="hello", vocabulary={})
     await house.workers.stop("talker")
     assert await answer is None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import click
@@ -9,6 +10,7 @@ import click
 from nondum.host.cli import complete, render
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.failure import EXIT_REFUSED
+from nondum.sdk.errors import GoalRefused, Problem
 
 _TRIPLE = (float, float, float)
 
@@ -24,6 +26,7 @@ _TRIPLE = (float, float, float)
     type=click.IntRange(-1000, 1000),
     help="Higher goes first.",
 )
+@click.option("--yes", is_flag=True, help="Take a component's translation without asking.")
 @click.option("--wait", is_flag=True, help="Until it is reached, is held, or has no plan.")
 @json_option
 @click.pass_obj
@@ -33,12 +36,14 @@ def goal(
     pddl: str | None,
     maintain: bool,
     priority: int,
+    yes: bool,
     wait: bool,
 ) -> int:
     """Give the robot a goal, in words or in PDDL.
 
-    `nondum goals` says which words are understood now. With --wait, exits with 1 when there is no
-    plan; the goal then waits for what is missing, until it is halted.
+    `nondum goals` says which words are understood now. Others may be translated by a component:
+    what it understood is shown, and given only once it is confirmed. With --wait, exits with 1 when
+    there is no plan; the goal then waits for what is missing, until it is halted.
 
     \b
     Examples: nondum goal follow me through the facility
@@ -50,7 +55,13 @@ def goal(
         raise click.UsageError("--maintain is of use with --pddl only: words say it themselves")
     kind = "maintain" if maintain else None
     said = " ".join(words) or None
-    given = session.ask("goal", words=said, pddl=pddl, kind=kind, priority=priority)
+    given = session.ask(
+        "goal", timeout_s=None, words=said, pddl=pddl, kind=kind, priority=priority, yes=yes
+    )
+    if "id" not in given:
+        given = _confirmed(session, said or "", given["understood"], priority)
+    elif "understood" in given and not session.as_json:
+        render.sentence(_understood(given["understood"]))
     if wait:
         given = _settled(session, given)
     if session.as_json:
@@ -58,6 +69,26 @@ def goal(
     else:
         _show_goal(given)
     return EXIT_REFUSED if given["state"] in ("suspended", "halted") else 0
+
+
+def _confirmed(
+    session: Session, said: str, understood: dict[str, Any], priority: int
+) -> dict[str, Any]:
+    """Ask the person whether they were understood, and give just that goal."""
+    if session.as_json or not sys.stdin.isatty():
+        fix = "give --yes to take it so, or the goal with --pddl"
+        raise GoalRefused(Problem("TRANSLATION_UNCONFIRMED", _understood(understood), fix=fix))
+    render.sentence(_understood(understood))
+    if not click.confirm("Is that what is wanted?"):
+        raise GoalRefused(Problem("TRANSLATION_UNCONFIRMED", "nothing was asked for", where=said))
+    goal, kind = understood["goal"], understood["kind"]
+    given: dict[str, Any] = session.ask("goal", pddl=goal, kind=kind, priority=priority, said=said)
+    return given
+
+
+def _understood(understood: dict[str, Any]) -> str:
+    by = " and ".join(understood["by"])
+    return f"understood by {by} as {understood['kind']} {understood['goal']}"
 
 
 def _settled(session: Session, given: dict[str, Any]) -> dict[str, Any]:

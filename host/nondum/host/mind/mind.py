@@ -128,10 +128,14 @@ class Mind:
         pddl: str | None = None,
         kind: GoalKind | None = None,
         priority: int = 0,
+        said: str | None = None,
     ) -> GivenGoal:
-        """Want something, said in words or in PDDL. Raises `GoalRefused`."""
+        """Want something, in words or in PDDL; `said` are words that the PDDL was understood from.
+
+        Raises `GoalRefused`.
+        """
         goal = self._understood(words, pddl, kind)
-        text = words if words is not None else goal.text
+        text = words or said or goal.text
         given = self.queue.give(text, goal_text(goal.expr), goal.kind, priority=priority)
         self._emit(GoalGiven(given.id, given.text, given.kind, given.pddl, priority))
         self.wake()

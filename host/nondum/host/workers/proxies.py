@@ -92,9 +92,10 @@ class Proxy:
         return self._answer("stop", {})
 
     @hookimpl
-    def translate_goal(self, words: str) -> Answer:
-        """Have it translate what a person said."""
-        return self._answer("translate_goal", {"words": words})
+    def translate_goal(self, words: str, vocabulary: Mapping[str, Any]) -> Answer:
+        """Have it translate what a person said, with the words that are known now."""
+        body = {"words": words, "vocabulary": vocabulary}
+        return self._answer("translate_goal", body)
 
     @hookimpl
     def speak(self, text: str) -> Answer:

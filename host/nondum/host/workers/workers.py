@@ -18,7 +18,7 @@ from nondum.host.workers import problems
 from nondum.host.workers.call import Call
 from nondum.host.workers.launcher import Launcher, RlimitLauncher
 from nondum.host.workers.logs import LogLine, Logs
-from nondum.host.workers.proxies import Proxy, plugin_manager
+from nondum.host.workers.proxies import Answer, Proxy, plugin_manager
 from nondum.host.workers.spec import Timing, WorkerSpec
 from nondum.host.workers.supervisor import Supervisor
 from nondum.host.workers.worker import Worker
@@ -181,6 +181,14 @@ class Workers:
         if supervisor is None or supervisor.worker is None:
             return ()
         return tuple(supervisor.worker.claims)
+
+    def translations(self, words: str, vocabulary: Mapping[str, Any]) -> dict[str, Answer]:
+        """Ask every running component to translate what a person said: component → its answer."""
+        return {
+            name: proxy.translate_goal(words, vocabulary)
+            for name, proxy in sorted(self._manager.list_name_plugin())
+            if isinstance(proxy, Proxy)
+        }
 
     def keep_spare(self) -> None:
         """Prepare the next launch, now and, from now on, some time after every launch."""

@@ -101,10 +101,16 @@ async def stop(ctx: Context) -> None:
 
 
 @hookspec
-async def translate_goal(ctx: Context, words: str) -> Mapping[str, str] | None:
-    """Translate words that match no phrase: `{"pddl": "(following self person)"}`, or None.
+async def translate_goal(
+    ctx: Context, words: str, vocabulary: Mapping[str, Any]
+) -> Mapping[str, str] | None:
+    """Translate words that match no phrase, or give None:
+    `{"pddl": "(following self person)", "kind": "maintain"}`; without `kind`, `achieve`.
 
-    The answer is parsed and type-checked like anyone's.
+    `vocabulary` is what is known now: `host`; `sentences` that are understood; `objects`, each with
+    `name`, `types` and `words`; `predicates` as PDDL declares them. The answer is parsed and
+    type-checked like anyone's, and shown to the person, who confirms it. A host waits for it
+    `planning.translate_s`.
     """
 
 

@@ -133,7 +133,10 @@ class Session:
                     body["behaviour"], body["arguments"], values, call_id
                 )
             case "translate_goal":
-                return await self._answer("translate_goal", words=body["words"])
+                vocabulary = body.get("vocabulary", {})
+                return await self._answer(
+                    "translate_goal", words=body["words"], vocabulary=vocabulary
+                )
             case "speak":
                 return await self._answer("speak", text=body["text"])
             case "listen":

@@ -1,0 +1,166 @@
+"""Words that match no phrase, translated by components; every answer is checked like anyone's.
+
+Nothing is guessed: answers that mean nothing here are refused by name, and different ones are told
+instead of chosen from.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable, Iterable, Mapping
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any, TypeAlias, cast, get_args
+
+from nondum.host.mind.composition import Composition
+from nondum.planning.domain import Predicate
+from nondum.planning.goal import GoalKind, goal_text, parse_goal
+from nondum.planning.syntax import type_text
+from nondum.sdk.errors import GoalRefused, Problem
+
+UNMATCHED = frozenset({"PHRASE_UNKNOWN", "PHRASE_WORDS_UNKNOWN"})
+"""Refusals of words that a translator may still understand; of ambiguous ones nobody is asked."""
+LONGEST_WORDS = 1000
+"""Characters of a sentence that is translated."""
+VOCABULARY_BYTES = 40_000
+"""What a packet to a worker has room for, and some to spare."""
+_ENTRIES = 400
+
+Vocabulary: TypeAlias = dict[str, Any]
+Answers: TypeAlias = Mapping[str, Awaitable[Mapping[str, Any] | None]]
+"""Component → its answer, once it has one; None where it has failed."""
+Asked: TypeAlias = Callable[[Vocabulary], Answers]
+"""Asks all components at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class Understood:
+    """What components take a sentence to mean."""
+
+    pddl: str
+    kind: GoalKind
+    by: tuple[str, ...]
+    """The components that understand it so."""
+
+    def __str__(self) -> str:
+        return f"understood by {' and '.join(self.by)} as {self.kind} {self.pddl}"
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain data for people's tools."""
+        return {"goal": self.pddl, "kind": self.kind, "by": list(self.by)}
+
+
+async def translated(
+    words: str,
+    refused: GoalRefused,
+    ask: Asked,
+    composition: Callable[[], Composition],
+    *,
+    deadline_s: float,
+) -> Understood:
+    """Have components translate what matched no phrase; one that hangs is cut off.
+
+    `refused` is why it did not. Raises `GoalRefused` with that, and with what is wrong with the
+    answers (TRANSLATION_INVALID, TRANSLATION_REFUSED, TRANSLATION_OVERDUE), or with
+    TRANSLATION_AMBIGUOUS.
+    """
+    if refused.code not in UNMATCHED or len(words) > LONGEST_WORDS:
+        raise refused
+    answers, problems = await _gathered(ask(vocabulary(composition())), deadline_s)
+    found: dict[tuple[str, GoalKind], list[str]] = {}
+    for component, answer in sorted(answers.items()):
+        try:
+            found.setdefault(_checked(component, answer, composition()), []).append(component)
+        except GoalRefused as amiss:
+            problems += amiss.problems
+    readings = [Understood(pddl, kind, tuple(by)) for (pddl, kind), by in found.items()]
+    if len(readings) > 1:
+        raise GoalRefused(_ambiguous(words, readings))
+    if not readings:
+        raise GoalRefused(*refused.problems, *problems)
+    return readings[0]
+
+
+def vocabulary(composition: Composition) -> Vocabulary:
+    """What a translator is told of the words known now, shortened to fit a packet.
+
+    `host`; `sentences` that can be said; `objects`: `name`, `types`, `words`; `predicates` as PDDL
+    declares them.
+    """
+    merged, book = composition.merged, composition.book
+    told: Vocabulary = {
+        "host": composition.host,
+        "sentences": list(islice(book.offers(), _ENTRIES)),
+        "predicates": [
+            _declared(predicate)
+            for predicate in islice(merged.domain.predicates.values(), _ENTRIES)
+        ],
+        "objects": [
+            {"name": name, "types": list(found.types), "words": book.labels.get(name, "")}
+            for name, found in islice(merged.objects.items(), _ENTRIES)
+        ],
+    }
+    while len(json.dumps(told)) > VOCABULARY_BYTES:
+        told = {k: v[: len(v) // 2] if isinstance(v, list) else v for k, v in told.items()}
+    return told
+
+
+def _declared(predicate: Predicate) -> str:
+    typed = (f"?{i} - {type_text(types)}" for i, types in enumerate(predicate.parameters, 1))
+    return f"({' '.join((predicate.name, *typed))})"
+
+
+async def _gathered(
+    asked: Answers, deadline_s: float
+) -> tuple[dict[str, Mapping[str, Any]], list[Problem]]:
+    """The answers that say something, and a problem for each component that is cut off."""
+    tasks = {
+        component: asyncio.ensure_future(_awaited(answer)) for component, answer in asked.items()
+    }
+    try:
+        if tasks:
+            await asyncio.wait(tasks.values(), timeout=deadline_s)
+        overdue = [
+            Problem("TRANSLATION_OVERDUE", f"no answer within {deadline_s:g} s", where=component)
+            for component, task in sorted(tasks.items())
+            if not task.done()
+        ]
+        answers = {c: task.result() for c, task in tasks.items() if task.done()}
+    finally:
+        for task in tasks.values():
+            task.cancel()
+        await asyncio.gather(*tasks.values(), return_exceptions=True)
+    return {component: answer for component, answer in answers.items() if answer}, overdue
+
+
+async def _awaited(answer: Awaitable[Mapping[str, Any] | None]) -> Mapping[str, Any] | None:
+    return await answer
+
+
+def _checked(
+    component: str, answer: Mapping[str, Any], composition: Composition
+) -> tuple[str, GoalKind]:
+    """The goal that an answer gives. Raises `GoalRefused` that names the component."""
+    pddl, kind = answer.get("pddl"), answer.get("kind", "achieve")
+    if not isinstance(pddl, str) or kind not in get_args(GoalKind):
+        message = f"its answer is no goal: {str(dict(answer))[:200]}"
+        raise GoalRefused(Problem("TRANSLATION_INVALID", message, where=component))
+    try:
+        goal = parse_goal(pddl, composition.merged, kind=cast(GoalKind, kind))
+    except GoalRefused as refused:
+        why = "; ".join(_first_line(problem) for problem in refused.problems)
+        message = f"it understands {pddl[:200]!r}, which means nothing here: {why}"
+        raise GoalRefused(Problem("TRANSLATION_REFUSED", message, where=component)) from refused
+    return goal_text(goal.expr), goal.kind
+
+
+def _first_line(problem: Problem) -> str:
+    fix = f" → {problem.fix}" if problem.fix else ""
+    return f"{problem.message.splitlines()[0]}{fix}"
+
+
+def _ambiguous(words: str, readings: Iterable[Understood]) -> Problem:
+    meanings = ", or ".join(map(str, readings))
+    fix = "say it in other words, or give the goal with --pddl"
+    return Problem("TRANSLATION_AMBIGUOUS", f"{words!r} is {meanings}", fix=fix)

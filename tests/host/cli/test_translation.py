@@ -1,0 +1,120 @@
+"""Words that match no phrase, translated by a component and confirmed by the person."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, in_terminal, running
+from tests.payloads import Part
+
+INTERPRETER = """
+'''Understands what it is told to.'''
+import time
+from nondum.sdk import hookimpl
+
+MEANINGS = {
+    "brighten up": {"pddl": "(lit self)", "kind": "maintain"},
+    "say hello to everybody": {"pddl": "(greeted person self)"},
+    "go away": {"pddl": "(litt self)"},
+    "sing": {"song": "la la"},
+}
+
+@hookimpl
+def translate_goal(ctx, words, vocabulary):
+    if words == "think hard":
+        time.sleep(3600)
+    if words == "what do you know":
+        raise RuntimeError(vocabulary)
+    if words == "repeat":
+        assert vocabulary["sentences"] == ["greet people", "shine"], vocabulary
+        assert {"name": "person", "types": ["class"], "words": "people"} in vocabulary["objects"]
+        assert "(lit ?1 - host)" in vocabulary["predicates"]
+        return MEANINGS["brighten up"]
+    return MEANINGS.get(words)
+"""
+OTHER = """
+'''Takes a person at their word.'''
+from nondum.sdk import hookimpl
+
+@hookimpl
+async def translate_goal(ctx, words):
+    return {"pddl": "(greeted person self)"} if "hello" in words or "brighten" in words else None
+"""
+LIT = "understood by interpreter as maintain (lit panther)"
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    patience = "[planning]\ntranslate_s = 1.0\n"
+    with running(tmp_path_factory.mktemp("host"), patience) as daemon:
+        daemon.plug(BEACON_ID, Part("beacon", BEACON))
+        daemon.plug("org.example.interpreter", Part("interpreter", INTERPRETER))
+        daemon.until(lambda view: [r["ready"] for r in view["components"]] == [True, True])
+        yield daemon
+
+
+@pytest.fixture(autouse=True)
+def at_rest(daemon: Daemon) -> Iterator[None]:
+    yield
+    daemon.run("halt", "--now").ok()
+    daemon.until(lambda view: not view["plan"]["steps"])
+
+
+def test_translation_is_taken_where_the_person_said_so(daemon: Daemon) -> None:
+    shown = daemon.run("goal", "brighten", "up", "--yes", "--wait").ok().out
+    assert shown.startswith(f"{LIT}\ngoal ")
+    view = daemon.until(lambda view: any(row["holds"] for row in view["goals"]))
+    assert view["goals"][-1]["text"] == "brighten up"
+    assert f"> 'brighten up' is {LIT}" in daemon.run("status").ok().out
+
+
+def test_machine_is_told_who_understood_what(daemon: Daemon) -> None:
+    given = daemon.run("goal", "repeat", "--yes", "--json").ok().json
+    expected = {"goal": "(lit panther)", "kind": "maintain", "by": ["interpreter"]}
+    assert given["understood"] == expected
+
+
+def test_translation_is_never_taken_unasked(daemon: Daemon) -> None:
+    before = len(daemon.run("goals", "--json").ok().json["given"])
+    daemon.run("goal", "brighten up").refused(1, f"TRANSLATION_UNCONFIRMED {LIT} → give --yes")
+    assert len(daemon.run("goals", "--json").ok().json["given"]) == before
+
+
+def test_person_confirms_at_the_terminal(daemon: Daemon) -> None:
+    shown = in_terminal("--control", daemon.control, "goal", "brighten up", typed="y\n")
+    assert LIT in shown
+    daemon.until(lambda view: any(row["holds"] for row in view["goals"]))
+
+
+def test_person_declines_at_the_terminal(daemon: Daemon) -> None:
+    shown = in_terminal("--control", daemon.control, "goal", "brighten up", typed="n\n", code=1)
+    assert "nothing was asked for" in shown
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ("go away", "TRANSLATION_REFUSED interpreter: it understands '(litt self)'"),
+        ("go away", "did you mean 'lit'?"),
+        ("sing", "TRANSLATION_INVALID interpreter: its answer is no goal"),
+        ("think hard", "TRANSLATION_OVERDUE interpreter: no answer within 1 s"),
+        ("mumble", "PHRASE_UNKNOWN"),
+        ("what do you know", "PHRASE_UNKNOWN"),
+    ],
+)
+def test_what_means_nothing_is_refused_by_name(daemon: Daemon, words: str, why: str) -> None:
+    ran = daemon.run("goal", words, "--yes")
+    ran.refused(1, "PHRASE_UNKNOWN").refused(1, why)
+
+
+def test_different_translations_are_told_and_none_is_chosen(daemon: Daemon) -> None:
+    daemon.plug("org.example.other", Part("other", OTHER))
+    daemon.until_state("org.example.other", "active")
+    ran = daemon.run("goal", "brighten up", "--yes").refused(1, "TRANSLATION_AMBIGUOUS")
+    assert "understood by interpreter as maintain (lit panther), or" in ran.err
+    assert "understood by other as achieve (greeted person panther)" in ran.err
+    same = daemon.run("goal", "say hello to everybody", "--yes", "--json").ok().json
+    assert same["understood"]["by"] == ["interpreter", "other"]
+    daemon.pull("org.example.other")
+    daemon.until(lambda view: len(view["components"]) == 2)
