@@ -19,6 +19,7 @@ from nondum.planning.goal import Goal, parse_goal
 from nondum.planning.ground import ground
 from nondum.planning.partial_order import causal_links, threats
 from nondum.planning.plain import plain
+from nondum.planning.pricing import at_own_cost, handicaps, priced
 from nondum.planning.step import steps_of, words
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
 from nondum.sdk.planner import AlreadyTrue, GaveUp, GroundTask, Plan, Unsolvable
@@ -108,13 +109,14 @@ async def search(
         task = await _task_of_any_size(composition, goal, situation)
     except FragmentRefused as refused:
         return NoPlan(situation, refused.problems)
-    found = await planners.plan(task, deadline_s)
+    handicap = handicaps(composition.contributions, composition.host)
+    found = await planners.plan(priced(task, handicap), deadline_s)
     match found.answer:
         case AlreadyTrue():
             task, nothing = plain(task, Plan((), 0))
             return Planned(situation, task, nothing, took_s=found.took_s)
-        case Plan() as plan:
-            task, plan = plain(task, plan)
+        case Plan() as dear:
+            task, plan = plain(task, at_own_cost(task, dear))
             if problem := cut_short(composition, task, plan):
                 return NoPlan(situation, (problem,))
             return Planned(situation, task, plan, found.planner, found.took_s)
