@@ -17,8 +17,8 @@ from tests.planning.strangers import (
 
 from nondum.planning.goal import Goal, goal_text
 from nondum.planning.merge import merge
-from nondum.planning.phrases import Phrasebook, phrasebook
-from nondum.sdk.description import Behaviour, Label, Phrase, PluginDescription
+from nondum.planning.phrases import MAX_OFFERS, Phrasebook, phrasebook
+from nondum.sdk.description import Behaviour, Fragment, Label, Phrase, PluginDescription
 from nondum.sdk.errors import GoalRefused
 
 
@@ -85,7 +85,10 @@ def test_different_meanings_are_told() -> None:
     )
     with pytest.raises(GoalRefused, match=r"may mean .*following.* or .*reported") as refused:
         book(BASE, speaker, DETECTOR).goal("follow me")
-    assert refused.value.code == "PHRASE_AMBIGUOUS"
+    [problem] = refused.value.problems
+    assert problem.code == "PHRASE_AMBIGUOUS"
+    assert '"follow {c:class} [through {words:text}]" of mobile-base' in problem.message
+    assert '"follow {c:class}" of speaker' in problem.message
 
 
 def test_label_of_two_objects_is_ambiguous() -> None:
@@ -98,7 +101,9 @@ def test_label_of_two_objects_is_ambiguous() -> None:
     )
     with pytest.raises(GoalRefused) as refused:
         book(BASE, DETECTOR, goose).goal("follow me")
-    assert refused.value.code == "PHRASE_AMBIGUOUS"
+    [problem] = refused.value.problems
+    assert problem.code == "PHRASE_AMBIGUOUS"
+    assert problem.fix == 'say: "follow goose", "follow person"; or give the goal in PDDL'
 
 
 def test_unknown_sentence_gets_near_phrases() -> None:
@@ -128,6 +133,19 @@ def test_offers_list_what_can_be_said() -> None:
         "follow me",
         "point at the radiation source",
     )
+
+
+def test_listed_sentences_are_bounded() -> None:
+    names = " ".join(f"thing-{i}" for i in range(MAX_OFFERS * 2))
+    many = PluginDescription(
+        "many",
+        "1",
+        fragments=(
+            Fragment("m.pddl", f"(define (problem m) (:domain m) (:objects {names} - class))"),
+        ),
+        phrases=(Phrase("{a:class} meets {b:class} near {c:class}", "(following self ?a)"),),
+    )
+    assert len(book(many).offers()) == MAX_OFFERS
 
 
 def test_phrase_without_things_to_name_is_not_offered() -> None:

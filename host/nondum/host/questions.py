@@ -57,7 +57,7 @@ class Questions:
             "warnings": list(self.warnings),
             "payloads": [payload_row(p, self.news.progress(p.key)) for p in snapshot.payloads],
             "drives": [drive_row(drive) for drive in snapshot.drives],
-            "goals": self.mind.views.goals()["given"],
+            "goals": self.mind.views.given(),
             "told": self.mind.views.told(self.mind.people.last_number - TOLD),
         }
 
@@ -95,7 +95,7 @@ class Questions:
 
     async def goals(self, arguments: Arguments) -> Row:
         """What can be asked for, and what was."""
-        return self.mind.views.goals()
+        return await asyncio.to_thread(self.mind.views.goals())
 
     async def plan(self, arguments: Arguments) -> Row:
         """The plan that is carried out."""
@@ -144,7 +144,7 @@ class Questions:
         id, version = arguments.text("id"), -1
         while True:
             version = await self.mind.changed(version)
-            given = next((row for row in self.mind.views.goals()["given"] if row["id"] == id), None)
+            given = next((row for row in self.mind.views.given() if row["id"] == id), None)
             if given is None:
                 raise GoalRefused(Problem("GOAL_UNKNOWN", f"there is no goal {id!r}"))
             yield given

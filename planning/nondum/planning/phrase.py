@@ -33,6 +33,8 @@ class KnownPhrase:
     """With a variable for each binding slot, and `self`."""
     kind: GoalKind
     plugin: str
+    component: str
+    """One that runs the plugin."""
 
     def binding_slots(self) -> Iterator[Slot]:
         """The slots whose words name an object."""
@@ -48,7 +50,7 @@ def known_phrases(
     for contribution in contributions:
         for pattern, source in _declared(contribution, merged):
             try:
-                known.append(_known(pattern, source, contribution.plugin, merged))
+                known.append(_known(pattern, source, contribution, merged))
             except PatternInvalid as wrong:
                 where = f"{contribution.plugin} {contribution.version} phrase {pattern!r}"
                 problems.append(Problem("PHRASE_INVALID", str(wrong), where=where))
@@ -65,7 +67,7 @@ def _declared(contribution: Contribution, merged: Merged) -> Iterator[tuple[str,
             yield pattern, by_behaviour[behaviour.name]
 
 
-def _known(pattern: str, source: Phrase | Action, plugin: str, merged: Merged) -> KnownPhrase:
+def _known(pattern: str, source: Phrase | Action, by: Contribution, merged: Merged) -> KnownPhrase:
     parts = parse_pattern(pattern)
     if isinstance(source, Action):
         parts = _typed(parts, source)
@@ -74,7 +76,7 @@ def _known(pattern: str, source: Phrase | Action, plugin: str, merged: Merged) -
     else:
         condition = _condition(source, parts, merged)
         kind = "maintain" if source.kind == "maintain" else "achieve"
-    known = KnownPhrase(pattern, parts, condition, kind, plugin)
+    known = KnownPhrase(pattern, parts, condition, kind, by.plugin, by.component)
     _check_slots(known, merged)
     return known
 

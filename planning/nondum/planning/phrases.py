@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
+from itertools import islice
 
 from nondum.planning.contribution import Contribution
 from nondum.planning.domain import Merged
-from nondum.planning.goal import Goal, goal_text
+from nondum.planning.goal import Goal
 from nondum.planning.merge import quarantine_key
 from nondum.planning.pattern import (
-    Optional,
     Part,
     Said,
     Slot,
@@ -26,8 +26,28 @@ from nondum.sdk.errors import GoalRefused, Problem
 
 MAX_WORDS = 40
 """A longer sentence is not looked at."""
+MAX_OFFERS = 200
+"""Sentences of one phrase that are listed, however many names there are."""
 
 _Names = Mapping[tuple[str, ...], frozenset[str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What a sentence means by one phrase."""
+
+    phrase: KnownPhrase
+    bound: Mapping[str, str]
+    """Slot → the object that its words name."""
+    goal: Goal
+
+    @property
+    def meaning(self) -> tuple[object, ...]:
+        """Equal for readings that ask for the same."""
+        return self.goal.expr, self.goal.kind
+
+    def __str__(self) -> str:
+        return f'{self.goal}, by "{self.phrase.pattern}" of {self.phrase.plugin}'
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +60,8 @@ class Phrasebook:
     """Words → the objects that they may mean."""
     labels: Mapping[str, str]
     """Object → the words to say it with."""
+    namers: Mapping[str, str]
+    """Object → the component whose label `labels` has for it."""
     problems: tuple[Problem, ...] = ()
     """Phrases that cannot be used, and why."""
 
@@ -51,35 +73,50 @@ class Phrasebook:
         words = words_of(sentence)
         if len(words) > MAX_WORDS:
             raise GoalRefused(Problem("PHRASE_UNKNOWN", f"more than {MAX_WORDS} words"))
-        found: list[Goal] = []
-        for goal in self._goals(sentence, words):
-            if all((goal.expr, goal.kind) != (other.expr, other.kind) for other in found):
-                found.append(goal)
+        found = self._readings(sentence, words)
         if len(found) > 1:
-            raise GoalRefused(_ambiguous(sentence, found))
+            raise GoalRefused(self._ambiguous(sentence, found))
         if not found:
             raise GoalRefused(self._unknown(sentence, words))
-        return found[0]
+        return found[0].goal
 
     def offers(self) -> tuple[str, ...]:
         """Sentences that can be said now: each phrase with every name that fits its slots."""
-        return tuple(
-            sorted({text for phrase in self.phrases for text in self._sentences(phrase.parts)})
-        )
+        return tuple(sorted({offer.goal.text for offer in self.offered()}))
 
-    def _goals(self, sentence: str, words: tuple[str, ...]) -> Iterator[Goal]:
+    def offered(self) -> Iterator[Reading]:
+        """What the sentences that can be said now mean; `goal.text` is the sentence.
+
+        A free slot stands in it as `<name>`. Up to `MAX_OFFERS` of each phrase.
+        """
+        for phrase in self.phrases:
+            for sentence, bound in islice(self._sentences(phrase.parts), MAX_OFFERS):
+                yield self._reading(phrase, bound, sentence)
+
+    def things_for(self, slot: Slot) -> tuple[str, ...]:
+        """The objects that can be named in a slot."""
+        return tuple(sorted(name for name in self.labels if self._fits(name, slot)))
+
+    def _readings(self, sentence: str, words: tuple[str, ...]) -> list[Reading]:
+        """Every different thing that a sentence may ask for."""
+        found: dict[tuple[object, ...], Reading] = {}
         for phrase in self.phrases:
             for said in matches(phrase.parts, words, self._is_name):
                 for bound in self._bindings(phrase, said):
-                    names = {SELF: self.merged.self_host, **bound}
-                    yield Goal(phrase.condition.bound(names), phrase.kind, sentence)
+                    reading = self._reading(phrase, bound, sentence)
+                    found.setdefault(reading.meaning, reading)
+        return list(found.values())
+
+    def _reading(self, phrase: KnownPhrase, bound: Mapping[str, str], sentence: str) -> Reading:
+        names = {SELF: self.merged.self_host, **{f"?{slot}": name for slot, name in bound.items()}}
+        return Reading(phrase, bound, Goal(phrase.condition.bound(names), phrase.kind, sentence))
 
     def _bindings(self, phrase: KnownPhrase, said: Said) -> Iterator[dict[str, str]]:
         """Every choice of objects for the words said in the slots."""
         bindings: list[dict[str, str]] = [{}]
         for slot in phrase.binding_slots():
             meant = sorted(self._meant(slot, said[slot.name])) if slot.name in said else []
-            bindings = [{**b, f"?{slot.name}": name} for b in bindings for name in meant]
+            bindings = [{**b, slot.name: name} for b in bindings for name in meant]
         yield from bindings
 
     def _meant(self, slot: Slot, words: tuple[str, ...]) -> frozenset[str]:
@@ -93,22 +130,30 @@ class Phrasebook:
     def _is_name(self, slot: Slot, words: tuple[str, ...]) -> bool:
         return slot.is_free or bool(self._meant(slot, words))
 
-    def _sentences(self, parts: tuple[Part, ...]) -> Iterator[str]:
+    def _sentences(self, parts: tuple[Part, ...]) -> Iterator[tuple[str, dict[str, str]]]:
+        """Sentences of a pattern, the shortest way, and what their slots stand for."""
         if not parts:
-            yield ""
+            yield "", {}
             return
+        heads: list[tuple[str, dict[str, str]]] = [("", {})]
         match parts[0]:
             case Word(text):
-                heads = [text]
+                heads = [(text, {})]
             case Slot(is_free=True, name=name):
-                heads = [f"<{name}>"]
-            case Slot() as slot:
-                heads = [label for name, label in self.labels.items() if self._fits(name, slot)]
-            case Optional():
-                heads = [""]
-        for head in heads:
-            for tail in self._sentences(parts[1:]):
-                yield f"{head} {tail}".strip()
+                heads = [(f"<{name}>", {})]
+            case Slot(name=name) as slot:
+                heads = [(self.labels[thing], {name: thing}) for thing in self.things_for(slot)]
+        for head, bound in heads:
+            for tail, others in self._sentences(parts[1:]):
+                yield f"{head} {tail}".strip(), {**bound, **others}
+
+    def _ambiguous(self, sentence: str, readings: Iterable[Reading]) -> Problem:
+        meanings = " or ".join(map(str, readings))
+        spelled = [_spelled(reading) for reading in readings]
+        clear = [text for text in spelled if len(self._readings(text, words_of(text))) == 1]
+        ways = _listed("say", dict.fromkeys(clear)) if clear else "say which one by its name"
+        fix = f"{ways}; or give the goal in PDDL"
+        return Problem("PHRASE_AMBIGUOUS", f"{sentence!r} may mean {meanings}", fix=fix)
 
     def _unknown(self, sentence: str, words: tuple[str, ...]) -> Problem:
         for phrase in self.phrases:
@@ -136,33 +181,44 @@ def phrasebook(contributions: Iterable[Contribution], merged: Merged) -> Phraseb
     )
     phrases, problems = known_phrases(present, merged)
     labels: dict[str, str] = {}
+    namers: dict[str, str] = {}
     names: dict[tuple[str, ...], frozenset[str]] = {}
-    for name, words in _said_names(present, merged):
+    for name, words, namer in _said_names(present, merged):
         if name in merged.objects:
+            if name not in labels and namer:
+                namers[name] = namer
             labels.setdefault(name, " ".join(words))
             key = name_words(words)
             names[key] = names.get(key, frozenset()) | {name}
-    return Phrasebook(merged, phrases, names, labels, problems)
+    return Phrasebook(merged, phrases, names, labels, namers, problems)
 
 
 def _said_names(
     contributions: Iterable[Contribution], merged: Merged
-) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Objects with words for them: labels first, then the names of shared objects."""
+) -> Iterator[tuple[str, tuple[str, ...], str]]:
+    """Objects with words for them, and whose words: labels, then the names of shared objects."""
     for contribution in contributions:
         own = {SELF: contribution.host, **contribution.local_names()}
         for label in contribution.labels:
-            yield own.get(label.object, label.object), words_of(label.words)
+            thing = own.get(label.object, label.object)
+            yield thing, words_of(label.words), contribution.component
     for name, found in merged.objects.items():
         if not found.component:
-            yield name, name_words((name,))
+            yield name, name_words((name,)), ""
 
 
-def _ambiguous(sentence: str, goals: Iterable[Goal]) -> Problem:
-    meanings = " or ".join(f"{goal.kind} {goal_text(goal.expr)}" for goal in goals)
-    return Problem(
-        "PHRASE_AMBIGUOUS", f"{sentence!r} may mean {meanings}", fix="say which one by its name"
-    )
+def _spelled(reading: Reading) -> str:
+    """The sentence of a reading with each thing called by its own name."""
+    said: list[str] = []
+    for part in reading.phrase.parts:
+        match part:
+            case Word(text):
+                said.append(text)
+            case Slot(is_free=True, name=name):
+                said.append(f"<{name}>")
+            case Slot(name=name):
+                said += name_words((reading.bound[name],))
+    return " ".join(said)
 
 
 def _listed(verb: str, sentences: Iterable[str]) -> str:

@@ -42,7 +42,7 @@ ROWS: dict[str, set[str]] = {
     "units": {"unit", "type", "component", "ready", "xyz", "rpy", "mount", "warnings"},
 }
 VIEWS: dict[str, set[str]] = {
-    "goals": {"can", "given"},
+    "goals": {"can", "phrases", "given", "problems"},
     "plan": {"goal", "kind", "steps"},
     "status": {
         "host",
@@ -109,9 +109,9 @@ ready panther__beacon__lamp                 AGE    beacon is healthy and its dev
 self panther                                AGE    this is the host that plans                 -
 """
 GOALS = """\
-WORDS         GOAL                      KIND
-greet people  (greeted person panther)  achieve
-shine         (lit panther)             maintain
+WORDS         GOAL                      KIND      NOW  FROM
+greet people  (greeted person panther)  achieve   can  beacon
+shine         (lit panther)             maintain  can  beacon
 
 no goal was given
 """

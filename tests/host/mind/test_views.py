@@ -9,8 +9,8 @@ import pytest
 from tests.host.mind.robot import HOST, Robot
 from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT, RECORDED_CAMERA
 
-from nondum.host.catalogue.records import MountPose
-from nondum.sdk.description import Fragment, Label, PluginDescription
+from nondum.host.catalogue.records import ComponentState, MountPose
+from nondum.sdk.description import Fragment, Label, Phrase, PluginDescription
 
 pytestmark = pytest.mark.anyio
 
@@ -30,12 +30,58 @@ async def point(robot: Robot) -> None:
 
 async def test_goal_in_words_of_two_strangers(robot: Robot) -> None:
     robot.plug(SENSING, POINTING)
-    can = robot.mind.views.goals()["can"]
+    [can] = robot.mind.views.goals()()["can"]
     goal = f"(pointing {HOST} radiation-source)"
-    assert can == [{"words": "point at the radiation source", "goal": goal, "kind": "maintain"}]
+    assert can == {
+        "words": "point at the radiation source",
+        "goal": goal,
+        "kind": "maintain",
+        "now": "can",
+        "lacks": [],
+        "from": ["compton-camera", "pan-tilt-unit"],
+    }
     given = robot.mind.give(words="point at the radiation source")
     assert (given.pddl, given.kind) == (goal, "maintain")
     await robot.until_holding()
+
+
+async def test_goals_say_what_holds_and_what_is_missing(robot: Robot) -> None:
+    await point(robot)
+    assert [row["now"] for row in robot.mind.views.goals()()["can"]] == ["holds"]
+    unready = ComponentState.RESTARTING
+    robot.set_state("pan-tilt-unit", unready)
+    await robot.until_goal("suspended")
+    [row] = robot.mind.views.goals()()["can"]
+    assert row["now"] == "cannot"
+    assert f"(ready {HEAD}) does not hold" in row["lacks"][0]
+
+
+async def test_phrase_without_anything_to_name_is_listed_with_what_it_lacks(robot: Robot) -> None:
+    robot.plug(POINTING)
+    view = robot.mind.views.goals()()
+    [row] = view["can"]
+    assert (row["words"], row["goal"]) == ("point at {t}", "(pointing self ?t)")
+    assert (row["now"], row["lacks"]) == ("cannot", ["there is no target to name"])
+    [phrase] = view["phrases"]
+    assert phrase["slots"] == [{"slot": "t", "types": ["target"], "values": []}]
+
+
+async def test_goal_that_cannot_be_had_names_who_used_to_help(robot: Robot) -> None:
+    robot.plug(SENSING, POINTING)
+    places = "(define (problem lab) (:domain lab) (:objects radiation-source - target))"
+    robot.plug(PluginDescription("lab", "1", fragments=(Fragment("lab.pddl", places),)))
+    robot.unplug("compton-camera")
+    [row] = robot.mind.views.goals()()["can"]
+    assert row["now"] == "cannot"
+    assert any("compton-camera used to supply it" in text for text in row["lacks"])
+
+
+async def test_words_with_two_meanings_are_listed_as_ambiguous(robot: Robot) -> None:
+    finding = Phrase("point at {t:target}", "(bearing-known ?t self)")
+    robot.plug(replace(SENSING, phrases=(finding,)), POINTING)
+    rows = robot.mind.views.goals()()["can"]
+    assert [row["now"] for row in rows] == ["ambiguous", "ambiguous"]
+    assert {row["goal"].split()[0] for row in rows} == {"(pointing", "(bearing-known"}
 
 
 async def test_plan_shows_steps_and_why(robot: Robot) -> None:
@@ -135,6 +181,6 @@ async def test_streams_show_flow(robot: Robot) -> None:
 async def test_everything_is_plain_data(robot: Robot) -> None:
     await point(robot)
     views = robot.mind.views
-    shown = [views.plan(), views.tree(), views.facts(), views.goals(), views.why()]
+    shown = [views.plan(), views.tree(), views.facts(), views.goals()(), views.why()]
     shown += [views.behaviours(), views.units(), views.streams(), views.told()]
     assert json.loads(json.dumps(shown)) == shown

@@ -81,16 +81,26 @@ def _ago(word: dict[str, Any]) -> str:
 def goals(session: Session) -> None:
     """What can be asked for now, and what was.
 
+    NOW says whether it holds, can be had as far as anyone can see, or cannot, and then what is
+    missing; FROM names the components that brought the words.
+
     Example: nondum goals
     """
     view = session.ask("goals")
     if session.as_json:
         render.as_json(view)
         return
-    table(view["can"], ["words", "goal", "kind"], empty="nothing can be asked for yet")
+    shown = [{**row, "now": _outlook(row)} for row in view["can"]]
+    table(shown, ["words", "goal", "kind", "now", "from"], empty="nothing can be asked for yet")
+    for problem in view["problems"]:
+        render.sentence(problem, colour="red")
     click.echo()
     columns = ["id", "text", "goal", "kind", "state", "reason"]
     table(view["given"], columns, empty="no goal was given")
+
+
+def _outlook(row: dict[str, Any]) -> str:
+    return ": ".join(filter(None, (row["now"], "; ".join(row["lacks"]))))
 
 
 @click.command()

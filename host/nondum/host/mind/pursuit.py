@@ -99,6 +99,11 @@ class Pursuit:
         return self.current.tree if self.current else None
 
     @property
+    def seen(self) -> tuple[Contribution, ...]:
+        """What every component that was ever here brought to planning, as it was last."""
+        return tuple(self._seen.values())
+
+    @property
     def is_searching(self) -> bool:
         """Whether a plan is being searched for."""
         return self._search is not None
@@ -221,7 +226,7 @@ class Pursuit:
                 wanted,
                 situation,
                 deadline_s=self._deadline_s,
-                seen=tuple(self._seen.values()),
+                seen=self.seen,
             )
         )
         self._search.add_done_callback(lambda _: self._wake())

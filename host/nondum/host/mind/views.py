@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Protocol
 
 from py_trees.behaviour import Behaviour
 
 from nondum.host.catalogue.records import ComponentRecord
-from nondum.host.mind import evidence
+from nondum.host.mind import evidence, offers
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition, own_objects
 from nondum.host.mind.frames import implausible
@@ -18,10 +18,8 @@ from nondum.host.mind.people import People
 from nondum.host.mind.pursuit import Pursuit
 from nondum.host.mind.runner import BehaviourRunner
 from nondum.host.mind.tree_view import Row, TreeView
-from nondum.planning.goal import goal_text
 from nondum.planning.task_control import Phase
 from nondum.planning.task_tree import StepLeaf
-from nondum.sdk.errors import GoalRefused
 
 
 class Shown(Protocol):
@@ -90,16 +88,33 @@ class Views:
         """One fact, true or not, and all that bears on it, see `evidence.explained`."""
         return evidence.explained(text, self._mind.beliefs, self._mind.composition)
 
-    def goals(self) -> Row:
-        """What can be asked for now (`can`: `words`, `goal`, `kind`), and what was (`given`; of
-        those that are reached, or kept up just now, `holds` is true)."""
+    def given(self) -> list[Row]:
+        """What was asked for; of goals that are reached, or kept up just now, `holds` is true."""
         current = self._mind.pursuit.current
         held = current.goal if current and current.phase is Phase.HOLDING else None
-        given = [
+        return [
             {**goal.to_dict(), "holds": goal.state is GoalState.REACHED or goal.id == held}
             for goal in self._mind.queue
         ]
-        return {"can": list(self._offers()), "given": given}
+
+    def goals(self) -> Callable[[], Row]:
+        """What can be asked for now and what was, worked out by the function that is given, in any
+        thread: `can` and `phrases`, see `offers`; `given`; `problems` of phrases."""
+        composition, given = self._mind.composition, self.given()
+        world, seen = self._mind.beliefs.world, self._mind.pursuit.seen
+        facts, bare_facts = world.facts, world.bare_facts
+
+        def goals() -> Row:
+            if composition is None:
+                return {"can": [], "phrases": [], "given": given, "problems": []}
+            return {
+                "can": offers.offers(composition, facts, bare_facts, seen),
+                "phrases": offers.phrases(composition),
+                "given": given,
+                "problems": [str(problem) for problem in composition.book.problems],
+            }
+
+        return goals
 
     def why(self) -> Row:
         """Why the robot does what it does, or cannot: `sentences` and `problems`."""
@@ -186,18 +201,6 @@ class Views:
 
     def _last_few(self) -> int:
         return max(0, self._mind.people.last_number - 5)
-
-    def _offers(self) -> Iterator[Row]:
-        composition = self._mind.composition
-        if composition is None:
-            return
-        for sentence in composition.book.offers():
-            try:
-                goal = composition.book.goal(sentence)
-            except GoalRefused:  # ambiguous, or with free words still to be filled in
-                yield {"words": sentence, "goal": None, "kind": None}
-            else:
-                yield {"words": sentence, "goal": goal_text(goal.expr), "kind": goal.kind}
 
     def _quarantined(self) -> list[str]:
         composition = self._mind.composition

@@ -1,0 +1,165 @@
+"""What can be asked for now, in whose words, and whether it can be had: plain data for tools.
+
+A function of the composition and of what is believed; it takes its time, so call it in a thread.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from typing import Any, TypeAlias
+
+from nondum.host.mind.composition import Composition
+from nondum.host.mind.search import Situation, why_not
+from nondum.planning.contribution import Contribution
+from nondum.planning.domain import bind
+from nondum.planning.exploration import explore
+from nondum.planning.goal import Goal, goal_text
+from nondum.planning.ground import ground
+from nondum.planning.normal import Condition
+from nondum.planning.pattern import Slot
+from nondum.planning.phrases import Reading
+from nondum.planning.relaxed import quick_answer
+from nondum.planning.syntax import type_text
+from nondum.sdk.errors import FragmentRefused
+from nondum.sdk.planner import AlreadyTrue, Unsolvable
+
+Row: TypeAlias = dict[str, Any]
+
+MOST_EXPLAINED = 50
+"""So many goals that cannot be had are explained; of the rest it is only said."""
+
+
+def phrases(composition: Composition) -> list[Row]:
+    """Each phrase: `phrase`, `goal` with variables, `kind`, `from` (components), `slots`: `slot`,
+    `types`, `values` (`words`, `object`, `from`)."""
+    rows: dict[tuple[str, str], Row] = {}
+    for phrase in composition.book.phrases:
+        row = {
+            "phrase": phrase.pattern,
+            "goal": goal_text(phrase.condition),
+            "kind": phrase.kind,
+            "from": [],
+            "slots": [_slot(slot, composition) for slot in phrase.binding_slots()],
+        }
+        kept = rows.setdefault((phrase.pattern, row["goal"]), row)
+        kept["from"].append(phrase.component)
+    return [row for _, row in sorted(rows.items())]
+
+
+def offers(
+    composition: Composition,
+    facts: frozenset[str],
+    bare_facts: frozenset[str],
+    seen: Iterable[Contribution],
+) -> list[Row]:
+    """Each sentence: `words`, `goal`, `kind`, `now`, `lacks`, `from` (components).
+
+    `now` is `holds`, `can` (nothing is missing, deletes ignored), `cannot` (then `lacks` says what,
+    and who used to supply it), `ambiguous` (it means something else too), or `unknown` where there
+    are too many ways to look at. Phrases with nothing to name are there as their authors wrote
+    them.
+    """
+    outlook = _Outlook(composition, facts, bare_facts, tuple(seen))
+    readings: dict[tuple[object, ...], list[Reading]] = {}
+    for reading in composition.book.offered():
+        readings.setdefault((reading.goal.text, *reading.meaning), []).append(reading)
+    said = Counter(same[0].goal.text for same in readings.values())
+    rows = [
+        _row(same, outlook, composition, is_clear=said[same[0].goal.text] == 1)
+        for same in readings.values()
+    ]
+    return sorted([*rows, *_mute(composition)], key=lambda row: (row["words"], row["goal"]))
+
+
+def _row(
+    same: list[Reading], outlook: _Outlook, composition: Composition, *, is_clear: bool
+) -> Row:
+    goal = same[0].goal
+    now, lacks = outlook.of(goal) if is_clear else ("ambiguous", [])
+    return {
+        "words": goal.text,
+        "goal": goal_text(goal.expr),
+        "kind": goal.kind,
+        "now": now,
+        "lacks": lacks,
+        "from": sorted({name for reading in same for name in _bringers(reading, composition)}),
+    }
+
+
+def _bringers(reading: Reading, composition: Composition) -> Iterator[str]:
+    """The components that bring the phrase, and the names in it."""
+    yield reading.phrase.component
+    for thing in reading.bound.values():
+        if namer := composition.book.namers.get(thing):
+            yield namer
+
+
+def _mute(composition: Composition) -> Iterator[Row]:
+    """Phrases that cannot be said: there is nothing to name in one of their slots."""
+    for phrase in composition.book.phrases:
+        slots = phrase.binding_slots()
+        empty = [slot for slot in slots if not composition.book.things_for(slot)]
+        if empty:
+            yield {
+                "words": phrase.pattern,
+                "goal": goal_text(phrase.condition),
+                "kind": phrase.kind,
+                "now": "cannot",
+                "lacks": [f"there is no {type_text(slot.types)} to name" for slot in empty],
+                "from": [phrase.component],
+            }
+
+
+def _slot(slot: Slot, composition: Composition) -> Row:
+    book = composition.book
+    values = [
+        {"words": book.labels[thing], "object": thing, "from": book.namers.get(thing, "")}
+        for thing in book.things_for(slot)
+    ]
+    return {"slot": slot.name, "types": list(slot.types), "values": values}
+
+
+class _Outlook:
+    """Whether goals can be had. One exploration serves all that ask for facts only."""
+
+    def __init__(
+        self,
+        composition: Composition,
+        facts: frozenset[str],
+        bare_facts: frozenset[str],
+        seen: tuple[Contribution, ...],
+    ) -> None:
+        self._composition, self._seen = composition, seen
+        self._facts, self._bare = facts, bare_facts
+        self._explained = 0
+        self._reachable: frozenset[str] | None = None
+        with contextlib.suppress(FragmentRefused):  # too many ways
+            self._reachable = explore(composition.merged, bare_facts).reachable
+
+    def of(self, goal: Goal) -> tuple[str, list[str]]:
+        """`now` and `lacks` of a goal."""
+        if self._reachable is None:
+            return "unknown", []
+        expr = goal.expr
+        wanted = {bind(atom, {}) for atom in expr.positive}
+        if expr == Condition(positive=expr.positive):
+            holds, can = wanted <= self._facts, wanted <= self._reachable
+        else:
+            holds = isinstance(self._quick_answer(goal, self._facts), AlreadyTrue)
+            can = not isinstance(self._quick_answer(goal, self._bare), Unsolvable)
+        if holds:
+            return "holds", []
+        return ("can", []) if can else ("cannot", self._lacks(goal))
+
+    def _quick_answer(self, goal: Goal, facts: frozenset[str]) -> object:
+        return quick_answer(ground(self._composition.merged, facts, goal.expr))
+
+    def _lacks(self, goal: Goal) -> list[str]:
+        self._explained += 1
+        if self._explained > MOST_EXPLAINED:
+            return []
+        now = Situation("", self._composition.revision, self._bare, frozenset())
+        problems = why_not(self._composition, goal, now, self._seen)
+        return [problem.message for problem in problems]
