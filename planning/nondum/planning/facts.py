@@ -30,6 +30,15 @@ def parts(text: str) -> tuple[str, tuple[str, ...]]:
     return predicate, tuple(arguments)
 
 
+def predicate_of(text: str) -> str:
+    """The predicate of a fact.
+
+    >>> predicate_of("pointing rover source")
+    'pointing'
+    """
+    return text.partition(" ")[0]
+
+
 def twin(text: str) -> str:
     """The fact that is true when this one is not; of a twin, the fact itself.
 

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from nondum.planning.concern import concern
 from nondum.planning.domain import Merged
 from nondum.planning.draft import drafted
 from nondum.planning.exploration import INSTANCES_LIMIT, explore
+from nondum.planning.facts import predicate_of
 from nondum.planning.goal import GoalExpr
 from nondum.planning.polarity import positive_task
 from nondum.planning.relevance import helpful
@@ -33,5 +35,7 @@ def ground(
     input gives the same task, whatever the order of `facts`. Raises `FragmentRefused` as `explore`
     does, for more than `limit` bound actions.
     """
-    found = explore(merged, facts, objects, limit=limit)
-    return positive_task(helpful(drafted(merged, found, goal)), found.table)
+    part = concern(merged, goal)
+    known = (text for text in facts if predicate_of(text) in part.read)
+    found = explore(part.merged, known, objects, limit=limit)
+    return positive_task(helpful(drafted(part.merged, found, goal)), found.table)

@@ -9,12 +9,16 @@ Concise finite-domain representations for PDDL planning tasks (2009).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
 from nondum.planning.matching import Pattern
 from nondum.planning.relations import Key, Relations, Row
+
+_FEW = 32
+"""So many objects are looked up one by one rather than found among all rows."""
 
 Values: TypeAlias = list[str]
 """A rule's variables, then the constants that it names; by position."""
@@ -87,18 +91,20 @@ class Join:
             self._first = self._step(left.pop(trigger), rule, bound, is_trigger=True)
         self._steps: list[_Step] = []
         while left:
-            best = max(left, key=lambda p: (_bound_share(p, bound), -len(p.terms)))
+            best = min(left, key=lambda pattern: _breadth(pattern, rule, bound))
+            if variable := _narrow(best, rule, bound):
+                self._steps.append(self._enumeration(variable, rule, bound))
             left.remove(best)
             self._steps.append(self._step(best, rule, bound))
         for variable in rule.variables:
             if variable not in bound:
-                bound.add(variable)
-                domain = rule.domains[variable]
-                new = ((0, self._at[variable], domain),)
-                objects = tuple(sorted(domain))
-                self._steps.append(
-                    _Step(None, new=new, checks=self._checked(bound), objects=objects)
-                )
+                self._steps.append(self._enumeration(variable, rule, bound))
+
+    def _enumeration(self, variable: str, rule: Rule, bound: set[str]) -> _Step:
+        bound.add(variable)
+        domain = rule.domains[variable]
+        new = ((0, self._at[variable], domain),)
+        return _Step(None, new=new, checks=self._checked(bound), objects=tuple(sorted(domain)))
 
     def run(self, relations: Relations, fire: Fire, row: Row = (), known: Row = ()) -> None:
         """Call `fire` with the values of every binding in which the trigger matches `row`."""
@@ -167,10 +173,22 @@ class Join:
         return tuple(_Check(self._at[a], self._at[b], is_equal) for (a, b), is_equal in ready)
 
 
-def _bound_share(pattern: Pattern, bound: set[str]) -> float:
-    if not pattern.terms:
-        return 1.0
-    return sum(term in bound for term in pattern.terms) / len(pattern.terms)
+def _breadth(pattern: Pattern, rule: Rule, bound: set[str]) -> float:
+    """A guess at how many rows fit: all objects of the open variables, fewer for each bound one."""
+    open_variables = {term for term in pattern.terms if term not in bound}
+    if not open_variables:
+        return 0.0
+    breadth = math.prod(len(rule.domains[variable]) for variable in open_variables)
+    return breadth / 10.0 ** (len(pattern.terms) - len(open_variables))
+
+
+def _narrow(pattern: Pattern, rule: Rule, bound: set[str]) -> str:
+    """The only variable of a pattern, if trying its objects is quicker than reading all rows."""
+    variables = set(pattern.terms)
+    if len(variables) != 1 or variables <= bound:
+        return ""
+    (variable,) = variables
+    return variable if len(rule.domains[variable]) <= _FEW else ""
 
 
 def _taken(step: _Step, row: Row, values: Values) -> bool:
