@@ -11,17 +11,30 @@ import pytest
 from tests.planning.tasks import FOLLOW_PLAN, follow_task, gripper_task, plan_of
 
 from nondum.host.mind.planner_process import PlannerProcess
+from nondum.host.mind.planner_wire import Request
 from nondum.host.mind.planners import Planners
 from nondum.sdk.errors import PlannerFailed
-from nondum.sdk.planner import AlreadyTrue, GaveUp, GroundTask, Plan, Unsolvable
+from nondum.sdk.planner import (
+    AlreadyTrue,
+    ConditionalEffect,
+    GaveUp,
+    GroundAction,
+    GroundTask,
+    Layer,
+    PddlTask,
+    Plan,
+    Rule,
+    Unsolvable,
+)
 
 pytestmark = pytest.mark.anyio
 
 SHAM = """
 import os, time
-from nondum.sdk.planner import AlreadyTrue, GaveUp, Plan, Unsolvable
+from nondum.sdk.planner import AlreadyTrue, GaveUp, Plan, PlanText, Unsolvable
 class Planner:
     speaks = "ground"
+    handles = frozenset()
 class Liar(Planner):
     def plan(self, task, deadline_s): return Plan((0,), 1)
 class Prover(Planner):
@@ -40,7 +53,22 @@ class Glutton(Planner):
     def plan(self, task, deadline_s): return len(bytearray(10**10))
 class Stranger(Planner):
     speaks = "esperanto"
+class Spender(Planner):
+    def plan(self, task, deadline_s):
+        dear = max(range(len(task.actions)), key=lambda index: task.actions[index].cost)
+        return Plan((dear,), task.actions[dear].cost)
+class Reader(Planner):
+    speaks = "pddl"
+    def plan(self, task, deadline_s): return PlanText(tuple(task.problem.split(",")))
+class Sceptic(Planner):
+    speaks = "pddl"
+    def plan(self, task, deadline_s): return Unsolvable("relaxed")
 """
+
+REFERENCES = {
+    "native": "nondum.host.mind.native_planner:NativePlanner",
+    "pyperplan": "nondum_planner_pyperplan:PyperplanPlanner",
+}
 
 Make = Callable[[str], PlannerProcess]
 
@@ -49,18 +77,13 @@ Make = Callable[[str], PlannerProcess]
 async def planner(tmp_path: Path) -> AsyncIterator[Make]:
     """Makes planner processes, also of planners that misbehave."""
     (tmp_path / "sham.py").write_text(SHAM)
-    info = tmp_path / "sham-1.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: sham\nVersion: 1\n")
-    names = [line.split("(")[0].split()[1] for line in SHAM.splitlines() if "(Planner)" in line]
-    entries = "\n".join(f"{name.lower()} = sham:{name}" for name in names)
-    (info / "entry_points.txt").write_text(f"[nondum.planners]\n{entries}\n")
     paths = [str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]
     made: list[PlannerProcess] = []
 
     def make(name: str) -> PlannerProcess:
         environment = {"PYTHONPATH": os.pathsep.join(paths)}
-        made.append(PlannerProcess(name, memory_mb=512, environment=environment))
+        reference = REFERENCES.get(name, f"sham:{name.capitalize()}")
+        made.append(PlannerProcess(name, reference, memory_mb=512, environment=environment))
         return made[-1]
 
     yield make
@@ -73,18 +96,28 @@ def task() -> GroundTask:
     return gripper_task(1)
 
 
-async def test_installed_planner_finds_a_plan(planner: Make, task: GroundTask) -> None:
-    found = await Planners([planner("pyperplan")]).plan(task, 5.0)
+@pytest.mark.parametrize("name", REFERENCES)
+async def test_shipped_planner_finds_a_plan(planner: Make, task: GroundTask, name: str) -> None:
+    found = await Planners([planner(name)]).plan(task, 5.0)
     assert found.answer == plan_of(task, "pick ball0 a", "move a b", "drop ball0 b")
-    assert found.planner == "pyperplan"
+    assert found.planner == name
+
+
+async def test_native_planner_is_installed_with_the_host(task: GroundTask) -> None:
+    planners = Planners.installed(memory_mb=512)
+    try:
+        assert "native" in planners.names
+        assert isinstance((await planners.plan(task, 5.0)).answer, Plan)
+    finally:
+        await planners.close()
 
 
 async def test_child_stays_warm(planner: Make, task: GroundTask) -> None:
     process = planner("pyperplan")
     await process.warm()
     pid = process.pid
-    await process.plan(task, 5.0)
-    await process.plan(task, 5.0)
+    await process.plan(Request(task), 5.0)
+    await process.plan(Request(task), 5.0)
     assert process.pid == pid is not None
 
 
@@ -136,21 +169,117 @@ async def test_first_valid_plan_wins(planner: Make, task: GroundTask) -> None:
     assert found.planner == "pyperplan"
 
 
+async def test_cheaper_plan_is_waited_for(planner: Make) -> None:
+    """A small task's first plan may come from a planner that knows no costs."""
+    fact = frozenset[int]
+    dear, cheap = fact({0}), fact({1})
+    task = GroundTask(
+        ("start", "half", "done"),
+        dear,
+        fact({2}),
+        (
+            GroundAction("leap", dear, fact({2}), fact(), 9),
+            GroundAction("step", dear, cheap, fact(), 1),
+            GroundAction("step on", cheap, fact({2}), fact(), 1),
+        ),
+    )
+    planners = Planners([planner("spender"), planner("native"), planner("hanger")])
+    await planners.warm()
+    found = await planners.plan(task, 20.0)
+    assert found.answer == Plan((1, 2), 2)
+    assert found.planner == "native"
+
+
+def with_everything() -> GroundTask:
+    """Needs a conditional effect and a derived fact."""
+    lit = ConditionalEffect(frozenset({0}), frozenset({1}), frozenset())
+    light = GroundAction("light", frozenset(), frozenset(), frozenset(), conditional=(lit,))
+    layer = Layer((Rule(2, frozenset({1})),), ((2, 3),))
+    facts = ("lamp", "lit", "bright", "!bright")
+    return GroundTask(facts, frozenset({0}), frozenset({2}), (light,), (layer,))
+
+
+async def test_planners_are_asked_what_they_handle(planner: Make) -> None:
+    found = await Planners([planner("pyperplan")]).plan(with_everything(), 5.0)
+    assert found.answer == GaveUp(
+        "pyperplan: it does not handle conditional-effects and derived-predicates"
+    )
+
+
+async def test_native_planner_handles_everything(planner: Make) -> None:
+    found = await Planners([planner("native")]).plan(with_everything(), 5.0)
+    assert found.answer == Plan((0,), 1)
+
+
+def written(plan: str) -> Callable[[], PddlTask]:
+    """PDDL in which the reader finds what it answers."""
+    return lambda: PddlTask("(define (domain d))", plan)
+
+
+async def test_plan_of_a_text_planner_is_found_by_its_names(
+    planner: Make, task: GroundTask
+) -> None:
+    names = ("pick ball0 a", "move a b", "drop ball0 b")
+    found = await Planners([planner("reader")]).plan(task, 5.0, written(",".join(names)))
+    assert found.answer == plan_of(task, *names)
+    assert found.planner == "reader"
+
+
+async def test_step_that_cannot_help_is_left_out(planner: Make, task: GroundTask) -> None:
+    """The text may have actions that the ground task does without."""
+    text = written("pick ball0 a,whistle,move a b,drop ball0 b")
+    found = await Planners([planner("reader")]).plan(task, 5.0, text)
+    assert found.answer == plan_of(task, "pick ball0 a", "move a b", "drop ball0 b")
+
+
+@pytest.mark.parametrize(
+    ("plan", "why"),
+    [
+        ("move a b,pick ball0 a", "step 2, pick ball0 a, cannot be taken"),
+        ("move a b", "at the end (in ball0 b) does not hold"),
+    ],
+)
+async def test_text_plan_is_checked(planner: Make, task: GroundTask, plan: str, why: str) -> None:
+    found = await Planners([planner("reader")]).plan(task, 5.0, written(plan))
+    assert found.answer == GaveUp(f"reader: its plan is not valid: {why}")
+
+
+async def test_text_planner_is_not_believed_without_proof(planner: Make, task: GroundTask) -> None:
+    found = await Planners([planner("sceptic")]).plan(task, 5.0, written(""))
+    assert found.answer == GaveUp("sceptic: it claims a proof that does not hold")
+
+
+async def test_text_is_made_only_where_it_is_wanted(planner: Make, task: GroundTask) -> None:
+    made: list[str] = []
+
+    def text() -> PddlTask:
+        made.append("text")
+        return PddlTask("", "")
+
+    assert isinstance((await Planners([planner("native")]).plan(task, 5.0, text)).answer, Plan)
+    assert not made
+
+
+async def test_text_planner_gives_up_without_text(planner: Make, task: GroundTask) -> None:
+    found = await Planners([planner("reader")]).plan(task, 5.0)
+    assert found.answer == GaveUp("reader: the task is not told in pddl")
+
+
 async def test_killed_planner_comes_back(planner: Make, task: GroundTask) -> None:
     process = planner("pyperplan")
     await process.warm()
     assert process.pid is not None
     os.kill(process.pid, 9)
     with pytest.raises(PlannerFailed):
-        await process.plan(task, 5.0)
-    assert isinstance(await process.plan(task, 5.0), Plan)
+        await process.plan(Request(task), 5.0)
+    assert isinstance(await process.plan(Request(task), 5.0), Plan)
 
 
 async def test_cancelling_kills_the_search(planner: Make, task: GroundTask) -> None:
     process = planner("hanger")
     await process.warm()
     pid = process.pid
-    search = asyncio.create_task(process.plan(task, 60.0))
+    search = asyncio.create_task(process.plan(Request(task), 60.0))
     await asyncio.sleep(0)
     search.cancel()
     with pytest.raises(asyncio.CancelledError):

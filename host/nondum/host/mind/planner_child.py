@@ -1,7 +1,8 @@
-"""The process that one planner runs in: `python -m nondum.host.mind.planner_child NAME MEMORY_MB`.
+"""The process that one planner runs in: `python -m nondum.host.mind.planner_child MODULE:CLASS MB`.
 
-It reads tasks from standard input and writes answers to standard output until the input ends. It is
-niced and limited in memory, and dies with the daemon.
+It says what it speaks and handles, reads tasks from standard input and writes answers to standard
+output until the input ends. It is niced and limited in memory, and dies with the daemon. It is kept
+while idle, so what it imports is little.
 """
 
 from __future__ import annotations
@@ -11,26 +12,25 @@ import os
 import resource
 import signal
 import sys
+from importlib import import_module
 from typing import Any, BinaryIO
 
-from importlib_metadata import entry_points
-
 from nondum.host.mind import planner_wire as wire
-from nondum.sdk.planner import Planner
+from nondum.sdk.planner import Planner, TextPlanner
 
-GROUP = "nondum.planners"
 NICENESS = 10
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 
-def main(name: str, memory_mb: int) -> int:
-    """Serve one planner until standard input ends."""
-    tasks, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb", buffering=0)
+def main(reference: str, memory_mb: int) -> int:
+    """Serve one planner, which an entry point refers to, until standard input ends."""
+    requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)  # what a planner prints must not get between the answers
     _limit(memory_mb)
-    planner: Planner = entry_points(group=GROUP)[name].load()()
-    answers.write(wire.frame(["ready", planner.speaks]))
-    while (body := _read(tasks)) is not None:
+    module, _, name = reference.partition(":")
+    planner: Planner | TextPlanner = getattr(import_module(module), name)()
+    answers.write(wire.frame(["ready", planner.speaks, sorted(planner.handles)]))
+    while (body := _read(requests)) is not None:
         answers.write(wire.frame(_answer(planner, wire.unframed(body))))
     return 0
 
@@ -43,10 +43,11 @@ def _limit(memory_mb: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def _answer(planner: Planner, request: Any) -> list[Any]:
-    deadline_s, task = request
+def _answer(planner: Any, request: Any) -> list[Any]:
+    deadline_s, body = request
+    task_of = wire.text_from_wire if planner.speaks == "pddl" else wire.task_from_wire
     try:
-        return wire.answer_to_wire(planner.plan(wire.task_from_wire(task), deadline_s))
+        return wire.answer_to_wire(planner.plan(task_of(wire.unframed(body)), deadline_s))
     except MemoryError:
         return ["gave up", "it ran out of memory"]
     except Exception as error:  # whatever a planner raises is told to the host, and it may go on

@@ -12,27 +12,38 @@ from collections.abc import Mapping
 
 from nondum.host.mind import planner_wire as wire
 from nondum.sdk.errors import PlannerFailed, Problem
-from nondum.sdk.planner import Answer, GaveUp, GroundTask
+from nondum.sdk.planner import Answer, GaveUp, PlanText
 
 START_S = 20.0
 """How long a planner may take to load."""
 GRACE_S = 0.5
 """How much longer than its deadline a planner may take before it is killed."""
+AT_ONCE = 2_000
+"""Ground actions that are written for the wire in a time that the loop can spare."""
+_LANGUAGES = ("ground", "pddl")
 
 
 class PlannerProcess:
     """Serves one task at a time. Close it when done."""
 
     def __init__(
-        self, name: str, *, memory_mb: int, environment: Mapping[str, str] | None = None
+        self,
+        name: str,
+        reference: str,
+        *,
+        memory_mb: int,
+        environment: Mapping[str, str] | None = None,
     ) -> None:
-        """`name` is an entry point in group `nondum.planners` of the child's environment, which is
-        that of this process, with `environment` added."""
+        """`reference` (`module:class`) is what entry point `name` in group `nondum.planners` names.
+        The child's environment is that of this process, with `environment` added."""
         self.name = name
+        self._reference = reference
         self._memory_mb = memory_mb
         self._environment = {**os.environ, "PYTHONHASHSEED": "0", **(environment or {})}
         self._process: Process | None = None
         self._is_ready = False
+        self._language = ""
+        self._handles: frozenset[str] = frozenset()
         self._lock = asyncio.Lock()
 
     @property
@@ -45,16 +56,18 @@ class PlannerProcess:
         async with self._lock:
             await self._running()
 
-    async def plan(self, task: GroundTask, deadline_s: float) -> Answer:
-        """Ask for a plan. Being cancelled kills the child.
+    async def plan(self, request: wire.Request, deadline_s: float) -> Answer | PlanText:
+        """Ask for a plan, if the planner is one for such tasks. Being cancelled kills the child.
 
         Raises `PlannerFailed` (PLANNER_START, PLANNER_DIED, PLANNER_ANSWER, PLANNER_RAISED).
         """
         async with self._lock:
             try:
                 process = await self._running()
+                if reason := self._refusal(request):
+                    return GaveUp(reason)
                 async with asyncio.timeout(deadline_s + GRACE_S):
-                    return await self._asked(process, task, deadline_s)
+                    return await self._asked(process, request, deadline_s)
             except TimeoutError:
                 await self._kill()
                 return GaveUp(f"it overran its deadline of {deadline_s:g} s and was killed")
@@ -70,10 +83,25 @@ class PlannerProcess:
         async with self._lock:
             await self._kill()
 
-    async def _asked(self, process: Process, task: GroundTask, deadline_s: float) -> Answer:
+    def _refusal(self, request: wire.Request) -> str:
+        """Why the planner is not one for a task; empty if it is."""
+        unhandled = request.task.features - self._handles
+        if unhandled:
+            return f"it does not handle {' and '.join(sorted(unhandled))}"
+        if not request.speaks(self._language):
+            return f"the task is not told in {self._language}"
+        return ""
+
+    async def _asked(
+        self, process: Process, request: wire.Request, deadline_s: float
+    ) -> Answer | PlanText:
         assert process.stdin is not None  # started with pipes
+        if len(request.task.actions) > AT_ONCE:
+            body = await asyncio.to_thread(request.body, self._language)
+        else:
+            body = request.body(self._language)
         try:
-            process.stdin.write(wire.frame([deadline_s, wire.task_to_wire(task)]))
+            process.stdin.write(wire.frame([deadline_s, body]))
             await process.stdin.drain()
         except ConnectionError as error:
             raise self._failure("PLANNER_DIED", "it ended before it was asked") from error
@@ -85,7 +113,7 @@ class PlannerProcess:
         await self._kill()
         module = "nondum.host.mind.planner_child"
         self._process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", module, self.name, str(self._memory_mb)),
+            *(sys.executable, "-m", module, self._reference, str(self._memory_mb)),
             stdin=PIPE,
             stdout=PIPE,
             stderr=DEVNULL,
@@ -98,9 +126,12 @@ class PlannerProcess:
         except (TimeoutError, PlannerFailed) as error:
             await self._kill()
             raise self._failure("PLANNER_START", "it does not start") from error
-        if hello != ["ready", "ground"]:
-            await self._kill()
-            raise self._failure("PLANNER_START", f"it speaks no language of this host: {hello}")
+        match hello:
+            case ["ready", str(language), [*handles]] if language in _LANGUAGES:
+                self._language, self._handles = language, frozenset(map(str, handles))
+            case _:
+                await self._kill()
+                raise self._failure("PLANNER_START", f"it speaks no language of this host: {hello}")
         self._is_ready = True
         return self._process
 

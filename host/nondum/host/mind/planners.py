@@ -1,21 +1,41 @@
-"""All installed planners as one: they search side by side, and the first valid plan wins."""
+"""All installed planners as one: they search side by side, and the first valid plan wins.
+
+Robots choose between alternatives by cost, and small tasks are planned in no time: there the others
+get a moment more, and the cheapest plan wins.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import logging
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from importlib_metadata import entry_points
 
-from nondum.host.mind.planner_child import GROUP
 from nondum.host.mind.planner_process import PlannerProcess
+from nondum.host.mind.planner_wire import Request, TaskText
+from nondum.planning.plan_text import plan_of
 from nondum.planning.relaxed import quick_answer
 from nondum.planning.validate import validate
-from nondum.sdk.errors import PlannerFailed
-from nondum.sdk.planner import AlreadyTrue, Answer, GaveUp, GroundTask, Plan, Unsolvable
+from nondum.sdk.errors import PlannerFailed, Problem
+from nondum.sdk.planner import (
+    AlreadyTrue,
+    Answer,
+    GaveUp,
+    GroundTask,
+    Plan,
+    PlanText,
+    Unsolvable,
+)
+
+GROUP = "nondum.planners"
+SMALL = 1_000
+"""Ground actions of a task for which a cheaper plan is waited for, …"""
+CHEAPER_S = 0.3
+"""… and how long."""
 
 log = logging.getLogger(__name__)
 
@@ -39,8 +59,10 @@ class Planners:
     @classmethod
     def installed(cls, *, memory_mb: int) -> Planners:
         """Those that are installed in this host's own environment."""
-        names = sorted({entry.name for entry in entry_points(group=GROUP)})
-        return cls([PlannerProcess(name, memory_mb=memory_mb) for name in names])
+        found = {entry.name: entry.value for entry in entry_points(group=GROUP)}
+        return cls(
+            [PlannerProcess(name, found[name], memory_mb=memory_mb) for name in sorted(found)]
+        )
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -58,20 +80,25 @@ class Planners:
             elif isinstance(result, BaseException):
                 raise result
 
-    async def plan(self, task: GroundTask, deadline_s: float) -> Found:
+    async def plan(
+        self, task: GroundTask, deadline_s: float, text: TaskText | None = None
+    ) -> Found:
         """Search for a plan. Being cancelled cancels every search.
 
-        The answer is a plan that was checked, a proof that there is none, or `GaveUp`.
+        The answer is a plan that was checked, a proof that there is none, or `GaveUp`. `text` makes
+        the same task's PDDL. It is called only for planners that ground by themselves, perhaps in
+        another thread; without it, they give up.
         """
         started_s = time.monotonic()
         if (known := quick_answer(task)) is not None:
             return Found(known, "", time.monotonic() - started_s)
+        request = Request(task, text)
         searches = {
-            asyncio.create_task(process.plan(task, deadline_s)): process.name
+            asyncio.create_task(process.plan(request, deadline_s)): process.name
             for process in self._processes
         }
         try:
-            answer, planner = await _first(searches, task)
+            answer, planner = await _best(searches, task)
         finally:
             for search in searches:
                 search.cancel()
@@ -83,32 +110,56 @@ class Planners:
         await asyncio.gather(*(process.close() for process in self._processes))
 
 
-async def _first(searches: dict[asyncio.Task[Answer], str], task: GroundTask) -> tuple[Answer, str]:
-    """The first answer that settles the matter, and whose it is."""
-    left: set[asyncio.Task[Answer]] = set(searches)
+_Search: TypeAlias = asyncio.Task[Answer | PlanText]
+
+
+async def _best(searches: Mapping[_Search, str], task: GroundTask) -> tuple[Answer, str]:
+    """The answer that settles the matter, and whose it is."""
     reasons: list[str] = []
-    while left:
-        done, left = await asyncio.wait(left, return_when=asyncio.FIRST_COMPLETED)
+    plans: list[tuple[int, str, Plan]] = []
+    left = set(searches)
+    until_s: float | None = None
+    while left and (done := await _done(left, until_s)):
+        left -= done
         for search in sorted(done, key=lambda search: searches[search]):
-            answer = _judged(search, task)
-            if not isinstance(answer, GaveUp):
-                return answer, searches[search]
-            log.info("planner %s gave up: %s", searches[search], answer.why)
-            reasons.append(f"{searches[search]}: {answer.why}")
+            answer, name = _judged(search, task), searches[search]
+            match answer:
+                case Plan(cost=cost):
+                    plans.append((cost, name, answer))
+                case GaveUp(why):
+                    log.info("planner %s gave up: %s", name, why)
+                    reasons.append(f"{name}: {why}")
+                case _ if not plans:
+                    return answer, name
+        if plans and until_s is None:
+            until_s = time.monotonic() + (CHEAPER_S if len(task.actions) <= SMALL else 0.0)
+    if plans:
+        _, name, plan = min(plans, key=lambda found: (found[0], len(found[2].steps), found[1]))
+        return plan, name
     return GaveUp("; ".join(sorted(reasons)) or "no planner is installed"), ""
 
 
-def _judged(search: asyncio.Task[Answer], task: GroundTask) -> Answer:
+async def _done(left: set[_Search], until_s: float | None) -> set[_Search]:
+    """The searches that end next; none if nothing ends in time."""
+    timeout_s = None if until_s is None else max(0.0, until_s - time.monotonic())
+    done, _ = await asyncio.wait(left, timeout=timeout_s, return_when=asyncio.FIRST_COMPLETED)
+    return done
+
+
+def _judged(search: _Search, task: GroundTask) -> Answer:
     """A search's answer, once checked; one that is worth nothing has given up."""
     try:
         answer = search.result()
     except PlannerFailed as error:
         return GaveUp(str(error))
-    match answer:
-        case Plan() if problems := validate(task, answer):
+    told = plan_of(task, answer) if isinstance(answer, PlanText) else answer
+    match told:
+        case Problem(message=message):
+            return GaveUp(f"its plan is not valid: {message}")
+        case Plan() if problems := validate(task, told):
             return GaveUp(f"its plan is not valid: {problems[0].message}")
         case Unsolvable(proof) if proof != "exhausted":
             return GaveUp("it claims a proof that does not hold")
         case AlreadyTrue():
             return GaveUp("it says that the goal holds, which it does not")
-    return answer
+    return told
