@@ -9,9 +9,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from nondum.planning.exploration import Exploration, domains_of, pattern_of
+from nondum.planning.exploration import Exploration, domains_of
 from nondum.planning.join import Join, Rule, Values
 from nondum.planning.literals import Literals
+from nondum.planning.matching import Pattern
 from nondum.planning.normal import condition_of, normal
 from nondum.planning.relations import Relations, Row
 from nondum.planning.static import Names, value_of
@@ -166,7 +167,7 @@ class Expander:
                 **domains_of(variables, self.found.members),
             },
             patterns=tuple(
-                pattern_of(atom)
+                Pattern.of(atom)
                 for atom in condition.positive
                 if own & {term.name for term in atom.terms}
             )

@@ -9,10 +9,11 @@ from dataclasses import dataclass, field
 from nondum.planning.domain import Action, DerivedRule, Merged
 from nondum.planning.effect import ConditionalChange
 from nondum.planning.facts import parts
-from nondum.planning.flat import Flat, flat
-from nondum.planning.join import Join, Rule, Values
+from nondum.planning.flat import Flat
+from nondum.planning.join import Join, Values
 from nondum.planning.matching import Pattern
 from nondum.planning.normal import Condition
+from nondum.planning.preparation import flattened, joins_of
 from nondum.planning.relations import FactTable, Relations, Row
 from nondum.planning.static import static_facts
 from nondum.planning.syntax import Atom, TypedName
@@ -145,12 +146,7 @@ def domains_of(
 
 def patterns_of(condition: Condition) -> tuple[Pattern, ...]:
     """The conditions that facts must match."""
-    return tuple(map(pattern_of, condition.positive))
-
-
-def pattern_of(atom: Atom) -> Pattern:
-    """An atom for matching."""
-    return Pattern(atom.predicate, tuple(term.name for term in atom.terms))
+    return tuple(map(Pattern.of, condition.positive))
 
 
 class _Template:
@@ -182,14 +178,12 @@ class _Head:
         self._flat = found
         self._fixpoint = fixpoint
         self.variables = tuple(variable.name for variable in found.variables)
-        self.rule = Rule(
-            variables=self.variables,
-            domains=fixpoint.domains_of(found.variables),
-            patterns=tuple(map(pattern_of, found.positive)),
-            equal=tuple((pair.left.name, pair.right.name) for pair in found.equal),
-            unequal=tuple((pair.left.name, pair.right.name) for pair in found.unequal),
-        )
         self._negative = self.template(found.negative)
+
+    @property
+    def joins(self) -> tuple[tuple[str, Join], ...]:
+        """What finds its bindings, each with the predicate that triggers it."""
+        return self._fixpoint.joins_of(self._flat)
 
     def template(self, atoms: Iterable[Atom]) -> _Template:
         """What atoms become when the rule fires."""
@@ -215,7 +209,7 @@ class _Head:
 
 class _ActionHead(_Head):
     def __init__(self, action: Action, fixpoint: _Fixpoint) -> None:
-        super().__init__(flat(action.parameters, action.precondition), fixpoint)
+        super().__init__(flattened(action.parameters, action.precondition), fixpoint)
         self._action = action
         self._arity = len(action.parameters)
         self._positive = self.template(action.precondition.positive)
@@ -244,7 +238,7 @@ class _ActionHead(_Head):
 class _ChangeHead(_Head):
     def __init__(self, action: Action, change: ConditionalChange, fixpoint: _Fixpoint) -> None:
         variables = (*action.parameters, *change.variables)
-        super().__init__(flat(variables, action.precondition, change.condition), fixpoint)
+        super().__init__(flattened(variables, action.precondition, change.condition), fixpoint)
         self._action = action
         self._change = change
         self._arity = len(action.parameters)
@@ -277,7 +271,7 @@ class _ChangeHead(_Head):
 
 class _DerivedHead(_Head):
     def __init__(self, derived: DerivedRule, fixpoint: _Fixpoint) -> None:
-        super().__init__(flat(derived.parameters, derived.condition), fixpoint)
+        super().__init__(flattened(derived.parameters, derived.condition), fixpoint)
         self._derived = derived
         self._arity = len(derived.parameters)
         self._positive = self.template(derived.condition.positive)
@@ -334,8 +328,8 @@ class _Fixpoint:
         self.instances: dict[tuple[str, Row], Instance] = {}
         self.derivations: list[Derivation] = []
 
-    def domains_of(self, variables: Iterable[TypedName]) -> dict[str, frozenset[str]]:
-        return domains_of(variables, self._members)
+    def joins_of(self, found: Flat) -> tuple[tuple[str, Join], ...]:
+        return joins_of(found, domains_of(found.variables, self._members), self._added)
 
     def excludes(self, negative: frozenset[int]) -> bool:
         """Whether a fact that must be false is true, and stays so."""
@@ -356,9 +350,7 @@ class _Fixpoint:
             raise self._too_many()
 
     def run(self) -> Exploration:
-        joins = [
-            (join, trigger, head) for head in self._heads() for trigger, join in self._of(head)
-        ]
+        joins = [(join, trigger, head) for head in self._heads() for trigger, join in head.joins]
         relations = Relations()
         triggered: defaultdict[str, list[tuple[Join, _Head]]] = defaultdict(list)
         for join, trigger, head in joins:
@@ -395,18 +387,6 @@ class _Fixpoint:
                 yield _ChangeHead(action, change, self)
         for rule in self._domain.derived:
             yield _DerivedHead(rule, self)
-
-    def _of(self, head: _Head) -> Iterator[tuple[str, Join]]:
-        """The joins of a rule, each with the predicate that triggers it; empty: it runs once.
-
-        Facts of predicates that nothing adds are all there from the beginning.
-        """
-        patterns = head.rule.patterns
-        growing = [i for i, pattern in enumerate(patterns) if pattern.predicate in self._added]
-        for index in growing:
-            yield patterns[index].predicate, Join(head.rule, index)
-        if not growing:
-            yield "", Join(head.rule)
 
     def _too_many(self) -> FragmentRefused:
         name, count = max(self._counts.items(), key=lambda counted: (counted[1], counted[0]))

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+from nondum.planning.syntax import Atom
+
 Tuple: TypeAlias = tuple[str, ...]
 Binding: TypeAlias = dict[str, str]
 
@@ -44,6 +46,11 @@ class Pattern:
 
     predicate: str
     terms: Tuple
+
+    @classmethod
+    def of(cls, atom: Atom) -> Pattern:
+        """An atom for matching."""
+        return cls(atom.predicate, tuple(term.name for term in atom.terms))
 
 
 def matched(
