@@ -37,6 +37,7 @@ from nondum.host.mind.system_tree import load_system_tree
 from nondum.host.news import News
 from nondum.host.orders import Orders
 from nondum.host.questions import Questions
+from nondum.host.speech import Speech
 from nondum.host.workers.spec import Limits, Timing
 from nondum.host.workers.workers import Workers
 from nondum.planning.attempts import Patience
@@ -108,6 +109,7 @@ async def _run(
             stop,
             manager.run(),
             mind.run(),
+            Speech(mind, workers.plugins, workers.pids).run(),
             *(source.watch(bus.emit) for source in device_sources(config)),
         )
     finally:

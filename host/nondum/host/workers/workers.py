@@ -182,13 +182,15 @@ class Workers:
             return ()
         return tuple(supervisor.worker.claims)
 
+    def plugins(self) -> dict[str, Proxy]:
+        """The plugins that run now, by component."""
+        named = self._manager.list_name_plugin()
+        return {name: plugin for name, plugin in named if isinstance(plugin, Proxy)}
+
     def translations(self, words: str, vocabulary: Mapping[str, Any]) -> dict[str, Answer]:
         """Ask every running component to translate what a person said: component → its answer."""
-        return {
-            name: proxy.translate_goal(words, vocabulary)
-            for name, proxy in sorted(self._manager.list_name_plugin())
-            if isinstance(proxy, Proxy)
-        }
+        plugins = sorted(self.plugins().items())
+        return {name: plugin.translate_goal(words, vocabulary) for name, plugin in plugins}
 
     def keep_spare(self) -> None:
         """Prepare the next launch, now and, from now on, some time after every launch."""

@@ -1,0 +1,113 @@
+"""What people are told is spoken, and what they say is heard, by components that can do that.
+
+A sentence that is heard is a goal in words, as if it had been typed; it is never translated, for
+nobody is asked to confirm it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+from nondum.host.mind.mind import Mind
+from nondum.host.workers.proxies import Answer
+from nondum.sdk.errors import GoalRefused
+
+SPEAK_S = 30.0
+"""What a component has to say a sentence; then the next one is said."""
+UNSAID = 3
+"""So many sentences may wait to be said: who lags behind hears the newest."""
+LONGEST_SPOKEN = 160
+"""A longer sentence is for reading."""
+PAUSE_S = 0.2
+"""Between two sentences of one listener, however much it says."""
+
+
+class Speaking(Protocol):
+    """A running plugin, as far as it speaks and listens."""
+
+    def speak(self, text: str) -> Answer:
+        """Have it say something."""
+        ...
+
+    def listen(self) -> Answer:
+        """Have it wait for a person's words."""
+        ...
+
+
+class Speech:
+    """Speaks and listens for one mind, while `run` runs."""
+
+    def __init__(
+        self,
+        mind: Mind,
+        plugins: Callable[[], Mapping[str, Speaking]],
+        processes: Callable[[], Mapping[str, int]],
+    ) -> None:
+        """`plugins` are those that run now, by component, `processes` their ids: one that does not
+        listen is asked again when its component has a new process."""
+        self._mind = mind
+        self._plugins = plugins
+        self._processes = processes
+
+    async def run(self) -> None:
+        """Speak and listen until cancelled."""
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._speak())
+            tasks.create_task(self._listen())
+
+    async def say(self, text: str) -> None:
+        """Have a sentence said by all components that speak, at once; `SPEAK_S` at most."""
+        saying = [asyncio.ensure_future(_awaited(p.speak(text))) for p in self._plugins().values()]
+        if saying:
+            _, late = await asyncio.wait(saying, timeout=SPEAK_S)
+            for task in late:
+                task.cancel()
+
+    def heard(self, component: str, words: str) -> None:
+        """Want what a person has said; tell people where that cannot be."""
+        try:
+            given = self._mind.give(words=words)
+        except GoalRefused as refused:
+            self._mind.people.tell(f"{component} heard {words!r}: {refused.problems[0]}")
+        else:
+            self._mind.people.tell(f"{component} heard {words!r}: that is goal {given.id}")
+
+    async def _speak(self) -> None:
+        version, said = self._mind.version, self._mind.people.last_number
+        while True:
+            version = await self._mind.changed(version)
+            said = max(said, self._mind.people.last_number - UNSAID)
+            for told in self._mind.people.since(said):
+                said = told.number
+                if len(told.text) <= LONGEST_SPOKEN:
+                    await self.say(told.text)
+
+    async def _listen(self) -> None:
+        version, listening = -1, dict[tuple[str, int], asyncio.Task[None]]()
+        try:
+            while True:
+                present = {key for key in self._processes().items() if key[0] in self._plugins()}
+                for gone in listening.keys() - present:
+                    listening.pop(gone).cancel()
+                for key in present - listening.keys():
+                    listening[key] = asyncio.create_task(self._hear(key[0]))
+                version = await self._mind.changed(version)
+        finally:
+            for task in listening.values():
+                task.cancel()
+            await asyncio.gather(*listening.values(), return_exceptions=True)
+
+    async def _hear(self, component: str) -> None:
+        """Hear what a component hears, until it says nothing: then it does not listen."""
+        while plugin := self._plugins().get(component):
+            words = (await plugin.listen() or {}).get("words")
+            if not isinstance(words, str) or not words.strip():
+                return
+            self.heard(component, words)
+            await asyncio.sleep(PAUSE_S)
+
+
+async def _awaited(answer: Answer) -> None:
+    await answer
