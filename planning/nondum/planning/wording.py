@@ -1,0 +1,132 @@
+"""Conditions and declarations in words that all planners agree on.
+
+No dot in a name, no `either`, no variable that hides another: what planners do not agree on is said
+in other words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from nondum.planning.normal import Condition
+from nondum.planning.syntax import And, Formula, Or, Quantified, TypedName, renamed, terms_of
+from nondum.planning.type_tree import TypeTree
+
+
+@dataclass(slots=True)
+class Wording:
+    """Says conditions over one domain's types, and keeps count of what it needed for that."""
+
+    tree: TypeTree
+    types: Mapping[str, str]
+    """Type → how it is spelled."""
+    taken: set[str]
+    """The names of predicates that are in use."""
+    members: dict[tuple[str, ...], str] = field(default_factory=dict)
+    """Types → the predicate, made here, that holds of what is one of them."""
+
+    def type_(self, types: Iterable[str]) -> str:
+        """The type to declare something of one of `types` with; it may be wider."""
+        return self.types[self.tree.declared(types)[0]]
+
+    def declared(self, variables: Sequence[TypedName]) -> tuple[str, list[str]]:
+        """Variables with their types, and what must hold of them besides."""
+        words: list[str] = []
+        besides: list[str] = []
+        for variable in variables:
+            type_, others = self.tree.declared(variable.types)
+            words.append(f"{variable.name} - {self.types[type_]}")
+            if others:
+                besides.append(f"({self._member(others)} {variable.name})")
+        return " ".join(words), besides
+
+    def conjuncts(self, condition: Condition, around: frozenset[str]) -> list[str]:
+        """The parts of a condition; `around` are the variables that mean something outside it."""
+        return [self._formula(part, around) for part in condition.parts()]
+
+    def predicate(self, name: str) -> str:
+        """A name for a predicate of our own making."""
+        self.taken.add(name := fresh(name, self.taken))
+        return name
+
+    def _member(self, types: tuple[str, ...]) -> str:
+        if types not in self.members:
+            name = f"is-{'-or-'.join(self.types[name] for name in types)}"
+            self.members[types] = self.predicate(name)
+        return self.members[types]
+
+    def _formula(self, formula: Formula, around: frozenset[str]) -> str:
+        match formula:
+            case And(parts):
+                return all_of([self._formula(part, around) for part in parts])
+            case Or(parts):
+                return f"(or{''.join(f' {self._formula(part, around)}' for part in parts)})"
+            case Quantified():
+                return self._quantified(formula, around)
+            case _:
+                return str(formula)
+
+    def _quantified(self, formula: Quantified, around: frozenset[str]) -> str:
+        names = apart(formula.variables, around, (formula.part,))
+        variables = called(formula.variables, names)
+        within = around | {variable.name for variable in variables}
+        declared, besides = self.declared(variables)
+        part = self._formula(renamed(formula.part, names), within)
+        if besides and formula.quantifier == "exists":
+            part = all_of([*besides, part])
+        elif besides:
+            part = f"(or {' '.join(f'(not {one})' for one in besides)} {part})"
+        return f"({formula.quantifier} ({declared}) {part})" if variables else part
+
+
+def apart(
+    variables: Iterable[TypedName], around: frozenset[str], parts: Iterable[Formula]
+) -> dict[str, str]:
+    """New names for those variables that would hide others, or that PDDL cannot write."""
+    used = around | {term.name for part in parts for term in terms_of(part)}
+    names: dict[str, str] = {}
+    for variable in variables:
+        if variable.name in around or "'" in variable.name:
+            new = fresh(variable.name.partition("'")[0], used)
+            names[variable.name] = new
+            used |= {new}
+    return names
+
+
+def called(variables: Iterable[TypedName], names: Mapping[str, str]) -> tuple[TypedName, ...]:
+    """Variables by their new names."""
+    return tuple(TypedName(names.get(v.name, v.name), v.types, v.place) for v in variables)
+
+
+def spelled(names: Iterable[str]) -> dict[str, str]:
+    """Name → how it is written: without dots, and no two alike.
+
+    >>> spelled(["eye.look", "look"])
+    {'look': 'look', 'eye.look': 'eye__look'}
+    """
+    found: dict[str, str] = {}
+    for name in sorted(names, key=lambda name: ("." in name, name)):
+        found[name] = fresh(name.replace(".", "__"), found.values())
+    return found
+
+
+def fresh(name: str, taken: Iterable[str]) -> str:
+    """The name, or one like it, that is not taken.
+
+    >>> fresh("?x", ["?x"])
+    '?x_'
+    """
+    others = frozenset(taken)
+    while name in others:
+        name += "_"
+    return name
+
+
+def all_of(conjuncts: Sequence[str]) -> str:
+    """One formula of several.
+
+    >>> all_of([]), all_of(["(p)"]), all_of(["(p)", "(q)"])
+    ('(and)', '(p)', '(and (p) (q))')
+    """
+    return conjuncts[0] if len(conjuncts) == 1 else f"(and{''.join(f' {c}' for c in conjuncts)})"
