@@ -189,3 +189,53 @@ def arm(id: str = "arm", *, is_rude: bool = False) -> Part:
 def compass(id: str = "compass") -> Part:
     """Knows the bearing of `north` and `south` in the body's frame: wherever its unit looks."""
     return Part(id, COMPASS)
+
+
+LAMPS = '''"""Toggles the lamps of rooms that other people's payloads may name."""
+from nondum.sdk import Fragment, Unit, behaviour, hookimpl
+
+DOMAIN = """
+(define (domain lamps)
+  (:types room - place)
+  (:predicates (lit ?r - room) (bright ?h - host))
+  (:derived (bright ?h - host) (and (self ?h) (forall (?r - room) (lit ?r))))
+  (:action toggle
+    :parameters (?u - light ?r - room ?h - host)
+    :precondition (and (on ?u ?h) (or (ready ?u) (lit ?r)))
+    :effect (and (when (lit ?r) (not (lit ?r))) (when (not (lit ?r)) (lit ?r)))))
+"""
+PROBLEM = "(define (problem lamps) (:domain lamps) (:objects hall kitchen - room))"
+
+@hookimpl
+def units():
+    return [Unit("switch", "light")]
+
+@hookimpl
+def fragments():
+    return [Fragment("lamps.pddl", DOMAIN), Fragment("rooms.pddl", PROBLEM)]
+
+@behaviour("toggle", action="(toggle ?u - light ?r - room ?h - host)")
+async def toggle(ctx, u, r, h):
+    ctx.log.info("toggled %s", r)
+'''
+
+ATTIC = '''"""Knows of one room more."""
+from nondum.sdk import Fragment, hookimpl
+
+DOMAIN = "(define (domain attic) (:types room - place))"
+PROBLEM = "(define (problem attic) (:domain attic) (:objects attic - room))"
+
+@hookimpl
+def fragments():
+    return [Fragment("words.pddl", DOMAIN), Fragment("attic.pddl", PROBLEM)]
+'''
+
+
+def lamps(id: str = "lamps") -> Part:
+    """Toggles lamps: `or`, `when`, `forall` and a derived predicate, in one fragment."""
+    return Part(id, LAMPS)
+
+
+def attic(id: str = "attic") -> Part:
+    """Brings a room, and nothing that acts."""
+    return Part(id, ATTIC)
