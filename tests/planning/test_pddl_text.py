@@ -13,9 +13,10 @@ from tests.planning.fragments import HOST, brings
 from nondum.planning.goal import parse_goal
 from nondum.planning.ground import ground
 from nondum.planning.merge import merge
-from nondum.planning.pddl_text import PddlText, pddl_text
+from nondum.planning.pddl_text import pddl_text
 from nondum.planning.standalone import Standalone, load
-from nondum.sdk.planner import GroundTask
+from nondum.planning.wording import without_dots
+from nondum.sdk.planner import GroundTask, PddlTask
 
 EYE = """(:predicates (seen ?c - class ?h - host))
   (:action look :parameters (?u - camera ?c - class ?h - host)
@@ -56,12 +57,12 @@ def shape(task: GroundTask) -> Hashable:
     )
 
 
-def written(loaded: Standalone) -> PddlText:
+def written(loaded: Standalone) -> PddlTask:
     return pddl_text(loaded.merged, loaded.facts, loaded.goal)
 
 
-def read_again(found: PddlText) -> Standalone:
-    return load(found.task.domain, "domain.pddl", found.task.problem, "problem.pddl")
+def read_again(found: PddlTask) -> Standalone:
+    return load(found.domain, "domain.pddl", found.problem, "problem.pddl")
 
 
 @pytest.mark.parametrize("text", TEXTS, ids=str)
@@ -72,7 +73,7 @@ def test_what_is_written_is_the_same_task(text: Text) -> None:
 
 @pytest.mark.parametrize("text", TEXTS, ids=str)
 def test_planners_need_not_know_either(text: Text) -> None:
-    task = written(text.load()).task
+    task = written(text.load())
     assert "(either" not in task.domain + task.problem
 
 
@@ -88,7 +89,7 @@ def test_the_order_of_facts_changes_nothing() -> None:
 
 
 def test_planners_that_insist_are_told_what_is_used() -> None:
-    by_name = {text.name: written(text.load()).task.domain for text in TEXTS}
+    by_name = {text.name: written(text.load()).domain for text in TEXTS}
     assert "(:requirements :strips :typing :negative-preconditions)" in by_name["strips"]
     assert ":conditional-effects" in by_name["conditional-effects"]
     assert ":derived-predicates" in by_name["derived"]
@@ -97,31 +98,39 @@ def test_planners_that_insist_are_told_what_is_used() -> None:
 
 
 def test_an_action_whose_cost_is_unknown_is_out_of_the_question() -> None:
-    domain = written(next(t for t in TEXTS if t.name == "costs").load()).task.domain
+    domain = written(next(t for t in TEXTS if t.name == "costs").load()).domain
     assert "(known-far ?p ?q)" in domain
 
 
-def test_a_merged_domain_is_written_without_dots() -> None:
+def test_a_merged_domain_can_be_written_without_dots() -> None:
     merged = merge([brings("eye", EYE, CLASSES, units={"left": "camera"})], HOST)
     goal = parse_goal("(seen person self)", merged)
     unit = f"{HOST}__eye__left"
     facts = [f"ready {unit}", f"on {unit} {HOST}"]
-    found = pddl_text(merged, facts, goal.expr, {HOST: ("host",)})
-    again = read_again(found)
+    again = read_again(pddl_text(merged, facts, goal.expr, spelled=without_dots))
     task = ground(again.merged, again.facts, again.goal)
-    own = ground(merged, facts, goal.expr, {HOST: ("host",)})
-    assert [found.own(action.name) for action in task.actions] == [a.name for a in own.actions]
+    own = ground(merged, facts, goal.expr)
+    assert [action.name for action in task.actions] == [f"eye__look {unit} person {HOST}"]
     assert [action.name for action in own.actions] == [f"eye.look {unit} person {HOST}"]
+
+
+def test_names_are_those_of_the_ground_task_unless_told_otherwise() -> None:
+    merged = merge([brings("eye", EYE, CLASSES, units={"left": "camera"})], HOST)
+    found = pddl_text(merged, [], parse_goal("(seen person self)", merged).expr)
+    assert "(:action eye.look" in found.domain
 
 
 def test_names_that_would_be_alike_stay_apart() -> None:
     loaded = TEXTS[0].load()
     actions = loaded.merged.domain.actions
-    doubled = {n: replace(actions["go"], name=n) for n in ("a.go", "a__go", "go")}
+    doubled = {name: replace(actions["go"], name=name) for name in ("a.go", "a__go", "go")}
     merged = replace(loaded.merged, domain=replace(loaded.merged.domain, actions=doubled))
-    found = pddl_text(merged, loaded.facts, loaded.goal)
-    assert set(found.actions.values()) == set(doubled)
-    assert found.own("a__go_ x y") == "a.go x y"
+    found = pddl_text(merged, loaded.facts, loaded.goal, spelled=without_dots)
+    assert [line for line in found.domain.splitlines() if "(:action" in line] == [
+        "(:action a__go_",
+        "(:action a__go",
+        "(:action go",
+    ]
 
 
 def test_a_goal_about_something_gone_is_still_a_goal() -> None:

@@ -1,4 +1,6 @@
-"""A merged domain, facts and a goal as PDDL text that any planner can read.
+"""A merged domain, facts and a goal as PDDL text for planners that ground by themselves.
+
+Only what they agree on is used: no `either`, one parent of a type, no variable that hides another.
 
 Source: PDDL 2.2 (Edelkamp and Hoffmann 2004) with the action costs of the IPC 2008.
 """
@@ -17,7 +19,7 @@ from nondum.planning.goal import GoalExpr
 from nondum.planning.syntax import Atom, Formula, Not, renamed_atom, terms_of
 from nondum.planning.type_tree import TypeTree
 from nondum.planning.typegraph import ROOT
-from nondum.planning.wording import Wording, all_of, apart, called, spelled
+from nondum.planning.wording import Spelling, Wording, all_of, apart, as_it_is, called
 from nondum.sdk.planner import PddlTask
 
 NAME = "nondum"
@@ -36,32 +38,21 @@ _REQUIREMENTS = {
 """What some planners insist on being told, and what in the text calls for it."""
 
 
-@dataclass(frozen=True, slots=True)
-class PddlText:
-    """A task in words, and the way back from them."""
-
-    task: PddlTask
-    actions: Mapping[str, str]
-    """Action as it is written → its own name."""
-
-    def own(self, step: str) -> str:
-        """A step of a plan, `action obj …`, by its name in the ground task."""
-        action, space, objects = step.partition(" ")
-        return f"{self.actions.get(action, action)}{space}{objects}"
-
-
 def pddl_text(
     merged: Merged,
     facts: Iterable[str],
     goal: GoalExpr,
     objects: Mapping[str, tuple[str, ...]] | None = None,
-) -> PddlText:
+    *,
+    spelled: Spelling = as_it_is,
+) -> PddlTask:
     """Write a task down; the arguments are those of `ground`, and it is the same task.
 
-    The same input gives the same text, whatever the order of `facts`.
+    Types and actions are `spelled`. The same input gives the same text, whatever the order of
+    `facts`.
     """
     types = {name: found.types for name, found in merged.objects.items()} | dict(objects or {})
-    return _Writing(merged, frozenset(facts), goal, types).text()
+    return _Writing(merged, frozenset(facts), goal, types, spelled).task()
 
 
 @dataclass(slots=True)
@@ -71,6 +62,7 @@ class _Writing:
     goal: GoalExpr
     types: Mapping[str, tuple[str, ...]]
     """Object → its types."""
+    spelled: Spelling
     words: Wording = field(init=False)
     actions: Mapping[str, str] = field(init=False)
     """Action → how it is spelled."""
@@ -80,11 +72,11 @@ class _Writing:
     def __post_init__(self) -> None:
         domain = self.merged.domain
         tree = TypeTree(domain.types, self.types)
-        names = spelled(name for name, _ in tree.edges()) | {ROOT: ROOT}
+        names = {**self.spelled(name for name, _ in tree.edges()), ROOT: ROOT}
         self.words = Wording(tree, names, set(domain.predicates))
-        self.actions = spelled(domain.actions)
+        self.actions = self.spelled(domain.actions)
 
-    def text(self) -> PddlText:
+    def task(self) -> PddlTask:
         goal = all_of(self.words.conjuncts(self.goal, frozenset()))
         body = self._body()
         needed = (name for name, sign in _REQUIREMENTS.items() if re.search(sign, body + goal))
@@ -95,11 +87,10 @@ class _Writing:
             f"(:goal {goal})",
             *(["(:metric minimize (total-cost))"] if self._is_costed else []),
         )
-        task = PddlTask(
+        return PddlTask(
             f"(define (domain {NAME})\n{requirements}\n{body})\n",
             f"(define (problem {NAME})\n(:domain {NAME})\n{_lines(problem)})\n",
         )
-        return PddlText(task, {written: own for own, written in self.actions.items()})
 
     def _body(self) -> str:
         """The sections of the domain. Those that come first tell of what the others needed."""

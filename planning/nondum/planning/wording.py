@@ -1,17 +1,17 @@
-"""Conditions and declarations in words that all planners agree on.
-
-No dot in a name, no `either`, no variable that hides another: what planners do not agree on is said
-in other words.
-"""
+"""Conditions and declarations in words that all planners agree on."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 from nondum.planning.normal import Condition
 from nondum.planning.syntax import And, Formula, Or, Quantified, TypedName, renamed, terms_of
 from nondum.planning.type_tree import TypeTree
+
+Spelling: TypeAlias = Callable[[Iterable[str]], Mapping[str, str]]
+"""Says how each of some names is written."""
 
 
 @dataclass(slots=True)
@@ -99,10 +99,15 @@ def called(variables: Iterable[TypedName], names: Mapping[str, str]) -> tuple[Ty
     return tuple(TypedName(names.get(v.name, v.name), v.types, v.place) for v in variables)
 
 
-def spelled(names: Iterable[str]) -> dict[str, str]:
-    """Name → how it is written: without dots, and no two alike.
+def as_it_is(names: Iterable[str]) -> dict[str, str]:
+    """Names as they are; Fast Downward, for one, has nothing against dots."""
+    return {name: name for name in names}
 
-    >>> spelled(["eye.look", "look"])
+
+def without_dots(names: Iterable[str]) -> dict[str, str]:
+    """Name → how it is written: without dots, as PDDL's grammar has it, and no two alike.
+
+    >>> without_dots(["eye.look", "look"])
     {'look': 'look', 'eye.look': 'eye__look'}
     """
     found: dict[str, str] = {}
