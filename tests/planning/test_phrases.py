@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from tests.planning.strangers import (
     COMPTON_CAMERA,
     MOBILE_BASE,
@@ -17,6 +19,7 @@ from tests.planning.strangers import (
 
 from nondum.planning.goal import Goal, goal_text
 from nondum.planning.merge import merge
+from nondum.planning.pattern import PatternInvalid, Word, parse_pattern
 from nondum.planning.phrases import MAX_OFFERS, Phrasebook, phrasebook
 from nondum.sdk.description import Behaviour, Fragment, Label, Phrase, PluginDescription
 from nondum.sdk.errors import GoalRefused
@@ -192,3 +195,27 @@ def test_quarantined_component_says_nothing() -> None:
     merged = merge(contributions, ROVER)
     assert list(merged.quarantined) == ["mobile-base"]
     assert phrasebook(contributions, merged).offers() == ()
+
+
+words = st.from_regex(r"[a-z]{1,8}", fullmatch=True)
+
+
+@given(st.text(alphabet="ab {}[]:-?x", max_size=30))
+def test_any_text_is_a_pattern_or_refused(text: str) -> None:
+    try:
+        parts = parse_pattern(text)
+    except PatternInvalid as refused:
+        assert str(refused)
+    else:
+        assert any(isinstance(part, Word) for part in parts)
+
+
+@given(st.lists(words, min_size=1, max_size=4), st.lists(words, min_size=1, max_size=3))
+def test_what_is_offered_is_understood(said: list[str], label: list[str]) -> None:
+    pattern = f"{' '.join(said)} {{c:class}} [or {{more:text}}]"
+    base = replace(MOBILE_BASE, phrases=(Phrase(pattern, "(following self ?c)", "maintain"),))
+    detector = replace(PEOPLE_DETECTOR, labels=(Label("person", " ".join(label)),))
+    known = book(base, detector)
+    [sentence] = known.offers()
+    for spoken in (sentence, sentence.upper(), f"{sentence}, or whatever!"):
+        assert asked(known.goal(spoken)) == ("maintain", "(following rover person)")

@@ -6,7 +6,7 @@ import pytest
 
 from nondum.planning.facts import twin
 from nondum.planning.testimony import Source
-from nondum.planning.world import WorldModel
+from nondum.planning.world import MOST_DENIALS, WorldModel
 
 
 @pytest.fixture
@@ -176,6 +176,16 @@ def test_dead_observer_lets_nothing_be_believed(world: WorldModel) -> None:
     world.forget("open door", "camera", 1.0)
     world.silence("camera")
     assert not world.facts
+
+
+def test_denials_of_one_component_are_bounded(world: WorldModel) -> None:
+    for number in range(MOST_DENIALS + 1):
+        world.forget(f"seen thing-{number}", "chatterbox", float(number))
+    assert not world.evidence("seen thing-0").cons
+    assert world.evidence("seen thing-1").cons
+    world.know("seen thing-1", "chatterbox", 1e6)
+    world.forget("seen another", "chatterbox", 2e6)
+    assert world.facts == {"seen thing-1"}
 
 
 def test_denial_goes_with_who_denied(world: WorldModel) -> None:

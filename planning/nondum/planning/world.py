@@ -26,6 +26,9 @@ from nondum.planning.testimony import (
 )
 from nondum.sdk.errors import Problem
 
+MOST_DENIALS = 4096
+"""Facts that one component may deny at once; of more, the oldest are forgotten."""
+
 
 class WorldModel:
     """Everything that is believed. Satisfies `running.World`."""
@@ -36,6 +39,8 @@ class WorldModel:
         self._testimony = Testimony()
         self._overlays: dict[str, Overlay] = {}
         self._seeded: dict[str, frozenset[str]] = {}
+        self._denied: dict[str, dict[str, None]] = {}
+        """Component → what it spoke against, oldest first."""
         self._observed: frozenset[str] = frozenset()
         self._functional: frozenset[str] = frozenset()
         self._objects: frozenset[str] | None = None
@@ -166,6 +171,13 @@ class WorldModel:
         said = f"{component} says that it does not hold"
         source = Source(SourceKind.OBSERVATION, component, said, at_s, is_against=True)
         self._take(fact, source)
+        denied = self._denied.setdefault(component, {})
+        denied.pop(fact, None)
+        denied[fact] = None
+        if len(denied) > MOST_DENIALS:
+            oldest = next(iter(denied))
+            del denied[oldest]
+            self.recant(oldest, component)
 
     def recant(self, fact: str, component: str) -> None:
         """A component takes back what it said against a fact, without saying that it holds."""
@@ -227,6 +239,7 @@ class WorldModel:
                 self._drop(fact, voice)
         self._overlays = {n: o for n, o in self._overlays.items() if o.source.who != component}
         self._seeded.pop(component, None)
+        self._denied.pop(component, None)
         self._changed()
 
     # Keeping words

@@ -25,6 +25,7 @@ from nondum.host.events import FactKnown, GoalReached, PlanMade, PlanMissing
 from nondum.host.mind.mind import PAUSE_S
 from nondum.host.mind.planners import Planners
 from nondum.planning.attempts import Patience
+from nondum.planning.facts import twin
 from nondum.planning.running import RunState
 from nondum.sdk.description import Fragment, Output, Unit
 from nondum.sdk.errors import GoalRefused
@@ -321,6 +322,11 @@ async def test_plugins_may_not_say_what_the_host_says(robot: Robot) -> None:
     facts = robot.mind.beliefs.world.facts
     assert f"ready {HOST}__speaker__voice" in facts
     assert "self mule" not in facts
+    before = facts
+    robot.know("speaker", "self mule")
+    robot.know("speaker", "found", f"person {HOST}", "more")
+    robot.know("speaker", twin("found"), "person", HOST)
+    assert robot.mind.beliefs.world.facts == before
 
 
 async def test_conflicting_component_is_named(robot: Robot) -> None:

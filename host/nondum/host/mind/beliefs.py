@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Callable, Mapping
 
 from nondum.host.catalogue.records import Snapshot
 from nondum.host.events import Event, FactForgotten, FactKnown, StreamFlowing, WorkerExited
 from nondum.host.mind.composition import Composition, always_produced, body_facts, own_objects
 from nondum.planning.core import HOST_PREDICATES
-from nondum.planning.facts import fact
+from nondum.planning.facts import fact, is_twin
 from nondum.planning.scope import SELF
 from nondum.planning.world import WorldModel
 from nondum.sdk.errors import Problem
 
 log = logging.getLogger(__name__)
+
+_NAME = re.compile(r"[^\s()]+")
+"""A space in a name would make another fact of it, perhaps one of the host's."""
 
 
 class Beliefs:
@@ -97,6 +101,10 @@ class Beliefs:
             return False
         if event.predicate in HOST_PREDICATES:
             log.warning("%s may not say (%s …): the host does", event.component, event.predicate)
+            return False
+        words = (event.predicate, *event.arguments)
+        if is_twin(event.predicate) or not all(map(_NAME.fullmatch, words)):
+            log.warning("%s says what is no fact: %r", event.component, words)
             return False
         return True
 
