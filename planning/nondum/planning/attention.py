@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from dataclasses import dataclass
 from typing import TypeAlias
 
 from nondum.planning.facts import is_twin, twin
@@ -11,6 +12,23 @@ from nondum.planning.step import Step
 
 Glimpse: TypeAlias = tuple[frozenset[str], frozenset[str]]
 """What matters and is so, and what would be so if all that is established had ended."""
+
+
+@dataclass(frozen=True, slots=True)
+class Narrow:
+    """A world without what does not matter. Satisfies `running.World`."""
+
+    world: World
+    matter: frozenset[str]
+
+    @property
+    def facts(self) -> frozenset[str]:
+        """What matters and holds."""
+        return self.matter & self.world.facts
+
+    def facts_without(self, ended: Collection[str]) -> frozenset[str]:
+        """What matters and would hold."""
+        return self.matter & self.world.facts_without(ended)
 
 
 class Attention:
@@ -22,6 +40,10 @@ class Attention:
         self._matter = named.union(twin(fact) for fact in named if is_twin(fact))
         self._seen: frozenset[str] | None = None
         self._glimpse: Glimpse | None = None
+
+    def narrowed(self, world: World) -> World:
+        """The world as far as it matters."""
+        return Narrow(world, self._matter)
 
     def keep(self, world: World, established: Collection[str], *, closely: bool) -> None:
         """Remember the world as it is. `closely`: any other fact will be a change."""
@@ -38,5 +60,6 @@ class Attention:
         return True
 
     def _glimpse_of(self, world: World, established: Collection[str]) -> Glimpse:
-        bare = world.facts_without(established) if established else world.facts
-        return self._matter & world.facts, self._matter & bare
+        narrow = self.narrowed(world)
+        facts = narrow.facts
+        return facts, narrow.facts_without(established) if established else facts

@@ -95,7 +95,7 @@ class TaskControl:
         self.decisions += 1
         self._collect(now_s)
         if self.phase is not Phase.REACHED:  # done is done, though what reached it is halted again
-            self.phase = self._decide(world, now_s)
+            self.phase = self._decide(self._attention.narrowed(world), now_s)
         self._run_states = self._states()
         self._attention.keep(world, self._established(), closely=not self._is_supported)
         return self.phase
@@ -262,7 +262,8 @@ class TaskControl:
 
     def _halt_unneeded(self) -> None:
         """Keep what the rest or a kept run needs, along causal links; halt all other runs."""
-        kept, others = [], []
+        kept: list[Run] = []
+        others: list[Run] = []
         for name, run in self.runs.items():
             if not run.is_halting:
                 (kept if self._is_left(name) else others).append(run)
