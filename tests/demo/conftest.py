@@ -12,6 +12,7 @@ PLUGINS = (
     "pan-tilt-unit",
     "panorama",
     "people-detector",
+    "pedestrian-detector",
     "thermal-camera",
     "visual-tracker",
 )

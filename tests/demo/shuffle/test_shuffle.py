@@ -26,6 +26,7 @@ PAYLOADS = (
     "recorded-camera",
     "thermal-camera",
     "people-detector",
+    "pedestrian-detector",
     "visual-tracker",
     "mobile-base",
     "compton-camera",

@@ -1,0 +1,1 @@
+"""Pedestrians in images, by the detector that Daimler trained for cars."""
