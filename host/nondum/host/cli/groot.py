@@ -145,8 +145,8 @@ class _Document:
 def identifier(text: str) -> str:
     """A name that the library, XML and file systems take.
 
-    >>> identifier("people-detector.detect"), identifier("goal 1"), identifier("3d.scan")
-    ('people-detector__detect', 'goal_1', '_3d__scan')
+    >>> identifier("lamp-post.shine"), identifier("goal 1"), identifier("3d.scan")
+    ('lamp-post__shine', 'goal_1', '_3d__scan')
     """
     plain = re.sub(r"[^A-Za-z0-9_-]", "_", text.replace(".", "__"))
     return plain if plain[:1].isalpha() else f"_{plain}"
