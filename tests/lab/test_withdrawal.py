@@ -73,7 +73,7 @@ def test_drive_pulled_in_the_middle_of_a_behaviour(host: RunningHost) -> None:
         assert "talker" not in {row["component"] for row in view["components"]}
         assert not view["streams"]
         assert not [action for action in steps(view) if "talker" in action]
-    assert reason == "there is no text, for test-scribe.write"
+    assert reason == "there is no text, which test-scribe.write needs, for (written spot)"
     told = host.until_told("cannot '(written spot)' now")
     assert "talker" in told, "it is said which component used to supply what is missing"
     assert happened(

@@ -186,6 +186,18 @@ def _net(
 
 def reachable(draft: Draft) -> Draft:
     """Only what can happen if nothing is ever deleted; negative conditions count as met."""
+    reached = reached_in(draft)
+    return Draft(
+        tuple(action for action in draft.actions if action.condition.positive <= reached),
+        tuple(rule for rule in draft.rules if rule.body.positive <= reached),
+        draft.layers,
+        draft.goal,
+        draft.believed,
+    )
+
+
+def reached_in(draft: Draft) -> frozenset[int]:
+    """The facts that can become true if nothing is ever deleted."""
     needs: dict[int, list[int]] = {}
     gives: list[frozenset[int]] = []
     missing: list[int] = []
@@ -207,13 +219,7 @@ def reachable(draft: Draft) -> Draft:
                 missing[index] -= 1
                 if not missing[index]:
                     ready.append(index)
-    return Draft(
-        tuple(action for action in draft.actions if action.condition.positive <= reached),
-        tuple(rule for rule in draft.rules if rule.body.positive <= reached),
-        draft.layers,
-        draft.goal,
-        draft.believed,
-    )
+    return frozenset(reached)
 
 
 def _givers(draft: Draft) -> Iterator[tuple[Literals, frozenset[int]]]:

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from nondum.planning.cause import Cause, Lack
 from nondum.planning.claims import claims_of
+from nondum.planning.concern import concern
+from nondum.planning.conflict import Conflict, Search, conflict_of
 from nondum.planning.contribution import Contribution
-from nondum.planning.core import TAKEN_PREDICATES, core_graph
+from nondum.planning.core import core_graph
 from nondum.planning.domain import Merged
+from nondum.planning.draft import Draft, drafted, reached_in
 from nondum.planning.exploration import explore
-from nondum.planning.facts import parts
+from nondum.planning.facts import parts, predicate_of
 from nondum.planning.goal import GoalExpr
-from nondum.planning.ground import ground
-from nondum.planning.matching import Pattern
-from nondum.planning.tracing import Cause, Lack, Tracer, distinct
+from nondum.planning.matching import Relations
+from nondum.planning.missing import Outlook
+from nondum.planning.syntax import Atom
+from nondum.planning.tracing import Tracer
+from nondum.planning.typegraph import TypeGraph, types_or_root
 from nondum.sdk.errors import Problem
-from nondum.sdk.planner import GroundTask
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,19 +30,14 @@ class Diagnosis:
 
     causes: tuple[Cause, ...]
     """What is missing. Empty: each part of the goal can be reached, if not all at once."""
-    contested: tuple[str, ...] = ()
-    """Resources (`free …`, `idle …`) that more than one step would take."""
+    conflict: Conflict | None = None
+    """Where nothing is missing: which parts of the goal exclude each other."""
 
     def problems(self) -> tuple[Problem, ...]:
         """The diagnosis in words, one problem for each cause."""
-        if self.causes:
-            return tuple(cause.problem() for cause in self.causes)
-        message = "all that is needed is here, but not at the same time"
-        if not self.contested:
-            return (Problem("WHY_NOT_TOGETHER", message),)
-        wanted = ", ".join(f"({text})" for text in self.contested)
-        fix = "ask for one after the other, or bring another of the kind"
-        return (Problem("WHY_NOT_TOGETHER", f"{message}; wanted twice: {wanted}", fix=fix),)
+        if self.conflict is not None:
+            return self.conflict.problems()
+        return tuple(cause.problem() for cause in self.causes)
 
 
 def explain(
@@ -46,33 +45,35 @@ def explain(
     facts: Iterable[str],
     goal: GoalExpr,
     objects: Mapping[str, tuple[str, ...]] | None = None,
+    *,
+    search: Search | None = None,
 ) -> Diagnosis:
     """Say why a goal has no plan; the arguments are those of `ground`.
 
     Only for a goal that a planner called unsolvable: of one that has a plan it says nothing true.
+    `search` tells which parts of the goal exclude each other; without it, that is not said. Raises
+    `FragmentRefused` as `ground` does.
     """
     believed = frozenset(facts)
-    found = explore(merged, believed, objects)
-    types = {name: thing.types for name, thing in merged.objects.items()} | dict(objects or {})
-    tracer = Tracer(merged, types, found.reachable)
-    causes: list[Cause] = []
-    for atom in goal.positive:
-        wanted = Pattern(atom.predicate, tuple(term.name for term in atom.terms))
-        if " ".join((wanted.predicate, *wanted.terms)) not in found.reachable:
-            causes += tracer.roots(wanted)
+    part = concern(merged, goal)
+    known = [text for text in believed if predicate_of(text) in part.read]
+    found = explore(part.merged, known, objects)
+    draft = drafted(part.merged, found, goal)
+    reachable = Relations()
+    for number in sorted(reached_in(draft)):
+        reachable.add(*found.table.facts[number])
+    lasting = frozenset(map(found.table.text, draft.believed - _deleted(draft)))
+    causes = Tracer(part.merged, Outlook(reachable, lasting, found.members)).causes(goal)
     if causes:
-        return Diagnosis(distinct(causes))
-    return Diagnosis((), _contested(ground(merged, believed, goal, objects)))
+        return Diagnosis(causes)
+    return Diagnosis((), conflict_of(merged, believed, goal, objects, search))
 
 
-def _contested(task: GroundTask) -> tuple[str, ...]:
-    """The resources that more than one action of the task takes."""
-    takers = Counter(index for action in task.actions for index in action.delete)
-    return tuple(
-        task.facts[index]
-        for index, count in sorted(takers.items())
-        if count > 1 and parts(task.facts[index])[0] in TAKEN_PREDICATES
-    )
+def _deleted(draft: Draft) -> frozenset[int]:
+    deleted = {fact for action in draft.actions for fact in action.delete}
+    for action in draft.actions:
+        deleted.update(*(change.delete for change in action.changes))
+    return frozenset(deleted)
 
 
 def suppliers(causes: Iterable[Cause], known: Iterable[Contribution]) -> tuple[Contribution, ...]:
@@ -87,14 +88,35 @@ def suppliers(causes: Iterable[Cause], known: Iterable[Contribution]) -> tuple[C
 
 def _supplies(contribution: Contribution, cause: Cause) -> bool:
     claims = claims_of(contribution)
+    if claims.problems:
+        return False
+    graph = core_graph().with_parents({claim.name: claim.parents for claim in claims.types})
     if cause.lack is Lack.ACTION:
-        predicate, _ = parts(cause.fact)
-        added = (atom.predicate for action in claims.actions for atom in action.effect.added())
-        return not claims.problems and predicate in added
+        effects = (
+            (atom, {p.name: types_or_root(p.types) for p in action.parameters})
+            for action in claims.actions
+            for atom in action.effect.added()
+        )
+        rules = (
+            (rule.head, {p.name: types_or_root(p.types) for p in rule.parameters})
+            for rule in claims.derived
+        )
+        return any(_gives(atom, types, cause, graph) for atom, types in (*effects, *rules))
     if cause.lack is Lack.OBJECT:
-        graph = core_graph().with_parents({claim.name: claim.parents for claim in claims.types})
         owned = {unit.type for unit in contribution.units}
         owned |= {stream.type for stream in contribution.streams}
         owned |= {type_ for claim in claims.objects for type_ in claim.types}
-        return not claims.problems and graph.is_one_of(owned, cause.types)
+        return graph.is_one_of(owned, cause.types)
     return False
+
+
+def _gives(
+    atom: Atom, types: Mapping[str, tuple[str, ...]], cause: Cause, graph: TypeGraph
+) -> bool:
+    """Whether an effect may be what is missing, as far as types tell."""
+    if atom.predicate != parts(cause.fact)[0]:
+        return False
+    return all(
+        not wanted or term.name not in types or graph.may_be(types[term.name], wanted)
+        for term, wanted in zip(atom.terms, cause.terms, strict=True)
+    )
