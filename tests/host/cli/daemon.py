@@ -7,7 +7,7 @@ import os
 import pty
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -186,8 +186,17 @@ def nondum(*arguments: str | Path, **environment: str) -> Ran:
     return Ran(done.returncode, done.stdout, done.stderr)
 
 
-def in_terminal(*arguments: str | Path, typed: str = "", code: int = 0, **environment: str) -> str:
-    """Run `nondum` in a terminal where a person types, and give everything that it shows there."""
+def in_terminal(*arguments: str | Path, **environment: str) -> str:
+    """Run `nondum` in a terminal, and give everything that it shows there."""
+    code, shown = at_terminal(*arguments, typed="", environment=environment)
+    assert code == 0, shown
+    return shown
+
+
+def at_terminal(
+    *arguments: str | Path, typed: str, environment: Mapping[str, str] | None = None
+) -> tuple[int, str]:
+    """Run `nondum` in a terminal where a person types; give its code and all that it shows."""
     ours, theirs = pty.openpty()
     os.write(ours, typed.encode())
     process = subprocess.Popen(
@@ -195,7 +204,7 @@ def in_terminal(*arguments: str | Path, typed: str = "", code: int = 0, **enviro
         stdin=theirs,
         stdout=theirs,
         stderr=theirs,
-        env=quiet_environment() | {"TERM": "xterm"} | environment,
+        env=quiet_environment() | {"TERM": "xterm"} | dict(environment or {}),
     )
     os.close(theirs)
     shown = b""
@@ -203,8 +212,7 @@ def in_terminal(*arguments: str | Path, typed: str = "", code: int = 0, **enviro
         while some := _read(ours):
             shown += some
     os.close(ours)
-    assert process.returncode == code, shown
-    return shown.decode()
+    return process.returncode, shown.decode()
 
 
 def _read(terminal: int) -> bytes:

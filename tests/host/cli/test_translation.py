@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, in_terminal, running
+from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, at_terminal, running
 from tests.payloads import Part
 
 INTERPRETER = """
@@ -82,14 +82,16 @@ def test_translation_is_never_taken_unasked(daemon: Daemon) -> None:
 
 
 def test_person_confirms_at_the_terminal(daemon: Daemon) -> None:
-    shown = in_terminal("--control", daemon.control, "goal", "brighten up", typed="y\n")
-    assert LIT in shown
+    asked = ("--control", daemon.control, "goal", "brighten up")
+    code, shown = at_terminal(*asked, typed="y\n")
+    assert (code, LIT in shown) == (0, True), shown
     daemon.until(lambda view: any(row["holds"] for row in view["goals"]))
 
 
 def test_person_declines_at_the_terminal(daemon: Daemon) -> None:
-    shown = in_terminal("--control", daemon.control, "goal", "brighten up", typed="n\n", code=1)
-    assert "nothing was asked for" in shown
+    asked = ("--control", daemon.control, "goal", "brighten up")
+    code, shown = at_terminal(*asked, typed="n\n")
+    assert (code, "nothing was asked for" in shown) == (1, True), shown
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,7 @@ def phrases(composition: Composition) -> list[Row]:
     `types`, `values` (`words`, `object`, `from`)."""
     rows: dict[tuple[str, str], Row] = {}
     for phrase in composition.book.phrases:
-        row = {
+        row: Row = {
             "phrase": phrase.pattern,
             "goal": goal_text(phrase.condition),
             "kind": phrase.kind,
