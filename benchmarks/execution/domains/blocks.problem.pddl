@@ -1,0 +1,6 @@
+(define (problem blocks-8) (:domain blocks)
+  (:objects arm - arm a b c d e f g h - block)
+  (:init (ready arm) (empty arm)
+         (on-table a) (on b a) (on c b) (on d c) (clear d)
+         (on-table e) (on f e) (on g f) (on h g) (clear h))
+  (:goal (and (on a b) (on b e) (on e d) (on d f) (on f h) (on h g) (on g c))))

@@ -1,0 +1,10 @@
+(define (problem depot-3) (:domain depot)
+  (:objects yard dock shop - place  van lorry - truck  yard-hoist dock-hoist shop-hoist - hoist
+            yard-pallet dock-pallet shop-pallet - pallet  c1 c2 c3 - crate)
+  (:init (ready van) (ready lorry) (ready yard-hoist) (ready dock-hoist) (ready shop-hoist)
+         (works yard-hoist yard) (works dock-hoist dock) (works shop-hoist shop)
+         (free yard-hoist) (free dock-hoist) (free shop-hoist) (at van dock) (at lorry yard)
+         (stands yard-pallet yard) (stands dock-pallet dock) (stands shop-pallet shop)
+         (stands c1 yard) (on c1 yard-pallet) (stands c2 yard) (on c2 c1) (clear c2)
+         (stands c3 dock) (on c3 dock-pallet) (clear c3) (clear shop-pallet))
+  (:goal (and (on c1 shop-pallet) (on c3 c1) (on c2 dock-pallet))))

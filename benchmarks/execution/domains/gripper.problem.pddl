@@ -1,0 +1,6 @@
+(define (problem gripper-4) (:domain gripper)
+  (:objects robot - robot left right - hand red green blue grey - ball store hall - room)
+  (:init (ready robot) (has robot left) (has robot right) (at robot store)
+         (empty left) (empty right)
+         (in red store) (in green store) (in blue store) (in grey store))
+  (:goal (and (in red hall) (in green hall) (in blue hall) (in grey hall))))

@@ -1,0 +1,10 @@
+(define (problem logistics-4) (:domain logistics)
+  (:objects north south - city  north-field south-field - airport  north-post south-post - place
+            north-truck south-truck - truck  bird - plane  p1 p2 p3 p4 - parcel)
+  (:init (ready north-truck) (ready south-truck) (ready bird)
+         (within north-field north) (within north-post north)
+         (within south-field south) (within south-post south)
+         (stands north-truck north-post) (stands south-truck south-field) (stands bird north-field)
+         (lies p1 north-post) (lies p2 north-field) (lies p3 south-post) (lies p4 south-post))
+  (:goal (and (lies p1 south-post) (lies p2 south-post) (lies p3 north-post)
+              (lies p4 south-field))))

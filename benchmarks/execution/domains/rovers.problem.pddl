@@ -1,0 +1,13 @@
+(define (problem rovers-5) (:domain rovers)
+  (:objects spirit luck - rover  eye mast - camera  w0 w1 w2 w3 - waypoint
+            cliff crater - objective)
+  (:init (ready spirit) (ready luck) (at spirit w3) (at luck w1) (vacant spirit) (vacant luck)
+         (carries spirit eye) (carries luck mast) (home w0)
+         (path spirit w3 w0) (path spirit w0 w3) (path spirit w3 w1) (path spirit w1 w3)
+         (path spirit w0 w2) (path spirit w2 w0)
+         (path luck w0 w1) (path luck w1 w0) (path luck w1 w2) (path luck w2 w1)
+         (rests w0 w0) (rests w1 w0) (rests w2 w0)
+         (sample w1) (sample w2) (sample w3)
+         (sees w0 cliff) (sees w2 cliff) (sees w3 crater) (sees w1 crater))
+  (:goal (and (sent-analysis w1) (sent-analysis w2) (sent-analysis w3)
+              (sent-image cliff) (sent-image crater))))

@@ -1,0 +1,11 @@
+(define (problem satellite-5) (:domain satellite)
+  (:objects hawk owl - satellite  lens prism antenna - instrument
+            earth star moon comet nebula - direction  visible infrared radio - mode)
+  (:init (ready hawk) (ready owl) (power hawk) (power owl)
+         (on-board lens hawk) (on-board prism hawk) (on-board antenna owl)
+         (supports lens visible) (supports prism infrared) (supports prism visible)
+         (supports antenna radio) (supports antenna infrared)
+         (target lens earth) (target prism star) (target antenna star)
+         (pointing hawk comet) (pointing owl earth))
+  (:goal (and (image moon visible) (image comet infrared) (image nebula radio)
+              (image star visible) (image earth infrared) (pointing hawk moon))))
