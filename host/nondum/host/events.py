@@ -350,6 +350,17 @@ class BehaviourEnded(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class BehavioursHalted(Event):
+    """A tick of the task tree took behaviours down: all that one decision halted."""
+
+    tick: int
+    halted: Mapping[str, str] = field(default_factory=dict)
+    """Actions whose behaviours were asked to end → why."""
+    lost: Mapping[str, str] = field(default_factory=dict)
+    """Actions whose behaviours had ended by themselves or with their component → how."""
+
+
+@dataclass(frozen=True, slots=True)
 class FactKnown(Event):
     """A component says that something is so."""
 

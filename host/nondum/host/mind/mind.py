@@ -20,6 +20,7 @@ from nondum.host.events import Emit, Event, GoalEnded, GoalGiven
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition, compose
 from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState
+from nondum.host.mind.halts import Halts
 from nondum.host.mind.people import People, recomposed
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.pursuit import Pursuit
@@ -66,9 +67,12 @@ class Mind:
         self.composition: Composition | None = None
         self.version = 0
         """Rises whenever a view may look different."""
+        self.ticks = 0
+        """How often the system tree was ticked."""
         self._calls = calls
         self._planners = planners
         self._emit = emit
+        self._halts = Halts()
         self._news = asyncio.Event()
         self._viewers = asyncio.Condition()
         self._composing: asyncio.Task[Composition | str] | None = None
@@ -173,7 +177,10 @@ class Mind:
 
     def tick(self) -> None:
         """Tick the system tree once."""
+        self.ticks += 1
         self.root.tick_once()
+        if (halts := self._halts.after(self.ticks, self.pursuit.runs)) is not None:
+            self._emit(halts)
 
     async def run(self) -> None:
         """Tick until cancelled: when there is news, at once or `PAUSE_S` after the last tick; else

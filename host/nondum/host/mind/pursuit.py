@@ -104,6 +104,12 @@ class Pursuit:
         return tuple(self._seen.values())
 
     @property
+    def runs(self) -> tuple[Run, ...]:
+        """All that was started and has not been seen to end, of this plan and of those before."""
+        current = tuple(self.current.tree.control.runs.values()) if self.current else ()
+        return (*current, *self._left_over)
+
+    @property
     def is_searching(self) -> bool:
         """Whether a plan is being searched for."""
         return self._search is not None
