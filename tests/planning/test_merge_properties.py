@@ -21,6 +21,16 @@ ACTIONS = st.sampled_from(
         "(:action go :parameters (?u - base) :precondition (ready ?u))",
         "(:action go :parameters (?u - unit) :precondition (ready ?u) :effect (far ?u))",
         "(:action stop :parameters (?u - base) :effect (not (idle ?u)))",
+        "(:action hop :parameters (?u - base) :precondition (or (ready ?u) (idle ?u))"
+        " :effect (when (forall (?h - host) (on ?u ?h)) (far ?u)))",
+    ]
+)
+RULES = st.sampled_from(
+    [
+        "",
+        "(:derived (far ?p - object) (ready ?p))",
+        "(:derived (near ?p - place) (not (far ?p)))",
+        "(:derived (far ?p - object) (not (near ?p)))",
     ]
 )
 
@@ -41,7 +51,7 @@ def contributions(draw: st.DrawFn) -> list[Contribution]:
         made.append(
             brings(
                 draw(st.sampled_from([name, "shared"])),
-                body + " " + draw(ACTIONS),
+                f"{body} {draw(RULES)} {draw(ACTIONS)}",
                 f"(:init {' '.join(draw(st.lists(INITS, max_size=2)))})",
                 rank=draw(st.integers(0, 2)),
                 component=name,

@@ -62,6 +62,7 @@ def parse_formula(text: str, file: str) -> Formula:
     return cast(Formula, _parse(text, file, "formula"))
 
 
+@lru_cache(maxsize=1024)
 def parse_signature(text: str, file: str) -> PredicateDeclaration:
     """Parse `(name ?parameter - type …)`. Raises `FragmentRefused` as `parse_fragment` does."""
     return cast(PredicateDeclaration, _parse(text, file, "signature"))

@@ -1,0 +1,1 @@
+"""From the fragments of fifty strangers to a plan that runs, and what one more costs."""
