@@ -25,6 +25,23 @@ Values: TypeAlias = list[str]
 Fire: TypeAlias = Callable[[Values], None]
 
 
+class TooMuchWork(Exception):
+    """More was looked at than may be."""
+
+
+@dataclass(slots=True)
+class Work:
+    """How many rows and objects may still be looked at."""
+
+    left: int
+
+    def spend(self, count: int) -> None:
+        """Raises `TooMuchWork`."""
+        self.left -= count
+        if self.left < 0:
+            raise TooMuchWork
+
+
 @dataclass(frozen=True, slots=True)
 class Rule:
     """What a join needs to know."""
@@ -106,14 +123,25 @@ class Join:
         new = ((0, self._at[variable], domain),)
         return _Step(None, new=new, checks=self._checked(bound), objects=tuple(sorted(domain)))
 
-    def run(self, relations: Relations, fire: Fire, row: Row = (), known: Row = ()) -> None:
-        """Call `fire` with the values of every binding in which the trigger matches `row`."""
+    def run(
+        self,
+        relations: Relations,
+        fire: Fire,
+        row: Row = (),
+        known: Row = (),
+        *,
+        work: Work | None = None,
+    ) -> None:
+        """Call `fire` with the values of every binding in which the trigger matches `row`.
+
+        Raises `TooMuchWork` where `work` does not allow for more.
+        """
         values = [*known, *[""] * (self._size - len(known)), *self._constants]
         if not _allowed(self._first_checks, values):
             return
         if self._first is None or _taken(self._first, row, values):
             tables = [relations.table(step.key) if step.key else None for step in self._steps]
-            self._walk(0, values, tables, fire)
+            self._walk(0, values, tables, fire, work)
 
     def _walk(
         self,
@@ -121,6 +149,7 @@ class Join:
         values: Values,
         tables: Sequence[Mapping[Row, Sequence[Row]] | None],
         fire: Fire,
+        work: Work | None,
     ) -> None:
         if depth == len(self._steps):
             fire(values)
@@ -128,14 +157,19 @@ class Join:
         step, table = self._steps[depth], tables[depth]
         if table is None:
             ((_, at, _),) = step.new
+            if work:
+                work.spend(len(step.objects))
             for name in step.objects:
                 values[at] = name
                 if _allowed(step.checks, values):
-                    self._walk(depth + 1, values, tables, fire)
+                    self._walk(depth + 1, values, tables, fire, work)
             return
-        for row in table.get(tuple([values[i] for i in step.look_up]), ()):
+        rows = table.get(tuple([values[i] for i in step.look_up]), ())
+        if work:
+            work.spend(len(rows))
+        for row in rows:
             if _taken(step, row, values):
-                self._walk(depth + 1, values, tables, fire)
+                self._walk(depth + 1, values, tables, fire, work)
 
     def _step(
         self, pattern: Pattern, rule: Rule, bound: set[str], *, is_trigger: bool = False
