@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from nondum.planning.domain import Action, DerivedRule, Merged
 from nondum.planning.goal import GoalExpr
-from nondum.planning.normal import Condition, atoms_in
-from nondum.planning.syntax import Atom
+from nondum.planning.normal import Condition, atoms_in, quantified_in
+from nondum.planning.relations import Row
+from nondum.planning.syntax import Atom, Term
 
-Wish: TypeAlias = tuple[str, bool]
-"""A predicate, and whether facts of it are to be true."""
+Wish: TypeAlias = tuple[str, bool, tuple[str, ...]]
+"""A predicate, whether the fact is to be true, and its arguments; empty: whatever it is."""
+
+
+_MOST = 16
+"""So many patterns of one predicate are told apart; beyond them all its facts are asked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,58 +27,121 @@ class Concern:
 
     merged: Merged
     """Only the schemas that give what the goal, or another of them, asks for."""
-    read: frozenset[str]
-    """The predicates that any of them reads: facts of others do not matter."""
+    wishes: Wishes
+
+    @property
+    def read(self) -> frozenset[str]:
+        """The predicates that are asked for: facts of others do not matter."""
+        return self.wishes.read
+
+
+class Wishes:
+    """What is asked for: facts with some arguments known."""
+
+    def __init__(self) -> None:
+        self._patterns: defaultdict[tuple[str, bool], list[Row]] = defaultdict(list)
+
+    @property
+    def read(self) -> frozenset[str]:
+        """The predicates that are asked for: facts of others do not matter."""
+        return frozenset(predicate for predicate, _ in self._patterns)
+
+    def new(self, wishes: Iterable[Wish]) -> Iterator[Wish]:
+        """Ask for something; gives what was not asked for before, or something wider."""
+        for predicate, is_true, row in wishes:
+            if self.include(predicate, row, is_true=is_true):
+                continue
+            patterns = self._patterns[predicate, is_true]
+            if len(patterns) == _MOST:
+                patterns.clear()
+                row = ("",) * len(row)
+            patterns.append(row)
+            yield predicate, is_true, row
+
+    def include(self, predicate: str, row: Row, *, is_true: bool) -> bool:
+        """Whether a fact is among what is asked for."""
+        for pattern in self._patterns.get((predicate, is_true), ()):
+            for asked, argument in zip(pattern, row, strict=True):
+                if asked and asked != argument:
+                    break
+            else:
+                return True
+        return False
 
 
 def concern(merged: Merged, goal: GoalExpr) -> Concern:
-    """Go back from the goal's predicates to everything that gives what is asked for."""
-    givers: defaultdict[Wish, list[Action]] = defaultdict(list)
+    """Go back from the goal to everything that gives what is asked for.
+
+    Objects that the goal names are passed on to the schemas that it asks, and on by them: a goal
+    about persons asks no detector for geese. Source: magic sets (Bancilhon et al. 1986).
+    """
+    givers: defaultdict[tuple[str, bool], list[tuple[Action, Atom]]] = defaultdict(list)
     for action in merged.domain.actions.values():
-        for wish in set(_given(action)):
-            givers[wish].append(action)
+        for atom in action.effect.added():
+            givers[atom.predicate, True].append((action, atom))
+        for atom in action.effect.deleted():
+            givers[atom.predicate, False].append((action, atom))
     rules: defaultdict[str, list[DerivedRule]] = defaultdict(list)
     for rule in merged.domain.derived:
         rules[rule.head.predicate].append(rule)
-    waiting = set(_wishes(goal))
-    asked: set[Wish] = set()
+    wishes = Wishes()
+    waiting = list(wishes.new(_wishes(goal, {})))
     actions: set[str] = set()
     while waiting:
-        wish = waiting.pop()
-        asked.add(wish)
-        predicate, is_true = wish
+        predicate, is_true, row = waiting.pop()
+        new: list[Wish] = []
         for rule in rules[predicate]:
-            waiting.update((p, sign is is_true) for p, sign in _wishes(rule.condition))
-        for action in givers[wish]:
-            actions.add(action.name)
-            waiting.update(_asked(action))
-        waiting -= asked
+            if (known := _matched(rule.head, row)) is not None:
+                asked = _wishes(rule.condition, known)
+                new += ((p, sign is is_true, asked_row) for p, sign, asked_row in asked)
+        for action, atom in givers[predicate, is_true]:
+            if (known := _matched(atom, row)) is not None:
+                actions.add(action.name)
+                new += _asked(action, known)
+        waiting += wishes.new(new)
     domain = replace(
         merged.domain,
         actions={name: a for name, a in merged.domain.actions.items() if name in actions},
     )
-    return Concern(replace(merged, domain=domain), frozenset(predicate for predicate, _ in asked))
+    return Concern(replace(merged, domain=domain), wishes)
 
 
-def _given(action: Action) -> Iterator[Wish]:
-    yield from _signed(action.effect.added(), is_true=True)
-    yield from _signed(action.effect.deleted(), is_true=False)
+def _matched(atom: Atom, row: Row) -> dict[str, str] | None:
+    """What a wish says of the variables in an atom; None if the atom never fits it."""
+    known: dict[str, str] = {}
+    for term, argument in zip(atom.terms, row, strict=True):
+        if not argument:
+            continue
+        if not term.is_variable:
+            if term.name != argument:
+                return None
+        elif known.setdefault(term.name, argument) != argument:
+            return None
+    return known
 
 
-def _asked(action: Action) -> Iterator[Wish]:
+def _asked(action: Action, known: Mapping[str, str]) -> Iterator[Wish]:
     """What the action needs, and needs for or against each of its conditional changes."""
-    yield from _wishes(action.precondition)
+    yield from _wishes(action.precondition, known)
     for change in action.effect.conditional:
-        for predicate, _ in _wishes(change.condition):
-            yield predicate, True
-            yield predicate, False
+        for predicate, _, row in _wishes(change.condition, known):
+            yield predicate, True, row
+            yield predicate, False, row
 
 
-def _signed(atoms: Iterable[Atom], *, is_true: bool) -> Iterator[Wish]:
-    return ((atom.predicate, is_true) for atom in atoms)
-
-
-def _wishes(condition: Condition) -> Iterator[Wish]:
+def _wishes(condition: Condition, known: Mapping[str, str]) -> Iterator[Wish]:
+    """What a condition asks for; variables that are not known stand for anything."""
     for part in condition.parts():
+        hidden = set(quantified_in(part))
         for atom, is_positive in atoms_in(part):
-            yield atom.predicate, is_positive
+            yield (
+                atom.predicate,
+                is_positive,
+                tuple(_known(term, known, hidden) for term in atom.terms),
+            )
+
+
+def _known(term: Term, known: Mapping[str, str], hidden: Collection[str]) -> str:
+    if not term.is_variable:
+        return term.name
+    return "" if term.name in hidden else known.get(term.name, "")

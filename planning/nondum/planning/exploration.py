@@ -6,11 +6,12 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from nondum.planning.domain import Action, DerivedRule, Merged
+from nondum.planning.concern import Wishes
+from nondum.planning.domain import Action, DerivedRule, Merged, Origin
 from nondum.planning.effect import ConditionalChange
 from nondum.planning.facts import parts
 from nondum.planning.flat import Flat
-from nondum.planning.join import Join, Values
+from nondum.planning.join import Join, TooMuchWork, Values, Work
 from nondum.planning.matching import Pattern
 from nondum.planning.normal import Condition
 from nondum.planning.preparation import flattened, joins_of
@@ -23,8 +24,21 @@ from nondum.sdk.errors import FragmentRefused, Problem
 INSTANCES_LIMIT = 100_000
 """Ground actions that a domain may have."""
 
+_WORK_PER_INSTANCE = 50
+"""Objects and facts that may be looked at in vain, for each ground action that there may be."""
+_WORK_OF_DECIDING = 10
+"""What deciding a disjunction or quantifier counts as."""
+
 Types = Mapping[str, tuple[str, ...]]
 """Object → its types."""
+
+
+class TooManyBindings(FragmentRefused):
+    """A domain that is too big to be written out. `components` brought what is widest in it."""
+
+    def __init__(self, problem: Problem, components: frozenset[str]) -> None:
+        super().__init__(problem)
+        self.components = components
 
 
 @dataclass(slots=True)
@@ -104,19 +118,20 @@ def explore(
     objects: Types | None = None,
     *,
     limit: int = INSTANCES_LIMIT,
+    wishes: Wishes | None = None,
 ) -> Exploration:
     """Explore from where exactly `facts` hold; `objects` exist beside the merged ones.
 
     A condition that something is false counts as reachable, unless it is true and nothing can ever
     make it false; disjunctions and quantifiers are decided as far as facts that never change do.
-    Raises `FragmentRefused` (PDDL_TOO_MANY) that names the action with most bindings when there are
-    more than `limit`: to leave some out would make a wrong proof.
+    Raises `TooManyBindings` (PDDL_TOO_MANY) that names the action with most bindings when there are
+    more than `limit`, or too many are looked at: to leave some out would make a wrong proof.
     """
     types = {name: found.types for name, found in merged.objects.items()} | dict(objects or {})
     members = members_of(merged, types)
     believed = [parts(text) for text in sorted(facts)]
     known = [(predicate, row) for predicate, row in believed if all(o in types for o in row)]
-    return _Fixpoint(merged, known, members, limit).run()
+    return _Fixpoint(merged, known, members, limit, wishes).run()
 
 
 def members_of(merged: Merged, types: Types) -> dict[str, frozenset[str]]:
@@ -174,7 +189,11 @@ class _Template:
 class _Head:
     """A rule of the join, and what happens when it fires."""
 
-    def __init__(self, found: Flat, fixpoint: _Fixpoint) -> None:
+    def __init__(
+        self, found: Flat, name: str, origins: tuple[Origin, ...], fixpoint: _Fixpoint
+    ) -> None:
+        self.name = name
+        self.origins = origins
         self._flat = found
         self._fixpoint = fixpoint
         self.variables = tuple(variable.name for variable in found.variables)
@@ -195,6 +214,7 @@ class _Head:
             return True
         if not self._flat.rest:
             return False
+        self._fixpoint.work.spend(_WORK_OF_DECIDING)
         names = self.names(values)
         return not all(self._fixpoint.static.may_hold(part, names) for part in self._flat.rest)
 
@@ -209,13 +229,15 @@ class _Head:
 
 class _ActionHead(_Head):
     def __init__(self, action: Action, fixpoint: _Fixpoint) -> None:
-        super().__init__(flattened(action.parameters, action.precondition), fixpoint)
+        found = flattened(action.parameters, action.precondition)
+        super().__init__(found, action.name, action.origins, fixpoint)
         self._action = action
         self._arity = len(action.parameters)
         self._positive = self.template(action.precondition.positive)
         self._negative_own = self.template(action.precondition.negative)
         self._add = self.template(action.effect.add)
         self._delete = self.template(action.effect.delete)
+        self._changes = bool(action.effect.conditional)
 
     def fire(self, values: Values) -> None:
         row = tuple(values[: self._arity])
@@ -223,22 +245,26 @@ class _ActionHead(_Head):
         if key in self._fixpoint.instances or self.is_excluded(values):
             return
         add = self._add.numbers(values)
+        delete = self._delete.numbers(values) - add
+        if not (self._changes or self._fixpoint.asks_for(add, delete)):
+            return
         self._fixpoint.instances[key] = Instance(
             action=self._action,
             row=row,
             positive=self._positive.numbers(values),
             negative=self._negative_own.numbers(values),
             add=add,
-            delete=self._delete.numbers(values) - add,
+            delete=delete,
         )
-        self._fixpoint.count(self._action)
+        self._fixpoint.count(self)
         self._fixpoint.reach(add)
 
 
 class _ChangeHead(_Head):
     def __init__(self, action: Action, change: ConditionalChange, fixpoint: _Fixpoint) -> None:
         variables = (*action.parameters, *change.variables)
-        super().__init__(flattened(variables, action.precondition, change.condition), fixpoint)
+        found = flattened(variables, action.precondition, change.condition)
+        super().__init__(found, action.name, action.origins, fixpoint)
         self._action = action
         self._change = change
         self._arity = len(action.parameters)
@@ -265,13 +291,14 @@ class _ChangeHead(_Head):
             delete=self._delete.numbers(values) - add,
         )
         instance.changes.append(change)
-        self._fixpoint.count(self._action)
+        self._fixpoint.count(self)
         self._fixpoint.reach(add)
 
 
 class _DerivedHead(_Head):
     def __init__(self, derived: DerivedRule, fixpoint: _Fixpoint) -> None:
-        super().__init__(flattened(derived.parameters, derived.condition), fixpoint)
+        found = flattened(derived.parameters, derived.condition)
+        super().__init__(found, derived.head.predicate, derived.origins, fixpoint)
         self._derived = derived
         self._arity = len(derived.parameters)
         self._positive = self.template(derived.condition.positive)
@@ -293,6 +320,7 @@ class _DerivedHead(_Head):
             negative=self._negative_own.numbers(values),
         )
         self._fixpoint.derivations.append(derivation)
+        self._fixpoint.count(self)
         self._fixpoint.reach(head)
 
 
@@ -305,11 +333,15 @@ class _Fixpoint:
         believed: Iterable[tuple[str, Row]],
         members: Mapping[str, frozenset[str]],
         limit: int,
+        wishes: Wishes | None,
     ) -> None:
+        self._wishes = wishes
         self._domain = merged.domain
         self._members = members
         self._limit = limit
-        self._counts: Counter[str] = Counter()
+        self.work = Work(_WORK_PER_INSTANCE * limit)
+        self._spent: Counter[_Head] = Counter()
+        self._counts: Counter[_Head] = Counter()
         self._total = 0
         self.table = FactTable()
         self._believed = frozenset(self.table.number(*fact) for fact in believed)
@@ -336,15 +368,25 @@ class _Fixpoint:
         facts = self.table.facts
         return any(facts[n][0] not in self._deleted for n in negative & self._believed)
 
+    def asks_for(self, add: frozenset[int], delete: frozenset[int]) -> bool:
+        """Whether anybody wishes for one of these changes."""
+        wishes = self._wishes
+        if wishes is None:
+            return True
+        facts = self.table.facts
+        return any(wishes.include(*facts[n], is_true=True) for n in add) or any(
+            wishes.include(*facts[n], is_true=False) for n in delete
+        )
+
     def reach(self, facts: frozenset[int]) -> None:
         """Put the facts that are new in line."""
         new = facts - self._reached
         self._reached |= new
         self._waiting += sorted(new)
 
-    def count(self, action: Action) -> None:
-        """Count a binding. Raises `FragmentRefused` where there are too many."""
-        self._counts[action.name] += 1
+    def count(self, head: _Head) -> None:
+        """Count a binding. Raises `TooManyBindings` where there are too many."""
+        self._counts[head] += 1
         self._total += 1
         if self._total > self._limit:
             raise self._too_many()
@@ -364,12 +406,12 @@ class _Fixpoint:
                 relations.add(predicate, row)
         for join, trigger, head in joins:
             if not trigger:
-                join.run(relations, head.fire)
+                self._join(join, head, relations)
         while self._waiting:
             predicate, row = self.table.facts[self._waiting.pop()]
             relations.add(predicate, row)
             for join, head in triggered.get(predicate, ()):
-                join.run(relations, head.fire, row)
+                self._join(join, head, relations, row)
         return Exploration(
             self.table,
             self._believed,
@@ -388,12 +430,36 @@ class _Fixpoint:
         for rule in self._domain.derived:
             yield _DerivedHead(rule, self)
 
-    def _too_many(self) -> FragmentRefused:
-        name, count = max(self._counts.items(), key=lambda counted: (counted[1], counted[0]))
-        widest = self._domain.actions[name]
-        message = (
-            f"more than {self._limit} ways to bind the actions, {count} of them of {widest.name!r}"
+    def _join(self, join: Join, head: _Head, relations: Relations, row: Row = ()) -> None:
+        before = self.work.left
+        try:
+            join.run(relations, head.fire, row, work=self.work)
+        except TooMuchWork:
+            self._spent[head] += before
+            raise self._too_many() from None
+        self._spent[head] += before - self.work.left
+
+    def _too_many(self) -> TooManyBindings:
+        """Those count who made most bindings or, where none were made, looked at most."""
+        is_fruitless = self.work.left < 0
+        counts = _by_name(self._spent if is_fruitless else self._counts)
+        name, (count, origins) = max(
+            counts.items(), key=lambda counted: (counted[1][0], counted[0])
         )
-        where = " and ".join(map(str, widest.origins))
+        message = (
+            f"the ways to bind {name!r} are too many to look at"
+            if is_fruitless
+            else f"more than {self._limit} ways to bind the actions, {count} of them of {name!r}"
+        )
+        where = " and ".join(map(str, origins))
         fix = "add preconditions that say which objects belong together"
-        return FragmentRefused(Problem("PDDL_TOO_MANY", message, where, fix=fix))
+        problem = Problem("PDDL_TOO_MANY", message, where, fix=fix)
+        return TooManyBindings(problem, frozenset(origin.component for origin in origins))
+
+
+def _by_name(counts: Mapping[_Head, int]) -> dict[str, tuple[int, tuple[Origin, ...]]]:
+    """An action's own bindings and those of its conditional effects are one."""
+    found: dict[str, tuple[int, tuple[Origin, ...]]] = {}
+    for head, count in counts.items():
+        found[head.name] = (found.get(head.name, (0, ()))[0] + count, head.origins)
+    return found

@@ -36,6 +36,7 @@ def ground(
     does, for more than `limit` bound actions.
     """
     part = concern(merged, goal)
-    known = (text for text in facts if predicate_of(text) in part.read)
-    found = explore(part.merged, known, objects, limit=limit)
+    read = part.read
+    known = (text for text in facts if predicate_of(text) in read)
+    found = explore(part.merged, known, objects, limit=limit, wishes=part.wishes)
     return positive_task(helpful(drafted(part.merged, found, goal)), found.table)

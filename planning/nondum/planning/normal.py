@@ -135,3 +135,14 @@ def atoms_in(formula: Formula) -> Iterator[tuple[Atom, bool]]:
                 yield from atoms_in(part)
         case Quantified():
             yield from atoms_in(formula.part)
+
+
+def quantified_in(formula: Formula) -> Iterator[str]:
+    """The variables that a normal condition binds."""
+    match formula:
+        case And() | Or():
+            for part in formula.parts:
+                yield from quantified_in(part)
+        case Quantified():
+            yield from (variable.name for variable in formula.variables)
+            yield from quantified_in(formula.part)
