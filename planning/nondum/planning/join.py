@@ -85,6 +85,8 @@ class _Step:
     checks: tuple[_Check, ...] = ()
     objects: tuple[str, ...] = ()
     """In what order the objects of a variable are tried."""
+    whole: tuple[int, ...] = ()
+    """Where one value alone is open: the values of a row, so that its few objects can be tried."""
 
 
 class Join:
@@ -140,36 +142,37 @@ class Join:
         if not _allowed(self._first_checks, values):
             return
         if self._first is None or _taken(self._first, row, values):
-            tables = [relations.table(step.key) if step.key else None for step in self._steps]
-            self._walk(0, values, tables, fire, work)
+            self._walk(0, values, relations, fire, work)
 
     def _walk(
         self,
         depth: int,
         values: Values,
-        tables: Sequence[Mapping[Row, Sequence[Row]] | None],
+        relations: Relations,
         fire: Fire,
         work: Work | None,
     ) -> None:
         if depth == len(self._steps):
             fire(values)
             return
-        step, table = self._steps[depth], tables[depth]
-        if table is None:
+        step = self._steps[depth]
+        if step.key is None:
             ((_, at, _),) = step.new
             if work:
                 work.spend(len(step.objects))
             for name in step.objects:
                 values[at] = name
                 if _allowed(step.checks, values):
-                    self._walk(depth + 1, values, tables, fire, work)
+                    self._walk(depth + 1, values, relations, fire, work)
             return
-        rows = table.get(tuple([values[i] for i in step.look_up]), ())
+        rows = relations.table(step.key).get(tuple([values[i] for i in step.look_up]), ())
+        if step.whole and len(rows) > len(step.new[0][2]):
+            rows = _rows_among(step, values, relations)
         if work:
             work.spend(len(rows))
         for row in rows:
             if _taken(step, row, values):
-                self._walk(depth + 1, values, tables, fire, work)
+                self._walk(depth + 1, values, relations, fire, work)
 
     def _step(
         self, pattern: Pattern, rule: Rule, bound: set[str], *, is_trigger: bool = False
@@ -195,7 +198,8 @@ class Join:
             )
             return _Step(None, new=(*compared, *new.values()), same=tuple(same), checks=checks)
         key = (pattern.predicate, tuple(positions))
-        return _Step(key, look_up, tuple(new.values()), tuple(same), checks)
+        whole = tuple(self._at[term] for term in pattern.terms) if len(new) == 1 else ()
+        return _Step(key, look_up, tuple(new.values()), tuple(same), checks, whole=whole)
 
     def _constant(self, at: int) -> str:
         return self._constants[at - self._size]
@@ -223,6 +227,18 @@ def _narrow(pattern: Pattern, rule: Rule, bound: set[str]) -> str:
         return ""
     (variable,) = variables
     return variable if len(rule.domains[variable]) <= _FEW else ""
+
+
+def _rows_among(step: _Step, values: Values, relations: Relations) -> Sequence[Row]:
+    """The rows of a step with one open value, found by trying its objects."""
+    assert step.key is not None  # only rows of a table are looked for
+    ((_, at, domain),) = step.new
+    table = relations.table((step.key[0], tuple(range(len(step.whole)))))
+    found: list[Row] = []
+    for name in domain:
+        values[at] = name
+        found += table.get(tuple([values[i] for i in step.whole]), ())
+    return found
 
 
 def _taken(step: _Step, row: Row, values: Values) -> bool:
