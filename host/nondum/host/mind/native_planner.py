@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from typing import ClassVar
 
@@ -24,7 +25,11 @@ class NativePlanner:
     def plan(self, task: GroundTask, deadline_s: float) -> Answer:
         """Search for at most about `deadline_s` seconds."""
         until_s = time.monotonic() + deadline_s
-        answer = solve(task, lambda: time.monotonic() > until_s)
+        gc.disable()  # millions of states, and no cycle in them: a full collection takes a second
+        try:
+            answer = solve(task, lambda: time.monotonic() > until_s)
+        finally:
+            gc.enable()
         if isinstance(answer, GaveUp):
             return GaveUp(f"no plan within {deadline_s:g} s")
         return answer

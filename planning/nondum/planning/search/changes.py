@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 
-from nondum.planning.search.encoding import Encoded
+from nondum.planning.search.encoding import Encoded, State
 
 RULE = -1
 """The move of a change that nobody needs to make."""
@@ -47,6 +47,16 @@ class Changes:
         self.moves += [RULE] * len(rules[0])
         self.goal = self._new_fact()
         self._add_rule(bits_of(encoded.goal | 1), self.goal)
+        self.needing: list[list[int]] = [[] for _ in range(self.facts)]
+        """Fact → the changes that need it."""
+        for change, needs in enumerate(self.needs):
+            for fact in needs:
+                self.needing[fact].append(change)
+        self._lists = _BitLists(self.facts)
+
+    def facts_of(self, state: State) -> list[int]:
+        """The facts that hold in a state, those about what is false included."""
+        return self._lists.of(state | (~state & self.negated) << self._encoded.width)
 
     def _add(self, needs: int, effect: tuple[int, int], move: int) -> None:
         add, delete = effect
@@ -111,3 +121,23 @@ class Changes:
     def _new_fact(self) -> int:
         self.facts += 1
         return self.facts - 1
+
+
+class _BitLists:
+    """Lists the bits of a mask byte by byte: quicker than bit by bit."""
+
+    def __init__(self, width: int) -> None:
+        self._bytes = (width + 7) // 8
+        self._lists: dict[tuple[int, int], tuple[int, ...]] = {}
+        self._table = [
+            [tuple(8 * i + b for b in range(8) if byte >> b & 1) for byte in range(256)]
+            for i in range(self._bytes)
+        ]
+
+    def of(self, mask: int) -> list[int]:
+        """The positions of a mask's bits, lowest first."""
+        found: list[int] = []
+        for table, byte in zip(self._table, mask.to_bytes(self._bytes, "little"), strict=True):
+            if byte:
+                found += table[byte]
+        return found

@@ -1,6 +1,8 @@
 """Lazy greedy best-first search with preferred moves first, as in Fast Downward's LAMA.
 
-Source: Richter and Helmert 2009 (boosted preferred operators), Richter and Westphal 2010.
+Source: Richter and Helmert 2009 (boosted preferred operators), Richter and Westphal 2010
+(landmarks). LAMA has a line of its own for landmarks; here they are added to the distance, which
+needed fewer estimates in most of the domains that it was tried in.
 """
 
 from __future__ import annotations
@@ -10,21 +12,27 @@ from collections.abc import Iterator
 from heapq import heappop, heappush
 
 from nondum.planning.search.encoding import Encoded, State
+from nondum.planning.search.landmarks import Landmarks
 from nondum.planning.search.relaxation import Relaxation
 from nondum.planning.search.tree import Moves, Standing, Tree
 
 _BOOST = 1000
 """Turns that preferred moves get for every state nearer to the goal than any before."""
 _FAR = 1 << 60
+_PER_LANDMARK = 2
+"""How much farther a state is for each landmark that is to come."""
 
 
 class Greedy:
     """A search that can be gone on with. A state is estimated when it is taken out of the line, and
     stands there with the distance of the state before it."""
 
-    def __init__(self, encoded: Encoded, relaxation: Relaxation) -> None:
+    def __init__(self, encoded: Encoded, relaxation: Relaxation, landmarks: Landmarks) -> None:
         self._encoded = encoded
         self._relaxation = relaxation
+        self._landmarks = landmarks
+        self._met: dict[State, int] = {}
+        """The landmarks met on the way to states that it may go on from."""
         self._tree = Tree()
         self._all, self._preferred = _OpenList(), _OpenList()
         self._turn = 0
@@ -45,22 +53,25 @@ class Greedy:
             self._tree.add(state, before)
             if self._encoded.is_goal(state):
                 return self._tree.moves_to(state)
-            self._expand(state)
+            self._expand(state, before)
             effort -= relaxation_effort
             if effort < 0:
                 return Standing.OPEN
             reached = self._next()
         return Standing.EXHAUSTED
 
-    def _expand(self, state: State) -> None:
+    def _expand(self, state: State, before: tuple[State, int] | None) -> None:
         estimate = self._relaxation.estimate(state)
         if estimate is None:
             return
-        if estimate.distance < self._nearest:
-            self._nearest = estimate.distance
+        met = self._landmarks.met(self._met[before[0]] if before else 0, state)
+        self._met[state] = met
+        distance = estimate.distance + _PER_LANDMARK * self._landmarks.left(met, state)
+        if distance < self._nearest:
+            self._nearest = distance
             self._turn -= _BOOST
-        self._preferred.push(estimate.distance, state, estimate.preferred)
-        self._all.push(estimate.distance, state, estimate.applicable)
+        self._preferred.push(distance, state, estimate.preferred)
+        self._all.push(distance, state, estimate.applicable)
 
     def _next(self) -> tuple[State, tuple[State, int]] | None:
         """A state that was not reached before; None when there is none left."""

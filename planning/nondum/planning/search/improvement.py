@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from heapq import heappop, heappush
 
+from nondum.planning.search.changes import Changes
 from nondum.planning.search.encoding import Encoded, State
 from nondum.planning.search.relaxation import Relaxation
 from nondum.planning.search.tree import Moves
@@ -48,13 +49,13 @@ class Improvement:
     It can be gone on with, and ends with a best plan of all where there is nothing left to look at.
     """
 
-    def __init__(self, encoded: Encoded, plan: Moves) -> None:
+    def __init__(self, encoded: Encoded, changes: Changes, plan: Moves) -> None:
         self.plan = plan
         """The best one so far."""
         self._encoded = encoded
         self._costs = [move.cost * _SCALE + 1 for move in encoded.moves]
         self._bound = sum(self._costs[index] for index in plan)
-        self._relaxation = Relaxation(encoded, self._costs)
+        self._relaxation = Relaxation(encoded, changes, self._costs)
         self._ways: dict[State, tuple[int, State, int]] = {encoded.init: (0, encoded.init, -1)}
         """State → cost of the best way to it, the state before it, and the move between."""
         self._open: list[tuple[int, int, State, int]] = []

@@ -34,30 +34,24 @@ class Estimate:
 class Relaxation:
     """Evaluates the states of one task."""
 
-    def __init__(self, encoded: Encoded, costs: Sequence[int] | None = None) -> None:
-        """`costs` are those of the moves; 1 each where left out."""
-        self._encoded = encoded
-        self._costs = costs or [1] * len(encoded.moves)
-        self._changes = changes = Changes(encoded)
-        self._bits = BitTable(changes.facts)
+    def __init__(self, encoded: Encoded, changes: Changes, costs: Sequence[int]) -> None:
+        """`costs` are those of the moves."""
+        self._width = encoded.width
+        self._costs = costs
+        self._changes = changes
         self._unmet = [
             len(needs) * _UNMET + (self._costs[move] if move != RULE else 0)
             for needs, move in zip(changes.needs, changes.moves, strict=True)
         ]
         self._unreached = [_UNMET] * changes.facts
-        needing: list[list[int]] = [[] for _ in range(changes.facts)]
-        for change, needs in enumerate(changes.needs):
-            for fact in needs:
-                needing[fact].append(change)
-        self._needing = tuple(map(tuple, needing))
         self.effort = sum(map(len, changes.needs)) + sum(map(len, changes.gives))
         """How much work an estimate is, at most."""
 
     def estimate(self, state: State) -> Estimate | None:
         """Estimate the way from a state to the goal. None: there is none, for certain."""
-        changes, needing = self._changes, self._needing
-        gives, goal = changes.gives, changes.goal
-        true = self._bits.of(state | (~state & changes.negated) << self._encoded.width)
+        changes = self._changes
+        needing, gives, goal = changes.needing, changes.gives, changes.goal
+        true = changes.facts_of(state)
         cost, unmet = self._unreached[:], self._unmet[:]
         for fact in true:
             cost[fact] = 0
@@ -121,26 +115,6 @@ class Relaxation:
         """The bits of those facts that are bits of a state."""
         total = 0
         for fact in facts:
-            if fact < self._encoded.width:
+            if fact < self._width:
                 total |= 1 << fact
         return total
-
-
-class BitTable:
-    """Lists the bits of a mask byte by byte: quicker than bit by bit."""
-
-    def __init__(self, width: int) -> None:
-        self._bytes = (width + 7) // 8
-        self._lists: dict[tuple[int, int], tuple[int, ...]] = {}
-        self._table = [
-            [tuple(8 * i + b for b in range(8) if byte >> b & 1) for byte in range(256)]
-            for i in range(self._bytes)
-        ]
-
-    def of(self, mask: int) -> list[int]:
-        """The positions of a mask's bits, lowest first."""
-        found: list[int] = []
-        for table, byte in zip(self._table, mask.to_bytes(self._bytes, "little"), strict=True):
-            if byte:
-                found += table[byte]
-        return found

@@ -6,9 +6,11 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 from nondum.planning.relaxed import quick_answer
+from nondum.planning.search.changes import Changes
 from nondum.planning.search.encoding import Encoded, encode
 from nondum.planning.search.greedy import Greedy
 from nondum.planning.search.improvement import Improvement, eliminated
+from nondum.planning.search.landmarks import Landmarks
 from nondum.planning.search.relaxation import Relaxation
 from nondum.planning.search.tree import Moves, Standing
 from nondum.planning.search.widths import Widths
@@ -35,37 +37,49 @@ def solve(task: GroundTask, is_over: IsOver) -> Answer:
     if (known := quick_answer(task)) is not None:
         return known
     encoded = encode(task)
-    found = _searched(encoded, is_over)
+    changes = Changes(encoded)
+    found = _searched(encoded, changes, is_over)
     match found:
         case Standing.EXHAUSTED:
             return Unsolvable("exhausted")
         case Standing.OPEN:
             return GaveUp("the time was up")
-    plan = _improved(encoded, eliminated(encoded, found), is_over)
+    plan = _improved(encoded, changes, eliminated(encoded, found), is_over)
     steps = tuple(encoded.moves[index].action for index in plan)
     return Plan(steps, sum(task.actions[step].cost for step in steps))
 
 
-def _searched(encoded: Encoded, is_over: IsOver) -> Moves | Standing:
-    relaxation = Relaxation(encoded)
-    greedy = Greedy(encoded, relaxation)
+def _searched(encoded: Encoded, changes: Changes, is_over: IsOver) -> Moves | Standing:
+    relaxation = Relaxation(encoded, changes, [1] * len(encoded.moves))
+    landmarks = Landmarks(encoded, changes)
+    greedy = Greedy(encoded, relaxation, landmarks)
     widths: Widths | None = None
     turn = _FIRST_TURN
     while True:
-        for search in (greedy, widths or (widths := Widths(encoded, relaxation))):
-            for _ in range(turn):
-                if is_over():
-                    return Standing.OPEN
-                found = search.advance(_SLICE)
-                if found is not Standing.OPEN:
-                    return found
+        found = _advanced(greedy, turn, is_over)
+        if found is Standing.OPEN and not is_over():
+            widths = widths or Widths(encoded, relaxation, landmarks)
+            found = _advanced(widths, turn, is_over)
+        if found is not Standing.OPEN or is_over():
+            return found
         turn += (turn + 1) // 2
 
 
-def _improved(encoded: Encoded, plan: Moves, is_over: IsOver) -> Moves:
+def _advanced(search: Greedy | Widths, turn: int, is_over: IsOver) -> Moves | Standing:
+    """Have a search take its turn."""
+    for _ in range(turn):
+        if is_over():
+            break
+        found = search.advance(_SLICE)
+        if found is not Standing.OPEN:
+            return found
+    return Standing.OPEN
+
+
+def _improved(encoded: Encoded, changes: Changes, plan: Moves, is_over: IsOver) -> Moves:
     if len(encoded.moves) > _IMPROVED_MOVES:
         return plan
-    search = Improvement(encoded, plan)
+    search = Improvement(encoded, changes, plan)
     for _ in range(_IMPROVED_SLICES):
         if is_over() or search.advance(_SLICE):
             break

@@ -1,7 +1,7 @@
 """Best-first width search: states with a fact that is new among their like first, and among them
-those that meet more of the goal. Cheap: few states are estimated.
+those with fewer landmarks to come. Cheap: few states are estimated.
 
-Source: Lipovetzky and Geffner 2017, BFWS(f5).
+Source: Lipovetzky and Geffner 2017, BFWS(f5), with landmarks in place of goals.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from heapq import heappop, heappush
 
 from nondum.planning.search.encoding import Encoded, State
+from nondum.planning.search.landmarks import Landmarks
 from nondum.planning.search.relaxation import Relaxation
 from nondum.planning.search.successors import Successors
 from nondum.planning.search.tree import Moves, Standing, Tree
@@ -22,25 +23,28 @@ _PER_STATE = 60
 class _Way:
     """How far a state has come."""
 
-    unmet: int
-    """Goal facts that do not hold."""
-    wanted: int
-    """The facts that a relaxed plan makes true, from where `unmet` was last lowered."""
+    left: int
+    """Landmarks to come."""
     met: int
+    """Landmarks met."""
+    wanted: int
+    """The facts that a relaxed plan makes true, from where `left` was last lowered."""
+    held: int
     """Those of them that held since."""
 
 
 class Widths:
     """A search that can be gone on with."""
 
-    def __init__(self, encoded: Encoded, relaxation: Relaxation) -> None:
+    def __init__(self, encoded: Encoded, relaxation: Relaxation, landmarks: Landmarks) -> None:
         self._encoded = encoded
         self._relaxation = relaxation
+        self._landmarks = landmarks
         self._successors = Successors(encoded)
         self._tree = Tree()
         self._open: list[tuple[bool, int, int, State, _Way]] = []
         self._seen: dict[tuple[int, int], int] = {}
-        """Facts that held in some state, by goal facts unmet and wanted facts met."""
+        """Facts that held in some state, by landmarks to come and how many wanted facts held."""
         self._per_state = _PER_STATE + 2 * sum(len(stage.clauses) for stage in encoded.stages)
         self._count = 0
         self._effort = 0
@@ -66,20 +70,20 @@ class Widths:
 
     def _reach(self, state: State, before: tuple[State, int] | None, way: _Way | None) -> None:
         self._tree.add(state, before)
-        unmet = (self._encoded.goal & ~state).bit_count()
-        if way is None or unmet < way.unmet:
+        met = self._landmarks.met(way.met if way else 0, state)
+        left = self._landmarks.left(met, state)
+        if way is None or left < way.left:
             estimate = self._relaxation.estimate(state)
             self._effort -= self._relaxation.effort
             if estimate is None:
                 return
-            wanted = self._relaxation.mask(estimate.wanted)
-            way = _Way(unmet, wanted, 0)
+            way = _Way(left, met, self._relaxation.mask(estimate.wanted), 0)
         else:
-            way = _Way(unmet, way.wanted, way.met | state & way.wanted)
-        like = (unmet, way.met.bit_count())
+            way = _Way(left, met, way.wanted, way.held | state & way.wanted)
+        like = (left, way.held.bit_count())
         seen = self._seen.get(like, 0)
         is_known = not state & ~seen
         if not is_known:
             self._seen[like] = seen | state
         self._count += 1
-        heappush(self._open, (is_known, unmet, self._count, state, way))
+        heappush(self._open, (is_known, left, self._count, state, way))
