@@ -54,7 +54,7 @@ class Questions:
             "host": snapshot.host,
             "revision": snapshot.revision,
             "state": host_state(snapshot),
-            "warnings": list(self.warnings),
+            "warnings": [*self.warnings, *map(_kept_out, self.mind.views.kept_out())],
             "payloads": [payload_row(p, self.news.progress(p.key)) for p in snapshot.payloads],
             "drives": [drive_row(drive) for drive in snapshot.drives],
             "goals": self.mind.views.given(),
@@ -182,3 +182,7 @@ class Questions:
                 task.cancel()
             await asyncio.gather(*waiting, return_exceptions=True)
         return self.mind.version, self.news.version
+
+
+def _kept_out(row: Row) -> str:
+    return f"{row['component']} is kept out of planning: {row['problem']}"

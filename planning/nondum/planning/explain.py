@@ -56,7 +56,7 @@ def explain(
     """
     believed = frozenset(facts)
     part = concern(merged, goal)
-    known = [text for text in believed if predicate_of(text) in part.read]
+    known = [text for text in believed if predicate_of(text) in part.wishes.read]
     found = explore(part.merged, known, objects)
     draft = drafted(part.merged, found, goal)
     reachable = Relations()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import re
 from dataclasses import replace
 
 import pytest
@@ -108,7 +109,8 @@ async def test_goal_whose_words_went_names_who_brought_them(robot: Robot) -> Non
     await robot.until_goal("suspended")
     [problem] = robot.mind.queue["1"].problems
     assert str(problem) == (
-        "WHY_WORDS_GONE 'lit' means nothing without lamp, which brought it → plug in lamp"
+        "WHY_WORDS_GONE 'lit' means nothing without lamp, which brought it"
+        " → plug in org.example.lamp"
     )
     robot.plug(lamp)
     await robot.until_holding()
@@ -339,23 +341,74 @@ async def test_conflicting_component_is_named(robot: Robot) -> None:
 KNOBS = " ".join(f"k{number}" for number in range(40))
 TOO_WIDE = f"""(define (domain knobs) (:types knob - object) (:constants {KNOBS} - knob)
     (:predicates (turned ?a ?b ?c - knob))
-    (:action turn :parameters (?u - speaker ?a ?b ?c ?d - knob)
-                  :precondition (ready ?u) :effect (turned ?a ?b ?c)))"""
+    (:action turn :parameters (?u - speaker ?a ?b ?c ?d - knob ?h - host ?k - class)
+                  :precondition (ready ?u) :effect (and (turned ?a ?b ?c) (following ?h ?k))))"""
+
+
+def plug_knobs(robot: Robot) -> None:
+    """A plugin that says its thousands of knobs make the robot follow."""
+    (report,) = SPEAKER.behaviours
+    action = "(turn ?u - speaker ?a ?b ?c ?d - knob ?h - host ?k - class)"
+    turn = replace(report, name="turn", action=action, phrases=())
+    fragment = Fragment("domain.pddl", TOO_WIDE)
+    robot.plug(replace(SPEAKER, name="knobs", fragments=(fragment,), behaviours=(turn,)))
 
 
 async def test_words_with_too_many_bindings_disturb_no_plan(robot: Robot) -> None:
     await follow(robot)
-    (report,) = SPEAKER.behaviours
-    turn = replace(report, name="turn", action="(turn ?u - speaker ?a ?b ?c ?d - knob)", phrases=())
-    fragment = Fragment("domain.pddl", TOO_WIDE)
-    robot.plug(replace(SPEAKER, name="knobs", fragments=(fragment,), behaviours=(turn,)))
+    plug_knobs(robot)
     await robot.until_holding()
     assert robot.started.count("drive") <= 1
     assert robot.running == {"recorded-camera.stream", *CHAIN}
-    robot.mind.give(pddl=FOLLOW, priority=1)  # asks for a task of its own
-    await robot.until_goal("suspended", "2")
-    assert [p.code for p in robot.mind.queue["2"].problems] == ["PDDL_TOO_MANY"]
-    assert "knobs 1.0 domain.pddl:3" in str(robot.mind.queue["2"].problems[0])
+
+
+async def test_component_with_too_many_bindings_is_kept_out_alone(robot: Robot) -> None:
+    plug_followers(robot)
+    plug_knobs(robot)
+    robot.mind.give(pddl=FOLLOW, kind="maintain")
+    await robot.until_holding()
+    assert robot.running == {"recorded-camera.stream", *CHAIN}
+    told = [text for text in robot.told if text.startswith("knobs is kept out of planning")]
+    assert len(told) == 1
+    [row] = robot.mind.views.kept_out()
+    assert row["component"] == "knobs"
+    assert row["problem"].startswith("PDDL_TOO_MANY knobs 1.0 domain.pddl:3")
+    assert row["problem"] in robot.mind.views.why()["problems"]
+    robot.unplug("knobs")
+    await robot.until_holding()
+    assert robot.mind.views.kept_out() == []
+
+
+async def test_goal_that_only_a_component_kept_out_serves_says_so(robot: Robot) -> None:
+    plug_knobs(robot)
+    robot.mind.give(pddl="(turned k1 k2 k3)")
+    await robot.until_goal("suspended")
+    assert [p.code for p in robot.mind.queue["1"].problems] == ["PDDL_TOO_MANY"]
+
+
+async def test_what_failed_is_told_with_its_last_reason(robot: Robot) -> None:
+    robot.broken.add("recorded-camera")
+    plug_followers(robot)
+    robot.mind.give(pddl=FOLLOW, kind="maintain")
+    await robot.until_goal("suspended")
+    [problem] = robot.mind.queue["1"].problems
+    assert problem.code == "NO_OTHER_WAY"
+    assert "recorded-camera.stream" in problem.message
+    assert problem.message.endswith("failed 3 times: no light")
+
+
+async def test_pulled_camera_is_told_with_the_payload_that_brings_it_back(robot: Robot) -> None:
+    await follow(robot)
+    robot.unplug("recorded-camera")
+    await robot.until_goal("suspended")
+    [told] = [text for text in robot.told if text.startswith("cannot")]
+    assert re.fullmatch(
+        r"cannot '\(following self person\)' now: there is no image, which people-detector\.detect"
+        r" needs, for visual-tracker\.track, for mobile-base\.drive,"
+        r" for \(following rover person\); recorded-camera used to supply it, until \d\d:\d\d:\d\d"
+        r" → plug in org\.example\.recorded-camera",
+        told,
+    )
 
 
 async def test_flood_of_news_costs_few_ticks(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:

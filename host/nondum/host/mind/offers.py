@@ -11,8 +11,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any, TypeAlias
 
 from nondum.host.mind.composition import Composition
-from nondum.host.mind.search import Situation, why_not
-from nondum.planning.contribution import Contribution
+from nondum.host.mind.diagnosis import Seen, why_not
 from nondum.planning.domain import bind
 from nondum.planning.exploration import explore
 from nondum.planning.goal import Goal, goal_text
@@ -52,7 +51,7 @@ def offers(
     composition: Composition,
     facts: frozenset[str],
     bare_facts: frozenset[str],
-    seen: Iterable[Contribution],
+    seen: Iterable[Seen],
 ) -> list[Row]:
     """Each sentence: `words`, `goal`, `kind`, `now`, `lacks`, `from` (components).
 
@@ -129,7 +128,7 @@ class _Outlook:
         composition: Composition,
         facts: frozenset[str],
         bare_facts: frozenset[str],
-        seen: tuple[Contribution, ...],
+        seen: tuple[Seen, ...],
     ) -> None:
         self._composition, self._seen = composition, seen
         self._facts, self._bare = facts, bare_facts
@@ -160,6 +159,5 @@ class _Outlook:
         self._explained += 1
         if self._explained > MOST_EXPLAINED:
             return []
-        now = Situation("", self._composition.revision, self._bare, frozenset())
-        problems = why_not(self._composition, goal, now, self._seen)
+        problems = why_not(self._composition.merged, goal, self._bare, self._seen)
         return [problem.message for problem in problems]

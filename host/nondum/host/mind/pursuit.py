@@ -8,24 +8,24 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from nondum.host.events import Emit, GoalEnded, GoalReached, PlanMade, PlanMissing
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition
+from nondum.host.mind.diagnosis import Seen, noted
 from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState
 from nondum.host.mind.people import People
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.runner import BehaviourRunner
-from nondum.host.mind.search import NoPlan, Planned, Situation, search, task_of
+from nondum.host.mind.search import NoPlan, Past, Planned, Situation, search, task_of
 from nondum.planning.attempts import Patience
-from nondum.planning.contribution import Contribution
 from nondum.planning.goal import parse_goal
 from nondum.planning.plain import plain
 from nondum.planning.replay import beginning_at, replayed
 from nondum.planning.running import Run
-from nondum.planning.task_control import Phase
+from nondum.planning.task_control import Phase, TaskControl
 from nondum.planning.task_tree import TaskTree
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
 from nondum.sdk.planner import GroundTask, Plan
@@ -69,6 +69,7 @@ class Pursuit:
         people: People,
         emit: Emit,
         now_s: Callable[[], float],
+        wall_s: Callable[[], float],
         deadline_s: float,
         patience: Patience,
         wake: Callable[[], None],
@@ -82,11 +83,14 @@ class Pursuit:
         self._people = people
         self._emit = emit
         self._now_s = now_s
+        self._wall_s = wall_s
         self._deadline_s = deadline_s
         self._patience = patience
         self._wake = wake
         self._composition: Composition | None = None
-        self._seen: dict[str, Contribution] = {}
+        self._seen: dict[str, Seen] = {}
+        self._left_out: dict[str, Problem] = {}
+        self._failures: dict[str, str] = {}
         self._search: asyncio.Task[Planned | NoPlan] | None = None
         self._searched_for: Situation | None = None
         self._tried: dict[str, Situation] = {}
@@ -99,9 +103,14 @@ class Pursuit:
         return self.current.tree if self.current else None
 
     @property
-    def seen(self) -> tuple[Contribution, ...]:
-        """What every component that was ever here brought to planning, as it was last."""
+    def seen(self) -> tuple[Seen, ...]:
+        """Every component that was ever here, as it was last."""
         return tuple(self._seen.values())
+
+    @property
+    def left_out(self) -> tuple[tuple[str, Problem], ...]:
+        """The components that are not planned with, for they have too many ways to act."""
+        return tuple(sorted(self._left_out.items()))
 
     @property
     def runs(self) -> tuple[Run, ...]:
@@ -139,8 +148,11 @@ class Pursuit:
 
     def adopt(self, composition: Composition) -> None:
         """Go on with the plan in a new composition if it still works there."""
+        before = self._composition.contributions if self._composition else ()
+        if not set(before) <= set(composition.contributions):  # what is left may be small enough
+            self._left_out.clear()
         self._composition = composition
-        self._seen |= {c.component: c for c in composition.contributions}
+        self._seen = noted(self._seen, composition, self._wall_s())
         self._excluded_until_s.clear()
         current = self.current
         if current is None:
@@ -203,7 +215,7 @@ class Pursuit:
         """Whether a goal has a plan that goes on, or will have one soon."""
         current = self.current
         if current is not None and current.goal == wanted.id:
-            self._exclude(current.tree.control.exhausted)
+            self._exclude(current.tree.control)
             if not current.is_outdated and current.tree.needs_replan is None:
                 self._cancel_search()
                 return True
@@ -211,9 +223,10 @@ class Pursuit:
             self._situation(wanted.id)
         )
 
-    def _exclude(self, names: tuple[str, ...]) -> None:
+    def _exclude(self, control: TaskControl) -> None:
         now_s = self._now_s()
-        for name in names:
+        for name in control.exhausted:
+            self._failures[name] = control.attempts.given_up(name) or ""
             if self._excluded_until_s.get(name, 0.0) <= now_s:
                 self._excluded_until_s[name] = now_s + COOL_DOWN_S
 
@@ -232,7 +245,7 @@ class Pursuit:
                 wanted,
                 situation,
                 deadline_s=self._deadline_s,
-                seen=self.seen,
+                past=Past(self.seen, dict(self._failures), dict(self._left_out)),
             )
         )
         self._search.add_done_callback(lambda _: self._wake())
@@ -257,12 +270,19 @@ class Pursuit:
         if self.queue[goal].state.is_final or not found.situation.is_like(self._situation(goal)):
             return
         self._tried[goal] = found.situation
+        self._note_left_out(found.left_out)
         if isinstance(found, NoPlan):
             self._suspend(found)
         elif self._still_works(found):
             self._take_up(found)
         else:
             del self._tried[goal]  # the world has moved on; `step` searches again
+
+    def _note_left_out(self, left_out: Mapping[str, Problem]) -> None:
+        for component, problem in left_out.items():
+            if component not in self._left_out:
+                self._people.tell(f"{component} is kept out of planning: {problem}")
+        self._left_out = dict(left_out)
 
     def _outcome(
         self, search: asyncio.Task[Planned | NoPlan], asked: Situation

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import re
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 from nondum.host.mind.composition import Composition
+from nondum.host.mind.diagnosis import Seen, why_not, words_gone
 from nondum.host.mind.goals import GivenGoal
 from nondum.host.mind.planners import Planners
-from nondum.planning.claims import claims_of
-from nondum.planning.contribution import Contribution
-from nondum.planning.explain import explain, suppliers
+from nondum.planning.domain import Merged
 from nondum.planning.exploration import INSTANCES_LIMIT
-from nondum.planning.goal import Goal, parse_goal
+from nondum.planning.goal import Goal, goal_problems, parse_goal
 from nondum.planning.ground import ground
+from nondum.planning.oversize import Fitted, fitted
 from nondum.planning.partial_order import causal_links, threats
 from nondum.planning.plain import plain
 from nondum.planning.pricing import at_own_cost, handicaps, priced
@@ -60,6 +59,8 @@ class Planned:
     plan: Plan
     planner: str = ""
     took_s: float = 0.0
+    left_out: Mapping[str, Problem] = field(default_factory=dict)
+    """Components that were not planned with, for they have too many ways to act."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -73,6 +74,20 @@ class NoPlan:
 
     situation: Situation
     problems: tuple[Problem, ...]
+    left_out: Mapping[str, Problem] = field(default_factory=dict)
+    """Components that were not planned with, for they have too many ways to act."""
+
+
+@dataclass(frozen=True, slots=True)
+class Past:
+    """What is remembered from before a search."""
+
+    seen: tuple[Seen, ...] = ()
+    """The components that are or were here: they may bring what is missing."""
+    failures: Mapping[str, str] = field(default_factory=dict)
+    """Actions that are excluded, and how they failed."""
+    left_out: Mapping[str, Problem] = field(default_factory=dict)
+    """Components that are known to have too many ways to act."""
 
 
 def task_of(
@@ -83,9 +98,7 @@ def task_of(
     Raises `FragmentRefused` (PDDL_TOO_MANY) for more than `limit` bound actions; up to `AT_ONCE`
     of them are made in a time that the loop can spare.
     """
-    task = ground(composition.merged, situation.facts, goal.expr, limit=limit)
-    kept = tuple(a for a in task.actions if a.name not in situation.excluded)
-    return replace(task, actions=kept)
+    return _task(composition.merged, goal, situation, limit=limit)
 
 
 async def search(
@@ -95,20 +108,38 @@ async def search(
     situation: Situation,
     *,
     deadline_s: float,
-    seen: Iterable[Contribution] = (),
+    past: Past | None = None,
 ) -> Planned | NoPlan:
     """Find a plan, or say why there is none.
 
-    `seen` are contributions of components that were here once: they may be what is missing.
+    A component with too many ways to act is left out of the task, and told of in the answer.
     """
+    past = past or Past()
     try:
         goal = parse_goal(given.pddl, composition.merged, kind=given.kind)
     except GoalRefused as refused:
-        return NoPlan(situation, words_gone(composition, given, seen) or refused.problems)
+        gone = words_gone(composition.merged, given.pddl, past.seen)
+        return NoPlan(situation, gone or refused.problems)
     try:
-        task = await _task_of_any_size(composition, goal, situation)
+        fit = await _task_of_any_size(composition, goal, situation, past.left_out)
     except FragmentRefused as refused:
         return NoPlan(situation, refused.problems)
+    found = await _searched(planners, composition, goal, situation, deadline_s, past, fit)
+    return replace(found, left_out=fit.left_out)
+
+
+async def _searched(
+    planners: Planners,
+    composition: Composition,
+    goal: Goal,
+    situation: Situation,
+    deadline_s: float,
+    past: Past,
+    fit: Fitted[GroundTask | None],
+) -> Planned | NoPlan:
+    task, too_big = fit.made, tuple(fit.left_out.values())
+    if task is None:
+        return NoPlan(situation, too_big)
     handicap = handicaps(composition.contributions, composition.host)
     found = await planners.plan(priced(task, handicap), deadline_s)
     match found.answer:
@@ -117,21 +148,24 @@ async def search(
             return Planned(situation, task, nothing, took_s=found.took_s)
         case Plan() as dear:
             task, plan = plain(task, at_own_cost(task, dear))
-            if problem := cut_short(composition, task, plan):
+            if problem := cut_short(composition.merged, task, plan):
                 return NoPlan(situation, (problem,))
             return Planned(situation, task, plan, found.planner, found.took_s)
         case GaveUp(why):
+            message = f"it is not known whether there is a plan: {why}"
             fix = "ask again with a longer planning.deadline_s, or for less"
-            problem = Problem("NO_ANSWER", f"no planner found a plan: {why}", fix=fix)
-            return NoPlan(situation, (problem,))
+            return NoPlan(situation, (Problem("NO_ANSWER", message, fix=fix), *too_big))
         case Unsolvable():
-            problems = await asyncio.to_thread(why_not, composition, goal, situation, tuple(seen))
-            return NoPlan(situation, problems)
+            failures = {name: past.failures.get(name, "") for name in situation.excluded}
+            problems = await asyncio.to_thread(
+                why_not, fit.merged, goal, situation.facts, past.seen, failures
+            )
+            return NoPlan(situation, (*problems, *too_big))
 
 
-def cut_short(composition: Composition, task: GroundTask, plan: Plan) -> Problem | None:
+def cut_short(merged: Merged, task: GroundTask, plan: Plan) -> Problem | None:
     """What is wrong with a plan that ends a lasting behaviour before its effects are used."""
-    steps = steps_of(task, plan, composition.merged.lasting())
+    steps = steps_of(task, plan, merged.lasting())
     found = threats(steps, causal_links(steps, words(task, task.goal)))
     if not found:
         return None
@@ -140,60 +174,28 @@ def cut_short(composition: Composition, task: GroundTask, plan: Plan) -> Problem
     return Problem("PLAN_CUT_SHORT", message)
 
 
-def why_not(
-    composition: Composition, goal: Goal, situation: Situation, seen: Iterable[Contribution]
-) -> tuple[Problem, ...]:
-    """What is missing for a goal that cannot be reached, and who used to supply it."""
-    diagnosis = explain(composition.merged, situation.facts, goal.expr)
-    if situation.excluded and not diagnosis.causes:
-        names = ", ".join(sorted(situation.excluded))
-        message = f"there is no way without what failed again and again: {names}"
-        return (Problem("NO_OTHER_WAY", message, fix="it is tried again after a while"),)
-    gone = _gone(composition, suppliers(diagnosis.causes, seen))
-    problems = diagnosis.problems()
-    if gone:
-        names = ", ".join(sorted({c.component for c in gone}))
-        problems += (Problem("WHY_SUPPLIER", f"{names} used to supply it", fix=f"plug in {names}"),)
-    return problems
-
-
-def words_gone(
-    composition: Composition, given: GivenGoal, seen: Iterable[Contribution]
-) -> tuple[Problem, ...]:
-    """Which of a goal's words mean nothing any more, and who brought them. Empty: none."""
-    merged = composition.merged
-    lost = {*re.findall(r"[^\s()]+", given.pddl)} - {*merged.domain.predicates, *merged.objects}
-    brought = {c.component: lost & _names(c) for c in _gone(composition, seen)}
-    words = ", ".join(sorted({repr(word) for found in brought.values() for word in found}))
-    names = ", ".join(sorted(component for component, found in brought.items() if found))
-    if not words:
-        return ()
-    message = f"{words} means nothing without {names}, which brought it"
-    return (Problem("WHY_WORDS_GONE", message, fix=f"plug in {names}"),)
-
-
-def _names(contribution: Contribution) -> set[str]:
-    """The predicates and objects that a contribution declares."""
-    claims = claims_of(contribution)
-    return {
-        *(predicate.name for predicate in claims.predicates),
-        *(claim.name for claim in claims.objects),
-        *(unit.object for unit in contribution.units),
-        *(stream.object for stream in contribution.streams),
-    }
-
-
-def _gone(composition: Composition, seen: Iterable[Contribution]) -> list[Contribution]:
-    """Those that are not here now."""
-    present = {contribution.component for contribution in composition.contributions}
-    return [contribution for contribution in seen if contribution.component not in present]
-
-
 async def _task_of_any_size(
-    composition: Composition, goal: Goal, situation: Situation
-) -> GroundTask:
-    """The task, made at once where that is short, in a thread where it would hold up the loop."""
-    if len(composition.contributions) <= SMALL:
+    composition: Composition, goal: Goal, situation: Situation, left_out: Mapping[str, Problem]
+) -> Fitted[GroundTask | None]:
+    """The task, made at once where that is short, in a thread where it would hold up the loop.
+
+    It is without the components that make it too big; None where the goal's words are theirs.
+    """
+    if len(composition.contributions) <= SMALL and not left_out:
         with contextlib.suppress(FragmentRefused):
-            return task_of(composition, goal, situation)
-    return await asyncio.to_thread(task_of, composition, goal, situation, limit=INSTANCES_LIMIT)
+            return Fitted(task_of(composition, goal, situation), composition.merged, {})
+
+    def make(merged: Merged) -> GroundTask | None:
+        if merged is not composition.merged and goal_problems(goal, merged):
+            return None
+        return _task(merged, goal, situation, limit=INSTANCES_LIMIT)
+
+    return await asyncio.to_thread(
+        fitted, composition.contributions, composition.merged, make, left_out
+    )
+
+
+def _task(merged: Merged, goal: Goal, situation: Situation, *, limit: int) -> GroundTask:
+    task = ground(merged, situation.facts, goal.expr, limit=limit)
+    kept = tuple(a for a in task.actions if a.name not in situation.excluded)
+    return replace(task, actions=kept)

@@ -131,7 +131,7 @@ class Views:
                 problems += [str(problem) for problem in goal.problems]
         return {
             "sentences": sentences or ["nothing is asked for"],
-            "problems": problems + self._quarantined() + self._conflicts(),
+            "problems": problems + [row["problem"] for row in self.kept_out()] + self._conflicts(),
             "told": [told.text for told in self._mind.people.since(self._last_few())],
         }
 
@@ -202,10 +202,13 @@ class Views:
     def _last_few(self) -> int:
         return max(0, self._mind.people.last_number - 5)
 
-    def _quarantined(self) -> list[str]:
+    def kept_out(self) -> list[Row]:
+        """The components that are not planned with: `component`, `problem`."""
         composition = self._mind.composition
-        found = composition.merged.quarantined.values() if composition else ()
-        return [str(problem) for problems in found for problem in problems]
+        found = composition.merged.quarantined.items() if composition else ()
+        rows = [(name, problem) for name, problems in found for problem in problems]
+        rows += self._mind.pursuit.left_out
+        return [{"component": name, "problem": str(problem)} for name, problem in rows]
 
     def _conflicts(self) -> list[str]:
         return [str(problem) for problem in self._mind.beliefs.world.conflicts()]

@@ -1,0 +1,123 @@
+"""Why a goal cannot be had, and who used to supply what it lacks."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from nondum.host.mind.composition import Composition
+from nondum.planning.claims import claims_of
+from nondum.planning.contribution import Contribution
+from nondum.planning.domain import Merged
+from nondum.planning.explain import explain, suppliers
+from nondum.planning.goal import Goal
+from nondum.planning.search import solve
+from nondum.sdk.errors import FragmentRefused, Problem
+from nondum.sdk.planner import Answer, GroundTask
+
+_TRIAL_S = 0.3
+"""How long a part of a goal is planned for, to see whether it can be had by itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A component that is here, or was."""
+
+    contribution: Contribution
+    payload: str
+    """Id of the payload that brings it, with its version."""
+    left_wall_s: float | None = None
+    """When it went, in seconds since 1970; None while it is here."""
+
+
+def noted(seen: Mapping[str, Seen], composition: Composition, wall_s: float) -> dict[str, Seen]:
+    """What is remembered of components once a composition was seen; later ones replace earlier."""
+    payloads = {payload.key: payload for payload in composition.snapshot.payloads}
+    present: dict[str, Seen] = {}
+    for contribution in composition.contributions:
+        record = composition.snapshot.component(contribution.component)
+        payload = payloads.get(record.payload) if record else None
+        name = record.payload_id if record else contribution.component
+        present[contribution.component] = Seen(
+            contribution, f"{name} {payload.version}" if payload else name
+        )
+    gone = {
+        name: Seen(known.contribution, known.payload, known.left_wall_s or wall_s)
+        for name, known in seen.items()
+        if name not in present
+    }
+    return {**gone, **present}
+
+
+def why_not(
+    merged: Merged,
+    goal: Goal,
+    facts: frozenset[str],
+    seen: Iterable[Seen],
+    failures: Mapping[str, str] | None = None,
+) -> tuple[Problem, ...]:
+    """What is missing for a goal that cannot be reached, and who used to supply it.
+
+    `failures` are the actions that must not be planned with, and how they failed. Takes its time.
+    """
+    try:
+        diagnosis = explain(merged, facts, goal.expr, search=_tried_out)
+    except FragmentRefused as refused:
+        return refused.problems
+    if failures and not diagnosis.causes:
+        reasons = "; ".join(f"{name} {failures[name]}" for name in sorted(failures))
+        message = f"there is no way without what failed again and again: {reasons}"
+        return (Problem("NO_OTHER_WAY", message, fix="it is tried again after a while"),)
+    gone = {known.contribution: known for known in seen if known.left_wall_s is not None}
+    brought = [gone[contribution] for contribution in suppliers(diagnosis.causes, gone)]
+    return (*diagnosis.problems(), *_used_to_supply(brought))
+
+
+def _used_to_supply(gone: Iterable[Seen]) -> Iterable[Problem]:
+    """One problem, for people look for a fix in the last one; none where nobody did."""
+    known = sorted(gone, key=lambda seen: seen.contribution.component)
+    if not known:
+        return ()
+    names = ", ".join(f"{s.contribution.component} used to supply it, {_until(s)}" for s in known)
+    return (Problem("WHY_SUPPLIER", names, fix=_plug_in(known)),)
+
+
+def _until(seen: Seen) -> str:
+    return f"until {time.strftime('%T', time.localtime(seen.left_wall_s))}"
+
+
+def _plug_in(gone: Iterable[Seen]) -> str:
+    payloads = dict.fromkeys(seen.payload for seen in gone)
+    return f"plug in {' or '.join(payloads)}"
+
+
+def words_gone(merged: Merged, pddl: str, seen: Iterable[Seen]) -> tuple[Problem, ...]:
+    """Which of a goal's words mean nothing any more, and who brought them. Empty: none."""
+    lost = {*re.findall(r"[^\s()]+", pddl)} - {*merged.domain.predicates, *merged.objects}
+    gone = [known for known in seen if known.left_wall_s is not None]
+    brought = [(known, lost & _names(known.contribution)) for known in gone]
+    words = ", ".join(sorted({repr(word) for _, found in brought for word in found}))
+    bringers = [known for known, found in brought if found]
+    if not words:
+        return ()
+    names = ", ".join(sorted(known.contribution.component for known in bringers))
+    message = f"{words} means nothing without {names}, which brought it"
+    return (Problem("WHY_WORDS_GONE", message, fix=_plug_in(bringers)),)
+
+
+def _names(contribution: Contribution) -> set[str]:
+    """The predicates and objects that a contribution declares."""
+    claims = claims_of(contribution)
+    return {
+        *(predicate.name for predicate in claims.predicates),
+        *(claim.name for claim in claims.objects),
+        *(unit.object for unit in contribution.units),
+        *(stream.object for stream in contribution.streams),
+    }
+
+
+def _tried_out(task: GroundTask) -> Answer:
+    until_s = time.monotonic() + _TRIAL_S
+    return solve(task, lambda: time.monotonic() > until_s)

@@ -1,0 +1,116 @@
+"""A component with too many ways to act is left out alone; the others are planned with."""
+
+from __future__ import annotations
+
+import pytest
+from tests.planning.fragments import brings
+from tests.planning.strangers import (
+    MOBILE_BASE,
+    PEOPLE_DETECTOR,
+    RECORDED_CAMERA,
+    ROVER,
+    VISUAL_TRACKER,
+    at_rest,
+    components,
+)
+
+from nondum.planning.contribution import Contribution
+from nondum.planning.domain import Merged
+from nondum.planning.exploration import INSTANCES_LIMIT, TooManyBindings
+from nondum.planning.goal import parse_goal
+from nondum.planning.ground import ground
+from nondum.planning.merge import merge
+from nondum.planning.oversize import Fitted, fitted
+from nondum.planning.search import solve
+from nondum.sdk.errors import Problem
+from nondum.sdk.planner import GroundTask, Plan
+
+FOLLOW = "(following self person)"
+
+
+def knobs(name: str, count: int, arguments: str, more: str = "") -> Contribution:
+    """A unit with so many knobs, which says that turning some of them makes the robot follow."""
+    names = " ".join(f"{name}{number}" for number in range(count))
+    body = f"""(:types {name}-knob - object) (:constants {names} - {name}-knob)
+    (:action turn :parameters (?u - speaker {arguments} - {name}-knob ?h - host ?c - class)
+      :precondition (and (ready ?u) {more}) :effect (following ?h ?c))"""
+    return brings(name, body, units={"panel": "speaker"})
+
+
+def fit(present: list[Contribution], goal: str = FOLLOW, limit: int = 2000) -> Fitted[GroundTask]:
+    merged = merge(present, ROVER)
+    assert not merged.quarantined, merged.quarantined
+    facts = at_rest(present, merged)
+
+    def make(found: Merged) -> GroundTask:
+        return ground(found, facts, parse_goal(goal, found).expr, limit=limit)
+
+    return fitted(present, merged, make)
+
+
+def followers() -> list[Contribution]:
+    return components([RECORDED_CAMERA, PEOPLE_DETECTOR, VISUAL_TRACKER, MOBILE_BASE])
+
+
+def test_oversized_component_is_left_out_alone() -> None:
+    found = fit([*followers(), knobs("wide", 30, "?x ?y ?z")])
+    assert set(found.left_out) == {"wide"}
+    assert found.left_out["wide"].code == "PDDL_TOO_MANY"
+    assert "wide 1.0 domain.pddl" in found.left_out["wide"].where
+    assert isinstance(solve(found.made, lambda: False), Plan)
+    assert {action.plugin for action in found.merged.domain.actions.values()} == {
+        c.plugin for c in followers()
+    }
+
+
+def test_real_oversized_fragment_is_left_out_at_the_hosts_limit() -> None:
+    found = fit([*followers(), knobs("wide", 60, "?x ?y ?z")], limit=INSTANCES_LIMIT)
+    assert set(found.left_out) == {"wide"}
+
+
+def test_bindings_that_are_looked_at_in_vain_count_too() -> None:
+    """Nothing is ever bound: all that is tried is excluded."""
+    letters = [f"?{letter}" for letter in "klmpqrst"]
+    never = "(or (reported ?c ?h) (exists (?t - target) (pointing ?h ?t)))"
+    apart = " ".join(f"(not (= {a} {b}))" for a in letters for b in letters if a < b)
+    in_vain = knobs("vain", 12, " ".join(letters), f"{apart} {never}")
+    found = fit([*followers(), in_vain])
+    assert set(found.left_out) == {"vain"}
+    assert "too many to look at" in found.left_out["vain"].message
+
+
+def test_derived_facts_count_too() -> None:
+    body = """(:types pin - object) (:predicates (linked ?a ?b ?c - pin))
+    (:derived (linked ?a ?b ?c - pin) (not (= ?a ?b)))
+    (:action join :parameters (?u - speaker ?h - host ?c - class ?p - pin)
+      :precondition (linked ?p ?p ?p) :effect (following ?h ?c))"""
+    pins = " ".join(f"pin{number}" for number in range(20))
+    wide = brings("wide", f"(:constants {pins} - pin) {body}", units={"panel": "speaker"})
+    assert set(fit([*followers(), wide]).left_out) == {"wide"}
+
+
+def test_who_is_merely_large_is_let_in_again() -> None:
+    """While the huge one is bound in part only, the large one looks widest."""
+    large = knobs("a-large", 11, "?x ?y ?z")
+    huge = knobs("b-huge", 40, "?x ?y ?z")
+    assert set(fit([*followers(), large, huge]).left_out) == {"b-huge"}
+
+
+def test_all_that_are_oversized_are_left_out() -> None:
+    both = [knobs("one", 30, "?x ?y ?z"), knobs("two", 40, "?x ?y ?z")]
+    assert set(fit([*followers(), *both]).left_out) == {"one", "two"}
+
+
+def test_what_concerns_no_goal_does_no_harm() -> None:
+    wide = knobs("wide", 30, "?x ?y ?z")
+    streaming = f"(from {ROVER}__recorded-camera__frames self)"
+    found = fit([wide, *components([RECORDED_CAMERA])], streaming)
+    assert not found.left_out
+
+
+def test_nobody_to_leave_out_is_refused() -> None:
+    def refuse(_: Merged) -> None:
+        raise TooManyBindings(Problem("PDDL_TOO_MANY", "too many"), frozenset())
+
+    with pytest.raises(TooManyBindings):
+        fitted(followers(), merge(followers(), ROVER), refuse)
