@@ -33,8 +33,8 @@ class Agreement:
     actions: dict[str, Action] = field(default_factory=dict)
     functions: dict[str, Predicate] = field(default_factory=dict)
     derived: tuple[DerivedRule, ...] = ()
-    asserted: dict[str, Origin] = field(default_factory=dict)
-    """Predicates that problem fragments assert facts of, each with the first who did."""
+    written: dict[str, Origin] = field(default_factory=dict)
+    """Predicates that actions or problem fragments write, each with the first who does."""
 
     @classmethod
     def of_core(cls, hosts: Iterable[str]) -> Agreement:
@@ -61,7 +61,7 @@ class Agreement:
             dict(self.actions),
             dict(self.functions),
             self.derived,
-            dict(self.asserted),
+            dict(self.written),
         )
         _join_types(wider, claims, report)
         if not report.problems:
@@ -81,7 +81,7 @@ def _join_types(agreed: Agreement, claims: Claims, report: Report) -> None:
     for claim in claims.types:
         both[claim.name] = both.get(claim.name, frozenset()) | claim.parents
     graph = TypeGraph(both)
-    cycle = graph.cycle()
+    cycle = graph.cycle(claim.name for claim in claims.types)
     if cycle:
         named = [claim for claim in claims.types if claim.name in cycle]
         others = _places(o for name in cycle for o in agreed.type_origins.get(name, ()))
@@ -192,31 +192,34 @@ def _join_actions(agreed: Agreement, claims: Claims, report: Report) -> None:
 
 def _join_derived(agreed: Agreement, claims: Claims, report: Report) -> None:
     """Derived predicates are written by rules alone, whoever brings them."""
+    written = dict(_written(claims))
+    agreed.written |= {name: by for name, by in written.items() if name not in agreed.written}
     agreed.derived += claims.derived
-    for claim in claims.facts:
-        agreed.asserted.setdefault(parts(claim.fact)[0], claim.origin)
-    derived = {rule.head.predicate: rule for rule in reversed(agreed.derived)}
-    for name, writer in _writers(agreed):
-        rule = derived.get(name)
-        own = rule is not None and rule in claims.derived
-        if rule and (own or writer.component == report.by.component):
-            mine, other = (rule.origins[0], writer) if own else (writer, rule.origins[0])
-            message = f"{name!r} follows from rules in one place and is written in another: {other}"
-            fix = "use another predicate for what is written"
-            report.problem("E-DERIVED", message, _place(mine), fix)
+    mine = {rule.head.predicate: rule.origins[0] for rule in claims.derived}
+    theirs = {rule.head.predicate: rule.origins[0] for rule in reversed(agreed.derived)}
+    for name in sorted(mine.keys() & agreed.written.keys()):
+        _refuse_written(name, mine[name], agreed.written[name], report)
+    for name in sorted(written.keys() & theirs.keys() - mine.keys()):
+        _refuse_written(name, written[name], theirs[name], report)
     if claims.derived and (circle := strata_of(agreed.derived).circle):
         message = f"these hold only if they do not: {', '.join(circle)}"
         fix = "take a negation out of the circle"
         report.problem("E-DERIVED", message, _place(claims.derived[0].origins[0]), fix)
 
 
-def _writers(agreed: Agreement) -> Iterator[tuple[str, Origin]]:
-    """Every predicate that an action or fact writes, once."""
-    writers = dict(agreed.asserted)
-    for action in agreed.actions.values():
+def _refuse_written(name: str, mine: Origin, other: Origin, report: Report) -> None:
+    message = f"{name!r} follows from rules in one place and is written in another: {other}"
+    fix = "use another predicate for what is written"
+    report.problem("E-DERIVED", message, _place(mine), fix)
+
+
+def _written(claims: Claims) -> Iterator[tuple[str, Origin]]:
+    """Every predicate that one component's actions and facts write."""
+    for claim in claims.facts:
+        yield parts(claim.fact)[0], claim.origin
+    for action in claims.actions:
         for atom in (*action.effect.added(), *action.effect.deleted()):
-            writers.setdefault(atom.predicate, action.origins[0])
-    yield from sorted(writers.items(), key=lambda writer: writer[0])
+            yield atom.predicate, action.origins[0]
 
 
 def _place(origin: Origin) -> Place:

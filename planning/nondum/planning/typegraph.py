@@ -63,10 +63,13 @@ class TypeGraph:
         right = tuple(others)
         return any(self.comparable((name,), (other,)) for name in names for other in right)
 
-    def cycle(self) -> tuple[str, ...]:
-        """The types of one cycle, each a kind of the next; empty if there is none."""
+    def cycle(self, starts: Iterable[str] | None = None) -> tuple[str, ...]:
+        """The types of one cycle, each a kind of the next; empty if there is none.
+
+        With `starts`, only cycles are looked for that lead on from one of them.
+        """
         finished: set[str] = set()
-        for start in sorted(self.parents):
+        for start in sorted(self.parents if starts is None else starts):
             found = self._cycle_from(start, finished)
             if found:
                 return found
