@@ -26,8 +26,10 @@ LISTED = 8
 class Rehearsed:
     """What came of trying out a plan."""
 
+    taken: int
+    """How many of its steps could be taken."""
     cost: int
-    """Of the steps that could be taken."""
+    """Of these steps."""
     problems: tuple[Problem, ...] = ()
     """Why it does not reach the goal; none if it does."""
 
@@ -41,25 +43,26 @@ def rehearsed(
     """
     meaning = Meaning(merged, {name: found.types for name, found in merged.objects.items()})
     situation = meaning.situation(meaning.start(facts))
-    cost = 0
-    for position, step in enumerate(steps, 1):
-        found = _bound(merged, step, f"step {position}, ({step})")
+    taken = cost = 0
+    for step in steps:
+        what = f"step {taken + 1}, ({step})"
+        found = _bound(merged, step, what)
         if isinstance(found, Problem):
-            return Rehearsed(cost, (found,))
+            return Rehearsed(taken, cost, (found,))
         action, names = found
         price = _price(merged, action, names)
         missing = _missing(situation, action.precondition, names)
         if price is None:
             missing = "a cost, which no function gives"
         if missing:
-            message = f"step {position}, ({step}), needs {missing}"
-            return Rehearsed(cost, (Problem("PLAN_STEP_IMPOSSIBLE", message),))
-        cost += price or 0
+            problem = Problem("PLAN_STEP_IMPOSSIBLE", f"{what}, needs {missing}")
+            return Rehearsed(taken, cost, (problem,))
+        taken, cost = taken + 1, cost + (price or 0)
         situation = meaning.situation(meaning.after(situation, action, names))
     if missing := _missing(situation, goal, {}):
         message = f"at the end the goal is missed: {missing}"
-        return Rehearsed(cost, (Problem("PLAN_GOAL_MISSED", message),))
-    return Rehearsed(cost)
+        return Rehearsed(taken, cost, (Problem("PLAN_GOAL_MISSED", message),))
+    return Rehearsed(taken, cost)
 
 
 def _missing(situation: Situation, condition: Condition, names: Names) -> str:

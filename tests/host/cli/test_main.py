@@ -44,12 +44,13 @@ Commands:
   logs        What components have written.
   mount       Tell where on the body a unit is mounted.
   payload     Make, judge and install payloads.
+  pddl        Check, merge and plan PDDL files, without a host.
   plan        The plan that is being carried out.
   retry       Try again what was refused or quarantined.
   status      The host, its payloads and its goals at a glance.
   store       The wheels that this host keeps.
   streams     Who sends what to whom, and what is sent.
-  tree        The behaviour tree as it is being ticked.
+  tree        The behaviour tree as it is being ticked, and why.
   units       What the robot has to act with.
   why         Why the robot does what it does, or why it cannot.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from nondum.host.cli import render
-from nondum.sdk.errors import ConfigRefused, HostUnreachable, NondumError
+from nondum.sdk.errors import ConfigRefused, FragmentRefused, HostUnreachable, NondumError, Problem
 
 EXIT_REFUSED = 1
 EXIT_BAD_INPUT = 2
@@ -22,10 +22,20 @@ def tell(error: NondumError, *, as_json: bool = False) -> int:
         render.as_json({"problems": [problem.to_dict() for problem in error.problems]})
     else:
         for problem in error.problems:
-            click.secho("error: ", fg="red", nl=False, err=True)
-            click.echo(render.lines_of(str(problem)), err=True)
+            tell_problem(problem)
     if isinstance(error, HostUnreachable):
         return EXIT_NO_DAEMON
-    if isinstance(error, ConfigRefused):
+    if isinstance(error, ConfigRefused | FragmentRefused):
         return EXIT_BAD_INPUT
     return EXIT_REFUSED
+
+
+def tell_problem(problem: Problem, *, as_warning: bool = False) -> None:
+    """Print a problem in words on standard error."""
+    click.secho(
+        "warning: " if as_warning else "error: ",
+        fg="yellow" if as_warning else "red",
+        nl=False,
+        err=True,
+    )
+    click.echo(render.lines_of(str(problem)), err=True)

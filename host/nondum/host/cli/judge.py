@@ -29,7 +29,7 @@ def inspect(session: Session, drive: Path) -> None:
 
     Example: nondum payload inspect /media/usb
     """
-    views = [_view(_loaded(folder)) for folder in payloads(drive)]
+    views = [_view(loaded_payload(folder)) for folder in payloads(drive)]
     if session.as_json:
         render.as_json({"payloads": views})
         return
@@ -111,11 +111,12 @@ def _judged(
     problems = verify_folder(folder, UnsignedAllowed(), facts, show)
     if problems:
         return problems, ()
-    judged = vocabulary_check.judge(_loaded(folder).index)
+    judged = vocabulary_check.judge(loaded_payload(folder).index)
     return judged.problems, judged.warnings
 
 
-def _loaded(folder: Path) -> StagedPayload:
+def loaded_payload(folder: Path) -> StagedPayload:
+    """What a payload folder carries, not hashed. Raises `PayloadRefused`."""
     from nondum.wheelhouse import contents, drive
     from nondum.wheelhouse.payload import load
 

@@ -35,6 +35,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "logs": ("past", "What components have written."),
     "mount": ("act", "Tell where on the body a unit is mounted."),
     "payload": ("payload", "Make, judge and install payloads."),
+    "pddl": ("pddl", "Check, merge and plan PDDL files, without a host."),
     "plan": ("mind", "The plan that is being carried out."),
     "retry": ("act", "Try again what was refused or quarantined."),
     "status": ("status", "The host, its payloads and its goals at a glance."),

@@ -1,0 +1,40 @@
+"""PDDL files as commands are given them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from nondum.sdk.errors import FragmentRefused, Problem
+
+if TYPE_CHECKING:
+    from nondum.planning.standalone import Standalone
+    from nondum.planning.syntax import FragmentSyntax
+
+FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
+
+
+def text_of(path: Path) -> str:
+    """The text of a file. Raises `FragmentRefused` (NOT_UTF8)."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        message = f"byte {error.start + 1} is not UTF-8"
+        raise FragmentRefused(Problem("NOT_UTF8", message, where=str(path))) from error
+
+
+def parsed(path: Path) -> FragmentSyntax:
+    """A domain or a problem. Raises `FragmentRefused`."""
+    from nondum.planning.parse import parse_fragment
+    from nondum.planning.standalone import SIZE_LIMIT_BYTES
+
+    return parse_fragment(text_of(path), str(path), size_limit_bytes=SIZE_LIMIT_BYTES)
+
+
+def loaded(domain: Path, problem: Path) -> Standalone:
+    """A domain with a problem of it. Raises `FragmentRefused` with all that is wrong."""
+    from nondum.planning.standalone import load
+
+    return load(text_of(domain), str(domain), text_of(problem), str(problem))
