@@ -55,7 +55,7 @@ FOLLOWING = """\
             rover__people-detector__found person)
           locks: no (free rover__people-detector__found) while it runs
           chosen: nothing else could do it
-      ▶ 3 visual-tracker.track  running since TIME  — is starting
+      ▶ 3 visual-tracker.track  running since TIME  — starting
           with: u=rover__visual-tracker__tracker,
             d=rover__people-detector__found, o=rover__visual-tracker__steering,
             h=rover, c=person
@@ -86,6 +86,14 @@ def plain(lines: list[str]) -> str:
 
 def test_eighty_columns_say_why_each_step_is_where_it_is() -> None:
     assert plain(outline(VIEWS["following"](), width=80)) == FOLLOWING
+
+
+def test_what_is_over_is_told_in_few_words() -> None:
+    lines = plain(outline(VIEWS["reporting"]())).splitlines()
+    (place,) = (n for n, line in enumerate(lines) if "visual-tracker.watch" in line and "✓" in line)
+    assert re.search("done at .* — what the rest of the plan needs of it holds$", lines[place])
+    labels = [line.split(":")[0].strip() for line in lines[place + 1 : place + 4]]
+    assert labels == ["with", "needed by", "chosen"]
 
 
 @views

@@ -70,13 +70,18 @@ def _task_details(task: Mapping[str, Any]) -> Iterator[str]:
 def _step_lines(node: Node, step: Node, width: int | None, depth: int) -> Iterator[str]:
     state = str(step["state"])
     mark = click.style(STEP_MARK.get(state, "·"), fg=STEP_COLOUR.get(state))
-    # Causal links say it with numbers of steps, and shorter.
-    is_said_below = state == "kept" or (state == "waiting" and step["waits_for"])
-    why = "" if is_said_below else node["why"]
     head = f"{step['number']} {step['schema']}  {state}{_time(step)}"
-    yield from _hanging(_with_why(head, why), width, depth, mark)
+    yield from _hanging(_with_why(head, _more_than_state(node, step)), width, depth, mark)
     for label, text in step_details(step):
         yield from _hanging(f"{label}: {text}", width, depth + 2)
+
+
+def _more_than_state(node: Node, step: Node) -> str:
+    """Why a step is where it is, as far as neither its state nor the lines below say it."""
+    state, why = step["state"], str(node["why"])
+    if state == "kept" or (state == "waiting" and step["waits_for"]):
+        return ""
+    return why.removeprefix("is ").removeprefix(state).removeprefix(": ")
 
 
 def step_details(step: Node) -> Iterator[tuple[str, str]]:
@@ -90,7 +95,7 @@ def step_details(step: Node) -> Iterator[tuple[str, str]]:
     if step["needed_by"]:
         label = "kept for" if step["state"] == "kept" else "needed by"
         yield label, "; ".join(_need(*of) for of in by_step(step["needed_by"]))
-    if locks := _locks(step):
+    if step["state"] not in ("done", "skipped") and (locks := _locks(step)):
         yield "locks", locks
     yield "chosen", _chosen(step["chosen"])
 
