@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from textwrap import fill
 
 from benchmarks import measuring
 from benchmarks.execution.results import Figures, Results
@@ -12,14 +13,15 @@ from benchmarks.execution.troubles import EVERYTHING, KINDS
 from benchmarks.measuring import Spread, table
 
 OURS = next(iter(EXECUTORS))
+WIDTH = 100
 HEAD = ["reached", "false", "stuck", "actions ÷ plan", "plans", "µs per tick (10-90 %)"]
 
 
 def as_markdown(results: Results, ticks: dict[str, dict[int, Spread]], seeds: int) -> str:
     """All but the title and the method."""
     sections = {
-        "Reading": "\n".join(f"- {line}" for line in _reading(results, ticks)),
-        "Rates": "\n".join(f"- **{kind}**: {rates}" for kind, rates in KINDS.items()),
+        "Reading": _list(_reading(results, ticks)),
+        "Rates": _list(f"**{kind}**: {rates}" for kind, rates in KINDS.items()),
         f"All troubles at once, {seeds} runs each": _by_scene(results),
         "One trouble at a time, all domains": _by_trouble(results),
         "A tick by the length of the plan": _ticks(ticks),
@@ -28,35 +30,34 @@ def as_markdown(results: Results, ticks: dict[str, dict[int, Spread]], seeds: in
     return "\n".join(f"## {title}\n\n{body}\n" for title, body in sections.items())
 
 
+def _list(lines: Iterable[str]) -> str:
+    return "\n".join(fill(f"- {line}", WIDTH, subsequent_indent="  ") for line in lines)
+
+
 def _reading(results: Results, ticks: dict[str, dict[int, Spread]]) -> Iterator[str]:
     """What the tables say, in sentences made of them."""
-    for executor in EXECUTORS:
-        found = results.of(executor)
+    overall = {executor: results.of(executor) for executor in EXECUTORS}
+    for executor, found in overall.items():
         yield (
-            f"**{executor}** reached the goal in {found.reached} of {found.runs} runs, claimed "
-            f"{_times(found.false)} falsely that it had, and was stuck {_times(found.stuck)}; it "
-            f"took {found.actions:.2f} times the plan's actions and {found.plans:.1f} plans a run."
+            f"**{executor}** reached the goal in {found.reached} of {found.runs} runs, claimed so "
+            f"falsely in {found.false} and was stuck in {found.stuck}; it took {found.actions:.2f} "
+            f"times the plan's actions and {found.plans:.1f} plans a run."
         )
     calm = {executor: results.of(executor, trouble="none") for executor in EXECUTORS}
-    failing = [f"{name} {f.runs - f.reached}" for name, f in calm.items() if f.reached < f.runs]
-    if failing:
+    if failing := [
+        f"{name} {f.runs - f.reached}" for name, f in calm.items() if f.reached < f.runs
+    ]:
         runs = calm[OURS].runs
         yield f"Even where nothing goes wrong, of {runs} runs some fail: {', '.join(failing)}."
+    took = ", ".join(f"{executor} {found.tick_us:.0f}" for executor, found in overall.items())
+    yield f"Here every moment brings news, so that every tick decides; medians in µs: {took}."
     longest = LENGTHS[-1]
-    quiet, *_ = (lengths[longest].median for lengths in ticks.values())
+    quiet, busy, changed, *_ = (lengths[longest].median for lengths in ticks.values())
     yield (
-        f"A tick of a task tree with {longest} steps takes {quiet:.1f} µs while nothing is new; "
-        "what it costs to decide again is paid once for each piece of news that matters."
+        f"A task tree of {longest} steps is ticked in {quiet:.1f} µs while nothing is new, in "
+        f"{busy:.1f} µs if the news is about something else, and in {changed:.0f} µs if it has to "
+        "decide again: once for each piece of news that matters, not at each tick."
     )
-
-
-def _times(count: int) -> str:
-    """A count in words.
-
-    >>> _times(0), _times(1), _times(7)
-    ('never', 'once', '7 times')
-    """
-    return {0: "never", 1: "once"}.get(count, f"{count} times")
 
 
 def _by_scene(results: Results) -> str:

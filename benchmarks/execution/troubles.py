@@ -25,7 +25,10 @@ class Troubles:
             "of a lasting behaviour's moments are its last": self.deaths,
             "of moments see a unit go": self.losses,
         }
-        return ", ".join(f"{rate:.0%} {what}" for what, rate in rates.items() if rate) or "nothing"
+        return (
+            ", ".join(f"{rate:.0%} {what}" for what, rate in rates.items() if rate)
+            or "all goes well"
+        )
 
 
 KINDS = {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
 from random import Random
 
 import pytest
@@ -37,10 +36,6 @@ def robot_in(place: Scene, troubles: Troubles = CALM) -> SimulatedRobot:
 def step(place: Scene, name: str) -> Step:
     action = next(action for action in place.task.actions if action.name == name)
     return Step.from_action(place.task, action, lasting=action.schema in place.lasting)
-
-
-def test_examples_are_true() -> None:
-    assert doctest.testmod(report).failed == 0
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -201,8 +196,9 @@ def test_page_has_a_row_for_each_executor_in_each_scene() -> None:
     text = report.as_markdown(found, ticks, seeds=1)
     rows = [line for line in text.splitlines() if line.startswith("| follow (10 steps) | ")]
     assert [row.split(" | ")[1] for row in rows] == list(EXECUTORS)
-    assert "**nondum** reached the goal in 35 of 35 runs, claimed never falsely" in text
-    assert "**PA-BT** reached the goal in 0 of 35 runs, claimed 35 times falsely" in text
+    words = " ".join(text.split())
+    assert "**nondum** reached the goal in 35 of 35 runs, claimed so falsely in 0" in words
+    assert "**PA-BT** reached the goal in 0 of 35 runs, claimed so falsely in 35" in words
 
 
 def test_executors_meet_the_same_fates() -> None:
