@@ -101,8 +101,8 @@ def contributions_of(path: Path, units: Sequence[Owned]) -> Iterator[Contributio
 def component_name(path: Path) -> str:
     """What a component is called that is only known by its file or folder.
 
-    >>> component_name(Path("plugins/thermal-camera/domain.pddl")), component_name(Path("Eye.pddl"))
-    ('thermal-camera', 'eye')
+    >>> component_name(Path("plugins/window-opener/domain.pddl")), component_name(Path("Eye.pddl"))
+    ('window-opener', 'eye')
     """
     generic = path.stem in ("domain", "problem") and path.resolve().parent.name
     name = generic or (path.resolve().name if path.is_dir() else path.stem)
