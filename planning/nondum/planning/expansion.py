@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from nondum.planning.exploration import Exploration, domains_of
-from nondum.planning.join import Join, Rule, Values
+from nondum.planning.join import Domains, Join, Rule, Values
 from nondum.planning.literals import Literals
 from nondum.planning.matching import Pattern
 from nondum.planning.normal import condition_of, normal
@@ -69,7 +69,9 @@ class Expander:
     standing: list[Standing] = field(default_factory=list)
     """The derived facts that had to be made so far."""
     _relations: Relations = field(default_factory=Relations)
-    _joins: dict[tuple[Quantified, Row], tuple[Join, Quantified]] = field(default_factory=dict)
+    _joins: dict[tuple[Quantified, Row], tuple[Join, Quantified, Domains]] = field(
+        default_factory=dict
+    )
     _lasting: frozenset[int] = frozenset()
 
     def __post_init__(self) -> None:
@@ -137,19 +139,19 @@ class Expander:
         key = (formula, tuple(names))
         if key not in self._joins:
             self._joins[key] = self._join(formula, tuple(names))
-        join, apart = self._joins[key]
+        join, apart, domains = self._joins[key]
         found: list[Row] = []
         size = len(names) + len(apart.variables)
 
         def fire(values: Values) -> None:
             found.append(tuple(values[:size]))
 
-        join.run(self._relations, fire, known=tuple(names.values()))
+        join.run(self._relations, domains, fire, known=tuple(names.values()))
         variables = (*names, *(variable.name for variable in apart.variables))
         for row in sorted(set(found)):
             yield apart.part, dict(zip(variables, row, strict=True))
 
-    def _join(self, formula: Quantified, names: Row) -> tuple[Join, Quantified]:
+    def _join(self, formula: Quantified, names: Row) -> tuple[Join, Quantified, Domains]:
         fresh = {v.name: f"{v.name}~{len(names)}" for v in formula.variables if v.name in names}
         variables = tuple(
             TypedName(fresh.get(v.name, v.name), v.types, v.place) for v in formula.variables
@@ -160,12 +162,11 @@ class Expander:
         own = {variable.name for variable in variables}
         # In an open world, what nothing here makes true may still come true, and must be guarded.
         is_selective = self.is_closed or formula.quantifier == "exists"
+        domains = domains_of(variables, self.found.members)
+        known = dict.fromkeys(names, frozenset[str]())
         rule = Rule(
             variables=(*names, *(variable.name for variable in variables)),
-            domains={
-                **dict.fromkeys(names, frozenset[str]()),
-                **domains_of(variables, self.found.members),
-            },
+            breadths={name: len(domain) for name, domain in {**known, **domains}.items()},
             patterns=tuple(
                 Pattern.of(atom)
                 for atom in condition.positive
@@ -175,7 +176,8 @@ class Expander:
             else (),
         )
         apart = Quantified(formula.quantifier, variables, part, formula.place)
-        return Join(rule, known=names), apart
+        of_all = (*known.values(), *(domains[variable.name] for variable in variables))
+        return Join(rule, known=names), apart, of_all
 
     def _small(self, tree: Tree, name: str) -> Tree:
         """The tree with every disjunction replaced by a fact that stands for it."""

@@ -197,12 +197,15 @@ class _Head:
         self._flat = found
         self._fixpoint = fixpoint
         self.variables = tuple(variable.name for variable in found.variables)
+        domains = fixpoint.domains_of(found.variables)
+        self.domains = tuple(domains[name] for name in self.variables)
+        """The objects of each variable."""
         self._negative = self.template(found.negative)
 
     @property
     def joins(self) -> tuple[tuple[str, Join], ...]:
         """What finds its bindings, each with the predicate that triggers it."""
-        return self._fixpoint.joins_of(self._flat)
+        return joins_of(self._flat, self.domains, self._fixpoint.added)
 
     def template(self, atoms: Iterable[Atom]) -> _Template:
         """What atoms become when the rule fires."""
@@ -351,17 +354,18 @@ class _Fixpoint:
         derived = {rule.head.predicate for rule in merged.domain.derived}
         added = {atom.predicate for effect in effects for atom in effect.added()}
         self._deleted = {atom.predicate for effect in effects for atom in effect.deleted()}
-        self._added = frozenset(added | derived)
+        self.added = frozenset(added | derived)
         self.static = static_facts(
             map(self.table.facts.__getitem__, self._believed),
-            frozenset(self._added | self._deleted),
+            frozenset(self.added | self._deleted),
             members,
         )
         self.instances: dict[tuple[str, Row], Instance] = {}
         self.derivations: list[Derivation] = []
 
-    def joins_of(self, found: Flat) -> tuple[tuple[str, Join], ...]:
-        return joins_of(found, domains_of(found.variables, self._members), self._added)
+    def domains_of(self, variables: Iterable[TypedName]) -> dict[str, frozenset[str]]:
+        """Variable → the objects that it may stand for."""
+        return domains_of(variables, self._members)
 
     def excludes(self, negative: frozenset[int]) -> bool:
         """Whether a fact that must be false is true, and stays so."""
@@ -400,7 +404,7 @@ class _Fixpoint:
                 triggered[trigger].append((join, head))
         for number in sorted(self._believed):
             predicate, row = self.table.facts[number]
-            if predicate in self._added:
+            if predicate in self.added:
                 self._waiting.append(number)
             else:
                 relations.add(predicate, row)
@@ -433,7 +437,7 @@ class _Fixpoint:
     def _join(self, join: Join, head: _Head, relations: Relations, row: Row = ()) -> None:
         before = self.work.left
         try:
-            join.run(relations, head.fire, row, work=self.work)
+            join.run(relations, head.domains, head.fire, row, work=self.work)
         except TooMuchWork:
             self._spent[head] += before
             raise self._too_many() from None

@@ -23,6 +23,8 @@ _FEW = 32
 Values: TypeAlias = list[str]
 """A rule's variables, then the constants that it names; by position."""
 Fire: TypeAlias = Callable[[Values], None]
+Domains: TypeAlias = Sequence[frozenset[str]]
+"""For each variable the objects that it may stand for."""
 
 
 class TooMuchWork(Exception):
@@ -47,8 +49,8 @@ class Rule:
     """What a join needs to know."""
 
     variables: Row
-    domains: Mapping[str, frozenset[str]]
-    """Variable → the objects of its types."""
+    breadths: Mapping[str, int]
+    """Variable → how many objects there are of its types, or were: this only decides the order."""
     patterns: tuple[Pattern, ...]
     equal: tuple[tuple[str, str], ...] = ()
     unequal: tuple[tuple[str, str], ...] = ()
@@ -78,15 +80,25 @@ class _Step:
     """The table; None: the objects of one variable."""
     look_up: tuple[int, ...] = ()
     """The values to look up in it."""
-    new: tuple[tuple[int, int, frozenset[str]], ...] = ()
-    """Position in the row → value that it gives, which must be one of these."""
+    new: tuple[tuple[int, int], ...] = ()
+    """Position in the row → value that it gives, which must be in the value's domain."""
+    named: tuple[tuple[int, str], ...] = ()
+    """Positions where a trigger must name an object."""
     same: tuple[tuple[int, int], ...] = ()
     """Positions of a row that must be alike."""
     checks: tuple[_Check, ...] = ()
-    objects: tuple[str, ...] = ()
-    """In what order the objects of a variable are tried."""
     whole: tuple[int, ...] = ()
     """Where one value alone is open: the values of a row, so that its few objects can be tried."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """What a join is run with."""
+
+    relations: Relations
+    domains: Domains
+    fire: Fire
+    work: Work | None
 
 
 class Join:
@@ -112,22 +124,21 @@ class Join:
         while left:
             best = min(left, key=lambda pattern: _breadth(pattern, rule, bound))
             if variable := _narrow(best, rule, bound):
-                self._steps.append(self._enumeration(variable, rule, bound))
+                self._steps.append(self._enumeration(variable, bound))
             left.remove(best)
             self._steps.append(self._step(best, rule, bound))
         for variable in rule.variables:
             if variable not in bound:
-                self._steps.append(self._enumeration(variable, rule, bound))
+                self._steps.append(self._enumeration(variable, bound))
 
-    def _enumeration(self, variable: str, rule: Rule, bound: set[str]) -> _Step:
+    def _enumeration(self, variable: str, bound: set[str]) -> _Step:
         bound.add(variable)
-        domain = rule.domains[variable]
-        new = ((0, self._at[variable], domain),)
-        return _Step(None, new=new, checks=self._checked(bound), objects=tuple(sorted(domain)))
+        return _Step(None, new=((0, self._at[variable]),), checks=self._checked(bound))
 
     def run(
         self,
         relations: Relations,
+        domains: Domains,
         fire: Fire,
         row: Row = (),
         known: Row = (),
@@ -141,44 +152,38 @@ class Join:
         values = [*known, *[""] * (self._size - len(known)), *self._constants]
         if not _allowed(self._first_checks, values):
             return
-        if self._first is None or _taken(self._first, row, values):
-            self._walk(0, values, relations, fire, work)
+        if self._first is None or _taken(self._first, row, values, domains):
+            self._walk(0, values, _Run(relations, domains, fire, work))
 
-    def _walk(
-        self,
-        depth: int,
-        values: Values,
-        relations: Relations,
-        fire: Fire,
-        work: Work | None,
-    ) -> None:
+    def _walk(self, depth: int, values: Values, run: _Run) -> None:
         if depth == len(self._steps):
-            fire(values)
+            run.fire(values)
             return
         step = self._steps[depth]
         if step.key is None:
-            ((_, at, _),) = step.new
-            if work:
-                work.spend(len(step.objects))
-            for name in step.objects:
+            ((_, at),) = step.new
+            domain = run.domains[at]
+            if run.work:
+                run.work.spend(len(domain))
+            for name in domain:
                 values[at] = name
                 if _allowed(step.checks, values):
-                    self._walk(depth + 1, values, relations, fire, work)
+                    self._walk(depth + 1, values, run)
             return
-        rows = relations.table(step.key).get(tuple([values[i] for i in step.look_up]), ())
-        if step.whole and len(rows) > len(step.new[0][2]):
-            rows = _rows_among(step, values, relations)
-        if work:
-            work.spend(len(rows))
+        rows = run.relations.table(step.key).get(tuple([values[i] for i in step.look_up]), ())
+        if step.whole and len(rows) > len(run.domains[step.new[0][1]]):
+            rows = _rows_among(step, values, run)
+        if run.work:
+            run.work.spend(len(rows))
         for row in rows:
-            if _taken(step, row, values):
-                self._walk(depth + 1, values, relations, fire, work)
+            if _taken(step, row, values, run.domains):
+                self._walk(depth + 1, values, run)
 
     def _step(
         self, pattern: Pattern, rule: Rule, bound: set[str], *, is_trigger: bool = False
     ) -> _Step:
         positions: list[int] = []
-        new: dict[str, tuple[int, int, frozenset[str]]] = {}
+        new: dict[str, tuple[int, int]] = {}
         same: list[tuple[int, int]] = []
         for position, term in enumerate(pattern.terms):
             if term in bound:
@@ -186,23 +191,18 @@ class Join:
             elif term in new:
                 same.append((new[term][0], position))
             else:
-                new[term] = (position, self._at[term], rule.domains[term])
-        look_up = tuple(self._at[pattern.terms[position]] for position in positions)
+                new[term] = (position, self._at[term])
         bound.update(new)
         checks = self._checked(bound)
+        opened = tuple(new.values())
         if is_trigger:
-            # Nothing is looked up for the trigger, so what is bound already must be compared.
-            compared = tuple(
-                (position, at, frozenset((self._constant(at),)))
-                for position, at in zip(positions, look_up, strict=True)
-            )
-            return _Step(None, new=(*compared, *new.values()), same=tuple(same), checks=checks)
+            # Nothing is looked up for the trigger, so the objects that it names are compared.
+            named = tuple((position, pattern.terms[position]) for position in positions)
+            return _Step(None, new=opened, named=named, same=tuple(same), checks=checks)
         key = (pattern.predicate, tuple(positions))
+        look_up = tuple(self._at[pattern.terms[position]] for position in positions)
         whole = tuple(self._at[term] for term in pattern.terms) if len(new) == 1 else ()
-        return _Step(key, look_up, tuple(new.values()), tuple(same), checks, whole=whole)
-
-    def _constant(self, at: int) -> str:
-        return self._constants[at - self._size]
+        return _Step(key, look_up, opened, same=tuple(same), checks=checks, whole=whole)
 
     def _checked(self, bound: set[str]) -> tuple[_Check, ...]:
         """The comparisons that can be made now; each is made once."""
@@ -216,7 +216,7 @@ def _breadth(pattern: Pattern, rule: Rule, bound: set[str]) -> float:
     open_variables = {term for term in pattern.terms if term not in bound}
     if not open_variables:
         return 0.0
-    breadth = math.prod(len(rule.domains[variable]) for variable in open_variables)
+    breadth = math.prod(rule.breadths[variable] for variable in open_variables)
     return breadth / 10.0 ** (len(pattern.terms) - len(open_variables))
 
 
@@ -226,28 +226,30 @@ def _narrow(pattern: Pattern, rule: Rule, bound: set[str]) -> str:
     if len(variables) != 1 or variables <= bound:
         return ""
     (variable,) = variables
-    return variable if len(rule.domains[variable]) <= _FEW else ""
+    return variable if rule.breadths[variable] <= _FEW else ""
 
 
-def _rows_among(step: _Step, values: Values, relations: Relations) -> Sequence[Row]:
+def _rows_among(step: _Step, values: Values, run: _Run) -> Sequence[Row]:
     """The rows of a step with one open value, found by trying its objects."""
     assert step.key is not None  # only rows of a table are looked for
-    ((_, at, domain),) = step.new
-    table = relations.table((step.key[0], tuple(range(len(step.whole)))))
+    ((_, at),) = step.new
+    table = run.relations.table((step.key[0], tuple(range(len(step.whole)))))
     found: list[Row] = []
-    for name in domain:
+    for name in run.domains[at]:
         values[at] = name
         found += table.get(tuple([values[i] for i in step.whole]), ())
     return found
 
 
-def _taken(step: _Step, row: Row, values: Values) -> bool:
+def _taken(step: _Step, row: Row, values: Values, domains: Domains) -> bool:
     """Take a row's values, if they are allowed."""
-    for position, at, domain in step.new:
+    for position, at in step.new:
         value = row[position]
-        if value not in domain:
+        if value not in domains[at]:
             return False
         values[at] = value
+    if step.named and any(row[position] != name for position, name in step.named):
+        return False
     if step.same and any(row[a] != row[b] for a, b in step.same):
         return False
     return not step.checks or _allowed(step.checks, values)

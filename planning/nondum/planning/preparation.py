@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import lru_cache
 from typing import Generic, TypeVar
 
 from nondum.planning.flat import Flat, flat
-from nondum.planning.join import Join, Rule
+from nondum.planning.join import Domains, Join, Rule
 from nondum.planning.matching import Pattern
 from nondum.planning.normal import Condition
 from nondum.planning.syntax import TypedName
@@ -43,26 +42,31 @@ def _flattened(variables: tuple[TypedName, ...], *conditions: _Same[Condition]) 
 
 
 def joins_of(
-    found: Flat, domains: Mapping[str, frozenset[str]], growing: frozenset[str]
+    found: Flat, domains: Domains, growing: frozenset[str]
 ) -> tuple[tuple[str, Join], ...]:
     """The joins of a condition, each with the predicate that triggers it; empty: it runs once.
 
-    `domains` are the objects of each variable. Facts of predicates that are not in `growing` are
-    all there from the beginning.
+    `domains` are the objects of each variable: how many there are when a condition is first met
+    decides in which order it is joined. Facts of predicates that are not in `growing` are all there
+    from the beginning.
     """
     at = tuple(i for i, atom in enumerate(found.positive) if atom.predicate in growing)
-    return _joins_of(_Same(found), tuple(domains[v.name] for v in found.variables), at)
+    key = (_Same(found), at)
+    if key not in _prepared:
+        if len(_prepared) == _KEPT:
+            _prepared.clear()
+        _prepared[key] = _joins(found, domains, at)
+    return _prepared[key]
 
 
-@lru_cache(maxsize=_KEPT)
-def _joins_of(
-    same: _Same[Flat], domains: tuple[frozenset[str], ...], growing: tuple[int, ...]
-) -> tuple[tuple[str, Join], ...]:
-    found = same.value
+_prepared: dict[tuple[_Same[Flat], tuple[int, ...]], tuple[tuple[str, Join], ...]] = {}
+
+
+def _joins(found: Flat, domains: Domains, growing: tuple[int, ...]) -> tuple[tuple[str, Join], ...]:
     names = tuple(variable.name for variable in found.variables)
     rule = Rule(
         variables=names,
-        domains=dict(zip(names, domains, strict=True)),
+        breadths={name: len(domain) for name, domain in zip(names, domains, strict=True)},
         patterns=tuple(map(Pattern.of, found.positive)),
         equal=tuple((pair.left.name, pair.right.name) for pair in found.equal),
         unequal=tuple((pair.left.name, pair.right.name) for pair in found.unequal),
