@@ -252,7 +252,7 @@ class WorldModel:
             self._parked.add(fact)
         if parts(fact)[0] in self._functional:
             self._leave_newest(fact)
-            is_plain = is_plain and not self._testimony.rivals(fact)
+            is_plain = False  # a rival, perhaps of a running behaviour, may give way to it
         overlays = self._overlays.values()
         if source.is_against or not is_plain or any(fact in o.delete for o in overlays):
             self._changed()  # else no other fact is true than before
