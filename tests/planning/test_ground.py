@@ -157,6 +157,25 @@ def test_twins_begin_as_the_closed_world_says() -> None:
             assert holds(text, initial) == (text in initial)
 
 
+JUMP = """(:functional at)
+          (:action jump :parameters (?u - base ?q - place) :precondition (ready ?u)
+            :effect (at ?u ?q))"""
+
+
+def test_functional_predicate_takes_its_other_values_away() -> None:
+    grounded = task(JUMP, [f"at {LEFT} a", f"ready {LEFT}"], f"(at {LEFT} b)")
+    jump = only(grounded)
+    taken = facts_of(grounded, jump.delete)
+    assert f"at {LEFT} a" in taken
+    assert f"at {LEFT} b" not in taken
+
+
+def test_functional_predicate_leaves_by_taking_another_value() -> None:
+    grounded = task(JUMP, [f"at {LEFT} a", f"ready {LEFT}"], f"(not (at {LEFT} a))")
+    assert names(grounded) == ["jump left b", "jump left c"]
+    assert quick_answer(grounded) is None
+
+
 def test_static_negative_condition_is_decided() -> None:
     grounded = task(CLOSE, [f"at {LEFT} a", f"at {RIGHT} a", "open a"], "(not (open a))")
     assert not grounded.actions

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-from nondum.planning.domain import Action, DerivedRule, Merged
+from nondum.planning.domain import Action, DerivedRule, Merged, functional_predicates
 from nondum.planning.goal import GoalExpr
 from nondum.planning.normal import Condition, atoms_in, quantified_in
 from nondum.planning.relations import Row
@@ -84,6 +84,7 @@ def concern(merged: Merged, goal: GoalExpr) -> Concern:
     rules: defaultdict[str, list[DerivedRule]] = defaultdict(list)
     for rule in merged.domain.derived:
         rules[rule.head.predicate].append(rule)
+    functional = functional_predicates(merged.domain)
     wishes = Wishes()
     waiting = list(wishes.new(_wishes(goal, {})))
     actions: set[str] = set()
@@ -98,6 +99,11 @@ def concern(merged: Merged, goal: GoalExpr) -> Concern:
             if (known := _matched(atom, row)) is not None:
                 actions.add(action.name)
                 new += _asked(action, known)
+        if predicate in functional and row and not is_true:
+            for action, atom in givers[predicate, True]:  # another value takes this one away
+                if (known := _matched(atom, (*row[:-1], ""))) is not None:
+                    actions.add(action.name)
+                    new += _asked(action, known)
         waiting += wishes.new(new)
     domain = replace(
         merged.domain,

@@ -192,3 +192,8 @@ class Merged:
 def bind(atom: Atom, bound: Mapping[str, str]) -> str:
     """The fact that an atom becomes when its variables are replaced."""
     return fact(atom.predicate, *(bound.get(term.name, term.name) for term in atom.terms))
+
+
+def functional_predicates(domain: Domain) -> frozenset[str]:
+    """Those with one last argument at most for each of the others."""
+    return frozenset(name for name, found in domain.predicates.items() if found.functional)

@@ -7,7 +7,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from nondum.planning.concern import Wishes
-from nondum.planning.domain import Action, DerivedRule, Merged, Origin
+from nondum.planning.domain import (
+    Action,
+    DerivedRule,
+    Merged,
+    Origin,
+    functional_predicates,
+)
 from nondum.planning.effect import ConditionalChange
 from nondum.planning.facts import parts
 from nondum.planning.flat import Flat
@@ -353,7 +359,9 @@ class _Fixpoint:
         effects = [action.effect for action in merged.domain.actions.values()]
         derived = {rule.head.predicate for rule in merged.domain.derived}
         added = {atom.predicate for effect in effects for atom in effect.added()}
-        self._deleted = {atom.predicate for effect in effects for atom in effect.deleted()}
+        deleted = {atom.predicate for effect in effects for atom in effect.deleted()}
+        self._functional = functional_predicates(merged.domain)
+        self._deleted = deleted | (added & self._functional)
         self.added = frozenset(added | derived)
         self.static = static_facts(
             map(self.table.facts.__getitem__, self._believed),
@@ -378,8 +386,10 @@ class _Fixpoint:
         if wishes is None:
             return True
         facts = self.table.facts
-        return any(wishes.include(*facts[n], is_true=True) for n in add) or any(
-            wishes.include(*facts[n], is_true=False) for n in delete
+        return (
+            any(wishes.include(*facts[n], is_true=True) for n in add)
+            or any(wishes.include(*facts[n], is_true=False) for n in delete)
+            or any(facts[n][0] in self._functional for n in add)
         )
 
     def reach(self, facts: frozenset[int]) -> None:

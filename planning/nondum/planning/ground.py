@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from nondum.planning.concern import concern
-from nondum.planning.domain import Merged
+from nondum.planning.displacement import displaced
+from nondum.planning.domain import Merged, functional_predicates
 from nondum.planning.draft import drafted
 from nondum.planning.exploration import INSTANCES_LIMIT, explore
 from nondum.planning.facts import predicate_of
@@ -39,4 +40,5 @@ def ground(
     read = part.read
     known = (text for text in facts if predicate_of(text) in read)
     found = explore(part.merged, known, objects, limit=limit, wishes=part.wishes)
+    found = displaced(found, functional_predicates(merged.domain))
     return positive_task(helpful(drafted(part.merged, found, goal)), found.table)
