@@ -52,11 +52,10 @@ class Changes:
         for change, needs in enumerate(self.needs):
             for fact in needs:
                 self.needing[fact].append(change)
-        self._lists = _BitLists(self.facts)
 
-    def facts_of(self, state: State) -> list[int]:
-        """The facts that hold in a state, those about what is false included."""
-        return self._lists.of(state | (~state & self.negated) << self._encoded.width)
+    def facts_in(self, state: State) -> int:
+        """The mask of the facts that hold in a state, those about what is false included."""
+        return state | (~state & self.negated) << self._encoded.width
 
     def _add(self, needs: int, effect: tuple[int, int], move: int) -> None:
         add, delete = effect
@@ -121,23 +120,3 @@ class Changes:
     def _new_fact(self) -> int:
         self.facts += 1
         return self.facts - 1
-
-
-class _BitLists:
-    """Lists the bits of a mask byte by byte: quicker than bit by bit."""
-
-    def __init__(self, width: int) -> None:
-        self._bytes = (width + 7) // 8
-        self._lists: dict[tuple[int, int], tuple[int, ...]] = {}
-        self._table = [
-            [tuple(8 * i + b for b in range(8) if byte >> b & 1) for byte in range(256)]
-            for i in range(self._bytes)
-        ]
-
-    def of(self, mask: int) -> list[int]:
-        """The positions of a mask's bits, lowest first."""
-        found: list[int] = []
-        for table, byte in zip(self._table, mask.to_bytes(self._bytes, "little"), strict=True):
-            if byte:
-                found += table[byte]
-        return found

@@ -78,11 +78,9 @@ class Greedy:
         moves, after, tree = self._encoded.moves, self._encoded.after, self._tree
         while step := self._step():
             state, index = step
-            move = moves[index]
-            if move.precondition & state == move.precondition:
-                reached = after(state, move)
-                if reached not in tree:
-                    return reached, step
+            reached = after(state, moves[index])
+            if reached not in tree:
+                return reached, step
         return None
 
     def _step(self) -> tuple[State, int] | None:

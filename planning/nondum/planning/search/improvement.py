@@ -88,8 +88,8 @@ class Improvement:
         rank = way + _WEIGHT * estimate.distance
         preferred = set(estimate.preferred)
         for index in estimate.applicable:
-            precondition, cost = self._encoded.moves[index].precondition, self._costs[index]
-            if precondition & state == precondition and way + cost < self._bound:
+            cost = self._costs[index]
+            if way + cost < self._bound:
                 self._count += 1
                 late = 0 if index in preferred else cost
                 heappush(self._open, (rank + late, self._count, state, index))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from nondum.planning.search.changes import Changes
+from nondum.planning.search.changes import Changes, bits_of
 from nondum.planning.search.encoding import Encoded, State
 
 
@@ -31,9 +31,8 @@ class Landmarks:
 
 def _before_each(changes: Changes, encoded: Encoded) -> list[int | None]:
     """Fact → the facts that hold at some time before it, with itself; None: it is out of reach."""
-    start = changes.facts_of(encoded.init)
     before: list[int | None] = [None] * changes.facts
-    for fact in start:
+    for fact in bits_of(changes.facts_in(encoded.init)):
         before[fact] = 0
     unmet = [sum(before[fact] is None for fact in needs) for needs in changes.needs]
     waiting = deque(change for change, count in enumerate(unmet) if not count)

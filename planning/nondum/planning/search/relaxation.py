@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
 
-from nondum.planning.search.changes import RULE, Changes
+from nondum.planning.search.changes import RULE, Changes, bits_of
 from nondum.planning.search.encoding import Encoded, State
 
 _UNMET = 1 << 40
@@ -32,34 +32,55 @@ class Estimate:
 
 
 class Relaxation:
-    """Evaluates the states of one task."""
+    """Evaluates the states of one task.
+
+    What holds in a state, and which changes happen in it, is worked out from the last state that
+    was evaluated: searches mostly go from one to the next.
+    """
 
     def __init__(self, encoded: Encoded, changes: Changes, costs: Sequence[int]) -> None:
         """`costs` are those of the moves."""
         self._width = encoded.width
         self._costs = costs
         self._changes = changes
+        self._facts = 0
+        """Those that hold in the last state, those about what is false included."""
+        self._cost = [_UNMET] * changes.facts
+        """Fact → 0 where it holds in the last state."""
         self._unmet = [
-            len(needs) * _UNMET + (self._costs[move] if move != RULE else 0)
+            len(needs) * _UNMET + (costs[move] if move != RULE else 0)
             for needs, move in zip(changes.needs, changes.moves, strict=True)
         ]
-        self._unreached = [_UNMET] * changes.facts
+        """Change → its cost, and what it lacks in the last state."""
+        self._ready: set[int] = set()
+        """The changes that lack nothing in the last state."""
         self.effort = sum(map(len, changes.needs)) + sum(map(len, changes.gives))
         """How much work an estimate is, at most."""
 
     def estimate(self, state: State) -> Estimate | None:
         """Estimate the way from a state to the goal. None: there is none, for certain."""
+        self._go_to(state)
         changes = self._changes
         needing, gives, goal = changes.needing, changes.gives, changes.goal
-        true = changes.facts_of(state)
-        cost, unmet = self._unreached[:], self._unmet[:]
-        for fact in true:
-            cost[fact] = 0
+        cost, unmet = self._cost[:], self._unmet[:]
+        ready = sorted(self._ready)
         by: dict[int, int] = {}
-        waiting = {0: true}
-        levels = [0]
-        ready: list[int] = []
-        while levels:
+        waiting: dict[int, list[int]] = {}
+        levels: list[int] = []
+        for change in ready:
+            total = unmet[change]
+            for given in gives[change]:
+                if total < cost[given]:
+                    cost[given] = total
+                    by[given] = change
+                    if total in waiting:
+                        waiting[total].append(given)
+                    else:
+                        waiting[total] = [given]
+                        heappush(levels, total)
+        while cost[goal] == _UNMET:
+            if not levels:
+                return None
             level = heappop(levels)
             met = level - _UNMET
             for fact in waiting[level]:
@@ -69,8 +90,6 @@ class Relaxation:
                     total = unmet[change] + met
                     unmet[change] = total
                     if total < _UNMET:
-                        if not level:
-                            ready.append(change)
                         for given in gives[change]:
                             if total < cost[given]:
                                 cost[given] = total
@@ -80,13 +99,35 @@ class Relaxation:
                                 else:
                                     waiting[total] = [given]
                                     heappush(levels, total)
-            if cost[goal] < _UNMET:
-                return self._estimate(state, by, unmet, ready)
-        return None
+        return self._extracted(by, ready)
 
-    def _estimate(
-        self, state: State, by: dict[int, int], unmet: list[int], ready: list[int]
-    ) -> Estimate:
+    def mask(self, facts: Iterable[int]) -> int:
+        """The bits of those facts that are bits of a state."""
+        total = 0
+        for fact in facts:
+            if fact < self._width:
+                total |= 1 << fact
+        return total
+
+    def _go_to(self, state: State) -> None:
+        facts, before = self._changes.facts_in(state), self._facts
+        self._facts = facts
+        needing, unmet, ready = self._changes.needing, self._unmet, self._ready
+        for fact in bits_of(facts & ~before):
+            self._cost[fact] = 0
+            for change in needing[fact]:
+                unmet[change] = lacking = unmet[change] - _UNMET
+                if lacking < _UNMET:
+                    ready.add(change)
+        for fact in bits_of(before & ~facts):
+            self._cost[fact] = _UNMET
+            for change in needing[fact]:
+                unmet[change] = lacking = unmet[change] + _UNMET
+                if lacking < 2 * _UNMET:
+                    ready.discard(change)
+
+    def _extracted(self, by: dict[int, int], ready: list[int]) -> Estimate:
+        """The relaxed plan, from the change that each fact is reached by."""
         needs, moves = self._changes.needs, self._changes.moves
         wanted = [self._changes.goal]
         seen = set(wanted)
@@ -97,7 +138,7 @@ class Relaxation:
             move = moves[change]
             if move != RULE:
                 made[move] = None
-                if unmet[change] == self._costs[move]:
+                if change in self._ready:
                     preferred[move] = None
             for need in needs[change]:
                 if need in by and need not in seen:
@@ -110,11 +151,3 @@ class Relaxation:
             applicable=[change for change in ready if change < count],
             wanted=wanted,
         )
-
-    def mask(self, facts: Iterable[int]) -> int:
-        """The bits of those facts that are bits of a state."""
-        total = 0
-        for fact in facts:
-            if fact < self._width:
-                total |= 1 << fact
-        return total
