@@ -15,7 +15,7 @@ _DURATION = re.compile(r"\s*\[\s*[0-9.]+\s*\]\s*$")
 _STEP = re.compile(r"\s*\(\s*([^\s();]+(?:\s+[^\s();]+)*)\s*\)\s*$")
 _BREAK = re.compile(r"[ \t]+")
 
-PSEUDO_STEPS = frozenset({"reach-goal"})
+PSEUDO_STEPS = frozenset({"reach-goal", "__extra_goal_operator"})
 """What some planners write after the last action, and no domain knows."""
 
 
