@@ -40,3 +40,13 @@ def test_disjunctive_goal_is_reached_one_way(host: RunningHost) -> None:
     goal = host.want("(exists (?r - room) (lit ?r))", kind="achieve")
     host.until_goal(goal, "reached")
     assert sum(fact.startswith("lit ") for fact in host.facts()) == 1
+
+
+def test_what_follows_is_told_with_its_rule(host: RunningHost) -> None:
+    host.bring("lamps", lamps())
+    host.until_goal(host.want("(bright self)", kind="achieve"), "reached")
+    assert "bright spot" in host.facts()
+    why = host.ask("fact", fact="(bright self)")
+    assert why["holds"]
+    assert [row["kind"] for row in why["for"]] == ["rule"]
+    assert "lamps.pddl:5:14" in why["for"][0]["said"]

@@ -54,7 +54,8 @@ def _explain(session: Session, found: dict[str, Any]) -> None:
     for side in ("for", "against"):
         for word in found[side]:
             behaviour = f" by its behaviour {word['behaviour']}" if word["behaviour"] else ""
-            render.sentence(f"{word['said']}{behaviour}, {_ago(word)}", mark=f"{side} it: ")
+            said = ", ".join(filter(None, (f"{word['said']}{behaviour}", _ago(word))))
+            render.sentence(said, mark=f"{side} it: ")
     told = [
         ("its value", found["value"] and cell(found["value"])),
         ("instead", found["instead"] and f"({found['instead']}) is believed"),
@@ -72,7 +73,8 @@ def _explain(session: Session, found: dict[str, Any]) -> None:
 
 
 def _ago(word: dict[str, Any]) -> str:
-    return f"{render.age(word['age_s'])} ago"
+    age = render.age(word["age_s"])
+    return age and f"{age} ago"
 
 
 @click.command()

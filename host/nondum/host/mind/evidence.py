@@ -8,8 +8,9 @@ from typing import Any, TypeAlias
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition
 from nondum.planning.caret import nearest
+from nondum.planning.conclusions import conclusions
 from nondum.planning.core import HOST_PREDICATES
-from nondum.planning.domain import Action, Merged
+from nondum.planning.domain import Action, DerivedRule, Merged
 from nondum.planning.facts import fact, parts
 from nondum.planning.scope import SELF
 from nondum.planning.syntax import Atom
@@ -18,9 +19,26 @@ from nondum.planning.testimony import Source, SourceKind
 Row: TypeAlias = dict[str, Any]
 
 
-def believed(beliefs: Beliefs) -> list[Row]:
-    """All that is believed: `fact`, `age_s` (since somebody has said so), `source`, `value`."""
-    return [_row(text, beliefs) for text in sorted(beliefs.world.facts)]
+def believed(beliefs: Beliefs, composition: Composition | None) -> list[Row]:
+    """All that is believed: `fact`, `age_s` (since somebody has said so; nothing for what follows
+    by rules), `source`, `value`."""
+    follows = _conclusions(beliefs, composition)
+    rows = [_row(text, beliefs) for text in beliefs.world.facts]
+    rows += [
+        {"fact": text, "age_s": None, "source": _by_rules(rules), "value": None}
+        for text, rules in follows.items()
+    ]
+    return sorted(rows, key=lambda row: str(row["fact"]))
+
+
+def _conclusions(
+    beliefs: Beliefs, composition: Composition | None
+) -> Mapping[str, tuple[DerivedRule, ...]]:
+    return conclusions(composition.merged, beliefs.world.facts) if composition else {}
+
+
+def _by_rules(rules: Iterable[DerivedRule]) -> str:
+    return f"it follows by {' or '.join(str(rule.origins[0]) for rule in rules)}"
 
 
 def parked(beliefs: Beliefs) -> list[Row]:
@@ -41,13 +59,17 @@ def explained(asked: str, beliefs: Beliefs, composition: Composition | None) -> 
     """
     text = _named(asked, beliefs.snapshot.host)
     found = beliefs.world.evidence(text)
+    follows = _conclusions(beliefs, composition).get(text, ())
     merged = composition.merged if composition else None
     actions = merged.domain.actions if merged else {}
     return {
         "fact": text,
-        "holds": found.holds,
+        "holds": found.holds or bool(follows),
         "value": beliefs.world.value(text),
-        "for": [_word(source, actions, beliefs) for source in found.pros],
+        "for": [
+            *(_word(source, actions, beliefs) for source in found.pros),
+            *(_rule_word(rule) for rule in follows),
+        ],
         "against": [_word(source, actions, beliefs) for source in found.cons],
         "instead": found.rival or None,
         "absent": list(found.absent),
@@ -65,6 +87,16 @@ def _row(text: str, beliefs: Beliefs) -> Row:
         "age_s": _age_s(found.since_s, beliefs),
         "source": "; ".join(source.said for source in found.pros),
         "value": beliefs.world.value(text),
+    }
+
+
+def _rule_word(rule: DerivedRule) -> Row:
+    return {
+        "component": rule.origins[0].component,
+        "kind": "rule",
+        "said": _by_rules([rule]),
+        "behaviour": "",
+        "age_s": None,
     }
 
 

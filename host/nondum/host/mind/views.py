@@ -18,6 +18,7 @@ from nondum.host.mind.people import People
 from nondum.host.mind.pursuit import Pursuit
 from nondum.host.mind.runner import BehaviourRunner
 from nondum.host.mind.tree_view import Row, TreeView
+from nondum.planning.conclusions import conclusions
 from nondum.planning.task_control import Phase
 from nondum.planning.task_tree import StepLeaf
 
@@ -78,7 +79,7 @@ class Views:
 
     def facts(self) -> list[Row]:
         """All that is believed, see `evidence.believed`."""
-        return evidence.believed(self._mind.beliefs)
+        return evidence.believed(self._mind.beliefs, self._mind.composition)
 
     def parked(self) -> list[Row]:
         """The facts that wait for objects, see `evidence.parked`."""
@@ -107,8 +108,9 @@ class Views:
         def goals() -> Row:
             if composition is None:
                 return {"can": [], "phrases": [], "given": given, "problems": []}
+            follows = conclusions(composition.merged, facts).keys()
             return {
-                "can": offers.offers(composition, facts, bare_facts, seen),
+                "can": offers.offers(composition, facts | follows, bare_facts, seen),
                 "phrases": offers.phrases(composition),
                 "given": given,
                 "problems": [str(problem) for problem in composition.book.problems],
