@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 from collections.abc import Callable
 from functools import cache
@@ -143,7 +142,6 @@ def test_any_text_can_be_quoted(text: str) -> None:
     assert words.isprintable()
 
 
-@pytest.mark.skipif(shutil.which("dot") is None, reason="Graphviz is not installed")
 @views
 def test_graphviz_draws_it(view: Draw) -> None:
     done = subprocess.run(
