@@ -75,22 +75,19 @@ def why_not(
     return (*diagnosis.problems(), *_used_to_supply(brought))
 
 
-def _used_to_supply(gone: Iterable[Seen]) -> Iterable[Problem]:
-    """One problem, for people look for a fix in the last one; none where nobody did."""
+def _used_to_supply(gone: Iterable[Seen]) -> tuple[Problem, ...]:
+    """One problem for all of them; none where nobody did."""
     known = sorted(gone, key=lambda seen: seen.contribution.component)
     if not known:
         return ()
-    names = ", ".join(f"{s.contribution.component} used to supply it, {_until(s)}" for s in known)
-    return (Problem("WHY_SUPPLIER", names, fix=_plug_in(known)),)
+    names = ", ".join(seen.contribution.component for seen in known)
+    until = time.strftime("%T", time.localtime(max(seen.left_wall_s or 0.0 for seen in known)))
+    message = f"{names} used to supply it, until {until}"
+    return (Problem("WHY_SUPPLIER", message, fix=f"plug in {_payloads(known)}"),)
 
 
-def _until(seen: Seen) -> str:
-    return f"until {time.strftime('%T', time.localtime(seen.left_wall_s))}"
-
-
-def _plug_in(gone: Iterable[Seen]) -> str:
-    payloads = dict.fromkeys(seen.payload for seen in gone)
-    return f"plug in {' or '.join(payloads)}"
+def _payloads(gone: Iterable[Seen]) -> str:
+    return " or ".join(dict.fromkeys(seen.payload for seen in gone))
 
 
 def words_gone(merged: Merged, pddl: str, seen: Iterable[Seen]) -> tuple[Problem, ...]:
@@ -104,7 +101,7 @@ def words_gone(merged: Merged, pddl: str, seen: Iterable[Seen]) -> tuple[Problem
         return ()
     names = ", ".join(sorted(known.contribution.component for known in bringers))
     message = f"{words} means nothing without {names}, which brought it"
-    return (Problem("WHY_WORDS_GONE", message, fix=_plug_in(bringers)),)
+    return (Problem("WHY_WORDS_GONE", message, fix=f"plug in {_payloads(bringers)}"),)
 
 
 def _names(contribution: Contribution) -> set[str]:

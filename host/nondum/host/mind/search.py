@@ -11,15 +11,14 @@ from nondum.host.mind.composition import Composition
 from nondum.host.mind.diagnosis import Seen, why_not, words_gone
 from nondum.host.mind.goals import GivenGoal
 from nondum.host.mind.planners import Planners
+from nondum.planning.cutting import cut_short
 from nondum.planning.domain import Merged
 from nondum.planning.exploration import INSTANCES_LIMIT
 from nondum.planning.goal import Goal, goal_problems, parse_goal
 from nondum.planning.ground import ground
 from nondum.planning.oversize import Fitted, fitted
-from nondum.planning.partial_order import causal_links, threats
 from nondum.planning.plain import plain
 from nondum.planning.pricing import at_own_cost, handicaps, priced
-from nondum.planning.step import steps_of, words
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
 from nondum.sdk.planner import AlreadyTrue, GaveUp, GroundTask, Plan, Unsolvable
 
@@ -161,17 +160,6 @@ async def _searched(
                 why_not, fit.merged, goal, situation.facts, past.seen, failures
             )
             return NoPlan(situation, (*problems, *too_big))
-
-
-def cut_short(merged: Merged, task: GroundTask, plan: Plan) -> Problem | None:
-    """What is wrong with a plan that ends a lasting behaviour before its effects are used."""
-    steps = steps_of(task, plan, merged.lasting())
-    found = threats(steps, causal_links(steps, words(task, task.goal)))
-    if not found:
-        return None
-    breaker, provider = steps[found[0].breaker].name, steps[found[0].link.provider or 0].name
-    message = f"{breaker} ends {provider}, whose ({found[0].link.fact}) is needed after it"
-    return Problem("PLAN_CUT_SHORT", message)
 
 
 async def _task_of_any_size(
