@@ -15,6 +15,8 @@ from nondum.planning.search.encoding import Encoded, State
 
 _UNMET = 1 << 40
 """Stands in a sum for a condition that is not met yet; more than any sum of costs."""
+_ANY_ESTIMATE = 300
+"""What even the smallest estimate takes of such steps."""
 
 
 @dataclass(slots=True)
@@ -54,8 +56,8 @@ class Relaxation:
         """Change → its cost, and what it lacks in the last state."""
         self._ready: set[int] = set()
         """The changes that lack nothing in the last state."""
-        self.effort = sum(map(len, changes.needs)) + sum(map(len, changes.gives))
-        """How much work an estimate is, at most."""
+        self.effort = _ANY_ESTIMATE + sum(map(len, (*changes.needs, *changes.gives)))
+        """How much work an estimate is, at most: steps of its inner loops."""
 
     def estimate(self, state: State) -> Estimate | None:
         """Estimate the way from a state to the goal. None: there is none, for certain."""
