@@ -178,10 +178,11 @@ def page(rounds: Sequence[Round]) -> str:
 
 `python -m benchmarks.composition` wrote this page. {PRESENT} plugins whose authors share the
 core's words and nothing else ({written / 1024:.0f} KiB of PDDL: cameras, detectors of several
-costs, trackers, bases, surveyors, arms, probes, pointers, speakers, lamps; with
-types, constants, functions, `or`, `forall`, `when`, derived predicates), then a fifty-first that the goal can be reached with. No text was seen before it is
-measured. The plan ({rounds[0].steps} steps, of {rounds[0].ground_actions} ground actions) is
-validated. Processor time in one process; {len(rounds)} repeats, medians (lowest-highest).
+costs, trackers, bases, surveyors, arms, probes, pointers, speakers, lamps; with types, constants,
+functions, `or`, `forall`, `when`, derived predicates), then a fifty-first that the goal can be
+reached with. No text was seen before it is measured. The plan ({rounds[0].steps} steps, of
+{rounds[0].ground_actions} ground actions) is validated. Processor time in one process;
+{len(rounds)} repeats, medians (lowest-highest).
 
 {table(header, rows)}
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from operator import itemgetter
 
 from nondum.planning.concern import Wishes
 from nondum.planning.domain import (
@@ -176,20 +177,26 @@ class _Template:
     def __init__(self, atoms: Iterable[Atom], variables: Row, table: FactTable) -> None:
         at = {name: index for index, name in enumerate(variables)}
         self._atoms = tuple(
-            (atom.predicate, tuple((at.get(term.name, -1), term.name) for term in atom.terms))
-            for atom in atoms
+            (atom.predicate, _row_of(atom, at), table.of(atom.predicate)) for atom in atoms
         )
         self._table = table
 
     def numbers(self, values: Values) -> frozenset[int]:
         """The facts."""
-        number = self._table.number
-        return frozenset(
-            [
-                number(predicate, tuple([values[i] if i >= 0 else name for i, name in terms]))
-                for predicate, terms in self._atoms
-            ]
-        )
+        found = []
+        for predicate, row_of, known in self._atoms:
+            row = row_of(values)
+            number = known.get(row)
+            found.append(self._table.number(predicate, row) if number is None else number)
+        return frozenset(found)
+
+
+def _row_of(atom: Atom, at: Mapping[str, int]) -> Callable[[Values], Row]:
+    """What makes an atom's row of a rule's values; the usual kinds of it quickly."""
+    terms = tuple((at.get(term.name, -1), term.name) for term in atom.terms)
+    if len(terms) > 1 and all(index >= 0 for index, _ in terms):
+        return itemgetter(*(index for index, _ in terms))
+    return lambda values: tuple([values[i] if i >= 0 else name for i, name in terms])
 
 
 class _Head:

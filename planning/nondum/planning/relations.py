@@ -20,6 +20,10 @@ class FactTable:
     facts: list[tuple[str, Row]] = field(default_factory=list)
     _numbers: defaultdict[str, dict[Row, int]] = field(default_factory=lambda: defaultdict(dict))
 
+    def of(self, predicate: str) -> Mapping[Row, int]:
+        """The facts of one predicate with their numbers; it grows as facts are mentioned."""
+        return self._numbers[predicate]
+
     def number(self, predicate: str, row: Row) -> int:
         """The number of a fact; a new one if it was never mentioned."""
         numbers = self._numbers[predicate]
