@@ -2,7 +2,7 @@
 
 Robots choose between alternatives by cost, and small tasks are planned in no time: there the others
 get a moment more, and the cheapest plan wins. (Over 30 small benchmark tasks the native planner,
-which looks for cheaper plans by itself, gave the cheaper plan in 8, and a greedy search in none; but
+which looks for cheaper plans by itself, gave the cheaper plan in 8, a greedy search in none; but
 the greedy one is often first, by up to 0.1 s.)
 """
 
