@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import cast
 
 from nondum.host.catalogue.catalogue import Catalogue
+from nondum.host.catalogue.records import Step
 from nondum.host.control.arguments import Arguments
 from nondum.host.mind.mind import Mind
 from nondum.host.news import News
@@ -110,6 +111,23 @@ class Questions:
         view = self.mind.views.why()
         told = [str(problem) for problem in problems_of(self.catalogue.snapshot())]
         return {**view, "problems": list(dict.fromkeys([*view["problems"], *told]))}
+
+    async def composition(self, arguments: Arguments) -> Row:
+        """All that planning goes by, and what is known that is not here, for tools that plan by
+        themselves; `waiting` are payloads that are here and not active."""
+        snapshot = self.catalogue.snapshot()
+        devices = [dict(device.properties) for device in snapshot.devices]
+        waiting = [
+            {
+                "payload": payload.payload_id,
+                "version": payload.version,
+                "folders": {drive: str(folder) for drive, folder in payload.sources.items()},
+                "problems": [problem.to_dict() for problem in payload.problems],
+            }
+            for payload in snapshot.payloads
+            if payload.step is not Step.ACTIVE
+        ]
+        return {**self.mind.views.composition(), "devices": devices, "waiting": waiting}
 
     async def journal(self, arguments: Arguments) -> list[Row]:
         """What happened, oldest first."""

@@ -17,6 +17,7 @@ def answering(questions: Questions, orders: Orders) -> dict[str, Verb]:
     verbs: dict[str, Callable[[Arguments], Awaitable[Any]]] = {
         "behaviours": questions.behaviours,
         "components": questions.components,
+        "composition": questions.composition,
         "devices": questions.devices,
         "fact": questions.fact,
         "facts": questions.facts,

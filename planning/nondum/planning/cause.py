@@ -48,7 +48,7 @@ class Cause:
         """The cause in words: what is missing, which step needs it, and what that is for."""
         needed = f", which {self.path[-1]} needs" if self.path else ""
         purpose = list(reversed(self.path[:-1]))
-        if self.goal and self.goal != self.fact:
+        if self.goal and (self.path or self.goal != self.fact):
             purpose.append(f"({self.goal})")
         serves = "".join(f", for {step}" for step in purpose)
         return Problem(self.lack.value, f"{self._said()}{needed}{serves}", fix=self._fix())

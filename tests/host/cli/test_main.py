@@ -31,6 +31,7 @@ Options:
   -h, --help      Show this message and exit.
 
 Commands:
+  advise      Which payloads would make a goal possible, and by which plan.
   behaviours  What the robot can do.
   completion  Print the script that completes commands in a shell.
   components  What the robot is made of at this moment.

@@ -22,6 +22,7 @@ COMPLETE = "_NONDUM_COMPLETE"
 """The variable by which a shell asks for completions."""
 
 COMMANDS: dict[str, tuple[str, str]] = {
+    "advise": ("advise", "Which payloads would make a goal possible, and by which plan."),
     "behaviours": ("body", "What the robot can do."),
     "completion": ("shell", "Print the script that completes commands in a shell."),
     "components": ("body", "What the robot is made of at this moment."),

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import click
 
-from nondum.host.cli import render
+from nondum.host.cli import complete, render
+from nondum.host.cli.advise import row, show, surroundings, wheelhouse_option
 from nondum.host.cli.connection import Session, json_option
+from nondum.host.cli.failure import tell_problem
 from nondum.host.cli.table import cell, table
+from nondum.sdk.errors import GoalRefused, Problem
 
 
 @click.command()
@@ -123,13 +127,24 @@ def plan(session: Session) -> None:
 
 
 @click.command()
+@click.argument("goal", nargs=-1, metavar="[GOAL|FACT]...", shell_complete=complete.goal_words)
+@wheelhouse_option
 @json_option
 @click.pass_obj
-def why(session: Session) -> None:
+def why(session: Session, goal: tuple[str, ...], wheelhouses: tuple[Path, ...]) -> None:
     """Why the robot does what it does, or why it cannot.
 
-    Example: nondum why
+    With a goal (its number, words, or PDDL) or a fact: what it lacks, which step needs that, who
+    used to supply it, and which known payload would help, as `nondum advise` says.
+
+    \b
+    Examples: nondum why
+              nondum why 1
+              nondum why "(following self person)"
     """
+    if goal:
+        _why_not(session, " ".join(goal), wheelhouses)
+        return
     view = session.ask("why")
     if session.as_json:
         render.as_json(view)
@@ -142,3 +157,27 @@ def why(session: Session) -> None:
         click.echo()
     for told in view["told"]:
         render.sentence(told, mark="> ")
+
+
+def _why_not(session: Session, asked: str, wheelhouses: tuple[Path, ...]) -> None:
+    """A goal's number stands for the goal; a fact that holds is explained as such."""
+    if asked.isdecimal():
+        given = {row["id"]: row["goal"] for row in session.ask("goals")["given"]}
+        if asked not in given:
+            known = ", ".join(given) or "none was given"
+            message = f"there is no goal {asked!r}"
+            raise GoalRefused(Problem("GOAL_UNKNOWN", message, fix=f"goals: {known}"))
+        asked = given[asked]
+    elif asked.startswith("(") and asked.count("(") == 1:
+        fact = session.ask("fact", fact=asked)
+        if fact["holds"]:
+            _explain(session, fact)
+            return
+    around, problems = surroundings(session, wheelhouses)
+    found = around.counsel(asked)
+    if session.as_json:
+        render.as_json(row(found))
+        return
+    for problem in problems:
+        tell_problem(problem, as_warning=True)
+    show(found)

@@ -11,7 +11,7 @@ from nondum.planning.domain import Merged
 from nondum.planning.facts import fact
 from nondum.planning.merge import merge
 from nondum.planning.phrases import Phrasebook, phrasebook
-from nondum.sdk.description import ACTUATORS
+from nondum.sdk.description import ACTUATORS, PluginDescription
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,25 +100,32 @@ def body_facts(snapshot: Snapshot) -> dict[str, str]:
     host = snapshot.host
     facts = {fact("self", host): "this is the host that plans"}
     for component in snapshot.components:
-        for text, why in _component_facts(host, component):
-            facts[text] = why
+        facts |= component_facts(
+            host, component.id, component.description, is_ready=component.is_ready
+        )
     return facts
 
 
-def _component_facts(host: str, component: ComponentRecord) -> Iterator[tuple[str, str]]:
-    for unit in component.description.units:
-        name = object_name(host, component.id, unit.name)
-        yield fact("on", name, host), f"{component.id} is plugged into this host"
-        if component.is_ready:
-            yield fact("ready", name), f"{component.id} is healthy and its devices are there"
-            yield fact("idle", name), "nobody uses it"
+def component_facts(
+    host: str, component: str, description: PluginDescription, *, is_ready: bool
+) -> dict[str, str]:
+    """What the host asserts of one component that is plugged in, each with the reason in words."""
+    facts: dict[str, str] = {}
+    for unit in description.units:
+        name = object_name(host, component, unit.name)
+        facts[fact("on", name, host)] = f"{component} is plugged into this host"
+        if is_ready:
+            facts[fact("ready", name)] = f"{component} is healthy and its devices are there"
+            facts[fact("idle", name)] = "nobody uses it"
         for output in unit.outputs:
-            stream = object_name(host, component.id, output.name)
-            yield fact("output", name, stream), f"{component.id} declares it"
+            stream = object_name(host, component, output.name)
+            facts[fact("output", name, stream)] = f"{component} declares it"
             if output.always:
-                yield fact("from", stream, host), f"{component.id} produces it from its start on"
+                why = f"{component} produces it from its start on"
+                facts[fact("from", stream, host)] = why
             else:
-                yield fact("free", stream), "nobody uses it"
+                facts[fact("free", stream)] = "nobody uses it"
+    return facts
 
 
 def own_objects(host: str, component: ComponentRecord) -> dict[str, str]:

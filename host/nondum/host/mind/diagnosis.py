@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from nondum.host.mind.composition import Composition
 from nondum.planning.claims import claims_of
@@ -14,6 +14,7 @@ from nondum.planning.domain import Merged
 from nondum.planning.explain import explain, suppliers
 from nondum.planning.goal import Goal
 from nondum.planning.search import solve
+from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import FragmentRefused, Problem
 from nondum.sdk.planner import Answer, GroundTask
 
@@ -26,25 +27,35 @@ class Seen:
     """A component that is here, or was."""
 
     contribution: Contribution
-    payload: str
-    """Id of the payload that brings it, with its version."""
+    description: PluginDescription
+    payload_id: str
+    """The payload that brings it."""
+    version: str = ""
+    """The payload's, where that is known."""
     left_wall_s: float | None = None
     """When it went, in seconds since 1970; None while it is here."""
+
+    @property
+    def payload(self) -> str:
+        """The payload's id and version."""
+        return f"{self.payload_id} {self.version}".rstrip()
 
 
 def noted(seen: Mapping[str, Seen], composition: Composition, wall_s: float) -> dict[str, Seen]:
     """What is remembered of components once a composition was seen; later ones replace earlier."""
-    payloads = {payload.key: payload for payload in composition.snapshot.payloads}
-    present: dict[str, Seen] = {}
-    for contribution in composition.contributions:
-        record = composition.snapshot.component(contribution.component)
-        payload = payloads.get(record.payload) if record else None
-        name = record.payload_id if record else contribution.component
-        present[contribution.component] = Seen(
-            contribution, f"{name} {payload.version}" if payload else name
+    versions = {payload.key: payload.version for payload in composition.snapshot.payloads}
+    brought = {contribution.component: contribution for contribution in composition.contributions}
+    present = {
+        record.id: Seen(
+            brought[record.id],
+            record.description,
+            record.payload_id,
+            versions.get(record.payload, ""),
         )
+        for record in composition.snapshot.components
+    }
     gone = {
-        name: Seen(known.contribution, known.payload, known.left_wall_s or wall_s)
+        name: replace(known, left_wall_s=known.left_wall_s or wall_s)
         for name, known in seen.items()
         if name not in present
     }

@@ -119,6 +119,11 @@ class Pursuit:
         return (*current, *self._left_over)
 
     @property
+    def failures(self) -> dict[str, str]:
+        """The actions that are excluded, and how they failed."""
+        return {name: self._failures.get(name, "") for name in sorted(self.excluded)}
+
+    @property
     def is_searching(self) -> bool:
         """Whether a plan is being searched for."""
         return self._search is not None

@@ -137,6 +137,37 @@ class Views:
             "told": [told.text for told in self._mind.people.since(self._last_few())],
         }
 
+    def composition(self) -> Row:
+        """All that planning goes by, for tools that plan by themselves: `host`, `components`,
+        `facts`, `excluded` actions and why, and the components `seen` that are not here now."""
+        beliefs, pursuit = self._mind.beliefs, self._mind.pursuit
+        kept_out = dict(pursuit.left_out)
+        return {
+            "host": beliefs.snapshot.host,
+            "components": [
+                {
+                    "component": component.id,
+                    "rank": component.rank,
+                    "description": component.description.to_dict(),
+                }
+                for component in self._components()
+                if component.id not in kept_out
+            ],
+            "facts": sorted(beliefs.world.bare_facts),
+            "excluded": pursuit.failures,
+            "seen": [
+                {
+                    "component": seen.contribution.component,
+                    "payload": seen.payload_id,
+                    "version": seen.version,
+                    "left": seen.left_wall_s,
+                    "description": seen.description.to_dict(),
+                }
+                for seen in pursuit.seen
+                if seen.left_wall_s is not None
+            ],
+        }
+
     def behaviours(self) -> list[Row]:
         """What can be done: `behaviour`, `component`, `kind`, `running`, `phrases`."""
         running = {(run.component, run.behaviour) for run in self._mind.runner}

@@ -3,5 +3,6 @@
 from nondum.planning.advise.advice import Advice, Way, advise
 from nondum.planning.advise.candidate import Candidate, Here
 from nondum.planning.advise.relevance import relevant
+from nondum.planning.advise.words import understood
 
-__all__ = ["Advice", "Candidate", "Here", "Way", "advise", "relevant"]
+__all__ = ["Advice", "Candidate", "Here", "Way", "advise", "relevant", "understood"]

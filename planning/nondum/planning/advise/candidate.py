@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 from nondum.planning.contribution import Contribution
 from nondum.sdk.errors import Problem
@@ -16,6 +17,20 @@ class Here:
     contributions: tuple[Contribution, ...]
     facts: frozenset[str]
     """All that is believed while no lasting behaviour runs."""
+    excluded: frozenset[str] = frozenset()
+    """Actions that failed too often to be planned with for now."""
+
+    def beside(self, candidates: Iterable[Candidate]) -> Here:
+        """The same host with all candidates, of components that several bring only the first."""
+        found = {(c.host, c.component): c for c in self.contributions}
+        rank = max((c.rank for c in self.contributions), default=0) + 1
+        facts = set(self.facts)
+        for candidate in candidates:
+            facts |= candidate.facts
+            for contribution in candidate.contributions:
+                key = (contribution.host, contribution.component)
+                found.setdefault(key, replace(contribution, rank=rank))
+        return replace(self, contributions=tuple(found.values()), facts=frozenset(facts))
 
 
 @dataclass(frozen=True, slots=True)

@@ -197,6 +197,8 @@ class Trials:
             return Trial(Outcome.UNKNOWN, merged, goal, oversized=oversized)
         except FragmentRefused:
             return Trial(Outcome.UNKNOWN, merged, goal)
+        kept = tuple(a for a in task.actions if a.name not in self._here.excluded)
+        task = replace(task, actions=kept)
         answer = quick_answer(task) or self._search(task)
         match answer:
             case AlreadyTrue():

@@ -1,0 +1,179 @@
+"""Which payloads would help, and how."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from nondum.host.cli import complete, render
+from nondum.host.cli.connection import Session, json_option
+from nondum.host.cli.failure import tell_problem
+from nondum.host.cli.judge import FOLDER
+from nondum.host.cli.table import table
+from nondum.sdk.errors import HostUnreachable, Problem
+
+if TYPE_CHECKING:
+    from nondum.host.counsel import Counsel, Surroundings
+    from nondum.planning.advise import Candidate, Way
+
+EXIT_NOTHING_HELPS = 11
+EXIT_UNKNOWN = 12
+"""Nothing was found that helps, but not everything could be looked at."""
+
+wheelhouse_option = click.option(
+    "--wheelhouse",
+    "wheelhouses",
+    multiple=True,
+    type=FOLDER,
+    help="Drive, or folder of payload folders, to look through as well.",
+)
+
+
+@click.command()
+@click.argument("goal", nargs=-1, required=True, shell_complete=complete.goal_words)
+@wheelhouse_option
+@click.option(
+    "--host-of",
+    "host",
+    metavar="NAME",
+    help="Ask no daemon: advise for a host of this name with nothing plugged in.",
+)
+@json_option
+@click.pass_obj
+def advise(
+    session: Session, goal: tuple[str, ...], wheelhouses: tuple[Path, ...], host: str | None
+) -> int:
+    """Which payloads would make a goal possible, and by which plan.
+
+    GOAL is in words, or in PDDL. Known are payloads that were here since the daemon started, that
+    are on drives, and those in the folders given; nothing of them is run. Each alternative needs
+    all its payloads; its plan was checked. Exits with 11 if nothing known helps, with 12 if that is
+    not certain.
+
+    \b
+    Examples: nondum advise follow me
+              nondum advise "(pointing self radiation-source)" --wheelhouse /media/usb
+    """
+    around, problems = surroundings(session, wheelhouses, host)
+    found = around.counsel(" ".join(goal))
+    if session.as_json:
+        render.as_json({**row(found), "unread": [problem.to_dict() for problem in problems]})
+    else:
+        for problem in problems:
+            tell_problem(problem, as_warning=True)
+        show(found)
+    return exit_code(found)
+
+
+def surroundings(
+    session: Session, wheelhouses: Iterable[Path], host: str | None = None
+) -> tuple[Surroundings, list[Problem]]:
+    """The daemon's host with all payloads that are known of, and what could not be read of them.
+
+    A bare host where one is named. Raises `HostUnreachable`.
+    """
+    from nondum.host.counsel import Surroundings, waiting
+    from nondum.host.shelf import Shelved, on_shelf
+    from nondum.wheelhouse import preflight
+
+    facts = preflight.probe(Path.cwd(), reserve_mb=0, confinement=0)
+    told = None if host else _told(session)
+    shelf: list[Shelved] = []
+    problems: list[Problem] = []
+    found = [found for folder in wheelhouses for found in on_shelf(folder, facts)]
+    for thing in [*found, *(waiting(told, facts) if told else ())]:
+        if isinstance(thing, Shelved):
+            shelf.append(thing)
+        else:
+            problems.append(thing)
+    if told is None:
+        return Surroundings.bare(host or "", shelf), problems
+    return Surroundings.of(told, shelf), problems
+
+
+def _told(session: Session) -> Any:
+    try:
+        return session.ask("composition")
+    except HostUnreachable as error:
+        fix = "start it, or give --host-of NAME to ask without one"
+        first = error.problems[0]
+        raise HostUnreachable(Problem(first.code, first.message, first.where, fix=fix)) from error
+
+
+def exit_code(found: Counsel) -> int:
+    """What a script is told."""
+    if found.advice.helps:
+        return 0
+    return EXIT_NOTHING_HELPS if found.advice.is_complete else EXIT_UNKNOWN
+
+
+def row(found: Counsel) -> dict[str, Any]:
+    """All of it as plain data."""
+    advice = found.advice
+    return {
+        "goal": found.goal,
+        "kind": found.kind,
+        "now": _way(advice.now) if advice.now else None,
+        "causes": [problem.to_dict() for problem in found.causes],
+        "ways": [_way(way) for way in advice.ways],
+        "complete": advice.is_complete,
+        "known": found.known,
+        "unfit": [_payload(candidate) for candidate in advice.unfit],
+    }
+
+
+def _way(way: Way) -> dict[str, Any]:
+    payloads = [_payload(candidate) for candidate in way.payloads]
+    return {"payloads": payloads, "plan": list(way.steps), "cost": way.plan.cost}
+
+
+def _payload(candidate: Candidate) -> dict[str, Any]:
+    caveats = [problem.to_dict() for problem in candidate.caveats]
+    return {
+        "payload": candidate.id,
+        "version": candidate.version,
+        "where": candidate.where,
+        "caveats": caveats,
+    }
+
+
+def show(found: Counsel) -> None:
+    """Tell a person: what is missing, the alternatives, and what speaks against them."""
+    advice = found.advice
+    render.sentence(f"goal {found.goal}")
+    if advice.now is not None:
+        render.sentence(f"it can be had now: {_shortly(advice.now) or 'it holds'}", colour="green")
+        return
+    for problem in found.causes:
+        render.sentence(str(problem), colour="red")
+    click.echo()
+    table(
+        list(_rows(advice.ways)),
+        ["way", "payload", "where", "plan"],
+        empty=f"none of the {found.known} payloads that are known of would help",
+    )
+    if not advice.is_complete:
+        render.sentence("there may be more: not everything could be looked at")
+    caveats = dict.fromkeys(c for way in advice.ways for c in way.payloads if c.caveats)
+    for candidate in (*caveats, *advice.unfit):
+        for problem in candidate.caveats:
+            render.sentence(f"{candidate.name}: {problem}", colour="yellow", mark="but ")
+
+
+def _rows(ways: Iterable[Way]) -> Iterator[dict[str, Any]]:
+    """A row a payload; the plan stands with the first of each way."""
+    for number, way in enumerate(ways, 1):
+        for index, candidate in enumerate(way.payloads):
+            yield {
+                "way": str(number) if index == 0 else "and",
+                "payload": candidate.name,
+                "where": candidate.where,
+                "plan": _shortly(way) if index == 0 else " ",
+            }
+
+
+def _shortly(way: Way) -> str:
+    return ", then ".join(step.split(" ")[0] for step in way.steps)

@@ -1,0 +1,157 @@
+"""Why a goal cannot be had and what would help, worked out outside the daemon.
+
+A daemon tells what planning goes by (the verb `composition`); the search takes none of its time.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from nondum.host.mind.diagnosis import Seen, why_not, words_gone
+from nondum.host.shelf import Shelved, candidate_of, distinct, on_shelf
+from nondum.planning.advise import Advice, Candidate, Here, advise, understood
+from nondum.planning.contribution import Contribution
+from nondum.planning.goal import GoalKind, goal_text, parse_goal
+from nondum.planning.merge import merge
+from nondum.planning.search import solve
+from nondum.sdk.description import PluginDescription
+from nondum.sdk.errors import GoalRefused, Problem
+from nondum.sdk.planner import Answer, GroundTask
+from nondum.wheelhouse.preflight import HostFacts
+
+WAYS_LIMIT = 10
+"""So many alternatives are told."""
+_SEARCH_S = 2.0
+"""How long is planned with one set of payloads."""
+
+
+@dataclass(frozen=True, slots=True)
+class Counsel:
+    """All that is told of one goal."""
+
+    goal: str
+    """In PDDL."""
+    kind: GoalKind
+    advice: Advice
+    causes: tuple[Problem, ...]
+    """Why it cannot be had now; empty if it can."""
+    known: int
+    """How many payloads are known of that are not at work."""
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """A host, what it remembers, and the payloads around it."""
+
+    here: Here
+    seen: tuple[Seen, ...]
+    failures: Mapping[str, str]
+    candidates: tuple[Candidate, ...]
+
+    @classmethod
+    def of(cls, told: Mapping[str, Any], shelf: Iterable[Shelved]) -> Surroundings:
+        """What a daemon told, and payloads from elsewhere."""
+        host = told["host"]
+        devices = told.get("devices")
+        seen = tuple(_seen(row, host) for row in told["seen"])
+        present = tuple(
+            Contribution.from_description(
+                _description(row), host=host, component=row["component"], rank=row["rank"]
+            )
+            for row in told["components"]
+        )
+        at_work = {contribution.component for contribution in present}
+        known = distinct((*shelf, *_remembered(seen)))
+        return cls(
+            Here(host, present, frozenset(told["facts"]), frozenset(told["excluded"])),
+            seen,
+            told["excluded"],
+            tuple(
+                candidate_of(payload, host, devices)
+                for payload in known
+                if not at_work.issuperset(payload.components)
+            ),
+        )
+
+    @classmethod
+    def bare(cls, host: str, shelf: Iterable[Shelved]) -> Surroundings:
+        """A host with nothing plugged in, and payloads from elsewhere."""
+        told = {"host": host, "components": [], "facts": [f"self {host}"], "excluded": {}}
+        return cls.of({**told, "seen": []}, shelf)
+
+    def counsel(self, asked: str) -> Counsel:
+        """Advise on a goal in words, or in PDDL where it begins with a parenthesis.
+
+        Raises `GoalRefused`.
+        """
+        goal: str = asked
+        kind: GoalKind = "achieve"
+        if not asked.lstrip().startswith("("):
+            meant = understood(asked, self.here, self.candidates)
+            goal, kind = goal_text(meant.expr), meant.kind
+        advice = advise(self.here, goal, self.candidates, _search, ways_limit=WAYS_LIMIT)
+        causes = () if advice.now else self._causes(goal, advice)
+        return Counsel(goal, kind, advice, causes, len(self.candidates))
+
+    def _causes(self, goal: str, advice: Advice) -> tuple[Problem, ...]:
+        """Raises `GoalRefused` for a goal whose words nobody knows."""
+        merged = merge(self.here.contributions, self.here.host)
+        try:
+            parsed = parse_goal(goal, merged)
+        except GoalRefused as refused:
+            gone = words_gone(merged, goal, self.seen)
+            return gone or refused.problems if advice.ways else self._lacking_still(goal)
+        return why_not(merged, parsed, self.here.facts, self.seen, self.failures)
+
+    def _lacking_still(self, goal: str) -> tuple[Problem, ...]:
+        """What a goal lacks even if all payloads were here; raises `GoalRefused` for words that
+        mean nothing then either."""
+        together = self.here.beside(self.candidates)
+        merged = merge(together.contributions, together.host)
+        parsed = parse_goal(goal, merged)
+        return why_not(merged, parsed, together.facts | merged.init.keys(), self.seen)
+
+
+def waiting(told: Mapping[str, Any], facts: HostFacts | None) -> Iterable[Shelved | Problem]:
+    """The payloads that a daemon has not got to work, as far as their drives can be read."""
+    for row in told["waiting"]:
+        refusal = tuple(Problem(**problem) for problem in row["problems"])
+        for name, folder in row["folders"].items():
+            for found in on_shelf(Path(folder), facts) if Path(folder).is_dir() else ():
+                if isinstance(found, Shelved):
+                    yield Shelved(found.id, found.version, name, found.components, refusal)
+
+
+def _remembered(seen: Iterable[Seen]) -> list[Shelved]:
+    """The payloads of components that were here, with those of their components that were."""
+    found: dict[tuple[str, str], dict[str, PluginDescription]] = {}
+    left: dict[tuple[str, str], float] = {}
+    for known in seen:
+        key = (known.payload_id, known.version)
+        found.setdefault(key, {})[known.contribution.component] = known.description
+        left[key] = max(left.get(key, 0.0), known.left_wall_s or 0.0)
+    return [
+        Shelved(
+            id, version, f"here until {time.strftime('%T', time.localtime(left[id, version]))}", c
+        )
+        for (id, version), c in found.items()
+    ]
+
+
+def _seen(row: Mapping[str, Any], host: str) -> Seen:
+    description = _description(row)
+    contribution = Contribution.from_description(description, host=host, component=row["component"])
+    return Seen(contribution, description, row["payload"], row["version"], row["left"])
+
+
+def _description(row: Mapping[str, Any]) -> PluginDescription:
+    return PluginDescription.parse(row["description"], where=row["component"])
+
+
+def _search(task: GroundTask) -> Answer:
+    until_s = time.monotonic() + _SEARCH_S
+    return solve(task, lambda: time.monotonic() > until_s)
