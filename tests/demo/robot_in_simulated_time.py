@@ -18,6 +18,8 @@ from nondum_panorama.playing import Score
 from nondum_panorama.recording import Frame
 from nondum_panorama.streaming import camera_model, open_recording
 from nondum_panorama.view import Lens, View
+from nondum_pedestrian_detector.settings import Settings
+from nondum_pedestrian_detector.spotter import Spotter
 from nondum_people_detector.detection import detect
 from nondum_people_detector.hog import HogDetector
 from nondum_thermal_camera.simulation import open_simulation
@@ -41,6 +43,15 @@ def camera(kind: str) -> Callable[[int], Frame]:
     return open_simulation(CLIP).frame
 
 
+def detector(name: str) -> Callable[[Image], Detections]:
+    """What a detector that goes by that name finds in an image."""
+    if name == "pedestrians":
+        spotter = Spotter(Settings())
+        return lambda image: spotter.spot(image, "person")
+    hog = HogDetector()
+    return lambda image: detect(hog, image, is_probability=False)
+
+
 @dataclass
 class Robot:
     """A body that pans a camera over the recording and follows what its detector finds."""
@@ -48,6 +59,8 @@ class Robot:
     kind: str = "colour"
     latency_s: float = 0.2
     """Mean time from an image to its detections; the next image is taken when they are there."""
+    detects: str = "people"
+    """Who detects: see `detector`."""
     begins_s: float = 1.0
     """When detecting and tracking begin, after the stream did."""
     has_odometry: bool = True
@@ -60,7 +73,7 @@ class Robot:
         view = View()
         self._lens, self._model = Lens(CLIP, view), camera_model(view)
         self._score = Score.of(CLIP, hold_s=HOLD_S)
-        self._detector = HogDetector()
+        self._detect = detector(self.detects)
         self._follower = Follower(Gains())
         self._dice = random.Random(self.seed)
         self._motion = Motion()
@@ -90,7 +103,7 @@ class Robot:
         encoding = "bgr8" if seen.ndim == 3 else "mono8"
         image = Image.from_array(Header(now_s, "body", number), seen, encoding, self._model)
         takes_s = self.latency_s * self._dice.uniform(0.7, 1.3)
-        self._pending = (now_s + takes_s, detect(self._detector, image, is_probability=False))
+        self._pending = (now_s + takes_s, self._detect(image))
 
     def _track(self, now_s: float) -> None:
         if self.has_odometry:

@@ -9,16 +9,18 @@ from dataclasses import dataclass
 class Settings:
     """How people are looked for."""
 
-    threshold: float = 0.8
+    threshold: float = 1.0
     """How sure is sure enough: distance from the SVM's plane."""
     scale: float = 1.1
     """Step of the image pyramid: 1.05 takes twice the time and finds hardly more."""
-    overlap: float = 0.25
-    """Of windows that overlap more (intersection over union), only the surest is told."""
+    overlap: float = 0.65
+    """Two windows that share more of the smaller one mean the same person."""
     threads: int = 1
     """Threads that OpenCV may use."""
 
     def __post_init__(self) -> None:
+        if self.threshold <= 0:
+            raise ValueError(f"threshold is {self.threshold}; it must be positive")
         if not 1.01 <= self.scale <= 2:
             raise ValueError(f"scale is {self.scale}; it must lie between 1.01 and 2")
         if not 0 < self.overlap < 1:

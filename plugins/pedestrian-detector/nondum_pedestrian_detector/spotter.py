@@ -7,7 +7,6 @@ pedestrian detection: survey and experiments", PAMI 2009); OpenCV ships it.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import cv2
@@ -16,6 +15,7 @@ import numpy.typing as npt
 
 from nondum.sdk import BoundingBox2D, Detection, Detections, Image
 from nondum_pedestrian_detector.settings import Settings
+from nondum_pedestrian_detector.windows import Floats, people
 
 WINDOW = (48, 96)
 _STRIDE = (8, 8)
@@ -38,19 +38,21 @@ class Spotter:
 
         Scores are distances from the SVM's plane, squeezed into 0..1; they are no probabilities.
         """
-        windows, scores = self._windows(grey(image))
-        kept = cv2.dnn.NMSBoxes(windows, scores, self._settings.threshold, self._settings.overlap)
+        windows, scores = people(*self._windows(grey(image)), self._settings.overlap)
         return Detections(
             header=image.header,
-            detections=tuple(_detection(class_id, windows[n], scores[n]) for n in kept),
+            detections=tuple(
+                _detection(class_id, window, score)
+                for window, score in zip(windows.tolist(), scores.tolist(), strict=True)
+            ),
             image_width=image.width,
             image_height=image.height,
             camera=image.camera,
         )
 
-    def _windows(self, image: npt.NDArray[np.uint8]) -> tuple[list[list[int]], list[float]]:
+    def _windows(self, image: npt.NDArray[np.uint8]) -> tuple[Floats, Floats]:
         if image.shape[0] < WINDOW[1] or image.shape[1] < WINDOW[0]:
-            return [], []
+            return np.empty((0, 4)), np.empty(0)
         windows, scores = self._hog.detectMultiScale(
             image,
             hitThreshold=self._settings.threshold,
@@ -58,7 +60,7 @@ class Spotter:
             scale=self._settings.scale,
             groupThreshold=0,
         )
-        return np.reshape(windows, (-1, 4)).tolist(), np.ravel(scores).tolist()
+        return np.reshape(windows, (-1, 4)).astype(np.float64), np.ravel(scores).astype(np.float64)
 
 
 def grey(image: Image) -> npt.NDArray[np.uint8]:
@@ -72,7 +74,7 @@ def grey(image: Image) -> npt.NDArray[np.uint8]:
     return np.asarray(array, dtype=np.uint8)
 
 
-def _detection(class_id: str, window: Sequence[int], score: float) -> Detection:
+def _detection(class_id: str, window: list[float], score: float) -> Detection:
     left, top, width, height = window
     middle = (left + width / 2, top + height / 2)
     box = BoundingBox2D(*middle, width * _BODY[0], height * _BODY[1])

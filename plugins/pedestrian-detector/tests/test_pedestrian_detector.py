@@ -112,9 +112,10 @@ def test_image_smaller_than_a_person_is_empty() -> None:
     [
         ({"scale": 1.0}, "scale is 1.0"),
         ({"overlap": 1.0}, "overlap is 1.0"),
+        ({"threshold": 0.0}, "threshold is 0.0"),
         ({"threads": 0}, "threads is 0"),
     ],
-    ids=["scale", "overlap", "threads"],
+    ids=["scale", "overlap", "threshold", "threads"],
 )
 def test_wrong_settings_refuse_the_component(
     worker: Any, settings: dict[str, object], words: str
