@@ -52,7 +52,7 @@ class PyperplanPlanner:
                 return Unsolvable("relaxed")
             found = greedy_best_first_search(translated, heuristic)
         except _DeadlinePassed:
-            return GaveUp(f"no plan within {deadline_s:g} s")
+            return GaveUp(f"no plan within {round(deadline_s, 1):g} s")
         if found is None:
             return Unsolvable("exhausted")
         steps = tuple(int(operator.name) for operator in found)

@@ -31,5 +31,5 @@ class NativePlanner:
         finally:
             gc.enable()
         if isinstance(answer, GaveUp):
-            return GaveUp(f"no plan within {deadline_s:g} s")
+            return GaveUp(f"no plan within {round(deadline_s, 1):g} s")
         return answer

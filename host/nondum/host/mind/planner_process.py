@@ -7,6 +7,7 @@ import contextlib
 import os
 import signal
 import sys
+import time
 from asyncio.subprocess import DEVNULL, PIPE, Process
 from collections.abc import Mapping
 
@@ -96,12 +97,13 @@ class PlannerProcess:
         self, process: Process, request: wire.Request, deadline_s: float
     ) -> Answer | PlanText:
         assert process.stdin is not None  # started with pipes
+        until_s = time.monotonic() + deadline_s
         if len(request.task.actions) > AT_ONCE:
             body = await asyncio.to_thread(request.body, self._language)
         else:
             body = request.body(self._language)
         try:
-            process.stdin.write(wire.frame([deadline_s, body]))
+            process.stdin.write(wire.frame([until_s, body]))
             await process.stdin.drain()
         except ConnectionError as error:
             raise self._failure("PLANNER_DIED", "it ended before it was asked") from error

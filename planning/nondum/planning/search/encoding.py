@@ -33,8 +33,8 @@ class Move:
     add: int
     delete: int
     """Without what it also adds."""
-    keep: int
-    """What survives it: all that is neither deleted nor derived."""
+    clear: int
+    """What does not survive it: all that it deletes, and all that is derived."""
     cost: int
     conditional: tuple[When, ...]
 
@@ -60,21 +60,15 @@ class Encoded:
 
     def after(self, state: State, move: Move) -> State:
         """The state that a move leads to, where its precondition holds."""
-        reached = state & move.keep | move.add
-        if move.conditional:
-            reached = _conditional(state, move)
+        clear, add = move.clear, move.add
+        for when in move.conditional:
+            if when.condition & state == when.condition:
+                clear |= when.delete
+                add |= when.add
+        reached = (state | clear) ^ clear | add
         for stage in self.stages:
             reached = stage.settled(reached)
         return reached
-
-
-def _conditional(state: State, move: Move) -> int:
-    keep, add = move.keep, move.add
-    for when in move.conditional:
-        if when.condition & state == when.condition:
-            keep &= ~when.delete
-            add |= when.add
-    return state & keep | add
 
 
 def encode(task: GroundTask) -> Encoded:
@@ -98,8 +92,7 @@ class _Encoder:
         fluent = (asked & reached) - (task.init - deleted - derived)
         self._facts = sorted(fluent, key=task.facts.__getitem__)
         self._bit = {fact: 1 << bit for bit, fact in enumerate(self._facts, 1)}
-        self._full = (2 << len(self._facts)) - 1
-        self._basic = self._full ^ self._mask(derived)
+        self._derived = self._mask(derived)
 
     def encoded(self) -> Encoded:
         layers = tuple(self._layers())
@@ -170,7 +163,7 @@ class _Encoder:
             precondition=precondition,
             add=add,
             delete=delete,
-            keep=self._basic & ~delete,
+            clear=delete | self._derived,
             cost=action.cost,
             conditional=tuple(when for when in useful if when.add or when.delete),
         )

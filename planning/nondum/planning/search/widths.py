@@ -78,7 +78,7 @@ class Widths:
             if estimate is None:
                 return
             way = _Way(left, met, self._relaxation.mask(estimate.wanted), 0)
-        else:
+        elif left > way.left or met != way.met or state & way.wanted & ~way.held:
             way = _Way(left, met, way.wanted, way.held | state & way.wanted)
         like = (left, way.held.bit_count())
         seen = self._seen.get(like, 0)
