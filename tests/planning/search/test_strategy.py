@@ -64,7 +64,7 @@ def counter(bits: int) -> GroundTask:
     return GroundTask(facts, off, on, tuple(actions))
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(tasks())
 def test_answer_agrees_with_looking_at_every_state(random_task: GroundTask) -> None:
     length = shortest(random_task)

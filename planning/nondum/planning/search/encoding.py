@@ -51,8 +51,6 @@ class Encoded:
     layers: tuple[MaskLayer, ...]
     stages: tuple[Stage, ...]
     """What settles the layers."""
-    facts: tuple[int, ...]
-    """Bit → index into `GroundTask.facts`; -1 for bit 0."""
 
     def is_goal(self, state: State) -> bool:
         """Whether the goal holds."""
@@ -73,7 +71,10 @@ class Encoded:
 
 def encode(task: GroundTask) -> Encoded:
     """Leave out facts that are true for ever, facts that nobody asks for, and actions that cannot
-    be reached, change nothing, or do the same as a cheaper one."""
+    be reached, change nothing, or do the same as a cheaper one.
+
+    The goal must be in reach when deletes are ignored.
+    """
     return _Encoder(task).encoded()
 
 
@@ -90,8 +91,8 @@ class _Encoder:
             (fact for fact, _ in pairs), *(rule.body for rules in self._rules for rule in rules)
         ).union(*map(_asked, (a for _, a in self._actions)))
         fluent = (asked & reached) - (task.init - deleted - derived)
-        self._facts = sorted(fluent, key=task.facts.__getitem__)
-        self._bit = {fact: 1 << bit for bit, fact in enumerate(self._facts, 1)}
+        ordered = sorted(fluent, key=task.facts.__getitem__)
+        self._bit = {fact: 1 << bit for bit, fact in enumerate(ordered, 1)}
         self._derived = self._mask(derived)
 
     def encoded(self) -> Encoded:
@@ -101,13 +102,12 @@ class _Encoder:
         for stage in stages:
             init = stage.settled(init)
         return Encoded(
-            width=len(self._facts) + 1,
+            width=len(self._bit) + 1,
             init=init,
             goal=self._mask(self._task.goal),
             moves=self._moves(),
             layers=layers,
             stages=stages,
-            facts=(-1, *self._facts),
         )
 
     def _mask(self, facts: Iterable[int]) -> int:
@@ -171,7 +171,7 @@ class _Encoder:
 
 def _deleted(action: GroundAction) -> frozenset[int]:
     """Every fact that an action may delete."""
-    return (action.delete.union(*(effect.delete for effect in action.conditional))) - action.add
+    return action.delete.union(*(effect.delete for effect in action.conditional)) - action.add
 
 
 def _asked(action: GroundAction) -> frozenset[int]:
