@@ -54,6 +54,14 @@ async def test_goal_is_maintained(robot: Robot) -> None:
     assert robot.running == {"recorded-camera.stream", *CHAIN}
 
 
+async def test_goal_that_holds_on_is_told_once(robot: Robot) -> None:
+    await follow(robot)
+    robot.plug(THERMAL_CAMERA)
+    for _ in range(3):
+        robot.mind.tick()
+    assert len([text for text in robot.told if "holds and is kept so" in text]) == 1
+
+
 async def test_wiring_is_the_plans(robot: Robot) -> None:
     await follow(robot)
     frames, found = f"{HOST}__recorded-camera__frames", f"{HOST}__people-detector__found"

@@ -186,7 +186,7 @@ class Pursuit:
 
     def _conclude(self) -> None:
         current = self.current
-        if current is None:
+        if current is None or not current.tree.control.decisions:  # not ticked yet
             return
         phase = current.tree.control.phase
         if phase is not current.phase:
