@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 from tests.host.cli import pictures
 from tests.host.mind.robot import Robot
-from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT
+from tests.planning.strangers import (
+    COMPTON_CAMERA,
+    MOBILE_BASE,
+    PAN_TILT_UNIT,
+    PEOPLE_DETECTOR,
+    RECORDED_CAMERA,
+    THERMAL_CAMERA,
+    VISUAL_TRACKER,
+)
 
 pytestmark = pytest.mark.anyio
 
@@ -78,6 +87,28 @@ async def test_alternative_is_named_with_cost_and_rank(robot: Robot) -> None:
     assert {taken["component"], other["component"]} == {"recorded-camera", "thermal-camera"}
     assert (taken["chosen"]["cost"], other["cost"]) == (1, 1)
     assert {taken["chosen"]["rank"], other["rank"]} == {0, 1}
+
+
+async def test_plan_that_goes_on_is_not_thrown_over_for_a_cheaper_way(robot: Robot) -> None:
+    (fragment,) = THERMAL_CAMERA.fragments
+    text = fragment.text.replace("(flowing ?o)", "(increase (total-cost) 60) (flowing ?o)")
+    dear = replace(THERMAL_CAMERA, fragments=(replace(fragment, text=text),))
+    robot.plug(dear, PEOPLE_DETECTOR, VISUAL_TRACKER, MOBILE_BASE)
+    robot.mind.give(pddl=FOLLOW, kind="maintain")
+    await robot.until_holding()
+    robot.plug(RECORDED_CAMERA)
+    robot.mind.tick()
+    camera = step_rows(robot)[0]
+    assert camera["component"] == "thermal-camera"
+    assert camera["chosen"]["why"] == (
+        "it costs 60, not 1, but a plan that goes on is not thrown over for that"
+    )
+    robot.mind.halt()
+    robot.mind.give(pddl=FOLLOW, kind="maintain")
+    await robot.until_holding("2")
+    camera = step_rows(robot)[0]
+    assert camera["component"] == "recorded-camera"
+    assert camera["chosen"]["why"] == "the cheapest: it costs 1, others 60 or more"
 
 
 async def test_what_failed_too_often_is_named_as_left_out(robot: Robot) -> None:

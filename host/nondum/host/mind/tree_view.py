@@ -173,7 +173,7 @@ class TreeView:
         others = self._others(leaf)
         excluded = self._excluded_for(leaf)
         return {
-            "why": _why_chosen(action, others, excluded),
+            "why": _why_kept(leaf, others) or _why_chosen(action, others, excluded),
             "cost": action.cost,
             "rank": self._rank(leaf.step.actor),
             "instead_of": [self._alternative(other) for other in others[:MOST_ALTERNATIVES]],
@@ -234,6 +234,15 @@ def _after(leaf: StepLeaf) -> list[int]:
 
 def _step_named(action: str, index: int) -> Row:
     return {"step": index + 1, "action": action}
+
+
+def _why_kept(leaf: StepLeaf, others: tuple[GroundAction, ...]) -> str:
+    """Why a step goes on though another way would be cheaper, or nothing."""
+    cost, begun_s = leaf.step.action.cost, leaf.where().started_s
+    if not others or cost <= others[0].cost or begun_s is None:
+        return ""
+    cheapest = others[0].cost
+    return f"it costs {cost}, not {cheapest}, but a plan that goes on is not thrown over for that"
 
 
 def _why_chosen(action: GroundAction, others: tuple[GroundAction, ...], excluded: list[str]) -> str:
