@@ -1,4 +1,4 @@
-"""`./run demo`: three stages on one host that is never restarted."""
+"""`./run demo`: seven stages on one host that is never restarted."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ import random
 import shutil
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from demo import live, shuffle, stages, table
 from demo.drives import build, payload_id
+from demo.follow_me import follow_me
 from demo.following import Reference
 from demo.robot import Robot, TooLate, running
 from demo.scenario import random_scenario
@@ -26,10 +27,13 @@ CACHE = ROOT / ".run/drives"
 REFERENCE = PLUGINS / "panorama/nondum_panorama/data/pedestrians.toml"
 
 INITIAL = "mobile-base"
-FIRST = ("recorded-camera", "people-detector", "visual-tracker")
+CAMERA = "recorded-camera"
+FIRST = (CAMERA, "people-detector", "visual-tracker")
+OFFERED = ("pedestrian-detector",)
 SECOND = ("thermal-camera",)
 THIRD = ("compton-camera", "pan-tilt-unit")
 LIBRARIES = ("sdk", "panorama")
+STAGES = ("I", "pulled", "put back", "offered", "killed", "II", "III")
 
 FOLLOW = "follow me through the facility"
 POINT = "point at the radiation source"
@@ -60,7 +64,9 @@ def main() -> int:
             running(work, name="panther", initial=kit.of([INITIAL])) as robot,
             live.view(robot, is_shown=not (options.json or options.plain)),
         ):
-            _play(robot, kit, options, results, say)
+            for result in _played(robot, kit, options, say):
+                results.append(result)
+                say(f"  {result.measure}")
     except TooLate as late:
         print(f"error: {late}", file=sys.stderr)
     finally:
@@ -72,61 +78,56 @@ def main() -> int:
         print(json.dumps(table.as_data(results, seed=options.seed), indent=2))
     else:
         print(table.as_text(results))
-    return 0 if len(results) == 3 and all(result.reached for result in results) else 1
+    is_whole = tuple(result.name for result in results) == STAGES
+    return 0 if is_whole and all(result.reached for result in results) else 1
 
 
-def _play(
-    robot: Robot,
-    kit: Kit,
-    options: argparse.Namespace,
-    results: list[StageResult],
-    say: live.Says,
-) -> None:
-    reference = Reference.read(REFERENCE)
+def _played(
+    robot: Robot, kit: Kit, options: argparse.Namespace, say: live.Says
+) -> Iterator[StageResult]:
     dice = random.Random(options.shuffle)
     first, second, third = list(FIRST), list(SECOND), list(THIRD)
     if options.shuffle is not None:
         for names in (first, second, third):
             dice.shuffle(names)
-    say(f"stage I: {', '.join(first)} go in; “{FOLLOW}”")
-    results.append(
-        stages.follow(robot, kit.of(first), reference, name="I", words=FOLLOW, published_s=93)
-    )
-    say(results[-1].measure)
-    say("stage II: the camera comes out, the thermal camera goes in; the goal stands")
-    stages.withdraw(robot, kit.drives["recorded-camera"])
-    results.append(
-        stages.follow(
-            robot,
-            kit.of(second),
-            reference,
-            name="II",
-            words=FOLLOW,
-            published_s=136,
-            is_given=True,
-        )
-    )
-    say(results[-1].measure)
-    say(f"stage III: those come out; {', '.join(third)} go in; “{POINT}” (--seed {options.seed})")
+    yield from _followed(robot, kit, first, second, say)
     robot.ask("halt", now=True)
-    stages.withdraw(robot, *(kit.drives[n] for n in (*second, "people-detector", "visual-tracker")))
-    scenario = random_scenario(options.seed)
-    results.append(
-        stages.point(
-            robot,
-            kit.of(third),
-            scenario,
-            name="III",
-            words=POINT,
-            published_s=199,
-            mistold_rad=math.radians(options.wrong_mount),
-        )
+    leaving = {*first, *OFFERED, *second} - {CAMERA}
+    stages.withdraw(robot, *(kit.drives[name] for name in leaving))
+    say(f"III: those come out; {', '.join(third)} go in; “{POINT}” (--seed {options.seed})")
+    yield stages.point(
+        robot,
+        kit.of(third),
+        random_scenario(options.seed),
+        name="III",
+        words=POINT,
+        published_s=199,
+        mistold_rad=math.radians(options.wrong_mount),
     )
-    say(results[-1].measure)
+
+
+def _followed(
+    robot: Robot, kit: Kit, first: Sequence[str], second: Sequence[str], say: live.Says
+) -> Iterator[StageResult]:
+    camera = kit.drives[CAMERA]
+    with follow_me(robot, Reference.read(REFERENCE), words=FOLLOW) as following:
+        say(f"I: {', '.join(first)} go in; “{FOLLOW}”")
+        yield following.begin(kit.of(first), name="I", published_s=93)
+        say("pulled: the camera comes out while the robot turns")
+        yield following.lose(camera, name="pulled")
+        say("put back: the camera goes in again; the goal stands")
+        yield following.begin(kit.of([CAMERA]), name="put back", is_given=True)
+        say(f"offered: {', '.join(OFFERED)} goes in; later the same is asked for anew")
+        yield following.offer(kit.of(OFFERED), name="offered")
+        say("killed: the worker of the detector that was chosen gets SIGKILL")
+        yield following.kill(name="killed")
+        say("II: the camera comes out, the thermal camera goes in; the goal stands")
+        stages.withdraw(robot, camera)
+        yield following.begin(kit.of(second), name="II", published_s=136, is_given=True)
 
 
 def _kit(options: argparse.Namespace, work: Path, say: live.Says) -> Kit:
-    names = (INITIAL, *FIRST, *SECOND, *THIRD)
+    names = (INITIAL, *FIRST, *OFFERED, *SECOND, *THIRD)
     folders = {name: PLUGINS / name for name in (*names, *LIBRARIES)}
     cache = CACHE
     if options.shuffle is not None:

@@ -18,18 +18,22 @@ from nondum.sdk.messages import Image, Message, Pose
 
 @dataclass
 class Heard:
-    """Headings of the body and numbers of the frames shown, each with its stamp (monotonic)."""
+    """How the body moved, and numbers of the frames shown, each with its stamp (monotonic)."""
 
     headings: list[tuple[float, float]] = field(default_factory=list)
     """Stamp, yaw in radians."""
     frames: list[tuple[float, int]] = field(default_factory=list)
+    places: list[tuple[float, float, float]] = field(default_factory=list)
+    """Stamp, metres along two axes."""
 
     def on_message(self, message: Message) -> None:
         """Keep what the scorer needs of a message."""
         if isinstance(message, Image):
             self.frames.append((message.header.stamp_s, message.header.seq))
         elif isinstance(message, Pose):
-            self.headings.append((message.header.stamp_s, _yaw(message)))
+            stamp_s, (x, y, _) = message.header.stamp_s, message.position
+            self.headings.append((stamp_s, _yaw(message)))
+            self.places.append((stamp_s, x, y))
 
 
 @contextmanager

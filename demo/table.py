@@ -22,8 +22,8 @@ class StageResult:
     goal: str
     phases_s: Mapping[str, float]
     """Phase → seconds after the first drive went in."""
-    published_s: float
-    """Time of the published system for the same stage, with hands."""
+    published_s: float | None
+    """Time of the published system for the same stage, with hands; None: it has no such stage."""
     reached: bool
     measure: str
     """What was measured, and the bound that it was held to."""
@@ -39,7 +39,7 @@ def as_text(results: Sequence[StageResult]) -> str:
         [
             result.name,
             *(_seconds(result.phases_s.get(phase)) for phase in PHASES),
-            f"{result.published_s:.0f} s *",
+            "-" if result.published_s is None else f"{result.published_s:.0f} s *",
             "yes" if result.reached else "NO",
         ]
         for result in results

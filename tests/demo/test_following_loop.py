@@ -21,10 +21,14 @@ def score(robot: Robot, reference: Reference) -> float:
 
 
 @pytest.mark.parametrize("kind", ["colour", "thermal"])
-@pytest.mark.parametrize("detects", ["people", "pedestrians"])
 @pytest.mark.parametrize("latency_s", [0.1, 0.25, 0.4])
-def test_follower_passes(kind: str, detects: str, latency_s: float, reference: Reference) -> None:
-    assert score(Robot(kind, latency_s, detects=detects), reference) >= WANTED_FRACTION
+def test_follower_passes(kind: str, latency_s: float, reference: Reference) -> None:
+    assert score(Robot(kind, latency_s), reference) >= WANTED_FRACTION
+
+
+@pytest.mark.parametrize("kind", ["colour", "thermal"])
+def test_follower_passes_with_another_detector(kind: str, reference: Reference) -> None:
+    assert score(Robot(kind, detects="pedestrians"), reference) >= WANTED_FRACTION
 
 
 def test_follower_passes_without_odometry(reference: Reference) -> None:

@@ -1,0 +1,82 @@
+"""How behaviours went down after a loss, as the journal tells it: in which ticks, and how they
+ended. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+HALTED_S = 1.0
+"""How long a behaviour may take to end once it was asked to: less than the host's own patience,
+after which it ends the worker."""
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """The end of a behaviour."""
+
+    component: str
+    outcome: str
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Fall:
+    """All that went down in a stretch of the journal."""
+
+    ticks: tuple[frozenset[str], ...]
+    """The actions that went down in each tick in which any did."""
+    decided_s: float
+    """When the first of these ticks was (monotonic clock); 0 when there was none."""
+    endings: tuple[Ending, ...]
+    exits: tuple[str, ...]
+    """Components whose worker ended."""
+
+    @classmethod
+    def of(cls, journal: Iterable[Row]) -> Fall:
+        """Read a journal's rows, oldest first."""
+        rows = list(journal)
+        halts = [row for row in rows if row["event"] == "BehavioursHalted"]
+        return cls(
+            ticks=tuple(
+                frozenset({*row["detail"]["halted"], *row["detail"]["lost"]}) for row in halts
+            ),
+            decided_s=halts[0]["monotonic"] if halts else 0.0,
+            endings=tuple(_ending(row) for row in rows if row["event"] == "BehaviourEnded"),
+            exits=tuple(row["subject"] for row in rows if row["event"] == "WorkerExited"),
+        )
+
+    @property
+    def took_s(self) -> float:
+        """From the decision until the last behaviour had ended."""
+        return max((ending.at_s for ending in self.endings), default=0.0) - self.decided_s
+
+    def faults(self, actions: Collection[str], components: Collection[str]) -> Iterator[str]:
+        """What is wrong with it, if `actions` had to go down together, and the behaviours of
+        `components` had to end of their own accord."""
+        if not self.ticks:
+            yield "nothing was halted"
+        else:
+            if len(self.ticks) > 1:
+                yield f"it took {len(self.ticks)} ticks to halt everything"
+            yield from (f"{action} was not halted" for action in {*actions} - self.ticks[0])
+        for component in components:
+            yield from self._lateness(component)
+            if component in self.exits:
+                yield f"the worker of {component} ended"
+
+    def _lateness(self, component: str) -> Iterator[str]:
+        ending = next((one for one in self.endings if one.component == component), None)
+        if ending is None:
+            yield f"what {component} did has not ended"
+        elif ending.outcome != "HALTED":
+            yield f"what {component} did {ending.outcome.lower()}"
+        elif ending.at_s - self.decided_s > HALTED_S:
+            yield f"what {component} did took {ending.at_s - self.decided_s:.1f} s to end"
+
+
+def _ending(row: Row) -> Ending:
+    return Ending(row["subject"], row["detail"]["outcome"], row["monotonic"])
