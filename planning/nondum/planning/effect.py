@@ -62,15 +62,15 @@ class Effect:
             yield from change.delete
 
 
-def effect_of(formula: Formula, parameters: Iterable[str] = ()) -> Effect:
-    """Read an effect of an action with `parameters`. One that names no cost costs 1.
+def effect_of(formula: Formula, parameters: Iterable[str] = (), *, unnamed_cost: int = 1) -> Effect:
+    """Read an effect of an action with `parameters`. One that names no cost has `unnamed_cost`.
 
     Quantified variables that hide others are renamed. Raises `Misplaced` (E-UNSUPPORTED,
     E-MISPLACED).
     """
     found = _Reading(frozenset(parameters))
     found.read(formula, _Where())
-    cost, functions = found.cost()
+    cost, functions = found.cost() if found.increases else (unnamed_cost, ())
     plain = found.changes.pop(_Where(), _Change())
     return Effect(
         add=unique(plain.add),
@@ -138,8 +138,6 @@ class _Reading:
         return tuple(variables), renamed(formula.part, hiding)
 
     def cost(self) -> tuple[int, tuple[Atom, ...]]:
-        if not self.increases:
-            return 1, ()
         cost = 0
         functions: list[Atom] = []
         for increase in self.increases:

@@ -50,9 +50,12 @@ def schema_of(
 
 
 def read_action(
-    declared: ActionDeclaration, scope: Scope
+    declared: ActionDeclaration, scope: Scope, *, unnamed_cost: int = 1
 ) -> tuple[tuple[TypedName, ...], Condition, Effect] | None:
-    """Parameters, precondition and effect, all names checked; None if something is wrong."""
+    """Parameters, precondition and effect, all names checked; None if something is wrong.
+
+    An action that names no cost has `unnamed_cost`.
+    """
     problems_before = len(scope.report.problems)
     if len(declared.parameters) > PARAMETERS_LIMIT:
         message = f"action {declared.name!r} has more than {PARAMETERS_LIMIT} parameters"
@@ -63,7 +66,7 @@ def read_action(
     variables = {p.name: p.types for p, ok in zip(parameters, known, strict=True) if ok}
     try:
         precondition = condition_of(declared.precondition)
-        effect = effect_of(declared.effect, variables)
+        effect = effect_of(declared.effect, variables, unnamed_cost=unnamed_cost)
     except Misplaced as wrong:
         scope.report.problem(wrong.code, wrong.message, wrong.place, wrong.fix)
         return None

@@ -16,7 +16,7 @@ from nondum.planning.inventory import values_of
 from nondum.planning.normal import Condition, condition_of
 from nondum.planning.parse import parse_fragment
 from nondum.planning.schema import read_action
-from nondum.planning.scope import Report, Scope, TooManyProblems
+from nondum.planning.scope import SELF, Report, Scope, TooManyProblems
 from nondum.planning.syntax import Atom, DomainFragment, Numeric, ProblemFragment, TypedName
 from nondum.planning.typegraph import ROOT, TypeGraph, types_or_root
 from nondum.planning.vocabulary import cycle_text, functions_of
@@ -73,7 +73,8 @@ class _Loading:
         self._domain = domain
         self._problem = problem
         self._report = Report(Origin("", "", ""), texts)
-        self._scope = Scope(self._report, "", {}, TypeGraph({}), of_host=frozenset())
+        # `self` is a name like any other here: it stands for itself.
+        self._scope = Scope(self._report, SELF, {}, TypeGraph({}), of_host=frozenset())
 
     def check(self) -> None:
         """Raises `FragmentRefused` with all that is wrong."""
@@ -178,7 +179,7 @@ class _Loading:
             if declared.name in found:
                 message = f"action {declared.name!r} is declared twice"
                 self._report.problem("E-TWICE", message, declared.place)
-            read = read_action(declared, self._scope)
+            read = read_action(declared, self._scope, unnamed_cost=0)
             if read:
                 parameters, precondition, effect = read
                 found[declared.name] = Action(

@@ -17,6 +17,7 @@ from nondum.planning.exploration import INSTANCES_LIMIT
 from nondum.planning.goal import Goal, goal_problems, parse_goal
 from nondum.planning.ground import ground
 from nondum.planning.oversize import Fitted, fitted
+from nondum.planning.pddl_text import pddl_text
 from nondum.planning.plain import plain
 from nondum.planning.pricing import at_own_cost, handicaps, priced
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
@@ -140,7 +141,11 @@ async def _searched(
     if task is None:
         return NoPlan(situation, too_big)
     handicap = handicaps(composition.contributions, composition.host)
-    found = await planners.plan(priced(task, handicap), deadline_s)
+    found = await planners.plan(
+        priced(task, handicap),
+        deadline_s,
+        lambda: pddl_text(fit.merged, situation.facts, goal.expr),
+    )
     match found.answer:
         case AlreadyTrue():
             task, nothing = plain(task, Plan((), 0))

@@ -1,0 +1,107 @@
+"""PDDL that is no fragment: domain and problem as their authors wrote them."""
+
+from __future__ import annotations
+
+import pytest
+
+from nondum.planning.ground import ground
+from nondum.planning.search import solve
+from nondum.planning.standalone import Standalone, load
+from nondum.sdk.errors import FragmentRefused, Problem
+from nondum.sdk.planner import GroundTask, Plan
+
+DOMAIN = """(define (domain ferry)
+  (:types port - place ship)
+  (:predicates (at ?s - ship ?p - port) (not-full ?s - ship) (on ?s - ship))
+  (:functions (way ?a ?b - port) (total-cost))
+  (:action sail
+    :parameters (?s - ship ?a ?b - port)
+    :precondition (and (at ?s ?a) (not-full ?s) (not (= ?a ?b)))
+    :effect (and (not (at ?s ?a)) (at ?s ?b) (increase (total-cost) (way ?a ?b))))
+  (:action load
+    :parameters (?s - ship)
+    :precondition (not-full ?s)
+    :effect (and (not (not-full ?s)) (on ?s))))
+"""
+PROBLEM = """(define (problem one) (:domain ferry)
+  (:objects self - ship a b c - port)
+  (:init (at self a) (not-full self) (= (total-cost) 0) (= (way a b) 4) (= (way b c) 1))
+  (:goal (and (at self c) (on self)))
+  {metric})
+"""
+
+
+def loaded(problem: str, domain: str = DOMAIN) -> Standalone:
+    return load(domain, "domain.pddl", problem, "problem.pddl")
+
+
+def task(metric: str = "") -> GroundTask:
+    found = loaded(PROBLEM.format(metric=metric))
+    return ground(found.merged, found.facts, found.goal)
+
+
+def refused(problem: str, domain: str = DOMAIN) -> Problem:
+    with pytest.raises(FragmentRefused) as error:
+        loaded(problem, domain)
+    return error.value.problems[0]
+
+
+def plan(of: GroundTask) -> tuple[list[str], int]:
+    answer = solve(of, lambda: False)
+    assert isinstance(answer, Plan)
+    return [of.actions[step].name for step in answer.steps], answer.cost
+
+
+def test_words_of_the_core_mean_what_their_authors_mean() -> None:
+    """`on`, `self` and `not-…` are nothing special in a domain of its own."""
+    steps, _ = plan(task())
+    assert steps == ["sail self a c", "load self"]
+
+
+def test_without_a_metric_every_action_costs_one() -> None:
+    assert plan(task())[1] == 2
+
+
+def test_with_a_metric_an_action_that_names_no_cost_costs_nothing() -> None:
+    assert plan(task("(:metric minimize (total-cost))"))[1] == 5
+
+
+def test_action_whose_function_has_no_value_cannot_be_taken() -> None:
+    names = {action.name for action in task("(:metric minimize (total-cost))").actions}
+    assert "sail self a b" in names
+    assert "sail self a c" not in names
+
+
+WRONG = {
+    "unknown object": ("(at self d)", "E-UNDECL", "nobody declares 'd'"),
+    "wrong type": ("(at a a)", "E-TYPE", "expected ship, a is port"),
+    "wrong arity": ("(at self)", "E-PRED-ARITY", "(at self) has 1 arguments"),
+    "unknown predicate": ("(att self a)", "E-UNDECL", "nobody declares predicate 'att'"),
+    "half a number": ("(= (way a c) 1.5)", "E-INIT", "only whole numbers"),
+    "negation": ("(not (at self b))", "E-INIT", "is not a fact"),
+}
+
+
+@pytest.mark.parametrize(("fact", "code", "message"), WRONG.values(), ids=WRONG)
+def test_wrong_fact_is_refused_where_it_stands(fact: str, code: str, message: str) -> None:
+    found = refused(PROBLEM.format(metric="").replace("(at self a)", f"(at self a) {fact}"))
+    assert found.code == code
+    assert message in found.message
+    assert found.where.startswith("problem.pddl:3:")
+
+
+def test_all_that_is_wrong_is_told_at_once() -> None:
+    with pytest.raises(FragmentRefused) as error:
+        loaded(PROBLEM.format(metric="").replace("a b c", "a b").replace("self c", "self z"))
+    assert [problem.where for problem in error.value.problems] == [
+        "problem.pddl:3:83",
+        "problem.pddl:4:24",
+    ]
+
+
+def test_problem_without_a_goal_is_refused() -> None:
+    assert refused("(define (problem one) (:domain ferry))").code == "E-GOAL"
+
+
+def test_two_domains_are_no_task() -> None:
+    assert refused(DOMAIN).code == "E-KIND"
