@@ -16,6 +16,9 @@ class Choice:
     others: tuple[str, ...]
     why: str
     """The host's reason."""
+    cost: int
+    others_cost: int
+    """Of the cheapest of them."""
 
     def __str__(self) -> str:
         return f"{self.component} instead of {', '.join(self.others)} ({self.why})"
@@ -26,6 +29,7 @@ def choices(tree: Mapping[str, Any]) -> Iterator[Choice]:
     if others := tree.get("step", {}).get("chosen", {}).get("instead_of"):
         step = tree["step"]
         names = tuple(str(row["component"]) for row in others)
-        yield Choice(str(step["component"]), names, step["chosen"]["why"])
+        costs = step["chosen"]["cost"], min(row["cost"] for row in others)
+        yield Choice(str(step["component"]), names, step["chosen"]["why"], *costs)
     for child in tree["children"]:
         yield from choices(child)

@@ -119,6 +119,8 @@ class FollowMe:
         taken = self._choice()
         if taken.component not in new or offered.component not in taken.others:
             stage.faults.append(f"{offered.component} was to be replaced by {', '.join(new)}")
+        if not offered.cost > taken.cost < taken.others_cost:
+            stage.faults.append("what was taken is no better")
         measure = f"at first {offered}; asked anew {taken}; {_told(share)}"
         return stage.result(reached=share >= WANTED_FRACTION, measure=measure)
 

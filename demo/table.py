@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 PHASES = ("seen", "verified", "installed", "ready", "in plan", "goal")
+WIDTH = 98
 NOTE = (
     "Seconds after the first drive of the stage went in, until the phase was complete for all of "
     "its payloads. The published times are for a person with real instruments: they include hands "
@@ -50,8 +52,8 @@ def as_text(results: Sequence[StageResult]) -> str:
         for line in [head, *rows]
     ]
     lines.insert(1, "-" * len(lines[0]))
-    measures = [f"{result.name}: {result.measure}" for result in results]
-    return "\n".join([*lines, "", *measures, "", f"* {NOTE}"])
+    measures = [_wrapped(f"{result.name}: {result.measure}") for result in results]
+    return "\n".join([*lines, "", *measures, "", _wrapped(f"* {NOTE}")])
 
 
 def as_data(results: Sequence[StageResult], *, seed: int) -> dict[str, Any]:
@@ -62,6 +64,10 @@ def as_data(results: Sequence[StageResult], *, seed: int) -> dict[str, Any]:
         "note": NOTE,
         "stages": [asdict(result) for result in results],
     }
+
+
+def _wrapped(text: str) -> str:
+    return textwrap.fill(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
 
 
 def _seconds(value: float | None) -> str:

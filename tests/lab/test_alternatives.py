@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import signal
+from dataclasses import replace
+
 import pytest
 from tests.lab.plugins import scribe, talker
 from tests.lab.running_host import RunningHost, steps
+from tests.payloads import Part
 
 pytestmark = pytest.mark.lab
 
@@ -42,6 +47,33 @@ def test_alternative_that_comes_later_leaves_the_task_alone(host: RunningHost) -
     ended = [entry for entry in host.journal() if entry["event"] == "BehaviourEnded"]
     assert used_talker(host) == "left"
     assert not ended
+
+
+def test_better_one_is_taken_anew_and_the_other_when_it_is_killed(host: RunningHost) -> None:
+    host.bring("write", scribe())
+    host.bring("dear", costing(talker("dear"), 60))
+    goal = host.want("(written spot)")
+    host.until_goal(goal, "holds")
+    host.bring("cheap", costing(talker("cheap"), 30))
+    assert used_talker(host) == "dear"
+    host.ask("halt", id=goal)
+    goal = host.want("(written spot)")
+    host.until_goal(goal, "holds")
+    assert used_talker(host) == "cheap"
+    cheap = host.component("cheap")
+    assert cheap is not None
+    os.kill(cheap["pid"], signal.SIGKILL)
+    host.until("the other talks", lambda v: used_in(steps(v)) == "dear", timeout_s=20)
+    host.until_told("cheap is ready")
+    host.until_goal(goal, "holds")
+    assert used_talker(host) == "dear"
+
+
+def costing(part: Part, cost: int) -> Part:
+    """A talker whose action says what it costs."""
+    effect = f"(from ?o ?h) (increase (total-cost) {cost})"
+    head, tail = part.source.rsplit("(from ?o ?h)", 1)
+    return replace(part, source=f"{head}{effect}{tail}")
 
 
 def used_talker(host: RunningHost) -> str:
