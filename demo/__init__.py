@@ -1,4 +1,4 @@
-"""The demonstration: one running host, rebuilt three times with payloads it has never seen.
+"""The demonstration: one running host, rebuilt again and again with payloads it has never seen.
 
 It is an outsider: it plugs and pulls drives, gives goals and reads views as a person would, through
 the host's command line and control socket. Of nondum it imports the control client, messages to
