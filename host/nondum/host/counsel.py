@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from nondum.host.mind.diagnosis import Seen, why_not, words_gone
+from nondum.host.mind.diagnosis import Seen, moment, why_not, words_gone
 from nondum.host.shelf import Shelved, candidate_of, distinct, on_shelf
 from nondum.planning.advise import Advice, Candidate, Here, advise, understood
 from nondum.planning.contribution import Contribution
@@ -133,12 +133,10 @@ def _remembered(seen: Iterable[Seen]) -> list[Shelved]:
     for known in seen:
         key = (known.payload_id, known.version)
         found.setdefault(key, {})[known.contribution.component] = known.description
-        left[key] = max(left.get(key, 0.0), known.left_wall_s or 0.0)
+        left[key] = known.left_wall_s
     return [
-        Shelved(
-            id, version, f"here until {time.strftime('%T', time.localtime(left[id, version]))}", c
-        )
-        for (id, version), c in found.items()
+        Shelved(*key, f"here until {moment(left[key])}", described)
+        for key, described in found.items()
     ]
 
 

@@ -228,6 +228,14 @@ class RetryAsked(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class ForgetAsked(Event):
+    """A person asked that a payload that is gone be forgotten."""
+
+    payload: str
+    """Its id: there is no key of what is gone."""
+
+
+@dataclass(frozen=True, slots=True)
 class Recovered(Event):
     """A payload was found half done when the daemon started, and sent forward or back."""
 

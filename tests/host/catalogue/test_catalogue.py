@@ -21,6 +21,7 @@ from nondum.host.catalogue.records import (
     DeviceRecord,
     DriveRecord,
     DriveState,
+    FormerPayload,
     GoalRecord,
     JournalEntry,
     Moment,
@@ -28,6 +29,7 @@ from nondum.host.catalogue.records import (
     PayloadRecord,
     Step,
 )
+from nondum.host.catalogue.rows import as_json
 from nondum.host.catalogue.state import Highwater, HostState
 from nondum.sdk.description import (
     Behaviour,
@@ -97,6 +99,12 @@ def component(id: str = "eye", payload: str = "k1", device: str | None = "usb1")
     )
 
 
+def former(payload_id: str = "org.example.arm") -> FormerPayload:
+    described = {"arm": replace(EYE, name="arm"), "hand": replace(EYE, name="hand", units=())}
+    size = len(as_json(described))
+    return FormerPayload(payload_id, "1.2", described, 1_700_000_000.5, size)
+
+
 FULL = HostState(
     host="spot",
     revision=5,
@@ -114,6 +122,7 @@ FULL = HostState(
     },
     highwater={("red", "org.example.eye"): Highwater(7, "digest-k1")},
     goals={"3": GoalRecord("3", "look at the lamp", "(seen lamp)", "achieve", -2)},
+    former={"org.example.arm": former()},
 )
 
 
@@ -198,19 +207,40 @@ async def test_file_of_another_version_is_left_alone(tmp_path: Path) -> None:
     assert refused.value.code == "CATALOGUE_VERSION"
 
 
+OLDER = {
+    1: ("DROP TABLE goals; DROP TABLE former;", replace(FULL, goals={}, former={})),
+    2: ("DROP TABLE former;", replace(FULL, former={})),
+}
+"""Schema → what makes it of the present one, and what it can hold of `FULL`."""
+
+
 @pytest.mark.anyio
-async def test_file_of_the_version_before_is_taken_over(tmp_path: Path) -> None:
-    before = replace(FULL, goals={})
+@pytest.mark.parametrize("schema", OLDER)
+async def test_file_of_a_version_before_is_taken_over(tmp_path: Path, schema: int) -> None:
+    script, before = OLDER[schema]
     async with opened(tmp_path) as catalogue:
         await catalogue.commit(before, ())
     connection = sqlite3.connect(tmp_path / "catalogue.sqlite")
-    connection.executescript("DROP TABLE goals; PRAGMA user_version = 1;")
+    connection.executescript(f"{script} PRAGMA user_version = {schema};")
     connection.close()
     async with opened(tmp_path) as catalogue:
         assert catalogue.state == before
         await catalogue.commit(FULL, ())
     async with opened(tmp_path) as catalogue:
         assert catalogue.state == FULL
+
+
+@pytest.mark.anyio
+async def test_memory_that_cannot_be_read_stops_nothing(tmp_path: Path) -> None:
+    async with opened(tmp_path) as catalogue:
+        await catalogue.commit(FULL, ())
+    connection = sqlite3.connect(tmp_path / "catalogue.sqlite")
+    for components in ("{", "[1]", '{"arm": {"nme": "arm"}}'):
+        with connection:
+            connection.execute("UPDATE former SET components = ?", (components,))
+        async with opened(tmp_path) as catalogue:
+            assert catalogue.state == replace(FULL, former={})
+    connection.close()
 
 
 @pytest.mark.anyio
@@ -254,6 +284,7 @@ STATES = st.lists(
         ),
         devices=st.sampled_from([{}, FULL.devices]),
         mounts=st.sampled_from([{}, FULL.mounts]),
+        former=st.sampled_from([{}, FULL.former, {"org.example.leg": former("org.example.leg")}]),
     ),
     min_size=2,
     max_size=4,

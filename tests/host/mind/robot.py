@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
 from pathlib import Path
 from typing import Any
 
-from nondum.host.catalogue.records import ComponentRecord, ComponentState, MountPose, Snapshot
+from nondum.host.catalogue.records import (
+    ComponentRecord,
+    ComponentState,
+    FormerPayload,
+    MountPose,
+    Snapshot,
+)
 from nondum.host.events import (
     BehaviourEnded,
     BehaviourEstablished,
@@ -65,6 +72,7 @@ class Robot:
     system_tree: SystemTree = default_tree
     components: dict[str, ComponentRecord] = field(default_factory=dict)
     mounts: tuple[MountPose, ...] = ()
+    former: dict[str, FormerPayload] = field(default_factory=dict)
     calls: list[RobotCall] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     told_values: list[tuple[str, FactValue]] = field(default_factory=list)
@@ -125,6 +133,7 @@ class Robot:
 
     def plug(self, *plugins: PluginDescription) -> None:
         for plugin in plugins:
+            self.former.pop(plugin.name, None)
             self.components[plugin.name] = ComponentRecord(
                 id=plugin.name,
                 payload=f"key-{plugin.name}",
@@ -143,7 +152,10 @@ class Robot:
 
     def unplug(self, *names: str) -> None:
         for name in names:
-            del self.components[name]
+            left = self.components.pop(name)
+            self.former[name] = FormerPayload(
+                left.payload_id, left.version, {name: left.description}, time.time(), 0
+            )
         self.see()
         for call in self.calls:
             if call.component in names:
@@ -156,7 +168,11 @@ class Robot:
     def see(self) -> None:
         self.revision += 1
         snapshot = Snapshot(
-            HOST, self.revision, tuple(self.components.values()), mounts=self.mounts
+            HOST,
+            self.revision,
+            tuple(self.components.values()),
+            mounts=self.mounts,
+            former=tuple(self.former.values()),
         )
         self.mind.see(snapshot)
 

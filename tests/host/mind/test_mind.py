@@ -118,7 +118,7 @@ async def test_goal_whose_words_went_names_who_brought_them(robot: Robot) -> Non
     [problem] = robot.mind.queue["1"].problems
     assert str(problem) == (
         "WHY_WORDS_GONE 'lit' means nothing without lamp, which brought it"
-        " → plug in org.example.lamp"
+        " → plug in org.example.lamp 1.0"
     )
     robot.plug(lamp)
     await robot.until_holding()
@@ -414,7 +414,7 @@ async def test_pulled_camera_is_told_with_the_payload_that_brings_it_back(robot:
         r"cannot '\(following self person\)' now: there is no image, which people-detector\.detect"
         r" needs, for visual-tracker\.track, for mobile-base\.drive,"
         r" for \(following rover person\); recorded-camera used to supply it, until \d\d:\d\d:\d\d"
-        r" → plug in org\.example\.recorded-camera",
+        r" → plug in org\.example\.recorded-camera 1\.0",
         told,
     )
 

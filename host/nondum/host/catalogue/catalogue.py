@@ -58,7 +58,7 @@ class Catalogue:
 
     @property
     def revision(self) -> int:
-        """Raised whenever components, their devices or mounts change."""
+        """Raised whenever components, their devices or mounts change, or what is remembered."""
         return self._state.revision
 
     def snapshot(self) -> Snapshot:

@@ -16,11 +16,13 @@ from nondum.host.catalogue.records import ComponentRecord, JournalEntry
 from nondum.host.catalogue.state import Highwater, HostState
 from nondum.sdk.errors import ConfigRefused, Problem
 
-SCHEMA = 2
+SCHEMA = 3
 
 _UPGRADES = {
     1: "CREATE TABLE goals (id TEXT PRIMARY KEY, text TEXT NOT NULL, pddl TEXT NOT NULL,"
-    " kind TEXT NOT NULL, priority INTEGER NOT NULL) STRICT;"
+    " kind TEXT NOT NULL, priority INTEGER NOT NULL) STRICT;",
+    2: "CREATE TABLE former (payload_id TEXT PRIMARY KEY, version TEXT NOT NULL,"
+    " components TEXT NOT NULL, left_wall_s REAL NOT NULL) STRICT;",
 }
 """Schema → what makes the next one of it."""
 
@@ -115,6 +117,7 @@ def load(connection: sqlite3.Connection, host: str) -> HostState:
         devices={d.id: d for d in map(rows.device, every("devices"))},
         mounts={m.unit: m for m in map(rows.mount, every("mounts"))},
         goals={g.id: g for g in map(rows.goal, every("goals"))},
+        former={f.payload_id: f for f in map(rows.former, every("former")) if f is not None},
         highwater={
             (row["fleet"], row["payload_id"]): Highwater(row["release"], row["digest"])
             for row in every("highwater")
@@ -160,6 +163,7 @@ def _write_state(connection: sqlite3.Connection, before: HostState, after: HostS
         ("drives", "id", before.drives, after.drives, rows.drive_row),
         ("mounts", "unit", before.mounts, after.mounts, rows.mount_row),
         ("goals", "id", before.goals, after.goals, rows.goal_row),
+        ("former", "payload_id", before.former, after.former, rows.former_row),
     )
     for table, key, old, new, as_row in simple:
         _difference(connection, table, key, old, new, as_row)

@@ -200,6 +200,22 @@ class GoalRecord:
 
 
 @dataclass(frozen=True, slots=True)
+class FormerPayload:
+    """A payload that was active here and is gone: what it could do, so that it can be named when
+    something is missing. Nothing of it runs, and none of its files are kept by this."""
+
+    payload_id: str
+    version: str
+    components: Mapping[str, PluginDescription]
+    """Id → what the component said of itself."""
+    left_wall_s: float
+    """When it was withdrawn, in seconds since 1970; if that was while no daemon ran, when the next
+    one started."""
+    size: int
+    """Length of `components` as JSON."""
+
+
+@dataclass(frozen=True, slots=True)
 class Snapshot:
     """The catalogue at one revision."""
 
@@ -213,6 +229,8 @@ class Snapshot:
     mounts: tuple[MountPose, ...] = ()
     goals: tuple[GoalRecord, ...] = ()
     """In the order they were given."""
+    former: tuple[FormerPayload, ...] = ()
+    """Those that left first come first."""
 
     def component(self, id: str) -> ComponentRecord | None:
         """The component of that id, if it is active."""

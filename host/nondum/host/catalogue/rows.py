@@ -15,6 +15,7 @@ from nondum.host.catalogue.records import (
     DeviceRecord,
     DriveRecord,
     DriveState,
+    FormerPayload,
     GoalRecord,
     JournalEntry,
     Moment,
@@ -24,7 +25,7 @@ from nondum.host.catalogue.records import (
 )
 from nondum.host.events import plain
 from nondum.sdk.description import PluginDescription
-from nondum.sdk.errors import Problem
+from nondum.sdk.errors import NondumError, Problem
 
 Row = dict[str, Any]
 
@@ -221,6 +222,31 @@ def goal_row(goal: GoalRecord) -> Row:
 def goal(row: sqlite3.Row) -> GoalRecord:
     """A goal of its row."""
     return GoalRecord(row["id"], row["text"], row["pddl"], row["kind"], row["priority"])
+
+
+def former_row(former: FormerPayload) -> Row:
+    """A row of `former`."""
+    return {
+        "payload_id": former.payload_id,
+        "version": former.version,
+        "components": as_json(former.components),
+        "left_wall_s": former.left_wall_s,
+    }
+
+
+def former(row: sqlite3.Row) -> FormerPayload | None:
+    """What is remembered of a payload; None if this nondum cannot read it.
+
+    Rows may be older than the nondum that reads them by many versions, and no daemon should fail to
+    start for want of a memory.
+    """
+    try:
+        said = dict(json.loads(row["components"]))
+        components = {id: PluginDescription.parse(one, where=id) for id, one in said.items()}
+    except (NondumError, TypeError, ValueError):
+        return None
+    size = len(row["components"])
+    return FormerPayload(row["payload_id"], row["version"], components, row["left_wall_s"], size)
 
 
 def entry_row(entry: JournalEntry) -> Row:

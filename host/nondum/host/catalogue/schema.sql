@@ -97,6 +97,13 @@ CREATE TABLE goals (                     -- those that are not over
     priority  INTEGER NOT NULL
 ) STRICT;
 
+CREATE TABLE former (                    -- payloads that were active and are gone
+    payload_id   TEXT PRIMARY KEY,
+    version      TEXT NOT NULL,
+    components   TEXT NOT NULL,          -- JSON {component: description}
+    left_wall_s  REAL NOT NULL
+) STRICT;
+
 CREATE TABLE journal (
     id           INTEGER PRIMARY KEY AUTOINCREMENT,
     monotonic_s  REAL NOT NULL,

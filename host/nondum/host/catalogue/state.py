@@ -9,6 +9,7 @@ from nondum.host.catalogue.records import (
     ComponentRecord,
     DeviceRecord,
     DriveRecord,
+    FormerPayload,
     GoalRecord,
     MountPose,
     PayloadRecord,
@@ -39,6 +40,8 @@ class HostState:
     """(fleet, payload id) → newest release."""
     goals: Mapping[str, GoalRecord] = field(default_factory=dict)
     """Those that are not over."""
+    former: Mapping[str, FormerPayload] = field(default_factory=dict)
+    """Payload id → what is remembered of it; none of these payloads is active."""
 
     def snapshot(self) -> Snapshot:
         """The state as readers get it."""
@@ -51,4 +54,5 @@ class HostState:
             devices=tuple(self.devices.values()),
             mounts=tuple(self.mounts.values()),
             goals=tuple(self.goals.values()),
+            former=tuple(sorted(self.former.values(), key=lambda f: f.left_wall_s)),
         )

@@ -29,6 +29,7 @@ RULES: Mapping[type[Event], _Rule] = {
     events.PayloadFound: payload_rules.on_payload_found,
     events.PayloadVerified: payload_rules.on_payload_verified,
     events.RetryAsked: component_rules.on_retry_asked,
+    events.ForgetAsked: payload_rules.on_forget_asked,
     events.WorkerReady: component_rules.on_worker_news,
     events.WorkerExited: component_rules.on_worker_news,
     events.WorkerFailed: component_rules.on_worker_news,
@@ -64,7 +65,8 @@ def settle(turn: Turn, before: HostState) -> Outcome:
     drive_rules.release_idle_drives(turn)
     if turn.state.components != before.components or turn.state.devices != before.devices:
         claims.settle(turn)
-    if turn.state.components != before.components or turn.state.mounts != before.mounts:
+    parts = ("components", "mounts", "former")
+    if any(getattr(turn.state, part) != getattr(before, part) for part in parts):
         turn.change(revision=before.revision + 1)
         turn.events.append(events.Recomposed(turn.state.revision, turn.events[0].name))
     return turn.outcome()

@@ -17,6 +17,7 @@ from nondum.host.effects import (
 )
 from nondum.host.events import (
     Event,
+    ForgetAsked,
     PayloadActivated,
     PayloadFailed,
     PayloadFound,
@@ -129,6 +130,13 @@ def _told(payload: PayloadRecord, event: Event) -> PayloadRecord:
             return payload
 
 
+def on_forget_asked(turn: Turn, event: ForgetAsked) -> None:
+    """Forget a payload that was here."""
+    if event.payload in turn.state.former:
+        turn.events.append(event)
+        turn.forget(event.payload)
+
+
 def effect_for(kind: type[PayloadEffect], payload: PayloadRecord) -> PayloadEffect:
     """An effect of a row of a table, for one payload."""
     if kind is CopyPayload:
@@ -146,6 +154,7 @@ def _activate(turn: Turn, payload: PayloadRecord, event: PayloadActivated) -> No
         rank = max(ranks, default=base) + 1 + offset
         entered = replace(component, payload_id=payload.payload_id, rank=rank)
         turn.put_component(entered)
+    turn.forget(payload.payload_id)
     turn.change(
         mounts={**_by_unit(event.mounts), **turn.state.mounts},
         highwater={

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, TypeVar
 
@@ -10,6 +10,7 @@ from nondum.host.catalogue.records import ComponentRecord, DriveRecord, Moment, 
 from nondum.host.catalogue.state import HostState
 from nondum.host.effects import Effect
 from nondum.host.events import Event
+from nondum.host.lifecycle.former import remembering
 
 _V = TypeVar("_V")
 
@@ -64,8 +65,9 @@ class Turn:
         self.change(drives=_without(self.state.drives, drive))
 
     def drop_components(self, payload: str) -> None:
-        """Withdraw a payload's components, and the mounts that only it had said."""
-        gone = {c.id for c in self.state.components.values() if c.payload == payload}
+        """Withdraw a payload's components, and the mounts that only it had said; what they could do
+        is remembered."""
+        gone = {id: c for id, c in self.state.components.items() if c.payload == payload}
         mounts = {
             unit: pose
             for unit, pose in self.state.mounts.items()
@@ -73,6 +75,18 @@ class Turn:
         }
         kept = {id: c for id, c in self.state.components.items() if id not in gone}
         self.change(components=kept, mounts=mounts)
+        if gone:
+            self._remember(self.state.payloads[payload], gone.values())
+
+    def forget(self, payload_id: str) -> None:
+        """Remember nothing of a payload that was here."""
+        self.change(former=_without(self.state.former, payload_id))
+
+    def _remember(self, payload: PayloadRecord, gone: Iterable[ComponentRecord]) -> None:
+        """Keep what a payload could do, unless it is still here in another version."""
+        if all(c.payload_id != payload.payload_id for c in self.state.components.values()):
+            kept = remembering(self.state.former, payload, gone, self.at.wall_s)
+            self.change(former=kept)
 
 
 def _with(mapping: Mapping[str, _V], key: str, value: _V) -> dict[str, _V]:

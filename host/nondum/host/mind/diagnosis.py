@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
-from nondum.host.mind.composition import Composition
+from nondum.host.catalogue.records import FormerPayload, Snapshot
 from nondum.planning.claims import claims_of
 from nondum.planning.contribution import Contribution
 from nondum.planning.domain import Merged
@@ -24,42 +24,43 @@ _TRIAL_S = 0.3
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """A component that is here, or was."""
+    """A component that was here, as it was last."""
 
     contribution: Contribution
     description: PluginDescription
     payload_id: str
     """The payload that brings it."""
-    version: str = ""
-    """The payload's, where that is known."""
-    left_wall_s: float | None = None
-    """When it went, in seconds since 1970; None while it is here."""
+    version: str
+    """The payload's."""
+    left_wall_s: float
+    """When it went, in seconds since 1970."""
+
+    @classmethod
+    def of(cls, former: FormerPayload, host: str) -> Iterator[Seen]:
+        """The components of a payload that was here."""
+        for component, description in former.components.items():
+            contribution = Contribution.from_description(
+                description, host=host, component=component
+            )
+            yield cls(
+                contribution, description, former.payload_id, former.version, former.left_wall_s
+            )
 
     @property
     def payload(self) -> str:
         """The payload's id and version."""
-        return f"{self.payload_id} {self.version}".rstrip()
+        return f"{self.payload_id} {self.version}"
 
 
-def noted(seen: Mapping[str, Seen], composition: Composition, wall_s: float) -> dict[str, Seen]:
-    """What is remembered of components once a composition was seen; later ones replace earlier."""
-    versions = {payload.key: payload.version for payload in composition.snapshot.payloads}
-    brought = {contribution.component: contribution for contribution in composition.contributions}
-    present = {
-        record.id: Seen(
-            brought[record.id],
-            record.description,
-            record.payload_id,
-            versions.get(record.payload, ""),
-        )
-        for record in composition.snapshot.components
-    }
-    gone = {
-        name: replace(known, left_wall_s=known.left_wall_s or wall_s)
-        for name, known in seen.items()
-        if name not in present
-    }
-    return {**gone, **present}
+def seen_in(snapshot: Snapshot) -> tuple[Seen, ...]:
+    """The components that were here, those that left first come first."""
+    return tuple(known for former in snapshot.former for known in Seen.of(former, snapshot.host))
+
+
+def moment(wall_s: float) -> str:
+    """A moment in the past for people: the time, and the date where that was another day."""
+    then, now = time.localtime(wall_s), time.localtime()
+    return time.strftime("%T" if then[:3] == now[:3] else "%F %T", then)
 
 
 def why_not(
@@ -81,7 +82,7 @@ def why_not(
         reasons = "; ".join(f"{name} {failures[name]}" for name in sorted(failures))
         message = f"there is no way without what failed again and again: {reasons}"
         return (Problem("NO_OTHER_WAY", message, fix="it is tried again after a while"),)
-    gone = {known.contribution: known for known in seen if known.left_wall_s is not None}
+    gone = {known.contribution: known for known in seen}
     brought = [gone[contribution] for contribution in suppliers(diagnosis.causes, gone)]
     return (*diagnosis.problems(), *_used_to_supply(brought))
 
@@ -92,7 +93,7 @@ def _used_to_supply(gone: Iterable[Seen]) -> tuple[Problem, ...]:
     if not known:
         return ()
     names = ", ".join(seen.contribution.component for seen in known)
-    until = time.strftime("%T", time.localtime(max(seen.left_wall_s or 0.0 for seen in known)))
+    until = moment(max(seen.left_wall_s for seen in known))
     message = f"{names} used to supply it, until {until}"
     return (Problem("WHY_SUPPLIER", message, fix=f"plug in {_payloads(known)}"),)
 
@@ -104,8 +105,7 @@ def _payloads(gone: Iterable[Seen]) -> str:
 def words_gone(merged: Merged, pddl: str, seen: Iterable[Seen]) -> tuple[Problem, ...]:
     """Which of a goal's words mean nothing any more, and who brought them. Empty: none."""
     lost = {*re.findall(r"[^\s()]+", pddl)} - {*merged.domain.predicates, *merged.objects}
-    gone = [known for known in seen if known.left_wall_s is not None]
-    brought = [(known, lost & _names(known.contribution)) for known in gone]
+    brought = [(known, lost & _names(known.contribution)) for known in seen]
     words = ", ".join(sorted({repr(word) for _, found in brought for word in found}))
     bringers = [known for known, found in brought if found]
     if not words:

@@ -85,7 +85,6 @@ class Mind:
             people=self.people,
             emit=emit,
             now_s=now_s,
-            wall_s=wall_s,
             deadline_s=deadline_s,
             patience=patience or Patience(),
             wake=self.wake,

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from nondum.host.events import Emit, GoalEnded, GoalReached, PlanMade, PlanMissing
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition
-from nondum.host.mind.diagnosis import Seen, noted
+from nondum.host.mind.diagnosis import Seen, seen_in
 from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState
 from nondum.host.mind.people import People
 from nondum.host.mind.planners import Planners
@@ -69,7 +69,6 @@ class Pursuit:
         people: People,
         emit: Emit,
         now_s: Callable[[], float],
-        wall_s: Callable[[], float],
         deadline_s: float,
         patience: Patience,
         wake: Callable[[], None],
@@ -83,12 +82,11 @@ class Pursuit:
         self._people = people
         self._emit = emit
         self._now_s = now_s
-        self._wall_s = wall_s
         self._deadline_s = deadline_s
         self._patience = patience
         self._wake = wake
         self._composition: Composition | None = None
-        self._seen: dict[str, Seen] = {}
+        self._seen: tuple[Seen, ...] = ()
         self._left_out: dict[str, Problem] = {}
         self._failures: dict[str, str] = {}
         self._search: asyncio.Task[Planned | NoPlan] | None = None
@@ -104,8 +102,8 @@ class Pursuit:
 
     @property
     def seen(self) -> tuple[Seen, ...]:
-        """Every component that was ever here, as it was last."""
-        return tuple(self._seen.values())
+        """The components that were here, as far as they are remembered."""
+        return self._seen
 
     @property
     def left_out(self) -> tuple[tuple[str, Problem], ...]:
@@ -157,7 +155,7 @@ class Pursuit:
         if not set(before) <= set(composition.contributions):  # what is left may be small enough
             self._left_out.clear()
         self._composition = composition
-        self._seen = noted(self._seen, composition, self._wall_s())
+        self._seen = seen_in(composition.snapshot)
         self._excluded_until_s.clear()
         current = self.current
         if current is None:

@@ -83,7 +83,7 @@ class Past:
     """What is remembered from before a search."""
 
     seen: tuple[Seen, ...] = ()
-    """The components that are or were here: they may bring what is missing."""
+    """The components that were here: they may bring what is missing."""
     failures: Mapping[str, str] = field(default_factory=dict)
     """Actions that are excluded, and how they failed."""
     left_out: Mapping[str, Problem] = field(default_factory=dict)
@@ -118,7 +118,7 @@ async def search(
     try:
         goal = parse_goal(given.pddl, composition.merged, kind=given.kind)
     except GoalRefused as refused:
-        gone = words_gone(composition.merged, given.pddl, past.seen)
+        gone = await asyncio.to_thread(words_gone, composition.merged, given.pddl, past.seen)
         return NoPlan(situation, gone or refused.problems)
     try:
         fit = await _task_of_any_size(composition, goal, situation, past.left_out)

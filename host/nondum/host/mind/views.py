@@ -139,7 +139,7 @@ class Views:
 
     def composition(self) -> Row:
         """All that planning goes by, for tools that plan by themselves: `host`, `components`,
-        `facts`, `excluded` actions and why, and the components `seen` that are not here now."""
+        `facts`, `excluded` actions and why, and the components `seen` here before."""
         beliefs, pursuit = self._mind.beliefs, self._mind.pursuit
         kept_out = dict(pursuit.left_out)
         return {
@@ -164,7 +164,6 @@ class Views:
                     "description": seen.description.to_dict(),
                 }
                 for seen in pursuit.seen
-                if seen.left_wall_s is not None
             ],
         }
 

@@ -1,0 +1,39 @@
+"""What is remembered of payloads that were active and are gone, so that advice can name them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from nondum.host.catalogue.records import ComponentRecord, FormerPayload, PayloadRecord
+from nondum.host.catalogue.rows import as_json
+
+PAYLOADS_LIMIT = 200
+"""So many are remembered."""
+SIZE_LIMIT = 4 * 1024**2
+"""What they said of themselves is together no longer than this, as JSON."""
+
+
+def remembering(
+    former: Mapping[str, FormerPayload],
+    payload: PayloadRecord,
+    components: Iterable[ComponentRecord],
+    wall_s: float,
+) -> dict[str, FormerPayload]:
+    """What is remembered once a payload has left with its components: beyond the limits those that
+    left first are forgotten."""
+    described = {component.id: component.description for component in components}
+    new = FormerPayload(
+        payload.payload_id, payload.version, described, wall_s, len(as_json(described))
+    )
+    return _within_limits({**former, new.payload_id: new})
+
+
+def _within_limits(former: Mapping[str, FormerPayload]) -> dict[str, FormerPayload]:
+    """As many of the last as there is room for; one for which there is none costs no others."""
+    kept: dict[str, FormerPayload] = {}
+    room = SIZE_LIMIT
+    for payload in sorted(former.values(), key=lambda f: f.left_wall_s, reverse=True):
+        if payload.size <= room and len(kept) < PAYLOADS_LIMIT:
+            kept[payload.payload_id] = payload
+            room -= payload.size
+    return kept
