@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 from tests.lab.plugins import scribe, talker
 from tests.lab.running_host import Row, RunningHost, happened, payload, steps
+from tests.lab.traces import former_payloads
 from tests.payloads import Part, make_wheel
 
 pytestmark = pytest.mark.lab
@@ -39,6 +40,7 @@ def test_drive_pulled_while_it_is_installed(host: RunningHost, heavy: Part, phas
     host.pull("heavy")
     host.until_gone("heavy")
     assert host.traces() == before
+    assert former_payloads(host.state) == {}
     assert host.component("keeper") == keeper
     assert host.until_told("org.example.heavy is withdrawn: its drive was pulled")
     (withdrawn,) = (e for e in host.journal("org.example.heavy") if e["step"] == "removing")
@@ -55,6 +57,9 @@ def test_drive_pulled_while_nothing_is_asked_for(host: RunningHost) -> None:
     host.until_told("talker is gone: it could talk")
     assert host.traces() == before
     assert len(host.ask("store")) == stored > 0
+    assert former_payloads(host.state) == {"org.example.talk": {"talker"}}
+    host.ask("forget", payload="org.example.talk")
+    assert former_payloads(host.state) == {}
 
 
 def test_drive_pulled_in_the_middle_of_a_behaviour(host: RunningHost) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import select
 import sqlite3
 from collections.abc import Iterator
@@ -12,8 +13,8 @@ from pathlib import Path
 from nondum.host.drives.mounting import mounted_below
 
 FOLDERS = ("staging", "payloads", "venvs", "scratch", "mounts")
-LASTING = {"host", "highwater", "journal"}
-"""Tables that outlive payloads."""
+LASTING = {"host", "highwater", "former", "journal"}
+"""Tables that outlive payloads; `former_payloads` says what is in that of former ones."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,13 @@ class Traces:
             tuple(sorted(_folders(state))),
             tuple(_rows(state / "catalogue.sqlite")),
         )
+
+
+def former_payloads(state: Path) -> dict[str, set[str]]:
+    """Payload id → components, of the payloads that a host remembers: all that is meant to stay."""
+    with _catalogue(state / "catalogue.sqlite") as connection:
+        rows = connection.execute("SELECT payload_id, components FROM former")
+        return {id: set(json.loads(components)) for id, components in rows}
 
 
 def workers(state: Path) -> Iterator[tuple[int, str]]:
@@ -97,9 +105,13 @@ def _folders(state: Path) -> Iterator[str]:
 
 
 def _rows(catalogue: Path) -> Iterator[tuple[str, tuple[object, ...]]]:
-    with contextlib.closing(sqlite3.connect(f"file:{catalogue}?mode=ro", uri=True)) as connection:
+    with _catalogue(catalogue) as connection:
         names = connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
         for (table,) in sorted(names.fetchall()):
             if table not in LASTING and not table.startswith("sqlite_"):
                 for row in sorted(connection.execute(f"SELECT * FROM {table}"), key=repr):
                     yield table, tuple(row)
+
+
+def _catalogue(file: Path) -> contextlib.closing[sqlite3.Connection]:
+    return contextlib.closing(sqlite3.connect(f"file:{file}?mode=ro", uri=True))

@@ -27,6 +27,9 @@ WAYS_LIMIT = 10
 """So many alternatives are told."""
 _SEARCH_S = 2.0
 """How long is planned with one set of payloads."""
+_GLANCE_TRIALS = 12
+_GLANCE_S = 1.0
+"""How many sets of payloads are planned with for the sake of a sentence, and how long in all."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +44,9 @@ class Counsel:
     """Why it cannot be had now; empty if it can."""
     known: int
     """How many payloads are known of that are not at work."""
+    left_out: tuple[Candidate, ...]
+    """Payloads of which nothing, or not every component, could be planned with here, and that are
+    in none of the ways; their caveats say why."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +57,8 @@ class Surroundings:
     seen: tuple[Seen, ...]
     failures: Mapping[str, str]
     candidates: tuple[Candidate, ...]
+    flawed: tuple[Candidate, ...]
+    """Those with components whose fragments are wrong."""
 
     @classmethod
     def of(cls, told: Mapping[str, Any], shelf: Iterable[Shelved]) -> Surroundings:
@@ -65,15 +73,21 @@ class Surroundings:
             for row in told["components"]
         )
         at_work = {contribution.component for contribution in present}
-        known = distinct((*shelf, *_remembered(seen)))
+        known = [
+            payload
+            for payload in distinct((*shelf, *_remembered(seen)))
+            if not at_work.issuperset(payload.components)
+        ]
+        candidates = tuple(candidate_of(payload, host, devices) for payload in known)
         return cls(
             Here(host, present, frozenset(told["facts"]), frozenset(told["excluded"])),
             seen,
             told["excluded"],
+            candidates,
             tuple(
-                candidate_of(payload, host, devices)
-                for payload in known
-                if not at_work.issuperset(payload.components)
+                candidate
+                for candidate, payload in zip(candidates, known, strict=True)
+                if len(candidate.contributions) < len(payload.components)
             ),
         )
 
@@ -95,7 +109,31 @@ class Surroundings:
             goal, kind = goal_text(meant.expr), meant.kind
         advice = advise(self.here, goal, self.candidates, _search, ways_limit=WAYS_LIMIT)
         causes = () if advice.now else self._causes(goal, advice)
-        return Counsel(goal, kind, advice, causes, len(self.candidates))
+        known = len(self.candidates)
+        return Counsel(goal, kind, advice, causes, known, self._left_out(advice))
+
+    def glance(self, goal: str) -> Advice:
+        """What would help towards a goal in PDDL, as far as that is found at once.
+
+        Raises `GoalRefused`.
+        """
+        until_s = time.monotonic() + _GLANCE_S
+
+        def search(task: GroundTask) -> Answer:
+            return solve(task, lambda: time.monotonic() > until_s)
+
+        return advise(
+            self.here,
+            goal,
+            self.candidates,
+            search,
+            ways_limit=WAYS_LIMIT,
+            trials_limit=_GLANCE_TRIALS,
+        )
+
+    def _left_out(self, advice: Advice) -> tuple[Candidate, ...]:
+        told = {c.name for c in advice.unfit} | {c.name for w in advice.ways for c in w.payloads}
+        return (*advice.unfit, *(c for c in self.flawed if c.name not in told))
 
     def _causes(self, goal: str, advice: Advice) -> tuple[Problem, ...]:
         """Raises `GoalRefused` for a goal whose words nobody knows."""

@@ -12,7 +12,7 @@ from typing import cast
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import MountPose, PayloadRecord, Snapshot, Step
 from nondum.host.control.arguments import Arguments, Triple
-from nondum.host.events import MountSet, RetryAsked
+from nondum.host.events import ForgetAsked, MountSet, RetryAsked
 from nondum.host.lifecycle import installed
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.mind.composition import Composition
@@ -123,6 +123,20 @@ class Orders:
         for payload in troubled:
             self.bus.emit(RetryAsked(payload.key))
         return {"payloads": [payload.payload_id for payload in troubled]}
+
+    async def forget(self, arguments: Arguments) -> Row:
+        """Forget a payload that was here. Raises `InstallFailed` (FORGET_UNKNOWN)."""
+        payload_id = arguments.text("payload")
+        known = [former.payload_id for former in self.catalogue.snapshot().former]
+        if payload_id not in known:
+            message = f"nothing is remembered of a payload {payload_id!r} that was here"
+            fix = f"remembered are: {', '.join(sorted(known)) or 'none'}"
+            raise InstallFailed(Problem("FORGET_UNKNOWN", message, fix=fix))
+        self.bus.emit(ForgetAsked(payload_id))
+        await self._until(
+            lambda snapshot: all(former.payload_id != payload_id for former in snapshot.former)
+        )
+        return {"payload": payload_id}
 
     async def tap(self, arguments: Arguments) -> Row:
         """Connect a stream to the socket that the client listens on. Raises `NondumError`."""

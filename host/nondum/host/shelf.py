@@ -9,6 +9,7 @@ from pathlib import Path
 
 from nondum.host.mind.composition import component_facts
 from nondum.planning.advise import Candidate
+from nondum.planning.claims import claims_of
 from nondum.planning.contribution import Contribution, object_name
 from nondum.planning.facts import fact
 from nondum.sdk.description import PluginDescription
@@ -64,12 +65,19 @@ def candidate_of(
 ) -> Candidate:
     """A payload as it would be on a host, its components healthy.
 
+    Components whose fragments are wrong are left out, as planning leaves them out; caveats say why.
     Of required devices that are not among `devices` (their udev properties) a caveat tells; None:
     it is not known which there are.
     """
     facts: set[str] = set()
     caveats = list(payload.caveats)
+    sound: list[Contribution] = []
     for component, description in payload.components.items():
+        brought = Contribution.from_description(description, host=host, component=component)
+        if problems := claims_of(brought).problems:
+            caveats += problems
+            continue
+        sound.append(brought)
         facts |= component_facts(host, component, description, is_ready=True).keys()
         facts.update(_flowing(host, component, description))
         if devices is not None:
@@ -78,10 +86,7 @@ def candidate_of(
         payload.id,
         payload.version,
         payload.where,
-        tuple(
-            Contribution.from_description(description, host=host, component=component)
-            for component, description in payload.components.items()
-        ),
+        tuple(sound),
         frozenset(facts),
         tuple(caveats),
     )

@@ -21,6 +21,7 @@ def answering(questions: Questions, orders: Orders) -> dict[str, Verb]:
         "devices": questions.devices,
         "fact": questions.fact,
         "facts": questions.facts,
+        "forget": orders.forget,
         "goal": orders.goal,
         "goals": questions.goals,
         "halt": orders.halt,

@@ -108,6 +108,41 @@ def test_payload_that_cannot_be_read_is_named(tmp_path: Path, shelf: Path) -> No
     assert f"warning: INDEX_INVALID {folder}: index.json" in ran.err
 
 
+BROKEN = """
+from nondum.sdk import Fragment, hookimpl
+
+@hookimpl
+def fragments():
+    return [Fragment("domain.pddl", "(define (domain broken)\\n  (:predicates (written")]
+"""
+
+
+def test_payload_whose_fragments_are_wrong_is_left_out_by_name(tmp_path: Path, shelf: Path) -> None:
+    make_payload(tmp_path, Part("broken", BROKEN), payload_id="org.example.broken")
+    asked = ("--host-of", "spot", "--wheelhouse", tmp_path, "--wheelhouse", shelf)
+    shown = nondum("advise", WRITTEN, *asked).ok().out
+    [told] = [line for line in shown.splitlines() if "org.example.broken" in line]
+    assert told.startswith("left out: org.example.broken 1.0: ")
+    assert "domain.pddl" in told
+    found = nondum("advise", WRITTEN, *asked, "--json").ok().json
+    [payload] = found["unfit"]
+    assert payload["payload"] == "org.example.broken"
+    assert len(found["ways"]) == 2
+
+
+def test_payload_is_of_use_without_its_component_whose_fragments_are_wrong(
+    tmp_path: Path,
+) -> None:
+    parts = (talker(), scribe(), Part("broken", BROKEN))
+    make_payload(tmp_path, *parts, payload_id="org.example.half")
+    asked = ("--host-of", "spot", "--wheelhouse", tmp_path)
+    found = nondum("advise", WRITTEN, *asked, "--json").ok().json
+    [way] = found["ways"]
+    assert [caveat["where"] for caveat in way["payloads"][0]["caveats"]]
+    [left_out] = nondum("advise", "(self spot)", *asked, "--json").ok().json["unfit"]
+    assert left_out["payload"] == "org.example.half"
+
+
 def test_host_that_runs_needs_only_what_it_lacks(daemon: Daemon, shelf: Path) -> None:
     ran = daemon.run("advise", "(lit self)").ok()
     assert ran.out == "goal (lit self)\nit can be had now: test-beacon.shine\n"

@@ -13,11 +13,11 @@ from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.failure import tell_problem
 from nondum.host.cli.judge import FOLDER
 from nondum.host.cli.table import table
-from nondum.sdk.errors import HostUnreachable, Problem
+from nondum.sdk.errors import GoalRefused, HostUnreachable, Problem
 
 if TYPE_CHECKING:
     from nondum.host.counsel import Counsel, Surroundings
-    from nondum.planning.advise import Candidate, Way
+    from nondum.planning.advise import Advice, Candidate, Way
 
 EXIT_NOTHING_HELPS = 11
 EXIT_UNKNOWN = 12
@@ -48,17 +48,20 @@ def advise(
 ) -> int:
     """Which payloads would make a goal possible, and by which plan.
 
-    GOAL is in words, or in PDDL. Known are payloads that were here since the daemon started, that
-    are on drives, and those in the folders given; nothing of them is run. Each alternative needs
-    all its payloads; its plan was checked. Exits with 11 if nothing known helps, with 12 if that is
-    not certain.
+    GOAL is in words, in PDDL, or the number of one that was given. Known are payloads that were
+    here before, that are on drives, and those in the folders given; nothing of them is run. Each
+    alternative needs all its payloads; its plan was checked. Exits with 11 if nothing known helps,
+    with 12 if that is not certain.
 
     \b
     Examples: nondum advise follow me
               nondum advise "(pointing self radiation-source)" --wheelhouse /media/usb
     """
+    asked = " ".join(goal)
+    if host is None:
+        asked = without_number(session, asked)
     around, problems = surroundings(session, wheelhouses, host)
-    found = around.counsel(" ".join(goal))
+    found = around.counsel(asked)
     if session.as_json:
         render.as_json({**row(found), "unread": [problem.to_dict() for problem in problems]})
     else:
@@ -66,6 +69,18 @@ def advise(
             tell_problem(problem, as_warning=True)
         show(found)
     return exit_code(found)
+
+
+def without_number(session: Session, asked: str) -> str:
+    """The goal in PDDL where its number is given. Raises `GoalRefused` (GOAL_UNKNOWN)."""
+    if not asked.isdecimal():
+        return asked
+    given = {row["id"]: str(row["goal"]) for row in session.ask("status")["goals"]}
+    if asked not in given:
+        known = ", ".join(given) or "none was given"
+        message = f"there is no goal {asked!r}"
+        raise GoalRefused(Problem("GOAL_UNKNOWN", message, fix=f"goals: {known}"))
+    return given[asked]
 
 
 def surroundings(
@@ -116,12 +131,19 @@ def row(found: Counsel) -> dict[str, Any]:
     return {
         "goal": found.goal,
         "kind": found.kind,
-        "now": _way(advice.now) if advice.now else None,
         "causes": [problem.to_dict() for problem in found.causes],
+        **ways(advice),
+        "known": found.known,
+        "unfit": [_payload(candidate) for candidate in found.left_out],
+    }
+
+
+def ways(advice: Advice) -> dict[str, Any]:
+    """The alternatives as plain data."""
+    return {
+        "now": _way(advice.now) if advice.now else None,
         "ways": [_way(way) for way in advice.ways],
         "complete": advice.is_complete,
-        "known": found.known,
-        "unfit": [_payload(candidate) for candidate in advice.unfit],
     }
 
 
@@ -158,9 +180,23 @@ def show(found: Counsel) -> None:
     if not advice.is_complete:
         render.sentence("there may be more: not everything could be looked at")
     caveats = dict.fromkeys(c for way in advice.ways for c in way.payloads if c.caveats)
-    for candidate in (*caveats, *advice.unfit):
-        for problem in candidate.caveats:
-            render.sentence(f"{candidate.name}: {problem}", colour="yellow", mark="but ")
+    for mark, candidates in (("but ", tuple(caveats)), ("left out: ", found.left_out)):
+        for candidate in candidates:
+            for problem in candidate.caveats:
+                render.sentence(f"{candidate.name}: {problem}", colour="yellow", mark=mark)
+
+
+def in_a_sentence(advice: Advice) -> str:
+    """The best alternative for a person who asked for more than this goal."""
+    if advice.now is not None:
+        return f"it can be had now: {_shortly(advice.now) or 'it holds'}"
+    if not advice.ways:
+        return "no payload that is known of would help" if advice.is_complete else ""
+    best = advice.ways[0]
+    names = " and ".join(f"{c.name} ({c.where})" for c in best.payloads)
+    more = len(advice.ways) - 1
+    others = f", or {more} other way{'s' if more > 1 else ''}" if more else ""
+    return f"{names} would do: {_shortly(best)}{others}"
 
 
 def _rows(ways: Iterable[Way]) -> Iterator[dict[str, Any]]:

@@ -76,6 +76,12 @@ def installed(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[C
     return list(_items(pairs, incomplete))
 
 
+def former(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Completes payloads that were here and are remembered."""
+    seen = _rows((_asked(ctx, "composition") or {}).get("seen"))
+    return list(_items({row["payload"]: row["version"] for row in seen}.items(), incomplete))
+
+
 def _asked(ctx: click.Context, verb: str) -> Any:
     """The daemon's answer, or None. Completion never fails: the shell would show it."""
     try:

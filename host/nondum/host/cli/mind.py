@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from nondum.host.cli import complete, render
-from nondum.host.cli.advise import row, show, surroundings, wheelhouse_option
+from nondum.host.cli.advise import (
+    in_a_sentence,
+    row,
+    show,
+    surroundings,
+    ways,
+    wheelhouse_option,
+    without_number,
+)
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.failure import tell_problem
 from nondum.host.cli.table import cell, table
-from nondum.sdk.errors import GoalRefused, Problem
+from nondum.sdk.errors import GoalRefused
+
+if TYPE_CHECKING:
+    from nondum.planning.advise import Advice
+
+GLANCES = 3
+"""Of so many suspended goals, people who ask of all get told what would help; it takes its time."""
 
 
 @click.command()
@@ -134,6 +149,8 @@ def plan(session: Session) -> None:
 def why(session: Session, goal: tuple[str, ...], wheelhouses: tuple[Path, ...]) -> None:
     """Why the robot does what it does, or why it cannot.
 
+    Of goals that are suspended: what they lack, and the best that a known payload would do for it.
+
     With a goal (its number, words, or PDDL) or a fact: what it lacks, which step needs that, who
     used to supply it, and which known payload would help, as `nondum advise` says.
 
@@ -145,29 +162,41 @@ def why(session: Session, goal: tuple[str, ...], wheelhouses: tuple[Path, ...]) 
     if goal:
         _why_not(session, " ".join(goal), wheelhouses)
         return
-    view = session.ask("why")
+    view, helps = session.ask("why"), _helps(session, wheelhouses)
     if session.as_json:
-        render.as_json(view)
+        told = [{"goal": id, **(ways(found) if found else {})} for id, found in helps.items()]
+        render.as_json({**view, "advice": told})
         return
     for sentence in view["sentences"]:
         render.sentence(sentence)
     for problem in view["problems"]:
         render.sentence(problem, colour="red")
+    for id, found in helps.items():
+        parts = (in_a_sentence(found) if found else "", f"see `nondum advise {id}`")
+        render.sentence("; ".join(filter(None, parts)), mark=f"goal {id}: ")
     if view["told"]:
         click.echo()
     for told in view["told"]:
         render.sentence(told, mark="> ")
 
 
+def _helps(session: Session, wheelhouses: tuple[Path, ...]) -> dict[str, Advice | None]:
+    """Suspended goals, by number, and what would help; None where that was not looked at."""
+    suspended = [goal for goal in session.ask("status")["goals"] if goal["state"] == "suspended"]
+    if not suspended:
+        return {}
+    around, _ = surroundings(session, wheelhouses)
+    helps: dict[str, Advice | None] = {goal["id"]: None for goal in suspended}
+    for goal in suspended[:GLANCES]:
+        with contextlib.suppress(GoalRefused):  # its words may mean nothing any more
+            helps[goal["id"]] = around.glance(goal["goal"])
+    return helps
+
+
 def _why_not(session: Session, asked: str, wheelhouses: tuple[Path, ...]) -> None:
     """A goal's number stands for the goal; a fact that holds is explained as such."""
     if asked.isdecimal():
-        given = {row["id"]: row["goal"] for row in session.ask("goals")["given"]}
-        if asked not in given:
-            known = ", ".join(given) or "none was given"
-            message = f"there is no goal {asked!r}"
-            raise GoalRefused(Problem("GOAL_UNKNOWN", message, fix=f"goals: {known}"))
-        asked = given[asked]
+        asked = without_number(session, asked)
     elif asked.startswith("(") and asked.count("(") == 1:
         fact = session.ask("fact", fact=asked)
         if fact["holds"]:

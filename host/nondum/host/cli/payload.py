@@ -169,6 +169,24 @@ def uninstall(session: Session, payload_id: str) -> None:
         click.echo(f"uninstalled {payload_id}")
 
 
+@payload.command()
+@click.argument("payload_id", metavar="PAYLOAD", shell_complete=complete.former)
+@json_option
+@click.pass_obj
+def forget(session: Session, payload_id: str) -> None:
+    """Forget a payload that was here and is gone.
+
+    The host remembers what such payloads could do, to say which would help; see `nondum advise`.
+
+    Example: nondum payload forget org.example.window-opener
+    """
+    done = session.ask("forget", payload=payload_id)
+    if session.as_json:
+        render.as_json(done)
+    else:
+        click.echo(f"forgot {payload_id}")
+
+
 def _size(folder: Path) -> str:
     return render.size(sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()))
 
