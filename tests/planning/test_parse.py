@@ -6,7 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.planning.parse import SIZE_LIMIT_BYTES, parse_formula, parse_fragment, parse_signature
+from nondum.planning.parse import (
+    NAME_LIMIT,
+    SIZE_LIMIT_BYTES,
+    parse_formula,
+    parse_fragment,
+    parse_signature,
+)
 from nondum.planning.syntax import (
     And,
     Atom,
@@ -144,6 +150,13 @@ SYNTAX_ERRORS = {
         "found 'x'",
     ),
     "too much": ("(define (domain d)) x", "1:21", "expected the end"),
+    "comment": ("; nothing but this", "1:1", "expected '(', found the end of the text"),
+    "number": (
+        "(define (problem p) (:init (= (f) .5)))",
+        "1:35",
+        "expected '(' or a name or a number or a variable, found '.5'",
+    ),
+    "long": ("(define (domain d) (:types a " + "$" * 150 + "))", "1:30", "$$$…'"),
 }
 
 
@@ -160,6 +173,28 @@ def test_caret_stands_under_the_culprit() -> None:
     assert message.splitlines()[1:] == ["\t(:typos a))", "\t ^"]
 
 
+def test_of_a_long_line_what_stands_around_the_culprit_is_shown() -> None:
+    message = refused("(define (domain d) " + " " * 5000 + "(:typos a)" + " " * 5000 + ")").message
+    _, line, below = message.splitlines()
+    assert len(line) < 200
+    assert line[below.index("^") :].startswith(":typos a)")
+
+
+@pytest.mark.parametrize("sign", ["\v", "\f\v", "\x1c", "\u2028", "\x85", "\xa0"], ids=ascii)
+def test_only_line_feeds_count_as_lines(sign: str) -> None:
+    """What Python, but no editor, takes for the end of a line does not move the caret."""
+    message = refused(f"(define (domain d)\n{sign}\n(:typos a))").message
+    assert "expected" in message
+    _, line, below = message.splitlines()
+    assert line[below.index("^")] == "\N{REPLACEMENT CHARACTER}"
+
+
+def test_byte_order_mark_is_passed_over() -> None:
+    assert domain("\ufeff" + DOMAIN) == domain(DOMAIN)
+    message = refused("\ufeff(define (domain d) (:typos a))").message
+    assert message.splitlines()[1:] == ["(define (domain d) (:typos a))", " " * 20 + "^"]
+
+
 def test_nearest_keyword_is_suggested() -> None:
     assert refused("(define (domain d) (:predicate (a)))").fix == "did you mean ':predicates'?"
 
@@ -169,6 +204,10 @@ def test_nearest_keyword_is_suggested() -> None:
     [
         ("(define (domain d) (:durative-action a))", "durative actions are not handled"),
         ("(define (domain d) (:constraints (and)))", "trajectory constraints are not handled"),
+        ("(define (domain d) (:process a))", "processes are not handled"),
+        ("(define (problem d) (:goal (preference p (a))))", "preferences are not handled"),
+        ("(define (problem d) (:init (at 5 (a))))", "facts that become true at a time are not"),
+        ("(define (problem d) (:init (= (f) -5)))", "negative numbers are not handled"),
         ("(define (problem d) (:metric minimize (total-time)))", "metric 'total-time' is not"),
         ("(define (problem d) (:metric maximize (x)))", "metrics that maximize are not handled"),
     ],
@@ -193,6 +232,12 @@ def test_what_stands_twice_is_refused(text: str) -> None:
 
 def test_deep_brackets_are_refused() -> None:
     assert refused("(" * 100_000).code == "PDDL_TOO_DEEP"
+
+
+def test_long_names_are_refused_where_they_stand() -> None:
+    problem = refused("(define (domain d) (:types\n a " + "b" * (NAME_LIMIT + 1) + "))")
+    assert (problem.code, problem.where) == ("PDDL_TOO_BIG", "d.pddl:2:4")
+    assert domain("(define (domain d) (:types " + "b" * NAME_LIMIT + "))")
 
 
 def test_long_text_is_refused() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 
@@ -10,6 +11,12 @@ from nondum.sdk.errors import Problem
 
 _LOOKED_AT = 1000
 """How many names are compared: a fragment of nothing but mistakes must not cost minutes."""
+_LINE_SHOWN = 160
+"""Of a longer line only what stands around the place is shown."""
+_BEFORE = 60
+_UNSEEN = re.compile("[\x00-\x08\x0a-\x1f\x7f-\xa0\u2028\u2029\ufeff]")
+"""Signs that take no place in a terminal, or two lines, or look like blanks that PDDL knows."""
+_NAME_SHOWN = 40
 
 
 def caret(text: str, place: Place) -> str:
@@ -19,10 +26,26 @@ def caret(text: str, place: Place) -> str:
       (at ?x))
        ^
     """
-    lines = text.splitlines()
-    line = lines[place.line - 1] if place.line <= len(lines) else ""
-    indent = "".join("\t" if sign == "\t" else " " for sign in line[: place.column - 1])
+    lines = text.removeprefix("\ufeff").split("\n", place.line)
+    line = lines[place.line - 1].rstrip("\r") if place.line <= len(lines) else ""
+    line = _UNSEEN.sub("\N{REPLACEMENT CHARACTER}", line)
+    column = place.column - 1
+    if len(line) > _LINE_SHOWN:
+        cut = max(column - _BEFORE, 0)
+        before, after = "…" * (cut > 0), "…" * (cut + _LINE_SHOWN < len(line))
+        line = f"{before}{line[cut : cut + _LINE_SHOWN]}{after}"
+        column += len(before) - cut
+    indent = "".join("\t" if sign == "\t" else " " for sign in line[:column])
     return f"{line}\n{indent}^"
+
+
+def shown(name: str) -> str:
+    """A name as messages give it: quoted, and cut where it is longer than any name should be.
+
+    >>> shown("ready")
+    "'ready'"
+    """
+    return repr(name if len(name) <= _NAME_SHOWN else f"{name[:_NAME_SHOWN]}…")
 
 
 def refusal(

@@ -11,20 +11,29 @@ from typing import cast
 from lark import Lark, Token, UnexpectedCharacters, UnexpectedInput
 
 from nondum.planning.build import Builder
-from nondum.planning.caret import Misplaced, nearest, refusal
+from nondum.planning.caret import Misplaced, nearest, refusal, shown
 from nondum.planning.syntax import Formula, FragmentSyntax, Place, PredicateDeclaration
 from nondum.sdk.errors import FragmentRefused, Problem
 
 SIZE_LIMIT_BYTES = 256 * 1024
 DEPTH_LIMIT = 64
+NAME_LIMIT = 200
 
 _COMMENT = re.compile(r";[^\n]*")
+_LONG = re.compile(rf"[^\s()]{{{NAME_LIMIT + 1},}}")
 _WORD = re.compile(r"[^\s()]+|.", re.DOTALL)
 _LOWER = {upper: upper + 32 for upper in range(ord("A"), ord("Z") + 1)}
 _SECTIONS_NOT_HANDLED = {
     ":durative-action": "durative actions",
     ":constraints": "trajectory constraints",
+    ":process": "processes",
+    ":event": "events",
 }
+_PREFERENCE = re.compile(r"\(\s*preference\s+[^\s()]*\s*$")
+_TIMED = re.compile(r"\(\s*at\s*$")
+_DIGITS = re.compile(r"[0-9.]+$")
+_NEGATIVE = re.compile(r"-[0-9.]+$")
+_LOOK_BACK = 200
 _SAID = {
     "LPAR": "'('",
     "RPAR": "')'",
@@ -44,9 +53,10 @@ def parse_fragment(
 ) -> FragmentSyntax:
     """Parse a whole domain or problem; `file` is the name that messages give.
 
-    Raises `FragmentRefused`: E-SYNTAX, E-UNSUPPORTED, E-TWICE, PDDL_TOO_BIG, PDDL_TOO_DEEP.
+    A byte order mark before it is passed over. Raises `FragmentRefused`: E-SYNTAX, E-UNSUPPORTED,
+    E-TWICE, PDDL_TOO_BIG, PDDL_TOO_DEEP.
     """
-    return _parse_cached(text, file, size_limit_bytes)
+    return _parse_cached(text.removeprefix("\ufeff"), file, size_limit_bytes)
 
 
 @lru_cache(maxsize=1024)
@@ -102,6 +112,10 @@ def _parser() -> _Parser:
 def _parse(text: str, file: str, start: str) -> object:
     clean = _COMMENT.sub(lambda comment: " " * len(comment[0]), text).translate(_LOWER)
     _check_depth(clean, text, file)
+    if long := _LONG.search(clean):
+        message = f"a name is longer than {NAME_LIMIT} characters"
+        place = _place(clean, long.start(), file)
+        raise FragmentRefused(refusal("PDDL_TOO_BIG", message, place, text))
     try:
         return _parser().parse(clean, file, start)
     except UnexpectedInput as error:
@@ -126,18 +140,31 @@ def _place(text: str, offset: int, file: str) -> Place:
 
 
 def _unexpected(error: UnexpectedInput, clean: str, text: str, file: str) -> Problem:
-    offset = len(clean.rstrip()) if _at_end(error) else cast(int, error.pos_in_stream)
+    is_at_end = _at_end(error)
+    offset = len(clean.rstrip()) if is_at_end else cast(int, error.pos_in_stream)
     match = _WORD.match(clean, offset)
-    found = match[0] if match else ""
+    found = match[0] if match and not is_at_end else ""
     place = _place(clean, offset, file)
-    if found in _SECTIONS_NOT_HANDLED:
-        message = f"{_SECTIONS_NOT_HANDLED[found]} are not handled"
+    if message := _not_handled(found, clean[max(offset - _LOOK_BACK, 0) : offset]):
         return refusal("E-UNSUPPORTED", message, place, text)
     expected = _expected(error)
     listed = " or ".join(expected) if len(expected) < 6 else "one of " + ", ".join(expected)
-    message = f"expected {listed}, found {repr(found) if found else 'the end of the text'}"
+    message = f"expected {listed}, found {shown(found) if found else 'the end of the text'}"
     fix = nearest(found, (word.strip("'") for word in expected)) if len(found) > 2 else ""
     return refusal("E-SYNTAX", message, place, text, fix=fix)
+
+
+def _not_handled(found: str, before: str) -> str:
+    """What is PDDL, but none of nondum's, said by its name."""
+    if found in _SECTIONS_NOT_HANDLED:
+        return f"{_SECTIONS_NOT_HANDLED[found]} are not handled"
+    if _PREFERENCE.search(before):
+        return "preferences are not handled"
+    if _TIMED.search(before) and _DIGITS.match(found):
+        return "facts that become true at a time are not handled"
+    if _NEGATIVE.match(found):
+        return "negative numbers are not handled"
+    return ""
 
 
 def _at_end(error: UnexpectedInput) -> bool:
@@ -146,9 +173,10 @@ def _at_end(error: UnexpectedInput) -> bool:
 
 
 def _expected(error: UnexpectedInput) -> list[str]:
+    """What could stand there. The parser knows; its lexer looks for more than can follow."""
     names: set[str]
     if isinstance(error, UnexpectedCharacters):
-        names = error.allowed or set()
+        names = error.interactive_parser.accepts()  # type: ignore[no-untyped-call]  # lark's own
     else:
         names = getattr(error, "accepts", None) or getattr(error, "expected", None) or set()
     return sorted({_said(name) for name in names if name != "_KEYWORD"})
