@@ -1,0 +1,115 @@
+"""The connections that were accepted, by descriptor: those that become no peers are cut.
+
+ZeroMQ has no call that ends one connection of a listening socket, so its TCP connection is shut
+down beneath it. A descriptor may have gone to another connection meanwhile: the address of the
+other end tells.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import struct
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import dataclass
+
+AWAITED_S = 5.0
+"""How long a connection may take to become a peer's."""
+MAX_STRANGERS = 256
+"""Connections that are no peers yet; the oldest makes room."""
+STRANGERS_BYTES = 64 * 1024
+"""What a connection may send before it is a peer's. ZeroMQ bounds messages, but not their number of
+parts: one that never ends would fill the memory before anybody sees it."""
+
+# struct tcp_info of linux/tcp.h: 8 bytes of small fields, 24 u32, 3 u64, then bytes_received.
+_TCP_INFO = struct.Struct("=128xQ")
+
+
+@dataclass(slots=True)
+class Accepted:
+    """One connection."""
+
+    end: str
+    """The other end, `address:port`."""
+    since_s: float
+    is_peer: bool = False
+
+
+class AcceptedConnections:
+    """What was accepted and is not closed yet."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, Accepted] = {}
+
+    @property
+    def strangers(self) -> int:
+        """Connections that are no peers yet."""
+        return sum(not one.is_peer for one in self._known.values())
+
+    def opened(self, descriptor: int, now_s: float) -> Iterator[str]:
+        """A connection was accepted; ends of those that were cut to make room."""
+        end = other_end(descriptor)
+        known = self._known.get(descriptor)
+        if not end or (known is not None and known.end == end):
+            return  # gone already, or its first message was quicker than the news of it
+        self._known[descriptor] = Accepted(end, now_s)
+        while self.strangers > MAX_STRANGERS:
+            oldest = next(d for d, one in self._known.items() if not one.is_peer)
+            gone = self._known.pop(oldest)
+            cut(oldest, gone.end)
+            yield gone.end
+
+    def became_peer(self, descriptor: int, now_s: float) -> None:
+        """The connection has shown who it is."""
+        self._known[descriptor] = Accepted(other_end(descriptor), now_s, is_peer=True)
+
+    def closed(self, descriptor: int) -> None:
+        """The connection is gone."""
+        self._known.pop(descriptor, None)
+
+    def cut_overdue(self, now_s: float) -> Iterator[str]:
+        """Cut those that took too long or sent too much, and tell their ends."""
+        for descriptor, one in list(self._known.items()):
+            if one.is_peer:
+                continue
+            is_late = now_s - one.since_s > AWAITED_S
+            if is_late or bytes_received(descriptor) > STRANGERS_BYTES:
+                del self._known[descriptor]
+                cut(descriptor, one.end)
+                yield one.end
+
+
+def other_end(descriptor: int) -> str:
+    """The other end of a TCP connection; empty when there is none."""
+    try:
+        with closing(_duplicate(descriptor)) as connection:
+            host, port = connection.getpeername()[:2]
+            return f"{host}:{port}"
+    except (OSError, ValueError):
+        return ""
+
+
+def bytes_received(descriptor: int) -> int:
+    """What has come over a TCP connection; 0 where the system does not tell."""
+    try:
+        with closing(_duplicate(descriptor)) as connection:
+            info = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO.size)
+            return int(_TCP_INFO.unpack(info)[0])
+    except (OSError, struct.error):
+        return 0
+
+
+def cut(descriptor: int, end: str) -> None:
+    """Shut a connection down, if the descriptor is still the one to that end."""
+    try:
+        with closing(_duplicate(descriptor)) as connection:
+            host, port = connection.getpeername()[:2]
+            if f"{host}:{port}" == end:
+                connection.shutdown(socket.SHUT_RDWR)
+    except (OSError, ValueError):
+        return  # it is gone by itself
+
+
+def _duplicate(descriptor: int) -> socket.socket:
+    return socket.socket(fileno=os.dup(descriptor))

@@ -1,0 +1,173 @@
+"""The standing wish to be linked to one peer: all its addresses at once, the first one wins.
+
+Every connection has a socket of its own. (ZeroMQ's own reconnecting sends what was queued for the
+connection before, retries a wrong key for ever, and a refused one never again.)
+"""
+
+from __future__ import annotations
+
+import asyncio
+import random
+from collections.abc import Callable, Sequence
+
+import zmq
+
+from nondum.sdk.errors import Problem
+from nondum.transport.peers.events import DialFailed
+from nondum.transport.peers.keys import PeerKey
+from nondum.transport.peers.link import DialledRoute
+from nondum.transport.peers.monitor import HANDSHAKE_FAILED, SocketEvent
+
+FIRST_WAIT_S = 0.05
+LONGEST_WAIT_S = 5.0
+ANSWER_S = 8.0
+"""How long one attempt may take, greeting included."""
+
+OnData = Callable[["Attempt", list[zmq.Frame]], None]
+
+
+class Attempt:
+    """One connection to one address, which may become a link."""
+
+    def __init__(self, dial: Dial, socket: zmq.Socket[bytes], address: str) -> None:
+        self.dial, self.address = dial, address
+        self.is_connected = False
+        self.is_settled = False
+        """Whether it became a peer's link."""
+        self.route = DialledRoute(socket, address, self._on_data, self._on_event)
+
+    def _on_data(self, frames: list[zmq.Frame]) -> None:
+        self.dial.on_data(self, frames)
+
+    def _on_event(self, event: SocketEvent) -> None:
+        if event.kind == zmq.EVENT_HANDSHAKE_SUCCEEDED:
+            self.is_connected = True
+            self.dial.won(self)
+        else:
+            self.route.drain()
+            self.dial.over(self, _why(event))
+
+
+class Dial:
+    """Tries, waits, and tries again, until it is closed."""
+
+    def __init__(
+        self,
+        key: PeerKey,
+        addresses: Sequence[str],
+        *,
+        connect: Callable[[PeerKey], zmq.Socket[bytes]],
+        is_wanted: Callable[[PeerKey], bool],
+        on_won: Callable[[Attempt], None],
+        on_over: Callable[[Attempt], None],
+        on_data: OnData,
+        on_event: Callable[[DialFailed], None],
+    ) -> None:
+        """`connect` makes a socket; `is_wanted` is false while there is another link already.
+
+        `on_won` is told of an authenticated connection, `on_over` of its end.
+        """
+        self.key, self.addresses = key, tuple(addresses)
+        self.on_data = on_data
+        self._connect, self._is_wanted = connect, is_wanted
+        self._on_won, self._on_over, self._on_event = on_won, on_over, on_event
+        self._loop = asyncio.get_running_loop()
+        self._attempts: list[Attempt] = []
+        self._told: dict[str, str] = {}
+        self._wait_s = FIRST_WAIT_S
+        self._retry: asyncio.TimerHandle | None = None
+        self._limit: asyncio.TimerHandle | None = None
+        self._is_closed = False
+        self._try()
+
+    def settled(self) -> None:
+        """The link is a peer's: the next break is met at once."""
+        self._wait_s = FIRST_WAIT_S
+        self._told.clear()
+        for attempt in self._attempts:
+            attempt.is_settled = attempt.is_connected
+
+    def again(self) -> None:
+        """There is no link to the peer any more: try soon."""
+        if self._is_closed or self._attempts or self._retry is not None:
+            return
+        wait_s = self._wait_s * random.uniform(0.5, 1.0)  # or two hosts may keep in step
+        self._wait_s = min(self._wait_s * 2, LONGEST_WAIT_S)
+        self._retry = self._loop.call_later(wait_s, self._try)
+
+    def won(self, attempt: Attempt) -> None:
+        """A connection is authenticated: the others are not needed."""
+        for other in self._attempts:
+            if other is not attempt:
+                other.route.cut()
+        self._attempts = [attempt]
+        self._on_won(attempt)
+
+    def over(self, attempt: Attempt, problem: Problem | None) -> None:
+        """An attempt has failed, or its connection broke."""
+        attempt.route.cut()
+        if attempt not in self._attempts:
+            return
+        self._attempts.remove(attempt)
+        if problem is not None and not attempt.is_settled:
+            self._tell(attempt.address, problem)
+        self._on_over(attempt)
+        self.again()
+
+    def close(self) -> None:
+        """Try no more. A connection that became a link lasts until it breaks."""
+        self._is_closed = True
+        for timer in (self._retry, self._limit):
+            if timer is not None:
+                timer.cancel()
+        for attempt in self._attempts:
+            if not attempt.is_settled:
+                attempt.route.cut()
+        self._attempts = [one for one in self._attempts if one.is_settled]
+
+    def _tell(self, address: str, problem: Problem) -> None:
+        if self._told.get(address) != problem.code:
+            self._told[address] = problem.code
+            self._on_event(DialFailed(self.key, address, problem))
+
+    def _try(self) -> None:
+        self._retry = None
+        if not self._is_wanted(self.key):
+            return
+        for address in self.addresses:
+            socket = self._connect(self.key)
+            try:
+                self._attempts.append(Attempt(self, socket, address))
+            except zmq.ZMQError as error:
+                socket.disable_monitor()
+                socket.close(0)
+                self._tell(address, _unusable(error))
+        if self._limit is not None:
+            self._limit.cancel()
+        self._limit = self._loop.call_later(ANSWER_S, self._give_up)
+        self.again()
+
+    def _give_up(self) -> None:
+        for attempt in list(self._attempts):
+            if not attempt.is_settled:
+                self.over(attempt, Problem("PEER_SILENT", "nobody answers there"))
+
+
+def _why(event: SocketEvent) -> Problem | None:
+    if event.kind == zmq.EVENT_HANDSHAKE_FAILED_AUTH:
+        return Problem(
+            "PEER_TURNED_AWAY",
+            "the peer does not let this host's key in",
+            fix="pair the two hosts, or look at the peer's revoked keys",
+        )
+    if event.kind & HANDSHAKE_FAILED:
+        return Problem(
+            "PEER_MISMATCH",
+            "the handshake broke off: another key than the one announced, or no keys at all",
+            fix="look at `security` and the fingerprints on both hosts",
+        )
+    return Problem("PEER_SILENT", "nobody answers there")
+
+
+def _unusable(error: zmq.ZMQError) -> Problem:
+    return Problem("ADDRESS_MALFORMED", f"the address cannot be dialled: {error}")

@@ -1,0 +1,81 @@
+"""Who this host is to its peers, and how links are secured."""
+
+from __future__ import annotations
+
+import ipaddress
+import secrets
+from dataclasses import dataclass, field
+from enum import Enum
+
+from nondum.sdk.errors import Problem
+from nondum.sdk.wire import MAX_ID
+from nondum.transport.peers.failures import PeerRefused
+from nondum.transport.peers.keys import HostKeys, PeerKey
+
+
+class Security(Enum):
+    """How links are secured; shown wherever the state of the host is."""
+
+    CURVE = "keys"
+    """Every link is encrypted, and both ends have proved their keys."""
+    DEVELOPMENT = "development: no keys, this machine only"
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """A host, in one of its lives."""
+
+    name: str
+    keys: HostKeys | None
+    """None in development mode."""
+    certificate: bytes = b""
+    """Of the fleet; empty for none."""
+    epoch: int = field(default_factory=lambda: 1 + secrets.randbelow(MAX_ID))
+    """Tells this life from earlier ones: no clock is needed to."""
+
+    @property
+    def security(self) -> Security:
+        """How its links are secured."""
+        return Security.DEVELOPMENT if self.keys is None else Security.CURVE
+
+    @property
+    def key(self) -> PeerKey:
+        """What peers know it by; in development mode, made of its name."""
+        return PeerKey(f"development:{self.name}") if self.keys is None else self.keys.public
+
+    def check_address(self, address: str) -> None:
+        """Refuse addresses beyond this machine in development mode.
+
+        >>> Identity("rover", None).check_address("tcp://127.0.0.1:7000")
+
+        Raises `PeerRefused` (DEVELOPMENT_LOOPBACK, ADDRESS_MALFORMED).
+        """
+        scheme, _, rest = address.partition("://")
+        host, _, port = rest.rpartition(":")
+        if scheme != "tcp" or not host or not port:
+            raise PeerRefused(
+                Problem("ADDRESS_MALFORMED", "an address is tcp://HOST:PORT", have=address)
+            )
+        if self.keys is None and not is_loopback(host):
+            raise PeerRefused(
+                Problem(
+                    "DEVELOPMENT_LOOPBACK",
+                    "without keys, peers may be on this machine only",
+                    have=address,
+                    fix="use 127.0.0.1, or give the host keys",
+                )
+            )
+
+
+def is_loopback(host: str) -> bool:
+    """Whether an IP address stays on this machine; a name does not count as one.
+
+    >>> is_loopback("127.0.0.1"), is_loopback("[::1]"), is_loopback("localhost")
+    (True, True, False)
+    """
+    try:
+        address = ipaddress.ip_address(host.strip("[]"))
+    except ValueError:
+        return False
+    mapped = getattr(address, "ipv4_mapped", None)
+    return (mapped or address).is_loopback

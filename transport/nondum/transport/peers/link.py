@@ -1,0 +1,119 @@
+"""One connection to a peer, dialled or accepted, from the first message to the end of it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Protocol
+
+import zmq
+
+from nondum.transport.peers import accepted
+from nondum.transport.peers.drained import Drained, Sent
+from nondum.transport.peers.keys import PeerKey
+from nondum.transport.peers.messages import Message, Ping, encode
+from nondum.transport.peers.monitor import SocketEvent, watch
+
+if TYPE_CHECKING:
+    from nondum.transport.peers.session import Session
+
+
+class Route(Protocol):
+    """How a link's messages leave, and how it is ended."""
+
+    @property
+    def address(self) -> str:
+        """The other end."""
+
+    def send(self, data: bytes) -> Sent:
+        """Send without waiting."""
+
+    def cut(self, linger_ms: int = 0) -> None:
+        """End the connection."""
+
+
+class Link:
+    """A route, who is proved to be at its end, and when that end was last heard."""
+
+    def __init__(
+        self, route: Route, proved: PeerKey | None, now_s: float, *, dialled: bool
+    ) -> None:
+        self.route, self.proved, self.dialled = route, proved, dialled
+        self.heard_s = now_s
+        self.session: Session | None = None
+        """The peer's, once greetings were exchanged."""
+        self.is_over = False
+        self.round_trip_s: float | None = None
+        self._pings = 0
+        self._pinged_s = now_s
+
+    def send(self, data: bytes) -> Sent:
+        """Send without waiting."""
+        return Sent.GONE if self.is_over else self.route.send(data)
+
+    def tell(self, message: Message) -> Sent:
+        """Send what may be lost."""
+        return self.send(encode(message))
+
+    def ping(self, now_s: float) -> Sent:
+        """Ask for a sign of life, and give one."""
+        self._pings += 1
+        self._pinged_s = now_s
+        return self.tell(Ping(self._pings))
+
+    def heard_pong(self, number: int, now_s: float) -> None:
+        """A ping was answered."""
+        if number == self._pings:
+            self.round_trip_s = now_s - self._pinged_s
+
+    def cut(self, linger_ms: int = 0) -> None:
+        """End it; once."""
+        if not self.is_over:
+            self.is_over = True
+            self.route.cut(linger_ms)
+
+
+class AcceptedRoute:
+    """Over the listening socket, by the routing id that ZeroMQ gave the connection."""
+
+    def __init__(self, listener: Drained, routing_id: bytes, descriptor: int) -> None:
+        self._listener, self._routing_id, self.descriptor = listener, routing_id, descriptor
+        self.address = accepted.other_end(descriptor)
+
+    def send(self, data: bytes) -> Sent:
+        """Send without waiting."""
+        return self._listener.send([self._routing_id, data])
+
+    def cut(self, linger_ms: int = 0) -> None:
+        """Shut the connection down, in `linger_ms`."""
+        loop = asyncio.get_running_loop()
+        loop.call_later(linger_ms / 1000, accepted.cut, self.descriptor, self.address)
+
+
+class DialledRoute:
+    """Over a socket of its own."""
+
+    def __init__(
+        self,
+        socket: zmq.Socket[bytes],
+        address: str,
+        on_data: Callable[[list[zmq.Frame]], None],
+        on_event: Callable[[SocketEvent], None],
+    ) -> None:
+        self.address = address
+        self._ears = watch(socket, on_event)
+        self._socket = Drained(socket, on_data)
+        socket.connect(address)
+
+    def send(self, data: bytes) -> Sent:
+        """Send without waiting."""
+        return self._socket.send([data])
+
+    def drain(self) -> None:
+        """Take in what came before the end."""
+        self._socket.drain()
+
+    def cut(self, linger_ms: int = 0) -> None:
+        """Close the socket."""
+        self._ears.close()
+        self._socket.close(linger_ms)

@@ -1,0 +1,346 @@
+"""What peers say to each other: one msgpack list per message, its kind first, with strict limits.
+
+Pure: values in, bytes out, and back. Whatever a hostile peer sends, `decode` gives a `Message` or
+raises `ProtocolViolation`. The first two kinds never change, so that any two versions can agree on
+a version, or part with a reason.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.wire import MAX_ID, MAX_NAME, Body, pack, unpack
+
+VERSIONS: tuple[int, ...] = (1,)
+"""Versions of this protocol that this host speaks, newest first."""
+MAX_MESSAGE = 256 * 1024
+"""Bytes in a message."""
+MAX_CERTIFICATE = 1024
+
+
+@dataclass(frozen=True, slots=True)
+class Hello:
+    """The first message of whoever dialled, and, as `Welcome`, the answer to it."""
+
+    versions: tuple[int, ...]
+    name: str
+    key: str
+    """The sender's public key; the link must prove the same one."""
+    epoch: int
+    """Drawn at random when the sender started."""
+    term: int
+    """How often the sender has given up links to this peer in this epoch, plus one."""
+    certificate: bytes
+    """Empty for none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Welcome:
+    """The answer to a hello: the same of the other end, with the one version to speak."""
+
+    hello: Hello
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """The last message before a link is cut: why."""
+
+    problem: Problem
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A call; answered once, by `Reply` or `Failure` with the same number."""
+
+    number: int
+    settled: int
+    """The caller has the answers of all its calls below this number."""
+    remaining_ms: int
+    """How long the caller will still wait: clocks differ, so never a time of day."""
+    method: str
+    args: Body
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """A call was carried out."""
+
+    number: int
+    body: Body
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A call failed, or was halted."""
+
+    number: int
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a call is; may be lost."""
+
+    number: int
+    body: Body
+
+
+@dataclass(frozen=True, slots=True)
+class Cancel:
+    """Halt a call; it is still answered."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """Something worth knowing; not answered, and never repeated."""
+
+    method: str
+    args: Body
+
+
+@dataclass(frozen=True, slots=True)
+class Ping:
+    """The sender's loop is working."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class Pong:
+    """So is this one's."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class Bye:
+    """The sender is going, and means to."""
+
+    reason: str
+
+
+Message: TypeAlias = (
+    Hello
+    | Welcome
+    | Refused
+    | Request
+    | Reply
+    | Failure
+    | Progress
+    | Cancel
+    | Notice
+    | Ping
+    | Pong
+    | Bye
+)
+
+
+def encode(message: Message) -> bytes:
+    """Make the bytes of a message.
+
+    Raises `ProtocolViolation` for what the other end would refuse (too long, too deep, NaN) and
+    `TypeError` for values that are no plain data.
+    """
+    match message:
+        case Request(number, settled, remaining_ms, method, args):
+            fields: tuple[Any, ...] = (3, number, settled, remaining_ms, method, args)
+        case Reply(number, body):
+            fields = (4, number, body)
+        case Ping(number):
+            fields = (9, number)
+        case Pong(number):
+            fields = (10, number)
+        case Failure(number, problems):
+            fields = (5, number, [problem.to_dict() for problem in problems])
+        case Progress(number, body):
+            fields = (6, number, body)
+        case Cancel(number):
+            fields = (7, number)
+        case Notice(method, args):
+            fields = (8, method, args)
+        case Hello():
+            fields = (0, *_greeting(message))
+        case Welcome(hello):
+            fields = (1, *_greeting(hello))
+        case Refused(problem):
+            fields = (2, problem.to_dict())
+        case Bye(reason):
+            fields = (11, reason)
+    return pack(fields, MAX_MESSAGE)
+
+
+def decode(data: bytes | memoryview) -> Message:
+    """Read a message. Raises `ProtocolViolation` for anything that is not one exact message."""
+    fields = unpack(data, MAX_MESSAGE)
+    if not isinstance(fields, list) or not fields or type(fields[0]) is not int:
+        raise _violation("PACKET_KIND", "a message is a list that begins with its kind")
+    if not 0 <= fields[0] < len(_READERS):
+        raise _violation("PACKET_KIND", f"no kind of message has the number {fields[0]}")
+    length, read = _READERS[fields[0]]
+    if len(fields) != length:
+        raise _violation(
+            "PACKET_FIELDS", f"kind {fields[0]} has {length} fields, found {len(fields)}"
+        )
+    return read(fields)
+
+
+def agreed_version(hello: Hello) -> int:
+    """The newest version that both ends speak.
+
+    >>> agreed_version(Hello((2, 1), "rover", "", 1, 1, b""))
+    1
+
+    Raises `ProtocolViolation` (PROTO_VERSION).
+    """
+    common = set(hello.versions) & set(VERSIONS)
+    if not common:
+        raise ProtocolViolation(
+            Problem(
+                "PROTO_VERSION",
+                "the peer speaks no version of the protocol that this host speaks",
+                where=hello.name,
+                need=" or ".join(map(str, VERSIONS)),
+                have=", ".join(map(str, hello.versions)),
+                fix="update the older of the two hosts",
+            )
+        )
+    return max(common)
+
+
+def _greeting(hello: Hello) -> tuple[Any, ...]:
+    return hello.versions, hello.name, hello.key, hello.epoch, hello.term, hello.certificate
+
+
+def _read_hello(fields: list[Any]) -> Hello:
+    versions, certificate = fields[1], fields[6]
+    if not isinstance(versions, list) or not 0 < len(versions) <= 16:
+        raise _violation("PACKET_FIELDS", "versions are a short list of whole numbers")
+    if type(certificate) is not bytes or len(certificate) > MAX_CERTIFICATE:
+        raise _violation("PACKET_FIELDS", f"a certificate has up to {MAX_CERTIFICATE} bytes")
+    return Hello(
+        tuple(_number(v) for v in versions),
+        _text(fields[2]),
+        _text(fields[3]),
+        _number(fields[4]),
+        _number(fields[5]),
+        certificate,
+    )
+
+
+def _read_welcome(fields: list[Any]) -> Welcome:
+    hello = _read_hello(fields)
+    if len(hello.versions) != 1:
+        raise _violation("PACKET_FIELDS", "a welcome names the one version to speak")
+    return Welcome(hello)
+
+
+def _read_refused(fields: list[Any]) -> Refused:
+    return Refused(_problem(fields[1]))
+
+
+def _read_request(fields: list[Any]) -> Request:
+    _, number, settled, remaining_ms, method, args = fields
+    return Request(
+        _number(number), _number(settled), _number(remaining_ms), _text(method), _body(args)
+    )
+
+
+def _read_reply(fields: list[Any]) -> Reply:
+    return Reply(_number(fields[1]), _body(fields[2]))
+
+
+def _read_failure(fields: list[Any]) -> Failure:
+    problems = fields[2]
+    if not isinstance(problems, list) or not 0 < len(problems) <= 64:
+        raise _violation("PACKET_FIELDS", "a failure names between one and 64 problems")
+    return Failure(_number(fields[1]), tuple(_problem(problem) for problem in problems))
+
+
+def _read_progress(fields: list[Any]) -> Progress:
+    return Progress(_number(fields[1]), _body(fields[2]))
+
+
+def _read_cancel(fields: list[Any]) -> Cancel:
+    return Cancel(_number(fields[1]))
+
+
+def _read_notice(fields: list[Any]) -> Notice:
+    return Notice(_text(fields[1]), _body(fields[2]))
+
+
+def _read_ping(fields: list[Any]) -> Ping:
+    return Ping(_number(fields[1]))
+
+
+def _read_pong(fields: list[Any]) -> Pong:
+    return Pong(_number(fields[1]))
+
+
+def _read_bye(fields: list[Any]) -> Bye:
+    return Bye(_text(fields[1]))
+
+
+_READERS: tuple[tuple[int, Callable[[list[Any]], Message]], ...] = (
+    (7, _read_hello),
+    (7, _read_welcome),
+    (2, _read_refused),
+    (6, _read_request),
+    (3, _read_reply),
+    (3, _read_failure),
+    (3, _read_progress),
+    (2, _read_cancel),
+    (3, _read_notice),
+    (2, _read_ping),
+    (2, _read_pong),
+    (2, _read_bye),
+)
+"""By kind: how many fields a message has, and how they are read."""
+
+_PROBLEM_KEYS = frozenset({"code", "message", "where", "need", "have", "fix"})
+
+
+def _problem(data: object) -> Problem:
+    if (
+        not isinstance(data, dict)
+        or not {"code", "message"} <= data.keys() <= _PROBLEM_KEYS
+        or not all(type(text) is str for text in data.values())
+    ):
+        raise _violation("PACKET_FIELDS", "a problem is a table of texts with code and message")
+    return Problem(**data)
+
+
+def _number(value: object) -> int:
+    if type(value) is not int or not 0 < value <= MAX_ID:
+        raise _violation("PACKET_FIELDS", f"expected a positive whole number, found {value!r:.40}")
+    return value
+
+
+def _text(value: object) -> str:
+    if type(value) is not str or not 0 < len(value) <= MAX_NAME:
+        raise _violation("PACKET_FIELDS", f"expected a short name, found {value!r:.40}")
+    return value
+
+
+def _body(value: object) -> dict[str, Any]:
+    if type(value) is not dict:
+        raise _violation("PACKET_FIELDS", f"expected a table, found {type(value).__name__}")
+    return value
+
+
+def milliseconds(seconds: float) -> int:
+    """A duration for the wire: whole, at least one, at most what a number may be.
+
+    >>> milliseconds(0.25), milliseconds(-3), milliseconds(float("inf"))
+    (250, 1, 9007199254740992)
+    """
+    return MAX_ID if math.isinf(seconds) else min(MAX_ID, max(1, round(seconds * 1000)))
+
+
+def _violation(code: str, message: str) -> ProtocolViolation:
+    return ProtocolViolation(Problem(code, message))

@@ -1,0 +1,88 @@
+"""Files that only their owner may read: written whole or not at all, and refused when others can.
+
+A file that others could read or write is not repaired: what was in it may be known already.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+import tempfile
+from pathlib import Path
+
+from nondum.sdk.errors import Problem
+from nondum.transport.peers.failures import PeerRefused
+
+MAX_BYTES = 1 << 20
+_OTHERS_READ = stat.S_IRWXG | stat.S_IRWXO
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+
+
+def create(path: Path, text: str) -> None:
+    """Write a new file of mode 0600; one that is there already is left alone.
+
+    Raises `FileExistsError`, `OSError`.
+    """
+    staged = _staged(path, text)
+    try:
+        os.link(staged, path)  # unlike rename, never replaces
+    finally:
+        staged.unlink()
+    _sync_folder(path.parent)
+
+
+def replace(path: Path, text: str) -> None:
+    """Write a file of mode 0600 in the place of what was there. Raises `OSError`."""
+    _staged(path, text).replace(path)
+    _sync_folder(path.parent)
+
+
+def read_secret(path: Path) -> str:
+    """Read what nobody else may know. Raises `PeerRefused` (FILE_OPEN_TO_OTHERS), `OSError`."""
+    return _read(path, _OTHERS_READ)
+
+
+def read_own(path: Path) -> str:
+    """Read what nobody else may change. Raises `PeerRefused` (FILE_OPEN_TO_OTHERS), `OSError`."""
+    return _read(path, _OTHERS_WRITE)
+
+
+def _read(path: Path, forbidden: int) -> str:
+    with path.open("rb") as file:
+        status = os.fstat(file.fileno())
+        if status.st_mode & forbidden or status.st_uid not in (0, os.geteuid()):
+            raise PeerRefused(_open_to_others(path, status))
+        data = file.read(MAX_BYTES + 1)
+    try:
+        return data[:MAX_BYTES].decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise PeerRefused(Problem("FILE_MALFORMED", "it is not text", where=str(path))) from error
+
+
+def _open_to_others(path: Path, status: os.stat_result) -> Problem:
+    return Problem(
+        "FILE_OPEN_TO_OTHERS",
+        "other users could read or change this file, so it proves nothing any more",
+        where=str(path),
+        need="mode 0600, own user",
+        have=f"mode {stat.S_IMODE(status.st_mode):04o}, user {status.st_uid}",
+        fix="make it anew, or, if nobody else has used this machine, `chmod 600` it",
+    )
+
+
+def _staged(path: Path, text: str) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)  # 0600
+    with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    return Path(name)
+
+
+def _sync_folder(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,72 @@
+"""Counts of what was turned away, by reason, and the last of it in detail; both bounded."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+LATEST = 64
+"""How many refusals are kept in detail."""
+
+
+class Reason(Enum):
+    """Why a connection was turned away or cut."""
+
+    UNKNOWN_KEY = "unknown key"
+    REVOKED = "revoked"
+    CERTIFICATE = "certificate"
+    """None, or one that does not hold."""
+    NOT_PROVED = "not proved"
+    """A message under another key than the link's (`User-Id`)."""
+    MISMATCH = "mismatch"
+    """Another mechanism (no CURVE), another server key, or a handshake that breaks off."""
+    GARBAGE = "garbage"
+    """Bytes that are no ZeroMQ, or a message that is none of ours."""
+    SILENT = "silent"
+    """Connected, and never became a peer."""
+    CROWDED = "crowded"
+    """Too many connections that are no peers yet."""
+    VERSION = "version"
+    DUPLICATE = "duplicate"
+    """A second host with the same key, or this host itself."""
+    WRONG_DOMAIN = "wrong domain"
+    INTERNAL = "internal"
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """One connection that was turned away or cut."""
+
+    reason: Reason
+    address: str
+    """The other end, as far as it is known."""
+    key: str
+    """The other end's key, as far as it is known."""
+    told: str
+    at_s: float
+    """On the loop's clock."""
+
+
+class Refusals:
+    """What was turned away since the start."""
+
+    def __init__(self) -> None:
+        self._counts: Counter[Reason] = Counter()
+        self._latest: deque[Refusal] = deque(maxlen=LATEST)
+
+    @property
+    def counts(self) -> Mapping[Reason, int]:
+        """How often, by reason."""
+        return dict(self._counts)
+
+    @property
+    def latest(self) -> tuple[Refusal, ...]:
+        """The last ones, oldest first."""
+        return tuple(self._latest)
+
+    def add(self, refusal: Refusal) -> None:
+        """Count one more."""
+        self._counts[refusal.reason] += 1
+        self._latest.append(refusal)

@@ -1,0 +1,146 @@
+"""What is between two hosts from the first greeting until one loses the other.
+
+It outlives its links: when one breaks, another of the same life and term of the peer takes its
+place, and calls that were unanswered are repeated over it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from typing import Any, assert_never
+
+from nondum.sdk.errors import Problem
+from nondum.transport.peers.calls import Calls
+from nondum.transport.peers.drained import Sent
+from nondum.transport.peers.errands import Errand, Errands, Handler
+from nondum.transport.peers.events import Loss
+from nondum.transport.peers.gate import Acquaintance
+from nondum.transport.peers.link import Link
+from nondum.transport.peers.messages import (
+    Bye,
+    Cancel,
+    Failure,
+    Hello,
+    Message,
+    Notice,
+    Ping,
+    Pong,
+    Progress,
+    Refused,
+    Reply,
+    Request,
+    Welcome,
+    encode,
+)
+from nondum.transport.peers.trust import Admission
+
+log = logging.getLogger(__name__)
+
+
+class Departed(Exception):
+    """The peer said that it is going, or that it wants no more."""
+
+    def __init__(self, reason: Loss) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
+class OutOfPlace(Exception):
+    """A message that has no place in a session."""
+
+
+class Session:
+    """A live peer."""
+
+    def __init__(self, admission: Admission, known: Acquaintance, handler: Handler) -> None:
+        self.admission, self.known = admission, known
+        self.links: list[Link] = []
+        """The last one is sent over."""
+        self.missing: asyncio.TimerHandle | None = None
+        """Ends the session, when the last link has broken."""
+        self.calls = Calls(admission.name, self.send, known.next_number)
+        self.errands = Errands(admission, known.once, handler, self.send)
+        self._handler = handler
+        self._loop = asyncio.get_running_loop()
+
+    def send(self, data: bytes) -> Sent:
+        """Send over the newest link that works."""
+        for link in reversed(self.links):
+            sent = link.send(data)
+            if sent is not Sent.GONE:
+                return sent
+        return Sent.GONE
+
+    def notify(self, message: Notice) -> Sent:
+        """Tell the peer something; not repeated."""
+        return self.send(encode(message))
+
+    def join(self, link: Link) -> list[Link]:
+        """Go on over a new link, repeating what is unanswered; the links that it replaces."""
+        replaced = [one for one in self.links if one.dialled == link.dialled]
+        self.links = [one for one in self.links if one.dialled != link.dialled]
+        is_first = not self.links and not replaced and self.missing is None
+        self.links.append(link)
+        link.session = self
+        if self.missing is not None:
+            self.missing.cancel()
+            self.missing = None
+        if not is_first:
+            self.calls.repeat()
+            self.errands.pass_on_waiting()
+        return replaced
+
+    def leave(self, link: Link) -> bool:
+        """A link is over; whether others are left. What went over it is repeated on those."""
+        was_used = bool(self.links) and self.links[-1] is link
+        self.links = [one for one in self.links if one is not link]
+        if self.links and was_used:
+            self.calls.repeat()
+        return bool(self.links)
+
+    def receive(self, link: Link, message: Message) -> None:
+        """Take a message in.
+
+        Raises `Departed`, and `OutOfPlace` for one that has no place in a session.
+        """
+        match message:
+            case Request():
+                self.errands.take(message)
+            case Reply(number, body):
+                self.calls.succeed(number, dict(body))
+            case Ping(number):
+                link.tell(Pong(number))
+            case Pong(number):
+                link.heard_pong(number, self._loop.time())
+            case Failure(number, problems):
+                self.calls.fail(number, problems)
+            case Progress(number, body):
+                self.calls.report(number, dict(body))
+            case Cancel(number):
+                self.errands.cancel(number)
+            case Notice(method, args):
+                self._notice(method, dict(args))
+            case Bye():
+                raise Departed(Loss.DEPARTED)
+            case Refused():
+                raise Departed(Loss.TURNED_AWAY)
+            case Hello() | Welcome():
+                raise OutOfPlace("the greeting came twice")
+            case _:
+                assert_never(message)
+
+    def _notice(self, method: str, args: dict[str, Any]) -> None:
+        try:
+            self._handler.notice(self.admission, method, args)
+        except Exception:
+            log.exception("a notice of %s could not be taken in", self.admission.name)
+
+    def end(self, reason: Loss) -> list[Errand]:
+        """The peer is lost: fail the calls to it; its errands that run on."""
+        if self.missing is not None:
+            self.missing.cancel()
+        self.known.next_number = self.calls.next_number
+        told = f"the peer was lost while a call ran: {reason.value}"
+        self.calls.lose(Problem("PEER_LOST", told, where=self.admission.name))
+        return self.errands.lose(reason)

@@ -1,0 +1,106 @@
+"""Who may connect, asked by ZeroMQ for every connection. Source: RFC 27/ZAP.
+
+ZeroMQ fails open: without a handler, or for a socket without a domain, every key is let in. So the
+sockets demand an answer (`ZAP_ENFORCE_DOMAIN`), and `listener` proves that one is asked for.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import TypeAlias
+
+import zmq
+from zmq.utils import z85
+
+from nondum.sdk.errors import Problem
+from nondum.transport.peers.drained import Drained
+from nondum.transport.peers.failures import PeerRefused
+
+ENDPOINT = "inproc://zeromq.zap.01"
+DOMAIN = b"nondum-peers"
+
+log = logging.getLogger(__name__)
+
+
+class Entry(Enum):
+    """The answer to a connection, with its ZAP status."""
+
+    LET_IN = b"200"
+    TURNED_AWAY = b"400"
+    BROKEN = b"500"
+
+
+@dataclass(frozen=True, slots=True)
+class Knock:
+    """Somebody wants to connect."""
+
+    address: str
+    """Where from: an IP address."""
+    routing_id: bytes
+    domain: bytes
+    mechanism: str
+    key: str
+    """The CURVE key that the other end has proved to hold, in Z85; empty without CURVE."""
+
+
+Judge: TypeAlias = Callable[[Knock], Entry]
+
+
+def parse(frames: list[bytes]) -> Knock:
+    """Read a request. Raises `ValueError` for one that ZeroMQ did not make."""
+    version, _, domain, address, routing_id, mechanism, *credentials = frames
+    if version != b"1.0":
+        raise ValueError(f"ZAP version {version!r}")
+    key = ""
+    if mechanism == b"CURVE":
+        (raw,) = credentials
+        key = z85.encode(raw).decode("ascii")
+    return Knock(address.decode("ascii"), routing_id, domain, mechanism.decode("ascii"), key)
+
+
+class ZapHandler:
+    """Answers for all sockets of one context. `close` it after them."""
+
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], judge: Judge) -> None:
+        """Raises `PeerRefused` (ZAP_TAKEN) when the context has a handler already."""
+        self._judge = judge
+        self._probes: set[bytes] = set()
+        socket = context.socket(zmq.REP)
+        socket.linger = 0
+        try:
+            socket.bind(ENDPOINT)
+        except zmq.ZMQError as error:
+            socket.close()
+            raise PeerRefused(
+                Problem("ZAP_TAKEN", "somebody else answers for this context's connections")
+            ) from error
+        self._replies = Drained(socket, self._answer)
+
+    def expect_probe(self, routing_id: bytes) -> None:
+        """Turn away, once, the connection that calls itself so: the self-test's."""
+        self._probes.add(routing_id)
+
+    def close(self) -> None:
+        """Answer no more: nobody is let in then."""
+        self._replies.close()
+
+    def _answer(self, frames: list[zmq.Frame]) -> None:
+        parts = [frame.bytes for frame in frames]
+        number = parts[1] if len(parts) > 1 else b""
+        key, entry = "", Entry.BROKEN
+        try:
+            knock = parse(parts)
+            key, entry = knock.key, self._judged(knock)
+        except Exception:  # whatever it is, everybody behind it would wait for ever
+            log.exception("a connection could not be judged")
+        user = key.encode("ascii") if entry is Entry.LET_IN else b""
+        self._replies.send([b"1.0", number, entry.value, entry.name.encode("ascii"), user, b""])
+
+    def _judged(self, knock: Knock) -> Entry:
+        if knock.routing_id in self._probes:
+            self._probes.discard(knock.routing_id)
+            return Entry.TURNED_AWAY
+        return self._judge(knock)
