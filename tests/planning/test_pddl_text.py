@@ -153,3 +153,22 @@ def test_an_object_of_two_types_is_of_both() -> None:
     )
     again = read_again(written(several.load()))
     assert shape(ground(again.merged, again.facts, again.goal)) == shape(several.task())
+
+
+def test_where_nothing_is_true_it_is_said() -> None:
+    loaded = TEXTS[0].load()
+    assert "(:init)" in pddl_text(loaded.merged, [], loaded.goal).problem
+
+
+def test_what_may_be_of_a_type_with_two_parents_may_be_spoken_of() -> None:
+    several = text(
+        "perhaps",
+        """(:types a b - object c - (either a b))
+           (:predicates (p ?x - c) (q))
+           (:constants x - a y - b)
+           (:action do :parameters () :precondition (and (not (p x)) (not (p y))) :effect (q))""",
+        """(:init) (:goal (q))""",
+        1,
+    )
+    again = read_again(written(several.load()))
+    assert shape(ground(again.merged, again.facts, again.goal)) == shape(several.task())

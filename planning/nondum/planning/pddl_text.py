@@ -83,7 +83,7 @@ class _Writing:
         requirements = f"(:requirements {' '.join((':strips', ':typing', *needed))})"
         problem = (
             _section(":objects", self._typed(self.types.keys() - self._constants() | self._lost())),
-            _section(":init", list(self._init())),
+            _section(":init", list(self._init())) or "(:init)",
             f"(:goal {goal})",
             *(["(:metric minimize (total-cost))"] if self._is_costed else []),
         )
@@ -98,7 +98,7 @@ class _Writing:
         rules = [self._rule(rule) for rule in domain.derived]
         actions = [self._action(action) for action in domain.actions.values()]
         predicates = [self._declaration(p.name, p) for p in domain.predicates.values()]
-        predicates += (f"({name} ?1 - {ROOT})" for name in self.words.members.values())
+        predicates += (f"({name} ?x - {ROOT})" for name in self.words.members.values())
         predicates += (self._declaration(n, domain.functions[f]) for f, n in self.priced.items())
         return _lines(
             (
@@ -128,8 +128,8 @@ class _Writing:
         return _named(self.goal.parts()) - self.types.keys() - self._constants()
 
     def _declaration(self, name: str, predicate: Predicate) -> str:
-        types = enumerate(map(self.words.type_, predicate.parameters), 1)
-        return f"({' '.join((name, *(f'?{number} - {type_}' for number, type_ in types)))})"
+        types = enumerate(map(self.words.wide, predicate.parameters), 1)
+        return f"({' '.join((name, *(f'?x{number} - {type_}' for number, type_ in types)))})"
 
     # Rules and actions
 

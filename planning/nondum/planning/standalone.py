@@ -19,7 +19,7 @@ from nondum.planning.schema import read_action
 from nondum.planning.scope import SELF, Report, Scope, TooManyProblems
 from nondum.planning.syntax import Atom, DomainFragment, Numeric, ProblemFragment, TypedName
 from nondum.planning.typegraph import ROOT, TypeGraph, types_or_root
-from nondum.planning.vocabulary import cycle_text, functions_of
+from nondum.planning.vocabulary import checked, cycle_text, functions_of
 from nondum.sdk.errors import FragmentRefused, Problem
 
 SIZE_LIMIT_BYTES = 64 * 1024 * 1024
@@ -146,24 +146,23 @@ class _Loading:
     def _predicates(self) -> Sequence[Predicate]:
         found: dict[str, Predicate] = {}
         for declared in self._domain.predicates:
-            if not all(self._scope.known_types(p.types, p.place) for p in declared.parameters):
-                continue
             if declared.name in found:
                 message = f"predicate {declared.name!r} is declared twice"
                 self._report.problem("E-TWICE", message, declared.place)
-            found[declared.name] = Predicate.declared(declared, self._report.origin(declared.place))
+            origin = self._report.origin(declared.place)
+            found[declared.name] = Predicate.declared(checked(declared, self._scope), origin)
         return list(found.values())
 
     def _objects(self) -> dict[str, Object]:
         """A constant may be named again among the objects, as the same."""
         found: dict[str, Object] = {}
-        for declared in (*self._domain.constants, *self._problem.objects):
+        declarations = (*self._domain.constants, *self._problem.objects)
+        for declared in self._scope.checked_types(declarations):
             types = types_or_root(declared.types)
-            if not self._scope.known_types(types, declared.place):
-                continue
             known = found.get(declared.name)
             if known and known.types != types:
                 self._refuse_twice(declared, known)
+                continue
             found[declared.name] = Object(
                 declared.name, types, origins=(self._report.origin(declared.place),)
             )

@@ -25,6 +25,11 @@ class TypeTree:
             lost |= meant - {*self._path(self.objects[name])}
         self._lost = frozenset(lost)
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether it says all that the types mean."""
+        return not self._lost
+
     def edges(self) -> tuple[tuple[str, str], ...]:
         """Type and parent, in order; `object` is the parent of those at the top."""
         return tuple((name, path[1]) for name, path in sorted(self._paths.items()) if path[1:])

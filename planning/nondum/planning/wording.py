@@ -9,6 +9,7 @@ from typing import TypeAlias
 from nondum.planning.normal import Condition
 from nondum.planning.syntax import And, Formula, Or, Quantified, TypedName, renamed, terms_of
 from nondum.planning.type_tree import TypeTree
+from nondum.planning.typegraph import ROOT
 
 Spelling: TypeAlias = Callable[[Iterable[str]], Mapping[str, str]]
 """Says how each of some names is written."""
@@ -26,9 +27,9 @@ class Wording:
     members: dict[tuple[str, ...], str] = field(default_factory=dict)
     """Types → the predicate, made here, that holds of what is one of them."""
 
-    def type_(self, types: Iterable[str]) -> str:
-        """The type to declare something of one of `types` with; it may be wider."""
-        return self.types[self.tree.declared(types)[0]]
+    def wide(self, types: Iterable[str]) -> str:
+        """A type for whatever may stand where one of `types` is asked for."""
+        return self.types[self.tree.declared(types)[0] if self.tree.is_whole else ROOT]
 
     def declared(self, variables: Sequence[TypedName]) -> tuple[str, list[str]]:
         """Variables with their types, and what must hold of them besides."""
@@ -81,10 +82,11 @@ class Wording:
 
 
 def apart(
-    variables: Iterable[TypedName], around: frozenset[str], parts: Iterable[Formula]
+    variables: Sequence[TypedName], around: frozenset[str], parts: Iterable[Formula]
 ) -> dict[str, str]:
     """New names for those variables that would hide others, or that PDDL cannot write."""
-    used = around | {term.name for part in parts for term in terms_of(part)}
+    used = around | {variable.name for variable in variables}
+    used |= {term.name for part in parts for term in terms_of(part)}
     names: dict[str, str] = {}
     for variable in variables:
         if variable.name in around or "'" in variable.name:

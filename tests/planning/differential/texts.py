@@ -193,28 +193,28 @@ TEXTS = (
     ),
     text(
         "derived",
-        """(:predicates (link ?x ?y) (joined ?x ?y) (cut ?x) (alone ?x))
+        """(:predicates (near ?x ?y) (link ?x ?y) (joined ?x ?y) (cut ?x) (lonely ?x))
            (:derived (joined ?x ?y)
              (and (not (cut ?x)) (or (link ?x ?y) (exists (?z) (and (link ?x ?z) (joined ?z ?y))))))
-           (:derived (alone ?x) (forall (?y) (not (joined ?x ?y))))
-           (:action connect :parameters (?x ?y) :precondition (not (joined ?x ?y))
-             :effect (link ?x ?y))
+           (:derived (lonely ?x) (forall (?y) (not (joined ?x ?y))))
+           (:action connect :parameters (?x ?y)
+             :precondition (and (near ?x ?y) (not (joined ?x ?y))) :effect (link ?x ?y))
            (:action cut :parameters (?x) :precondition (and) :effect (cut ?x))""",
-        """(:objects a b c d) (:init (link a b) (link c d))
-           (:goal (and (joined a d) (alone b)))""",
+        """(:objects a b c d) (:init (link a b) (link c d) (near a d) (near b c) (near c a))
+           (:goal (and (joined a d) (lonely b)))""",
         1,
     ),
     text(
         "derived-with-a-plan",
-        """(:predicates (link ?x ?y) (joined ?x ?y) (cut ?x) (alone ?x))
+        """(:predicates (near ?x ?y) (link ?x ?y) (joined ?x ?y) (cut ?x) (lonely ?x))
            (:derived (joined ?x ?y)
              (and (not (cut ?x)) (or (link ?x ?y) (exists (?z) (and (link ?x ?z) (joined ?z ?y))))))
-           (:derived (alone ?x) (forall (?y) (not (joined ?x ?y))))
-           (:action connect :parameters (?x ?y) :precondition (not (joined ?x ?y))
-             :effect (link ?x ?y))
+           (:derived (lonely ?x) (forall (?y) (not (joined ?x ?y))))
+           (:action connect :parameters (?x ?y)
+             :precondition (and (near ?x ?y) (not (joined ?x ?y))) :effect (link ?x ?y))
            (:action cut :parameters (?x) :precondition (and) :effect (cut ?x))""",
-        """(:objects a b c d) (:init (link a b) (link c d))
-           (:goal (and (joined a d) (alone c)))""",
+        """(:objects a b c d) (:init (link a b) (link c d) (near a d) (near b c) (near c a))
+           (:goal (and (joined a d) (lonely c)))""",
         2,
     ),
     text(

@@ -1,0 +1,168 @@
+"""Ground tasks mean what their PDDL means: the same states, steps and plans."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import replace
+
+import pytest
+from hypothesis import assume, given, settings
+from tests.planning.differential.generated import texts
+from tests.planning.differential.semantics import (
+    Problem,
+    State,
+    TooManyStates,
+    distance,
+    reachable,
+)
+from tests.planning.differential.texts import TEXTS, Text
+
+from nondum.planning.draft import drafted
+from nondum.planning.exploration import explore
+from nondum.planning.facts import is_twin, twin
+from nondum.planning.ground import ground
+from nondum.planning.pddl_text import pddl_text
+from nondum.planning.polarity import positive_task
+from nondum.planning.progression import progress, start
+from nondum.planning.rehearsal import rehearsed
+from nondum.planning.search import solve
+from nondum.planning.standalone import Standalone, load
+from nondum.planning.validate import validate
+from nondum.sdk.planner import AlreadyTrue, GroundTask, Plan, Unsolvable
+
+Graph = Mapping[State, frozenset[tuple[str, State]]]
+MOST_STATES = 150
+
+
+def graph_of(problem: Problem, task: GroundTask) -> Graph:
+    """The states of a ground task, as sets of atoms, with their successors."""
+    basic = {declared.name for declared in problem.domain.predicates}
+    basic -= {rule.name for rule in problem.domain.derived}
+    unsaid = problem.start - {tuple(text.split(" ")) for text in task.facts}
+
+    def state_of(state: frozenset[int]) -> State:
+        atoms = (tuple(task.facts[number].split(" ")) for number in state)
+        return unsaid | {atom for atom in atoms if atom[0] in basic}
+
+    found: dict[State, frozenset[tuple[str, State]]] = {}
+    waiting = [start(task)]
+    while waiting:
+        state = waiting.pop()
+        if (key := state_of(state)) in found:
+            continue
+        check_twins(task, state)
+        check_derived(problem, task, state, key)
+        possible = [a for a in task.actions if a.precondition <= state]
+        after = [(action.name, progress(task, state, action)) for action in possible]
+        found[key] = frozenset((name, state_of(state)) for name, state in after)
+        waiting += (state for _, state in after)
+    return found
+
+
+def check_twins(task: GroundTask, state: frozenset[int]) -> None:
+    """A twin holds exactly where its fact does not."""
+    number = {text: index for index, text in enumerate(task.facts)}
+    for text, index in number.items():
+        if is_twin(text):
+            assert (index in state) != (
+                number[twin(text)] in state if twin(text) in number else False
+            ), text
+
+
+def check_derived(problem: Problem, task: GroundTask, state: frozenset[int], basic: State) -> None:
+    """A derived fact holds exactly where its rules say so."""
+    derived = {rule.name for rule in problem.domain.derived}
+    whole = problem.settled(basic)
+    for index, text in enumerate(task.facts):
+        atom = tuple(text.split(" "))
+        if atom[0] in derived:
+            assert (index in state) == (atom in whole), text
+
+
+def all_that_can_be_done(loaded: Standalone) -> GroundTask:
+    """The task with what does not help, too."""
+    found = explore(loaded.merged, loaded.facts)
+    return positive_task(drafted(loaded.merged, found, loaded.goal), found.table)
+
+
+def shortest(task: GroundTask) -> int | None:
+    seen, frontier, length = {start(task)}, [start(task)], 0
+    while frontier:
+        if any(task.goal <= state for state in frontier):
+            return length
+        after = {
+            progress(task, state, action)
+            for state in frontier
+            for action in task.actions
+            if action.precondition <= state
+        }
+        frontier, length = list(after - seen), length + 1
+        seen |= after
+    return None
+
+
+def small(problem: Problem) -> Graph:
+    """The graph of a problem, unless it is too large to look at."""
+    try:
+        return reachable(problem, most=MOST_STATES)
+    except TooManyStates:
+        assume(False)
+        raise
+
+
+def check(text: Text, graph: Graph) -> None:
+    """Everything that must be so of a text and what is made of it."""
+    problem, loaded = Problem.of(text), text.load()
+    length = distance(problem, graph)
+    for closed in (True, False):
+        merged = replace(loaded.merged, is_closed=closed)
+        assert graph_of(problem, all_that_can_be_done(replace(loaded, merged=merged))) == graph
+        task = ground(merged, loaded.facts, loaded.goal)
+        assert shortest(task) == length
+    answer = solve(task, lambda: False)
+    match answer:
+        case AlreadyTrue():
+            assert length == 0
+        case Unsolvable():
+            assert length is None
+        case Plan(steps, cost):
+            assert length
+            assert not validate(task, answer)
+            names = [task.actions[step].name for step in steps]
+            found = rehearsed(loaded.merged, loaded.facts, loaded.goal, names)
+            assert (found.cost, found.problems) == (cost, ())
+        case _:
+            raise AssertionError(answer)
+
+
+@pytest.mark.parametrize("text", TEXTS, ids=str)
+def test_features_mean_what_they_say(text: Text) -> None:
+    problem = Problem.of(text)
+    if text.name != "costs":  # where an action without a cost could be taken
+        check(text, reachable(problem))
+        assert distance(problem, reachable(problem)) == text.shortest
+
+
+@given(text=texts())
+@settings(max_examples=300, deadline=None)
+def test_whatever_is_written_means_what_it_says(text: Text) -> None:
+    check(text, small(Problem.of(text)))
+
+
+@given(text=texts())
+@settings(max_examples=150, deadline=None)
+def test_whatever_is_written_is_written_again(text: Text) -> None:
+    loaded = text.load()
+    task = pddl_text(loaded.merged, loaded.facts, loaded.goal)
+    again = load(task.domain, "domain", task.problem, "problem")
+    assert pddl_text(again.merged, again.facts, again.goal).domain
+    written = Text("again", task.domain, task.problem, None)
+    problem = Problem.of(text)
+    graph = small(problem)
+    made = [rule.name for rule in Problem.of(written).domain.derived]
+    assert made == [rule.name for rule in problem.domain.derived]
+    names = Counter(name for after in graph.values() for name, _ in after)
+    others = reachable(Problem.of(written))
+    assert Counter(name for after in others.values() for name, _ in after) == names
+    assert distance(Problem.of(written), others) == distance(problem, graph)
