@@ -31,12 +31,13 @@ EYE = """(define (domain eye)
 CLASSES = """(define (problem eye) (:domain eye)
   (:objects person dog - class) (:init (seen person self) (looks left)))
 """
-ENDLESS = """(define (domain endless)
-  (:predicates (at ?x) (road ?x ?y) (lit ?x))
-  (:action go :parameters (?x ?y) :precondition (and (at ?x) (road ?x ?y))
-    :effect (and (at ?y) (not (at ?x))))
-  (:action on :parameters (?x) :precondition (not (lit ?x)) :effect (lit ?x))
-  (:action off :parameters (?x) :precondition (lit ?x) :effect (not (lit ?x))))
+ENDLESS = """(define (domain holes)
+  (:types pigeon hole)
+  (:predicates (out ?p - pigeon) (free ?h - hole) (in ?p - pigeon ?h - hole) (home ?p - pigeon))
+  (:action enter :parameters (?p - pigeon ?h - hole) :precondition (and (out ?p) (free ?h))
+    :effect (and (in ?p ?h) (home ?p) (not (out ?p)) (not (free ?h))))
+  (:action leave :parameters (?p - pigeon ?h - hole) :precondition (in ?p ?h)
+    :effect (and (out ?p) (free ?h) (not (in ?p ?h)) (not (home ?p)))))
 """
 
 
@@ -61,12 +62,14 @@ def files(tmp_path: Path) -> Path:
 
 
 def endless() -> str:
-    """A problem that only a look at some 2^60 states would show to have no plan."""
-    lamps = [f"l{number}" for number in range(60)]
-    lit = " ".join(f"(lit {lamp})" for lamp in lamps)
+    """Fourteen pigeons for thirteen holes, which nobody proves by looking at all states."""
+    pigeons, holes = [f"p{n}" for n in range(14)], [f"h{n}" for n in range(13)]
+    outside = [f"(out {pigeon})" for pigeon in pigeons] + [f"(free {hole})" for hole in holes]
     return (
-        f"(define (problem endless) (:domain endless) (:objects a b c {' '.join(lamps)})"
-        f"(:init (at a) (road a b) (road a c)) (:goal (and (at b) (at c) {lit})))"
+        "(define (problem endless) (:domain holes)"
+        f"(:objects {' '.join(pigeons)} - pigeon {' '.join(holes)} - hole)"
+        f"(:init {' '.join(outside)})"
+        f"(:goal (and {' '.join(f'(home {p})' for p in pigeons)})))"
     )
 
 
