@@ -8,7 +8,7 @@ import signal
 import pytest
 from tests.lab.plugins import scribe, talker
 from tests.lab.running_host import Row, RunningHost, until_ended
-from tests.lab.traces import Traces, descendants
+from tests.lab.traces import Traces, descendants, former_payloads
 
 pytestmark = pytest.mark.lab
 
@@ -34,7 +34,13 @@ def test_killed_daemon_comes_back_with_the_same_components(
     for name in ("write", "talk"):
         host.pull(name)
         host.until_gone(name)
-    assert host.traces() == Traces((), (), (), (), ())
+    left = host.traces()
+    assert places(left) == ((), (), (), ())
+    assert {table for table, _ in left.rows} == {"goals"}, "what was asked for is still wanted"
+    assert former_payloads(host.state) == {
+        "org.example.write": {"scribe"},
+        "org.example.talk": {"talker"},
+    }
 
 
 def test_killed_worker_is_started_again_and_others_never_notice(host: RunningHost) -> None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, nondum
 from tests.lab.plugins import gauge, scribe, talker
 from tests.payloads import Part, make_payload
 
+from nondum.host.cli.mind import GLANCES
 from nondum.wheelhouse.lock import file_name
 
 WRITTEN = "(written self)"
@@ -166,6 +168,27 @@ def test_why_says_what_a_goal_lacks_and_what_would_help(daemon: Daemon, shelf: P
         "WHY_NO_ACTION nothing here makes (found person panther) true",
     ]
     assert "payloads that are known of would help" in shown
+
+
+def test_why_of_everything_says_what_would_help_each_goal(daemon: Daemon, shelf: Path) -> None:
+    waiting = "(found person self)"
+    ids = [daemon.run("goal", "--pddl", waiting, "--json").ok().json["id"] for _ in range(5)]
+
+    def are_suspended(view: dict[str, Any]) -> bool:
+        return {row["id"] for row in view["goals"] if row["state"] == "suspended"} >= {*ids}
+
+    daemon.until(are_suspended)
+    shown = daemon.run("why", "--wheelhouse", shelf).ok().out
+    advice = daemon.run("why", "--wheelhouse", shelf, "--json").ok().json["advice"]
+    daemon.run("halt").ok()
+    told = [line for line in shown.splitlines() if line.startswith("goal ") and "advise" in line]
+    nothing = "no payload that is known of would help; "
+    assert told == [
+        f"goal {id}: {nothing if number < GLANCES else ''}see `nondum advise {id}`"
+        for number, id in enumerate(ids)
+    ]
+    assert advice[0] == {"goal": ids[0], "now": None, "ways": [], "complete": True}
+    assert advice[-1] == {"goal": ids[-1]}
 
 
 def test_why_of_a_fact_that_holds_explains_the_fact(daemon: Daemon) -> None:

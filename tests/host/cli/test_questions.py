@@ -55,7 +55,7 @@ VIEWS: dict[str, set[str]] = {
         "told",
     },
     "tree": {"name", "kind", "status", "why", "policy", "children"},
-    "why": {"sentences", "problems", "told"},
+    "why": {"advice", "sentences", "problems", "told"},
 }
 PAYLOAD_KEYS = {
     "payload",
