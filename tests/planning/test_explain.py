@@ -230,6 +230,17 @@ def test_what_only_one_of_two_conditions_lacks_is_not_forgotten() -> None:
     assert {cause.fact for cause in causes} == {"lit hall", "near hall"}
 
 
+def test_function_without_a_value_is_named() -> None:
+    """Such an action cannot be taken, though all its conditions can be met."""
+    body = """(:functions (effort ?p - place))
+     (:action shine :parameters (?u - light ?p - place) :precondition (ready ?u)
+      :effect (and (lit ?p) (increase (total-cost) (effort ?p))))"""
+    light = lamp(body, "(= (effort cellar) 2)")
+    [cause] = why([light], "(lit hall)").causes
+    assert (cause.lack, cause.fact, cause.path) == (Lack.VALUE, "effort hall", ("lamp.shine",))
+    assert "(effort hall) has no value, which lamp.shine needs" in str(cause.problem())
+
+
 def test_streams_of_another_type_are_no_way() -> None:
     """Detections would make (flowing …) true, but it is an image that is needed."""
     known = components([VISUAL_TRACKER, PEOPLE_DETECTOR])

@@ -293,7 +293,7 @@ def test_circle_through_two_strangers_rules_keeps_the_later_one_out() -> None:
     result = merge([second, first], HOST)
     [problem] = result.quarantined["base"]
     assert problem.code == "E-DERIVED"
-    assert "these hold only if they do not" in problem.message
+    assert "these hold only if they do not: down, up" in problem.message
 
 
 def test_values_of_functions_are_kept() -> None:

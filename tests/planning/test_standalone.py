@@ -79,6 +79,8 @@ WRONG = {
     "unknown predicate": ("(att self a)", "E-UNDECL", "nobody declares predicate 'att'"),
     "half a number": ("(= (way a c) 1.5)", "E-INIT", "only whole numbers"),
     "negation": ("(not (at self b))", "E-INIT", "is not a fact"),
+    "too big a number": ("(= (way a c) 9007199254740993)", "E-INIT", "numbers below 2^53"),
+    "two numbers": ("(= (way a c) 1) (= (way a c) 2)", "E-TWICE", "(way a c) is 1 at problem"),
 }
 
 
@@ -97,6 +99,52 @@ def test_all_that_is_wrong_is_told_at_once() -> None:
         "problem.pddl:3:83",
         "problem.pddl:4:24",
     ]
+
+
+GOALS = {
+    "when": ("(when (on self) (on self))", "E-MISPLACED", "a condition says 'imply'"),
+    "comparison": ("(> (way a b) 2)", "E-UNSUPPORTED", "the numeric condition (> (way a b) 2"),
+    "increase": ("(increase (total-cost) 1)", "E-UNSUPPORTED", "the numeric condition (increase"),
+}
+
+
+@pytest.mark.parametrize(("goal", "code", "message"), GOALS.values(), ids=GOALS)
+def test_goal_that_is_no_condition_is_refused_where_it_stands(
+    goal: str, code: str, message: str
+) -> None:
+    found = refused(PROBLEM.format(metric="").replace("(on self)))", f"{goal}))"))
+    assert found.code == code
+    assert message in found.message
+    assert found.where == "problem.pddl:4:28"
+
+
+def test_unknown_type_is_told_where_it_stands_and_nowhere_else() -> None:
+    with pytest.raises(FragmentRefused) as error:
+        loaded(PROBLEM.format(metric=""), DOMAIN.replace("(at ?s - ship", "(at ?s - shop"))
+    assert [problem.where for problem in error.value.problems] == ["domain.pddl:3:20"]
+    assert error.value.problems[0].fix == "did you mean 'ship'?"
+
+
+def test_nothing_is_above_object() -> None:
+    found = refused(PROBLEM.format(metric=""), DOMAIN.replace("port - place", "object - place"))
+    assert (found.code, found.where) == ("E-TYPE-CYCLE", "domain.pddl:2:11")
+
+
+def test_circle_of_rules_names_those_that_deny_each_other() -> None:
+    """Neither a rule that needs itself to hold, nor one that hangs on the circle, is in it."""
+    rules = """(:predicates (up) (down) (out) (far ?a ?b - port))
+      (:derived (far ?a ?b - port) (exists (?c - port) (far ?a ?c)))
+      (:derived (out) (up)) (:derived (up) (not (down))) (:derived (down) (up))"""
+    found = refused("", f"(define (domain d) (:types port) {rules})")
+    assert found.message.startswith("these hold only if they do not: down, up\n")
+    assert found.where == "domain.pddl:3:69"
+
+
+def test_problem_of_another_domain_is_told() -> None:
+    [warning] = loaded(PROBLEM.format(metric="").replace(":domain ferry", ":domain boat")).warnings
+    assert warning.code == "DOMAIN_OTHER"
+    assert "one of domain 'boat'" in warning.message
+    assert not loaded(PROBLEM.format(metric="")).warnings
 
 
 def test_problem_without_a_goal_is_refused() -> None:

@@ -204,7 +204,8 @@ def _join_derived(agreed: Agreement, claims: Claims, report: Report) -> None:
     if claims.derived and (circle := strata_of(agreed.derived).circle):
         message = f"these hold only if they do not: {', '.join(circle)}"
         fix = "take a negation out of the circle"
-        report.problem("E-DERIVED", message, _place(claims.derived[0].origins[0]), fix)
+        origin = next(r.origins[0] for r in claims.derived if r.head.predicate in circle)
+        report.problem("E-DERIVED", message, _place(origin), fix)
 
 
 def _refuse_written(name: str, mine: Origin, other: Origin, report: Report) -> None:

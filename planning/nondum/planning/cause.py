@@ -20,6 +20,8 @@ class Lack(Enum):
     """There is nothing of a type."""
     HOST = "WHY_NOT_SO"
     """The host does not say so: not ready, not on this body, in use."""
+    VALUE = "WHY_NO_VALUE"
+    """A function that is added to the cost has no value, so the action cannot be taken."""
     FALSE = "WHY_NEVER_FALSE"
     """It holds, must not, and nothing ends it."""
     EXCLUDED = "WHY_EXCLUDED"
@@ -61,6 +63,8 @@ class Cause:
                 return f"there is no {type_text(self.types)}"
             case Lack.HOST:
                 return f"({self.fact}) does not hold"
+            case Lack.VALUE:
+                return f"({self.fact}) has no value"
             case Lack.FALSE:
                 return f"({self.fact}) holds, and nothing here ends that"
             case Lack.EXCLUDED:

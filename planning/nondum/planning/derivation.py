@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from graphlib import CycleError, TopologicalSorter
 
 from nondum.planning.caret import Misplaced
 from nondum.planning.domain import DerivedRule
@@ -20,7 +19,8 @@ class Strata:
 
     groups: tuple[tuple[str, ...], ...] = ()
     circle: tuple[str, ...] = ()
-    """Predicates that hold only if they do not; then there are no groups."""
+    """Predicates that hold only if they do not, each asking for the next; then there are no groups.
+    """
 
 
 def derived_of(domains: Iterable[DomainFragment], scope: Scope) -> tuple[DerivedRule, ...]:
@@ -36,8 +36,7 @@ def _rule(declared: DerivedDeclaration, scope: Scope) -> DerivedRule | None:
         scope.check_writable(declared.head)
         return None
     parameters = typed(declared.parameters)
-    known = [scope.known_types(p.types, p.place) for p in parameters]
-    variables = {p.name: p.types for p, ok in zip(parameters, known, strict=True) if ok}
+    variables = {p.name: p.types for p in scope.checked_types(parameters)}
     try:
         condition = condition_of(declared.condition)
     except Misplaced as wrong:
@@ -68,16 +67,17 @@ def strata_of(rules: Sequence[DerivedRule]) -> Strata:
         for needed, is_positive in _needs(rule)
         if needed in names
     ]
+    raised_by: dict[str, str] = {}
     for _ in range(len(names) + 1):
-        raised = False
+        raised = ""
         for head, needed, is_positive in edges:
             lowest = level[needed] + (0 if is_positive else 1)
             if level[head] < lowest:
-                level[head], raised = lowest, True
+                level[head], raised_by[head], raised = lowest, needed, head
         if not raised:
             break
     else:
-        return Strata(circle=_circle(edges))
+        return Strata(circle=_circle(raised_by, raised))
     groups: dict[int, list[str]] = {}
     for name in sorted(names):
         groups.setdefault(level[name], []).append(name)
@@ -90,12 +90,12 @@ def _needs(rule: DerivedRule) -> Iterator[tuple[str, bool]]:
             yield atom.predicate, is_positive
 
 
-def _circle(edges: Iterable[tuple[str, str, bool]]) -> tuple[str, ...]:
-    graph: dict[str, set[str]] = {}
-    for head, needed, _ in edges:
-        graph.setdefault(head, set()).add(needed)
-    try:
-        TopologicalSorter(graph).prepare()
-    except CycleError as error:
-        return tuple(dict.fromkeys(error.args[1]))
-    raise AssertionError("levels rise without end only in a circle")
+def _circle(raised_by: Mapping[str, str], last: str) -> tuple[str, ...]:
+    """What raises itself without end, the first by name first."""
+    for _ in raised_by:  # whoever rises last may only hang on a circle
+        last = raised_by[last]
+    circle = [last]
+    while raised_by[circle[-1]] != last:
+        circle.append(raised_by[circle[-1]])
+    first = circle.index(min(circle))
+    return (*circle[first:], *circle[:first])

@@ -142,17 +142,26 @@ class _Reading:
         functions: list[Atom] = []
         for increase in self.increases:
             match increase:
-                case Numeric("increase", Atom("total-cost"), float(value)) if value.is_integer():
+                case Numeric("increase", Atom("total-cost"), float(value)) if is_exact(value):
                     cost += int(value)
                 case Numeric("increase", Atom("total-cost"), Atom() as function):
                     functions.append(function)
                 case _:
                     message = (
                         f"numeric effect {increase} is not handled,"
-                        " only whole numbers and functions added to total-cost"
+                        " only whole numbers below 2^53 and functions added to total-cost"
                     )
                     raise Misplaced("E-UNSUPPORTED", message, increase.place)
         return cost, tuple(functions)
+
+
+def is_exact(value: float) -> bool:
+    """Whether a number is whole, and so small that it is the one that was written.
+
+    >>> is_exact(3.0), is_exact(0.5), is_exact(1e17), is_exact(float("inf"))
+    (True, False, False, False)
+    """
+    return value.is_integer() and value < 2**53
 
 
 def _called(formula: Formula) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from nondum.planning.contribution import Contribution, StreamObject, UnitObject
 from nondum.planning.domain import Origin, bind
+from nondum.planning.effect import is_exact
 from nondum.planning.scope import OWNED_MARK, Scope
 from nondum.planning.syntax import (
     Atom,
@@ -76,11 +77,9 @@ def _check_kind(owned: UnitObject | StreamObject, local: str, kind: str, scope: 
 def objects_of(fragments: Sequence[FragmentSyntax], scope: Scope) -> tuple[ObjectClaim, ...]:
     """The shared objects declared (E-UNDECL, E-OWNED, E-OBJ-TYPE, E-TWICE)."""
     claims: dict[str, ObjectClaim] = {}
-    for declared in _declarations(fragments):
+    for declared in scope.checked_types(_declarations(fragments)):
         types = types_or_root(declared.types)
         name = scope.resolve(declared.name)
-        if not scope.known_types(types, declared.place):
-            continue
         if name in scope.objects:
             _check_own(declared, types, scope.objects[name], scope)
         elif OWNED_MARK in name:
@@ -140,28 +139,34 @@ def _asserted(formula: Formula, scope: Scope) -> Atom | None:
 
 
 def values_of(fragments: Sequence[FragmentSyntax], scope: Scope) -> tuple[ValueClaim, ...]:
-    """The values given to functions (E-UNDECL, E-TYPE, E-PRED-ARITY, E-INIT).
+    """The values given to functions (E-UNDECL, E-TYPE, E-PRED-ARITY, E-INIT, E-TWICE).
 
     `total-cost` is a plan's own, and begins with 0 whatever is said.
     """
-    claims = []
+    claims: dict[str, ValueClaim] = {}
     for fragment in fragments:
         for formula in fragment.init if isinstance(fragment, ProblemFragment) else ():
             match formula:
                 case Numeric("=", Atom("total-cost")):
                     continue
                 case Numeric("=", Atom() as function, float(value)):
-                    if value.is_integer() and scope.check_function(function, {}):
-                        text = bind(function, _resolved(function, scope))
-                        origin = scope.report.origin(formula.place)
-                        claims.append(ValueClaim(text, int(value), origin))
-                    elif not value.is_integer():
-                        message = f"{formula}: only whole numbers are handled"
+                    if not is_exact(value):
+                        message = f"{formula}: only whole numbers below 2^53 are handled"
                         scope.report.problem("E-INIT", message, formula.place)
+                    elif scope.check_function(function, {}):
+                        text = bind(function, _resolved(function, scope))
+                        claim = ValueClaim(text, int(value), scope.report.origin(formula.place))
+                        _check_agrees(claim, claims.setdefault(text, claim), formula, scope)
                 case Numeric(operator="="):
                     message = f"{formula} gives no function a number"
                     scope.report.problem("E-INIT", message, formula.place)
-    return tuple(claims)
+    return tuple(claims.values())
+
+
+def _check_agrees(claim: ValueClaim, known: ValueClaim, formula: Numeric, scope: Scope) -> None:
+    if claim.value != known.value:
+        message = f"({claim.function}) is {known.value} at {known.origin.place}"
+        scope.report.problem("E-TWICE", message, formula.place)
 
 
 def _resolved(atom: Atom, scope: Scope) -> dict[str, str]:

@@ -113,7 +113,7 @@ def _parse(text: str, file: str, start: str) -> object:
     clean = _COMMENT.sub(lambda comment: " " * len(comment[0]), text).translate(_LOWER)
     _check_depth(clean, text, file)
     if long := _LONG.search(clean):
-        message = f"a name is longer than {NAME_LIMIT} characters"
+        message = f"a name or number is longer than {NAME_LIMIT} characters"
         place = _place(clean, long.start(), file)
         raise FragmentRefused(refusal("PDDL_TOO_BIG", message, place, text))
     try:

@@ -62,8 +62,7 @@ def read_action(
         scope.report.problem("PDDL_TOO_MANY", message, declared.place)
         return None
     parameters = typed(declared.parameters)
-    known = [scope.known_types(p.types, p.place) for p in parameters]
-    variables = {p.name: p.types for p, ok in zip(parameters, known, strict=True) if ok}
+    variables = {p.name: p.types for p in scope.checked_types(parameters)}
     try:
         precondition = condition_of(declared.precondition)
         effect = effect_of(declared.effect, variables, unnamed_cost=unnamed_cost)

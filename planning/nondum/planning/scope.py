@@ -26,6 +26,7 @@ from nondum.planning.syntax import (
     Place,
     Quantified,
     Term,
+    TypedName,
     When,
     type_text,
 )
@@ -103,8 +104,17 @@ class Scope:
         """The object that a local name, `self` or a shared name stands for."""
         return self.host if name == SELF else self.locals.get(name, name)
 
-    def known_types(self, types: Iterable[str], place: Place) -> bool:
-        """Check that all types are declared (E-UNDECL)."""
+    def checked_types(self, names: Iterable[TypedName]) -> tuple[TypedName, ...]:
+        """The names, their types checked (E-UNDECL).
+
+        What is of an undeclared type counts as an object, so that one mistake is told once.
+        """
+        return tuple(
+            name if self._are_types(name.types, name.place) else replace(name, types=(ROOT,))
+            for name in names
+        )
+
+    def _are_types(self, types: Iterable[str], place: Place) -> bool:
         unknown = [name for name in types if name not in self.graph]
         for name in unknown:
             fix = nearest(name, self.graph.parents) or "declare it in :types"
@@ -131,10 +141,9 @@ class Scope:
                 self.check_formula(formula.condition, variables)
                 self.check_formula(formula.effect, variables)
             case Quantified():
-                own = {v.name: types_or_root(v.types) for v in formula.variables}
-                known = [self.known_types(own[v.name], v.place) for v in formula.variables]
-                if all(known):
-                    self.check_formula(formula.part, {**variables, **own})
+                checked = self.checked_types(formula.variables)
+                own = {variable.name: types_or_root(variable.types) for variable in checked}
+                self.check_formula(formula.part, {**variables, **own})
             case Numeric(right=Atom() as function):
                 self.check_function(function, variables)
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
+from nondum.planning.caret import Misplaced
 from nondum.planning.derivation import derived_of, strata_of
 from nondum.planning.domain import Action, Domain, Merged, Object, Origin, Predicate
 from nondum.planning.effect import Effect
@@ -19,7 +20,7 @@ from nondum.planning.schema import read_action
 from nondum.planning.scope import SELF, Report, Scope, TooManyProblems
 from nondum.planning.syntax import Atom, DomainFragment, Numeric, ProblemFragment, TypedName
 from nondum.planning.typegraph import ROOT, TypeGraph, types_or_root
-from nondum.planning.vocabulary import checked, cycle_text, functions_of
+from nondum.planning.vocabulary import check_root, checked, cycle_text, functions_of
 from nondum.sdk.errors import FragmentRefused, Problem
 
 SIZE_LIMIT_BYTES = 64 * 1024 * 1024
@@ -86,12 +87,21 @@ class _Loading:
     def loaded(self) -> Standalone:
         found: Standalone | None = None
         with suppress(TooManyProblems):
+            self._check_named()
             merged = self._merged()
             facts, goal = self._facts(merged), self._goal()
             found = Standalone(merged, facts, goal, tuple(self._report.warnings))
         if found is None or self._report.problems:
             raise FragmentRefused(*self._report.problems)
         return found
+
+    def _check_named(self) -> None:
+        """A problem may be planned in any domain that has its words, but that is rarely meant."""
+        named = self._problem.domain
+        if named and named != self._domain.name:
+            message = f"problem {self._problem.name!r} is one of domain {named!r}"
+            warning = Problem("DOMAIN_OTHER", message, self._problem.file, have=self._domain.name)
+            self._report.warnings.append(warning)
 
     def _merged(self) -> Merged:
         scope = self._scope
@@ -104,9 +114,10 @@ class _Loading:
         actions = {action.name: action for action in self._actions()}
         derived = derived_of([self._domain], scope)
         if circle := strata_of(derived).circle:
-            place = self._domain.derived[0].place
+            place = next(rule.place for rule in self._domain.derived if rule.name == circle[0])
             message = f"these hold only if they do not: {', '.join(circle)}"
-            self._report.problem("E-DERIVED", message, place)
+            fix = "take a negation out of the circle"
+            self._report.problem("E-DERIVED", message, place, fix)
         merged = Merged(
             domain=Domain(
                 types=scope.graph,
@@ -129,7 +140,9 @@ class _Loading:
         """Parents that are not declared are objects, as many domains have it."""
         parents: dict[str, frozenset[str]] = {ROOT: frozenset()}
         for declared in self._domain.types:
-            if declared.name != ROOT:
+            if declared.name == ROOT:
+                check_root(declared, self._report)
+            else:
                 known = parents.get(declared.name, frozenset())
                 parents[declared.name] = known | frozenset(types_or_root(declared.types))
         for declared in self._domain.types:
@@ -229,4 +242,8 @@ class _Loading:
             self._report.problems.append(problem)
             return Condition()
         self._scope.check_formula(goal, {})
-        return condition_of(goal)
+        try:
+            return condition_of(goal)
+        except Misplaced as wrong:
+            self._report.problem(wrong.code, wrong.message, wrong.place, wrong.fix)
+            return Condition()

@@ -15,12 +15,20 @@ from nondum.planning.cause import Cause, Lack, distinct
 from nondum.planning.core import HOST_PREDICATES
 from nondum.planning.domain import Merged
 from nondum.planning.exploration import domains_of
-from nondum.planning.facts import fact
+from nondum.planning.facts import fact, parts
 from nondum.planning.goal import GoalExpr
-from nondum.planning.matching import Binding
+from nondum.planning.matching import Binding, Pattern, Relations, matched
 from nondum.planning.missing import Missing, Outlook, Shortfall
 from nondum.planning.normal import Condition
-from nondum.planning.syntax import Atom, Formula, Not, Quantified, TypedName, type_text
+from nondum.planning.syntax import (
+    Atom,
+    Formula,
+    Not,
+    Quantified,
+    TypedName,
+    renamed,
+    type_text,
+)
 from nondum.planning.typegraph import types_or_root
 
 _NEEDS_LIMIT = 2000
@@ -50,6 +58,8 @@ class _Giver:
     variables: tuple[TypedName, ...]
     conditions: tuple[Condition, ...]
     atom: Atom
+    price: tuple[Atom, ...] = ()
+    """The functions that it adds to the cost."""
 
 
 @dataclass(slots=True)
@@ -80,6 +90,9 @@ class Tracer:
         self._givers: defaultdict[str, list[_Giver]] = defaultdict(list)
         for giver in _givers(merged):
             self._givers[giver.atom.predicate].append(giver)
+        self._values = Relations()
+        for function in merged.values:
+            self._values.add(*parts(function))
         self._shortfalls: dict[_Giver, Shortfall] = {}
         self._nodes: dict[Need, _Node] = {}
 
@@ -208,9 +221,20 @@ class Tracer:
         for missing in shortfall.least(binding):
             leaves = [leaf for part in missing if (leaf := _leaf(part, self._outlook))]
             if not missing:
-                leaves = [Cause(Lack.EXCLUDED, str(need))]
+                unpriced = self._without_value(giver, binding, shortfall)
+                lack = Lack.VALUE if unpriced else Lack.EXCLUDED
+                leaves = [Cause(lack, unpriced or str(need))]
             needs = [_need(part, shortfall) for part in missing if isinstance(part, Atom)]
             yield _Way(giver.step, tuple(leaves), tuple(dict.fromkeys(needs)))
+
+    def _without_value(self, giver: _Giver, binding: Binding, shortfall: Shortfall) -> str:
+        """A function in a giver's cost to which nothing gives a value; empty if there is none."""
+        for function in giver.price:
+            pattern = Pattern.of(function)
+            known = self._values.candidates(pattern, binding)
+            if all(matched(pattern, row, binding, shortfall.domains) is None for row in known):
+                return _bare(renamed(function, binding))
+        return ""
 
 
 def _leaf(part: Formula, outlook: Outlook) -> Cause | None:
@@ -245,13 +269,14 @@ def _need(part: Formula, shortfall: Shortfall) -> Need:
 def _givers(merged: Merged) -> Iterator[_Giver]:
     for action in merged.domain.actions.values():
         before, parameters = action.precondition, action.parameters
+        price = action.effect.cost_functions
         for atom in action.effect.add:
-            yield _Giver(action.name, parameters, (before,), atom)
+            yield _Giver(action.name, parameters, (before,), atom, price)
         for change in action.effect.conditional:
             variables = (*parameters, *change.variables)
             for atom in change.add:
                 conditions = (before, change.condition)
-                yield _Giver(action.name, variables, conditions, atom)
+                yield _Giver(action.name, variables, conditions, atom, price)
     for rule in merged.domain.derived:
         yield _Giver("", rule.parameters, (rule.condition,), rule.head)
 

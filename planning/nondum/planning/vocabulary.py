@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from nondum.planning.caret import nearest
 from nondum.planning.core import core_graph, core_predicates
@@ -60,13 +60,18 @@ def _is_core(type_: TypedName, report: Report) -> bool:
     if type_.name not in core_graph():
         return False
     if type_.name == ROOT:
-        if set(type_.types) - {ROOT}:
-            report.problem("E-TYPE-CYCLE", "'object' is above all types", type_.place)
+        check_root(type_, report)
     elif not set(type_.types) <= core_graph().ancestors(type_.name):
         parents = type_text(tuple(sorted(core_graph().parents[type_.name])))
         message = f"in the core, {type_.name!r} is a kind of {parents}"
         report.problem("E-TYPE-PARENT", message, type_.place, "choose another name")
     return True
+
+
+def check_root(type_: TypedName, report: Report) -> None:
+    """Check that `object` is not declared below another type (E-TYPE-CYCLE)."""
+    if set(type_.types) - {ROOT}:
+        report.problem("E-TYPE-CYCLE", "'object' is above all types", type_.place)
 
 
 def _check_cycle(claims: dict[str, TypeClaim], report: Report) -> None:
@@ -93,14 +98,12 @@ def predicates_of(domains: Sequence[DomainFragment], scope: Scope) -> tuple[Pred
     found: dict[str, Predicate] = {}
     for declared in (predicate for domain in domains for predicate in domain.predicates):
         predicate = Predicate.declared(
-            declared,
+            checked(declared, scope),
             scope.report.origin(declared.place),
             valued=declared.name in valued,
             functional=declared.name in functional,
         )
         known = core_predicates().get(declared.name) or found.get(declared.name)
-        if not _types_known(declared, scope):
-            continue
         if known is None:
             found[declared.name] = predicate
         else:
@@ -112,9 +115,8 @@ def functions_of(domains: Sequence[DomainFragment], scope: Scope) -> tuple[Predi
     """The functions declared, `total-cost` included (E-UNDECL, E-TWICE)."""
     found: dict[str, Predicate] = {}
     for declared in (function for domain in domains for function in domain.functions):
-        if not _types_known(declared, scope):
-            continue
-        function = Predicate.declared(declared, scope.report.origin(declared.place))
+        origin = scope.report.origin(declared.place)
+        function = Predicate.declared(checked(declared, scope), origin)
         known = found.setdefault(declared.name, function)
         if known.parameters != function.parameters:
             message = f"function {declared.name!r} has other parameters at {known.origins[0].place}"
@@ -122,8 +124,9 @@ def functions_of(domains: Sequence[DomainFragment], scope: Scope) -> tuple[Predi
     return tuple(found.values())
 
 
-def _types_known(declared: PredicateDeclaration, scope: Scope) -> bool:
-    return all([scope.known_types(p.types, p.place) for p in declared.parameters])
+def checked(declared: PredicateDeclaration, scope: Scope) -> PredicateDeclaration:
+    """A predicate or function, the types of its parameters checked (E-UNDECL)."""
+    return replace(declared, parameters=scope.checked_types(declared.parameters))
 
 
 def _compare(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from nondum.host.cli.failure import tell_problem
 from nondum.host.cli.pddl_files import loaded
 from nondum.host.cli.progress import ProgressLine
 from nondum.sdk.errors import FragmentRefused
@@ -96,8 +97,11 @@ class Question:
     """Phase → how long it took."""
 
     def read(self, domain: Path, problem: Path) -> Standalone:
-        """Raises `FragmentRefused`."""
-        return self._timed("parse", lambda: loaded(domain, problem))
+        """Read both, and tell warnings. Raises `FragmentRefused`."""
+        found = self._timed("parse", lambda: loaded(domain, problem))
+        for warning in found.warnings:
+            tell_problem(warning, as_warning=True)
+        return found
 
     def outcome(self, problem: Standalone) -> Outcome:
         """Ground and search. Raises `click.BadParameter` where the planner is not installed."""
