@@ -142,7 +142,7 @@ def test_circle_of_rules_names_those_that_deny_each_other() -> None:
 
 def test_problem_of_another_domain_is_told() -> None:
     [warning] = loaded(PROBLEM.format(metric="").replace(":domain ferry", ":domain boat")).warnings
-    assert warning.code == "DOMAIN_OTHER"
+    assert warning.code == "E-DOMAIN"
     assert "one of domain 'boat'" in warning.message
     assert not loaded(PROBLEM.format(metric="")).warnings
 

@@ -100,7 +100,7 @@ class _Loading:
         named = self._problem.domain
         if named and named != self._domain.name:
             message = f"problem {self._problem.name!r} is one of domain {named!r}"
-            warning = Problem("DOMAIN_OTHER", message, self._problem.file, have=self._domain.name)
+            warning = Problem("E-DOMAIN", message, self._problem.file, have=self._domain.name)
             self._report.warnings.append(warning)
 
     def _merged(self) -> Merged:
