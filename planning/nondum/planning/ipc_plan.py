@@ -7,13 +7,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from nondum.planning.caret import refusal
+from nondum.planning.scope import PROBLEMS_LIMIT
 from nondum.planning.syntax import Place
 from nondum.sdk.errors import FragmentRefused
 
-_TIMED = re.compile(r"\s*[0-9.]+\s*:\s*")
-_DURATION = re.compile(r"\s*\[\s*[0-9.]+\s*\]\s*$")
-_STEP = re.compile(r"\s*\(\s*([^\s();]+(?:\s+[^\s();]+)*)\s*\)\s*$")
-_BREAK = re.compile(r"[ \t]+")
+_BESIDE = re.compile(r"^(\s*[0-9.]+(?:e[+-]?[0-9]+)?\s*:)|\[[^\][()]*\]", re.IGNORECASE)
+"""The time before a step, and its duration and cost behind it: `[1.0]`, `[D:1.0; C:2.0]`."""
+_STEP = re.compile(r"\(\s*([^\s();]+(?:\s+[^\s();]+)*)\s*\)")
+_BREAK = re.compile(r"\s+")
 
 PSEUDO_STEPS = frozenset({"reach-goal", "__extra_goal_operator"})
 """What some planners write after the last action, and no domain knows."""
@@ -31,25 +32,26 @@ class Step:
 def read_plan(text: str, file: str) -> tuple[Step, ...]:
     """The steps of a plan; times and durations that stand beside them are ignored.
 
-    Raises `FragmentRefused` (E-SYNTAX) with every line that is no step.
+    Raises `FragmentRefused` (E-SYNTAX) with the lines that are no steps.
 
-    >>> [step.name for step in read_plan("; found\\n(GO A B)\\n0.001: (look) [1]\\n", "plan")]
-    ['go a b', 'look']
+    >>> text = "; found\\n(GO A B)\\n0.001: (look) [1]\\n2: (LOOK) [D:1.0; C:0.5]\\n"
+    >>> [step.name for step in read_plan(text, "plan")]
+    ['go a b', 'look', 'look']
     """
     steps: list[Step] = []
     problems = []
-    for number, line in enumerate(text.splitlines(), 1):
-        bare = line.partition(";")[0]
-        if not bare.strip():
+    for number, line in enumerate(text.split("\n"), 1):
+        bare = _BESIDE.sub("", line).partition(";")[0].strip()
+        if not bare:
             continue
-        timed = _TIMED.match(bare)
-        found = _STEP.match(_DURATION.sub("", bare[timed.end() if timed else 0 :]))
-        place = Place(file, number, len(bare) - len(bare.lstrip()) + 1)
-        if found:
+        place = Place(file, number, len(line) - len(line.lstrip()) + 1)
+        if found := _STEP.fullmatch(bare):
             steps.append(Step(_BREAK.sub(" ", found[1].lower()), place))
         else:
             message = "expected a step, such as (move a b)"
             problems.append(refusal("E-SYNTAX", message, place, text))
+            if len(problems) == PROBLEMS_LIMIT:
+                break
     if problems:
         raise FragmentRefused(*problems)
     return tuple(steps)

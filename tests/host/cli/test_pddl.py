@@ -161,9 +161,26 @@ def test_wrong_usage_of_plan(files: Path, arguments: list[str], words: str) -> N
 
 
 def test_text_that_is_not_utf_8_is_told(files: Path) -> None:
-    (files / "latin.pddl").write_bytes("(define (problem zür) )".encode("latin-1"))
+    (files / "latin.pddl").write_bytes("(define\n (problem zür) )".encode("latin-1"))
     pddl(files, "plan", "domain.pddl", "latin.pddl").refused(2, "NOT_UTF8")
-    pddl(files, "check", "latin.pddl").refused(2, "byte 19 is not UTF-8")
+    pddl(files, "check", "latin.pddl").refused(2, "latin.pddl:2:12: byte 20 is not UTF-8")
+
+
+def test_a_byte_order_mark_does_no_harm(files: Path) -> None:
+    for name in ("domain.pddl", "problem.pddl"):
+        (files / name).write_text((files / name).read_text("utf-8"), encoding="utf-8-sig")
+    pddl(files, "plan", "domain.pddl", "problem.pddl").ok()
+    assert check_plan(files, "\ufeff(go a b)\n(go b c)\n").ok()
+
+
+def test_a_problem_of_another_domain_is_warned_of(files: Path) -> None:
+    other = (files / "domain.pddl").read_text("utf-8").replace("roads", "rails")
+    (files / "rails.pddl").write_text(other, encoding="utf-8")
+    (files / "steps").write_text("(go a b)\n(go b c)\n", encoding="utf-8")
+    for command_name, more in (("plan", ()), ("why", ()), ("validate", ("steps",))):
+        ran = pddl(files, command_name, "rails.pddl", "problem.pddl", *more)
+        assert (ran.code, ran.err.count("\n")) == (0, 1)
+        assert ran.err.startswith("warning: E-DOMAIN ")
 
 
 def test_ctrl_c_ends_a_search_in_silence_and_leaves_nobody_behind(files: Path) -> None:
@@ -335,8 +352,9 @@ def check_plan(files: Path, text: str, *options: str) -> Ran:
         "(go a b)\n(go b c)\n; cost = 2 (unit cost)\n",
         "; found by somebody\n\n( GO A B )\n\t(Go  b C)  ; on\n(REACH-GOAL)\n",
         "0.000: (go a b) [1.000]\n1.000: (go b c) [1.000]\n",
+        "0: (GO A B) [D:1.00; C:1.00]\r\n1.0e0: (GO B C)  [D:1.00; C:1.00] ; last\r\n",
     ],
-    ids=["plain", "as others write", "with times"],
+    ids=["plain", "as others write", "with times", "with costs"],
 )
 def test_a_plan_of_any_planner_is_read(files: Path, text: str) -> None:
     assert check_plan(files, text).ok().out == "valid: 2 steps, cost = 2\n"
@@ -346,7 +364,7 @@ def test_a_plan_of_any_planner_is_read(files: Path, text: str) -> None:
     ("text", "words"),
     [
         ("(go a b)\n(go a c)\n", "plan:2:1: step 2, (go a c), needs (at a), (road a c)"),
-        ("(go a b)\n", "at the end the goal is missed: (at c)"),
+        ("(go a b)\n", "plan: at the end the goal is missed: (at c)"),
         ("(run a b)\n", "there is no action 'run'"),
         ("(go a)\n", "'go' has 2 parameters"),
         ("(go a x)\n", "there is no object 'x'"),
@@ -366,6 +384,9 @@ def test_a_plan_that_does_not_hold_is_told_with_its_step(
 
 def test_what_is_no_plan_is_bad_input(files: Path) -> None:
     check_plan(files, "go a b\n").refused(2, "plan:1:1: expected a step, such as (move a b)")
+    ran = check_plan(files, "anything else\n" * 20_000)
+    ran.refused(2, "plan:50:1: expected a step")
+    assert "plan:51:1" not in ran.err
 
 
 # why

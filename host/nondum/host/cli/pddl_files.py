@@ -17,12 +17,16 @@ FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
 
 
 def text_of(path: Path) -> str:
-    """The text of a file. Raises `FragmentRefused` (NOT_UTF8)."""
+    """The text of a file, without its byte order mark. Raises `FragmentRefused` (NOT_UTF8)."""
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
+        before = error.object[: error.start].rpartition(b"\n")[2]
+        line = error.object.count(b"\n", 0, error.start) + 1
         message = f"byte {error.start + 1} is not UTF-8"
-        raise FragmentRefused(Problem("NOT_UTF8", message, where=str(path))) from error
+        where = f"{path}:{line}:{len(before.decode(errors='replace')) + 1}"
+        fix = "save it as UTF-8"
+        raise FragmentRefused(Problem("NOT_UTF8", message, where, fix=fix)) from error
 
 
 def parsed(path: Path) -> FragmentSyntax:

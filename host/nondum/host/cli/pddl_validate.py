@@ -10,7 +10,7 @@ import click
 
 from nondum.host.cli import render
 from nondum.host.cli.connection import Session, json_option
-from nondum.host.cli.failure import EXIT_PROBLEMS
+from nondum.host.cli.failure import EXIT_PROBLEMS, tell_problem
 from nondum.host.cli.pddl_files import FILE, loaded, text_of
 from nondum.sdk.errors import Problem
 
@@ -35,14 +35,15 @@ def validate(session: Session, domain: Path, problem: Path, plan: Path) -> int:
     from nondum.planning.rehearsal import rehearsed
 
     read = loaded(domain, problem)
+    for warning in read.warnings:
+        tell_problem(warning, as_warning=True)
     text = text_of(plan)
     steps = read_plan(text, str(plan))
     if steps and steps[-1].name in PSEUDO_STEPS - read.merged.domain.actions.keys():
         steps = steps[:-1]
     found = rehearsed(read.merged, read.facts, read.goal, [step.name for step in steps])
-    problems = list(found.problems)
-    if problems and found.taken < len(steps):
-        problems = [replace(one, where=str(steps[found.taken].place)) for one in problems]
+    place = str(steps[found.taken].place) if found.taken < len(steps) else str(plan)
+    problems = [replace(one, where=place) for one in found.problems]
     claimed = _CLAIM.search(text)
     if not problems and claimed and int(claimed[1]) != found.cost:
         message = "the cost is not the sum of its steps"
