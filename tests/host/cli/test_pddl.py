@@ -177,7 +177,7 @@ def test_a_problem_of_another_domain_is_warned_of(files: Path) -> None:
     other = (files / "domain.pddl").read_text("utf-8").replace("roads", "rails")
     (files / "rails.pddl").write_text(other, encoding="utf-8")
     (files / "steps").write_text("(go a b)\n(go b c)\n", encoding="utf-8")
-    for command_name, more in (("plan", ()), ("why", ()), ("validate", ("steps",))):
+    for command_name, more in (("plan", ()), ("why", ()), ("validate", (str(files / "steps"),))):
         ran = pddl(files, command_name, "rails.pddl", "problem.pddl", *more)
         assert (ran.code, ran.err.count("\n")) == (0, 1)
         assert ran.err.startswith("warning: E-DOMAIN ")
