@@ -267,6 +267,16 @@ def test_a_problem_goes_with_the_last_domain_of_its_name_before_it(files: Path) 
     pddl(files, "check", "domain.pddl", "wrong.pddl", "other.pddl").refused(2, "'att'")
 
 
+def test_a_problem_goes_with_its_own_domain_before_any_other(files: Path) -> None:
+    for number in range(2):
+        text = ROADS.replace("(:predicates", f"(:predicates (p{number})")
+        (files / f"p{number}-domain.pddl").write_text(text)
+        goal = f"(and (at c) (p{number}))"
+        (files / f"p{number}-a.pddl").write_text(MAP.format(goal=goal))
+    names = ("p0-a.pddl", "p0-domain.pddl", "p1-a.pddl", "p1-domain.pddl")
+    assert pddl(files, "check", *names).ok().out.count("problem 'map' of") == 2
+
+
 def test_mistakes_as_json(files: Path) -> None:
     ran = pddl(files, "check", "domain.pddl", "wrong.pddl", "--json")
     assert (ran.code, ran.json["ok"]) == (2, False)
@@ -280,6 +290,11 @@ def test_fragments_are_judged_together(files: Path) -> None:
     assert ran.out.count("a fragment") == 2
     ran = pddl(files, "check", "--fragment", "--unit", "left=arm", *fragments)
     ran.refused(2, f"E-TYPE eye {files}/eye/problem.pddl:2:66: ")
+
+
+def test_a_unit_of_an_unknown_type_is_a_problem_of_the_component(files: Path) -> None:
+    ran = pddl(files, "check", "--fragment", "--unit", "left=camra", "eye/domain.pddl")
+    ran.refused(2, "unit 'left': nobody declares type 'camra'")
 
 
 def test_a_domain_is_no_fragment_for_all_that(files: Path) -> None:

@@ -49,8 +49,9 @@ class _Judged:
 def check(session: Session, files: tuple[Path, ...], fragment: bool, units: Sequence[Owned]) -> int:
     """Check domains and problems: each by itself, and problems against their domains.
 
-    A problem belongs to the domain that it names; of several with that name, to the last one before
-    it. Exits with 2 when anything is wrong.
+    A problem belongs to the domain that it names. Of several with that name it is p01-domain.pddl
+    for p01-easy.pddl, else one of the same folder, else the last one before it. Exits with 2 when
+    anything is wrong.
 
     \b
     Examples: nondum pddl check domain.pddl problem-*.pddl
@@ -81,6 +82,9 @@ def _as_fragments(files: Sequence[Path], units: Sequence[Owned]) -> Iterator[_Ju
     from nondum.planning.claims import claims_of
 
     claims = claims_of(contribution_of(files, units))
+    of_units = tuple(p for p in claims.problems if not any(_is_of(p, path) for path in files))
+    if of_units:
+        yield _Judged(files[0].parent, "a component", of_units)
     for path in files:
         yield _Judged(
             path,
@@ -143,8 +147,13 @@ def _problem(path: Path, name: str, domain: Path | None) -> _Judged:
 def _domain_of(
     path: Path, name: str, files: Sequence[Path], domains: dict[Path, DomainFragment]
 ) -> Path | None:
-    """The last domain of that name before the problem, else the first after it."""
-    place = files.index(path)
+    """Of the domains of that name: the problem's own (`p01-domain.pddl` of `p01-easy.pddl`), else
+    one of its folder, else the last before it."""
+    own, place = f"{path.stem.partition('-')[0]}-domain", files.index(path)
+
+    def nearness(other: Path) -> tuple[bool, bool, bool, int]:
+        is_beside, at = other.parent == path.parent, files.index(other)
+        return is_beside and other.stem == own, is_beside, at < place, at if at < place else -at
+
     called = [other for other, domain in domains.items() if domain.name == name]
-    before = [other for other in called if files.index(other) < place]
-    return next(iter([*reversed(before), *called]), None)
+    return max(called, key=nearness, default=None)
