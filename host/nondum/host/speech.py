@@ -1,16 +1,17 @@
 """What people are told is spoken, and what they say is heard, by components that can do that.
 
 A sentence that is heard is a goal in words, as if it had been typed; it is never translated, for
-nobody is asked to confirm it.
+nobody is asked to confirm it. Who listens is told what can be said, and again when that changes.
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping
-from typing import Protocol
+from typing import Any, Protocol
 
 from nondum.host.mind.mind import Mind
+from nondum.host.mind.sayings import sayings
 from nondum.host.workers.proxies import Answer
 from nondum.sdk.errors import GoalRefused
 
@@ -33,6 +34,10 @@ class Speaking(Protocol):
 
     def listen(self) -> Answer:
         """Have it wait for a person's words."""
+        ...
+
+    def learn_words(self, vocabulary: Mapping[str, Any]) -> Answer:
+        """Have it learn what can be said now."""
         ...
 
 
@@ -92,12 +97,33 @@ class Speech:
                 for gone in listening.keys() - present:
                     listening.pop(gone).cancel()
                 for key in present - listening.keys():
-                    listening[key] = asyncio.create_task(self._hear(key[0]))
+                    listening[key] = asyncio.create_task(self._attend(key[0]))
                 version = await self._mind.changed(version)
         finally:
             for task in listening.values():
                 task.cancel()
             await asyncio.gather(*listening.values(), return_exceptions=True)
+
+    async def _attend(self, component: str) -> None:
+        """Hear a component, and teach it beside that."""
+        teaching = asyncio.create_task(self._teach(component))
+        try:
+            await self._hear(component)
+        finally:
+            teaching.cancel()
+            await asyncio.gather(teaching, return_exceptions=True)
+
+    async def _teach(self, component: str) -> None:
+        """Tell a component what can be said, each time that it is something else."""
+        version, seen, taught = -1, None, None
+        while plugin := self._plugins().get(component):
+            composition = self._mind.composition
+            if composition is not None and composition is not seen:
+                seen, vocabulary = composition, sayings(composition.book)
+                if vocabulary != taught:
+                    await plugin.learn_words(vocabulary)
+                    taught = vocabulary
+            version = await self._mind.changed(version)
 
     async def _hear(self, component: str) -> None:
         """Hear what a component hears, until it says nothing: then it does not listen."""

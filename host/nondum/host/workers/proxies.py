@@ -107,6 +107,11 @@ class Proxy:
         """Have it wait for a person's words."""
         return self._answer("listen", {})
 
+    @hookimpl
+    def learn_words(self, vocabulary: Mapping[str, Any]) -> Answer:
+        """Have it learn what can be said now."""
+        return self._answer("learn_words", {"vocabulary": vocabulary})
+
     async def _answer(self, verb: str, body: Mapping[str, Any]) -> Mapping[str, Any] | None:
         try:
             return await self._ask(verb, body)

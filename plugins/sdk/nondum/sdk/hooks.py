@@ -124,6 +124,16 @@ async def listen(ctx: Context) -> Mapping[str, str]:  # type: ignore[empty-body]
     """Wait for a person to say something: `{"words": "follow me"}`."""
 
 
+@hookspec
+async def learn_words(ctx: Context, vocabulary: Mapping[str, Any]) -> None:
+    """Learn what can be said now; for those that listen, before and while they do.
+
+    `vocabulary` has `phrases`, patterns with `[optional]` parts and `{slots}`; and `names`: slot →
+    the words that may be said there, without articles. A slot without names takes any words. A host
+    tells it anew each time that it changes.
+    """
+
+
 DESCRIBING: tuple[str, ...] = (
     "describe",
     "behaviours",
@@ -134,4 +144,4 @@ DESCRIBING: tuple[str, ...] = (
     "phrases",
     "labels",
 )
-ACTING: tuple[str, ...] = ("start", "stop", "translate_goal", "speak", "listen")
+ACTING: tuple[str, ...] = ("start", "stop", "translate_goal", "speak", "listen", "learn_words")

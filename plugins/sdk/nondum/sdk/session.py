@@ -141,6 +141,8 @@ class Session:
                 return await self._answer("speak", text=body["text"])
             case "listen":
                 return await self._answer("listen")
+            case "learn_words":
+                return await self._answer("learn_words", vocabulary=body["vocabulary"])
             case _:
                 self._rewire(verb, body)
         return {}

@@ -1,0 +1,1 @@
+"""Hears goals and says sentences, offline: PocketSphinx and eSpeak NG."""

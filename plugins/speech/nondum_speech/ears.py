@@ -1,0 +1,115 @@
+"""What is heard, one sentence after the other, whatever it came from.
+
+Words change while people speak: a sentence is heard by what could be said when it ended.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import AsyncIterator, Iterator
+from pathlib import Path
+
+from nondum_speech.espeak import Espeak
+from nondum_speech.grammar import Vocabulary
+from nondum_speech.inbox import Inbox, may_grow
+from nondum_speech.lexicon import lexicon
+from nondum_speech.recogniser import Recogniser
+from nondum_speech.sentences import Sentences, sentences_of
+from nondum_speech.sound import Sound, SoundInvalid, read_wav
+
+LOOK_S = 0.2
+WAITING = 8
+"""So many sentences may wait for a host that does not ask; then the oldest is forgotten."""
+ECHO_S = 0.4
+"""After the own voice has ended, its echo is not listened to either."""
+
+
+class Ears:
+    """Turns sounds into sentences said; they wait in `sentences`."""
+
+    def __init__(self, espeak: Espeak, log: logging.Logger, *, confidence: float) -> None:
+        self.sentences: asyncio.Queue[str] = asyncio.Queue()
+        self._espeak, self._log, self._confidence = espeak, log, confidence
+        self._recogniser: Recogniser | None = None
+        self._one_at_a_time = asyncio.Lock()
+        self._learnt = asyncio.Event()
+        self._speaking = 0
+
+    async def learn(self, vocabulary: Vocabulary) -> None:
+        """Hear other words from now on; tell which ones cannot be heard well."""
+        words = await asyncio.to_thread(lexicon, vocabulary.words, self._pronounced)
+        if words.guessed:
+            self._log.info("in no dictionary, pronounced by rule: %s", ", ".join(words.guessed))
+        if words.unsayable:
+            told = ", ".join(words.unsayable)
+            self._log.warning("phrases and names with these words cannot be heard: %s", told)
+        recogniser = await asyncio.to_thread(
+            Recogniser, vocabulary, words, confidence=self._confidence
+        )
+        async with self._one_at_a_time:
+            self._recogniser = recogniser
+        self._learnt.set()
+
+    async def watch(self, inbox: Inbox) -> None:
+        """Hear the files that are put into a folder, for ever."""
+        await self._learnt.wait()
+        while True:
+            for path in inbox.waiting():
+                await self._hear_file(inbox, path)
+            await asyncio.sleep(LOOK_S)
+
+    async def attend(self, pieces: AsyncIterator[bytes]) -> None:
+        """Hear a flow of samples, as long as it flows; the own voice is not listened to."""
+        cutter = Sentences()
+        async for piece in pieces:
+            if self._speaking:
+                cutter = Sentences()
+                continue
+            for sentence in cutter.heard(piece):
+                await self._hear(sentence)
+
+    @contextlib.contextmanager
+    def deafened(self) -> Iterator[None]:
+        """Do not listen to a microphone: this machine speaks, of goals too."""
+        self._speaking += 1
+        try:
+            yield
+        finally:
+            asyncio.get_running_loop().call_later(ECHO_S, self._hear_again)
+
+    def _hear_again(self) -> None:
+        self._speaking -= 1
+
+    async def _hear_file(self, inbox: Inbox, path: Path) -> None:
+        try:
+            sound = await asyncio.to_thread(read_wav, path)
+        except SoundInvalid as invalid:
+            if may_grow(path):
+                return
+            self._log.warning("%s cannot be heard: %s", path.name, invalid)
+            inbox.take(path)
+            return
+        inbox.take(path)
+        for sentence in await asyncio.to_thread(sentences_of, sound):
+            await self._hear(sentence)
+
+    async def _hear(self, sentence: Sound) -> None:
+        async with self._one_at_a_time:
+            if self._recogniser is None:
+                return
+            heard = await asyncio.to_thread(self._recogniser.hear, sentence)
+        if not heard.said:
+            near = (
+                f"; the nearest is {heard.words!r} ({heard.confidence:.1f})" if heard.words else ""
+            )
+            self._log.info("heard %.1f s of no known sentence%s", sentence.seconds, near)
+            return
+        self._log.info("heard %r (%.1f)", heard.said, heard.confidence)
+        if self.sentences.qsize() == WAITING:
+            self.sentences.get_nowait()
+        self.sentences.put_nowait(heard.said)
+
+    def _pronounced(self, word: str, accent: str) -> str:
+        return self._espeak.phonemes(word, voice=accent)

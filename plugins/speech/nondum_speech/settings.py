@@ -1,0 +1,28 @@
+"""What an integrator may set; see the README for each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Where is listened, and how things are said."""
+
+    microphone: str = "default"
+    """A capture device of ALSA; empty: no microphone."""
+    inbox: str = ""
+    """Folder of WAV files to hear; empty: `inbox` in the component's scratch folder."""
+    confidence: float = -3.0
+    """What the worst word must reach at least to be taken as said; nearer zero is stricter."""
+    said: str = ""
+    """Folder for a WAV file of each sentence said; empty: the default sound device."""
+    voice: str = "en-us"
+    """A voice of eSpeak NG; `en-us+f2` is a variant of one."""
+    words_per_minute: int = 160
+
+    def __post_init__(self) -> None:
+        if not 80 <= self.words_per_minute <= 450:
+            raise ValueError("words_per_minute must lie between 80 and 450")
+        if self.confidence > 0:
+            raise ValueError("confidence is zero or less")
