@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import ipaddress
-import secrets
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 
 from nondum.sdk.errors import Problem
-from nondum.sdk.wire import MAX_ID
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import HostKeys, PeerKey
 
@@ -23,15 +21,13 @@ class Security(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """A host, in one of its lives."""
+    """A host."""
 
     name: str
     keys: HostKeys | None
     """None in development mode."""
     certificate: bytes = b""
     """Of the fleet; empty for none."""
-    epoch: int = field(default_factory=lambda: 1 + secrets.randbelow(MAX_ID))
-    """Tells this life from earlier ones: no clock is needed to."""
 
     @property
     def security(self) -> Security:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import secrets
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 
 import zmq
 
 from nondum.sdk.errors import Problem, ProtocolViolation
-from nondum.sdk.wire import Body
+from nondum.sdk.wire import MAX_ID, Body
 from nondum.transport.peers.accepted import AcceptedConnections
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.dial import Attempt, Dial
@@ -69,6 +70,8 @@ class PeerNode:
     ) -> None:
         """`trust` is not asked in development mode. `clock` tells the time of day."""
         self.identity = identity
+        self.epoch = 1 + secrets.randbelow(MAX_ID)
+        """Tells this life of the host from earlier ones: no clock is needed to."""
         self.refusals = Refusals()
         self._gate = Gate(identity, trust, clock)
         self._handler, self._on_event = handler, on_event
@@ -298,7 +301,7 @@ class PeerNode:
     def _hello(self, known: Acquaintance, version: int | None = None) -> Hello:
         me = self.identity
         versions = VERSIONS if version is None else (version,)
-        return Hello(versions, me.name, me.key, me.epoch, known.term, me.certificate)
+        return Hello(versions, me.name, me.key, self.epoch, known.term, me.certificate)
 
     def _acquaintance(self, key: PeerKey) -> Acquaintance:
         if key not in self._known and len(self._known) >= ACQUAINTANCES:

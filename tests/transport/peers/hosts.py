@@ -1,0 +1,213 @@
+"""Hosts for the tests: real nodes on loopback, in this process or in one of their own.
+
+python -m tests.transport.peers.hosts CONFIG        # serves until it is killed
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import subprocess
+import sys
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from nondum.sdk.errors import Problem
+from nondum.sdk.wire import Body
+from nondum.transport.peers import (
+    Admission,
+    CallFailed,
+    Errand,
+    HostKeys,
+    Identity,
+    Lease,
+    Loss,
+    PeerEvent,
+    PeerKey,
+    PeerNode,
+    Trust,
+)
+
+ROOT = Path(__file__).parents[3]
+PATIENCE_S = 20.0
+E = TypeVar("E", bound=PeerEvent)
+
+
+@dataclass
+class Servant:
+    """Carries out what the tests ask for, and remembers it."""
+
+    lease: Lease = Lease.STOP
+    served: list[str] = field(default_factory=list)
+    notices: asyncio.Queue[dict[str, Any]] = field(default_factory=asyncio.Queue)
+    running: asyncio.Queue[Errand] = field(default_factory=asyncio.Queue)
+    ended: asyncio.Queue[str] = field(default_factory=asyncio.Queue)
+    lost: asyncio.Queue[Loss] = field(default_factory=asyncio.Queue)
+    gate: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def serve(self, errand: Errand) -> Body | Awaitable[Body]:
+        self.served.append(str(errand.args.get("tag", errand.method)))
+        match errand.method:
+            case "echo":
+                return errand.args
+            case "wait":
+                return self.wait(errand)
+            case "count":
+                return self.count(errand)
+            case "hang":
+                time.sleep(errand.args["seconds"])
+                return {}
+            case "long":
+                return {"text": "x" * 1_000_000}
+            case "break":
+                raise ValueError("broken")
+        raise CallFailed(Problem("NO_METHOD", f"nobody serves {errand.method}"))
+
+    async def wait(self, errand: Errand) -> Body:
+        self.running.put_nowait(errand)
+        try:
+            opened = asyncio.ensure_future(self.gate.wait())
+            orphaned = asyncio.ensure_future(errand.orphaned.wait())
+            await asyncio.wait({opened, orphaned}, return_when=asyncio.FIRST_COMPLETED)
+            orphaned.cancel()
+            await opened
+        except asyncio.CancelledError:
+            self.ended.put_nowait("cancelled")
+            raise
+        self.ended.put_nowait("finished")
+        return {"waited": True}
+
+    async def count(self, errand: Errand) -> Body:
+        for number in range(errand.args["to"]):
+            errand.progress({"number": number})
+            await asyncio.sleep(0)
+        return {"counted": errand.args["to"]}
+
+    def notice(self, caller: Admission, method: str, args: dict[str, Any]) -> None:
+        self.notices.put_nowait({"from": caller.name, "method": method, **args})
+
+    def orphaned(self, errand: Errand, reason: Loss) -> Lease:
+        self.lost.put_nowait(reason)
+        return self.lease
+
+
+@dataclass
+class Host:
+    """A node and what it told."""
+
+    node: PeerNode
+    servant: Servant
+    events: asyncio.Queue[PeerEvent]
+    address: str
+
+    @property
+    def key(self) -> PeerKey:
+        return self.node.identity.key
+
+    async def told(self, kind: type[E], key: PeerKey | None = None) -> E:
+        """Wait for the next event of a kind; others before it are dropped."""
+        async with asyncio.timeout(PATIENCE_S):
+            while True:
+                event = await self.events.get()
+                if isinstance(event, kind) and key in (None, event.key):
+                    return event
+
+
+def identity(name: str, keys: HostKeys | None = None, certificate: bytes = b"") -> Identity:
+    return Identity(name, keys or HostKeys.generate(), certificate)
+
+
+def trusting(*identities: Identity) -> Trust:
+    return Trust(paired={one.key: one.name for one in identities})
+
+
+@contextlib.asynccontextmanager
+async def host(
+    me: Identity, trust: Trust | None = None, *, address: str = "tcp://127.0.0.1:0"
+) -> AsyncIterator[Host]:
+    """A host that listens, until the end of the block."""
+    events: asyncio.Queue[PeerEvent] = asyncio.Queue()
+    servant = Servant()
+    node = PeerNode(me, trust or Trust(), servant, on_event=events.put_nowait)
+    try:
+        (bound,) = await node.start([address])
+        yield Host(node, servant, events, bound)
+    finally:
+        await node.close()
+
+
+@contextlib.asynccontextmanager
+async def two_hosts() -> AsyncIterator[tuple[Host, Host]]:
+    """A rover that has dialled a base, both up."""
+    rover, base = identity("rover"), identity("base")
+    async with host(base, trusting(rover)) as there, host(rover, trusting(base)) as here:
+        here.node.dial(there.key, [there.address])
+        await up(here, there)
+        yield here, there
+
+
+async def up(one: Host, other: Host) -> None:
+    """Wait until two hosts can call each other."""
+    async with asyncio.timeout(PATIENCE_S):
+        while other.key not in one.node.peers or one.key not in other.node.peers:
+            await asyncio.sleep(0.005)
+
+
+@dataclass
+class Child:
+    """A host in a process of its own."""
+
+    process: subprocess.Popen[str]
+    key: PeerKey
+    address: str
+
+
+@contextlib.contextmanager
+def child(
+    keys: HostKeys, trusted: Sequence[Identity], *, port: int = 0, dial: Sequence[str] = ()
+) -> Iterator[Child]:
+    """Start a host in a process; killed at the end of the block, whatever became of it."""
+    config = {
+        "public": keys.public,
+        "secret": keys.secret,
+        "trusted": {one.key: one.name for one in trusted},
+        "address": f"tcp://127.0.0.1:{port}",
+        "dial": list(dial),
+    }
+    command = [sys.executable, "-m", "tests.transport.peers.hosts", json.dumps(config)]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            address = process.stdout.readline().strip()
+            yield Child(process, keys.public, address)
+        finally:
+            process.kill()
+
+
+async def _serve(config: dict[str, Any]) -> None:
+    keys = HostKeys(PeerKey(config["public"]), config["secret"])
+    trust = Trust(paired={PeerKey(key): name for key, name in config["trusted"].items()})
+    node = PeerNode(Identity("child", keys), trust, Servant(), on_event=lambda _: None)
+    (bound,) = await node.start([config["address"]])
+    for key in config["trusted"]:
+        if config["dial"]:
+            node.dial(PeerKey(key), config["dial"])
+    print(bound, flush=True)
+    await asyncio.Event().wait()
+
+
+async def raises(call: Callable[[], Awaitable[Any]]) -> list[str]:
+    """The codes that a call fails with."""
+    try:
+        await call()
+    except Exception as error:
+        return [problem.code for problem in getattr(error, "problems", ())] or [repr(error)]
+    return []
+
+
+if __name__ == "__main__":
+    asyncio.run(_serve(json.loads(sys.argv[1])))

@@ -1,0 +1,378 @@
+"""Who is let in, who is turned away, and that neither garbage nor strangers hurt the others."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import socket
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+
+import pytest
+import zmq
+from tests.transport.peers.hosts import (
+    PATIENCE_S,
+    Host,
+    Servant,
+    host,
+    identity,
+    trusting,
+    two_hosts,
+    up,
+)
+
+from nondum.transport.peers import (
+    DialFailed,
+    HostKeys,
+    Identity,
+    Loss,
+    PeerLost,
+    PeerNode,
+    PeerRefused,
+    PeerUp,
+    Reason,
+    Security,
+    Trust,
+    accepted,
+)
+from nondum.transport.peers.certificate import issue, new_fleet
+from nondum.transport.peers.listener import listening, prove_enforced
+from nondum.transport.peers.messages import MAX_MESSAGE, Hello, encode
+from nondum.transport.peers.zap import Entry, Knock, ZapHandler
+
+pytestmark = pytest.mark.anyio
+
+NOW = datetime.now(UTC)
+FLEET, FLEET_SECRET = new_fleet()
+FLEET_TRUST = Trust().with_fleet(FLEET, "survey")
+
+
+def certified(name: str, days: float = 30) -> Identity:
+    keys = HostKeys.generate()
+    ends = NOW + timedelta(days=days)
+    begins = min(NOW, ends) - timedelta(days=1)
+    found = issue(FLEET_SECRET, name, keys.public, not_before=begins, not_after=ends)
+    return Identity(name, keys, found.to_bytes())
+
+
+async def counted(there: Host, reason: Reason, times: int = 1) -> None:
+    """Wait until a host has turned so many away."""
+    async with asyncio.timeout(PATIENCE_S):
+        while there.node.refusals.counts.get(reason, 0) < times:
+            await asyncio.sleep(0.01)
+
+
+async def test_hosts_of_one_fleet_need_no_pairing() -> None:
+    async with host(certified("base"), FLEET_TRUST) as there:
+        async with host(certified("rover"), FLEET_TRUST) as here:
+            here.node.dial(there.key, [there.address])
+            await up(here, there)
+            assert (await there.told(PeerUp)).admitted_by == "certificate"
+            assert there.node.peers[here.key].name == "rover"
+
+
+async def test_stranger_is_turned_away_at_the_handshake() -> None:
+    base = identity("base")
+    async with host(base) as there, host(identity("rover"), trusting(base)) as here:
+        here.node.dial(there.key, [there.address])
+        failure = await here.told(DialFailed)
+        assert failure.problem.code == "PEER_TURNED_AWAY"
+        assert there.node.refusals.counts == {Reason.UNKNOWN_KEY: 1}
+        assert there.node.refusals.latest[0].key == here.key
+
+
+async def test_turned_away_host_is_let_in_once_it_is_paired() -> None:
+    """libzmq itself would never try again."""
+    base, rover = identity("base"), identity("rover")
+    async with host(base) as there, host(rover, trusting(base)) as here:
+        here.node.dial(there.key, [there.address])
+        await here.told(DialFailed)
+        there.node.set_trust(trusting(rover))
+        await here.told(PeerUp)
+
+
+async def test_host_of_a_fleet_without_certificate_is_told_why() -> None:
+    base = certified("base")
+    async with host(base, FLEET_TRUST) as there, host(identity("rover"), trusting(base)) as here:
+        here.node.dial(there.key, [there.address])
+        assert (await here.told(DialFailed)).problem.code == "KEY_UNKNOWN"
+        assert Reason.UNKNOWN_KEY in there.node.refusals.counts
+
+
+@pytest.mark.parametrize(
+    ("who", "code"),
+    [
+        (lambda: certified("rover", days=-2), "CERTIFICATE_TIME"),
+        (lambda: identity("rover", None, certified("rover").certificate), "CERTIFICATE_KEY"),
+        (lambda: identity("rover", None, b"nonsense"), "CERTIFICATE_MALFORMED"),
+    ],
+    ids=["ended", "another host's", "malformed"],
+)
+async def test_certificate_that_does_not_hold_is_refused(who: object, code: str) -> None:
+    base = certified("base")
+    async with host(base, FLEET_TRUST) as there, host(who(), trusting(base)) as here:  # type: ignore[operator]  # one of the above
+        here.node.dial(there.key, [there.address])
+        assert (await here.told(DialFailed)).problem.code == code
+        assert there.node.refusals.counts[Reason.CERTIFICATE] >= 1
+        assert here.key not in there.node.peers
+
+
+async def test_certificate_that_ends_ends_the_link() -> None:
+    now = [NOW]
+    base, rover = certified("base"), certified("rover", days=1)
+    events: asyncio.Queue[object] = asyncio.Queue()
+    node = PeerNode(base, FLEET_TRUST, Servant(), on_event=events.put_nowait, clock=lambda: now[0])
+    (address,) = await node.start(["tcp://127.0.0.1:0"])
+    async with host(rover, FLEET_TRUST) as here:
+        here.node.dial(base.key, [address])
+        await here.told(PeerUp)
+        now[0] += timedelta(days=2)
+        assert (await here.told(PeerLost)).reason in (Loss.TURNED_AWAY, Loss.DISCONNECTED)
+    await node.close()
+
+
+async def test_revoked_peer_is_cut_while_it_talks() -> None:
+    async with two_hosts() as (rover, base):
+        call = rover.node.call(base.key, "wait", {}, deadline_s=60)
+        await base.servant.running.get()
+        base.node.set_trust(trusting(rover.node.identity).with_revoked(rover.key, "stolen"))
+        assert (await base.told(PeerLost)).reason is Loss.REVOKED
+        assert (await rover.told(PeerLost)).reason is Loss.TURNED_AWAY
+        assert await asyncio.wait_for(base.servant.ended.get(), 5) == "cancelled"
+        with pytest.raises(Exception, match="PEER_LOST"):
+            await call
+        await counted(base, Reason.REVOKED)
+        assert rover.key not in base.node.peers
+
+
+async def test_revoked_connection_is_shut_even_if_its_host_does_not_listen() -> None:
+    base, rover = identity("base"), identity("rover")
+    async with host(base, trusting(rover)) as there:
+        with raw_dealer(there, rover) as stubborn:
+            ended = stubborn.get_monitor_socket(zmq.EVENT_DISCONNECTED)
+            stubborn.send(hello_of(rover))
+            await there.told(PeerUp)
+            there.node.set_trust(Trust().with_revoked(rover.key, "stolen"))
+            assert await asyncio.to_thread(ended.poll, 1000)
+            stubborn.disable_monitor()
+            ended.close(0)
+
+
+async def test_wrong_server_key_is_counted_at_both_ends() -> None:
+    base, rover = identity("base"), identity("rover")
+    async with host(base, trusting(rover)) as there, host(rover, trusting(base)) as here:
+        here.node.dial(HostKeys.generate().public, [there.address])
+        assert (await here.told(DialFailed)).problem.code == "PEER_MISMATCH"
+        await counted(there, Reason.MISMATCH)
+
+
+async def test_host_without_keys_is_turned_away() -> None:
+    async with host(identity("base"), trusting(identity("rover"))) as there:
+        context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        with context.socket(zmq.DEALER) as plain:
+            plain.linger = 0
+            plain.connect(there.address)
+            await counted(there, Reason.MISMATCH)
+        context.term()
+
+
+@pytest.mark.parametrize(
+    "noise",
+    [b"GET / HTTP/1.1\r\n\r\n" * 20, b"\xff" * 400, b"\0" * 400, os.urandom(4096)],
+    ids=["HTTP", "ones", "noughts", "random"],
+)
+async def test_garbage_speaker_is_dropped_and_hurts_nobody(noise: bytes) -> None:
+    async with two_hosts() as (rover, base):
+        with tcp(base) as speaker:
+            speaker.sendall(noise)
+            assert await rover.node.call(base.key, "echo", {"a": 1}, deadline_s=5) == {"a": 1}
+
+
+async def test_slow_strangers_are_cut_and_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(accepted, "AWAITED_S", 0.5)
+    monkeypatch.setattr(accepted, "MAX_STRANGERS", 20)
+    async with two_hosts() as (rover, base):
+        idle = [tcp(base) for _ in range(50)]
+        for stranger in idle:
+            stranger.send(b"\xff\0\0")  # the beginning of a greeting, and nothing more
+        assert await rover.node.call(base.key, "echo", {}, deadline_s=5) == {}
+        await counted(base, Reason.CROWDED, 30)
+        await counted(base, Reason.SILENT, 20)
+        assert base.node._accepted.strangers == 0
+        for stranger in idle:
+            stranger.close()
+        assert await rover.node.call(base.key, "echo", {}, deadline_s=5) == {}
+
+
+async def test_message_without_end_of_a_stranger_is_cut_before_it_fills_the_memory() -> None:
+    base, rover = certified("base"), identity("rover")
+    async with host(base, FLEET_TRUST) as there:
+        with raw_dealer(there, rover) as endless:
+            sent = 0
+            async with asyncio.timeout(PATIENCE_S):
+                while Reason.SILENT not in there.node.refusals.counts:
+                    try:
+                        endless.send(b"x" * 10_000, zmq.DONTWAIT | zmq.SNDMORE)
+                        sent += 1
+                    except zmq.Again:
+                        pass
+                    if sent % 50 == 0:
+                        await asyncio.sleep(0.02)
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"\xc1", b"\x91\x09", os.urandom(300)], ids=["empty", "never", "short", "random"]
+)
+async def test_malformed_message_of_a_peer_ends_its_session_alone(data: bytes) -> None:
+    base, rover, other = identity("base"), identity("rover"), identity("other")
+    async with host(base, trusting(rover, other)) as there, host(other, trusting(base)) as good:
+        good.node.dial(there.key, [there.address])
+        await up(good, there)
+        with raw_dealer(there, rover) as bad:
+            bad.send(hello_of(rover))
+            await there.told(PeerUp, rover.key)
+            bad.send(data)
+            assert (await there.told(PeerLost)).reason is Loss.VIOLATED
+        assert there.node.refusals.counts[Reason.GARBAGE] == 1
+        assert await good.node.call(there.key, "echo", {}, deadline_s=5) == {}
+
+
+async def test_message_before_the_greeting_is_garbage() -> None:
+    base, rover = identity("base"), identity("rover")
+    async with host(base, trusting(rover)) as there, asyncio.timeout(PATIENCE_S):
+        with raw_dealer(there, rover) as rude:
+            rude.send(b"\x92\x09\x01")
+            await counted(there, Reason.GARBAGE)
+        assert not there.node.peers
+
+
+async def test_name_of_another_in_the_greeting_is_no_proof() -> None:
+    base, rover, victim = identity("base"), identity("rover"), identity("victim")
+    async with host(base, trusting(rover, victim)) as there:
+        with raw_dealer(there, rover) as liar:
+            liar.send(hello_of(victim))
+            await counted(there, Reason.NOT_PROVED)
+        assert not there.node.peers
+
+
+async def test_longer_message_than_allowed_cuts_the_sender_alone() -> None:
+    base, rover, other = identity("base"), identity("rover"), identity("other")
+    async with host(base, trusting(rover, other)) as there, host(other, trusting(base)) as good:
+        good.node.dial(there.key, [there.address])
+        await up(good, there)
+        with raw_dealer(there, rover) as big:
+            big.send(hello_of(rover))
+            await there.told(PeerUp, rover.key)
+            big.send(b"x" * (MAX_MESSAGE + 1))
+            assert (await there.told(PeerLost)).key == rover.key
+        assert await good.node.call(there.key, "echo", {}, deadline_s=5) == {}
+
+
+async def test_version_that_nobody_speaks_is_told() -> None:
+    base, rover = identity("base"), identity("rover")
+    async with host(base, trusting(rover)) as there:
+        with raw_dealer(there, rover) as future:
+            future.send(hello_of(rover, versions=(99,)))
+            await counted(there, Reason.VERSION)
+
+
+async def test_development_mode_is_explicit_and_stays_on_this_machine() -> None:
+    rover, base = Identity("rover", None), Identity("base", None)
+    async with host(base) as there, host(rover) as here:
+        assert there.node.security is Security.DEVELOPMENT
+        here.node.dial(there.key, [there.address])
+        await up(here, there)
+        assert await here.node.call(there.key, "echo", {}, deadline_s=5) == {}
+        with pytest.raises(PeerRefused, match="DEVELOPMENT_LOOPBACK"):
+            here.node.dial(there.key, ["tcp://192.0.2.1:7000"])
+    with pytest.raises(PeerRefused, match="DEVELOPMENT_LOOPBACK"):
+        async with host(base, address="tcp://*:0"):
+            pass
+
+
+async def test_host_with_keys_and_host_without_do_not_meet() -> None:
+    rover = identity("rover")
+    async with host(Identity("base", None)) as there:
+        async with host(rover, trusting(rover)) as here:
+            here.node.dial(HostKeys.generate().public, [there.address])
+            assert (await here.told(DialFailed)).problem.code == "PEER_MISMATCH"
+
+
+@pytest.mark.parametrize("fault", ["no domain", "lets all in", "nobody answers"])
+async def test_socket_that_lets_strangers_in_is_never_bound(fault: str) -> None:
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    keys = HostKeys.generate()
+    broken = None if fault == "nobody answers" else ZapHandler(context, lambda _: Entry.LET_IN)
+    sock = listening(context, keys)
+    if fault == "no domain":
+        sock.setsockopt(zmq.ZAP_DOMAIN, b"")
+        sock.setsockopt(zmq.ZAP_ENFORCE_DOMAIN, 0)
+    if fault == "nobody answers":
+        sock.setsockopt(zmq.ZAP_ENFORCE_DOMAIN, 0)
+    with pytest.raises(PeerRefused, match="ZAP_INEFFECTIVE"):
+        await prove_enforced(sock, keys, lambda _: None)
+    sock.close()
+    if broken is not None:
+        broken.close()
+    context.term()
+
+
+async def test_second_authenticator_of_a_context_is_refused() -> None:
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    first = ZapHandler(context, lambda _: Entry.TURNED_AWAY)
+    with pytest.raises(PeerRefused, match="ZAP_TAKEN"):
+        ZapHandler(context, lambda _: Entry.LET_IN)
+    first.close()
+    context.term()
+
+
+async def test_judge_that_fails_turns_away_and_goes_on(caplog: pytest.LogCaptureFixture) -> None:
+    """An exception must not leave later handshakes hanging."""
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    asked: list[Knock] = []
+
+    def judge(knock: Knock) -> Entry:
+        asked.append(knock)
+        raise RuntimeError("no judge today")
+
+    handler = ZapHandler(context, judge)
+    keys = HostKeys.generate()
+    sock = listening(context, keys)
+    for _ in range(2):
+        with pytest.raises(PeerRefused):
+            await prove_enforced(sock, keys, lambda _: None)
+    assert len(asked) >= 2
+    assert "no judge today" in caplog.text
+    sock.close()
+    handler.close()
+    context.term()
+
+
+async def test_self_test_leaves_no_trace() -> None:
+    async with host(identity("base")) as there:
+        assert there.node.refusals.counts == {}
+
+
+@contextlib.contextmanager
+def raw_dealer(there: Host, me: Identity) -> Iterator[zmq.Socket[bytes]]:
+    """A peer that says whatever the test wants."""
+    assert me.keys is not None
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    with context.socket(zmq.DEALER) as sock:
+        sock.linger = 0
+        sock.curve_publickey = me.keys.public.encode("ascii")
+        sock.curve_secretkey = me.keys.secret.encode("ascii")
+        sock.curve_serverkey = there.key.encode("ascii")
+        sock.connect(there.address)
+        yield sock
+    context.term()
+
+
+def hello_of(me: Identity, versions: tuple[int, ...] = (1,)) -> bytes:
+    return encode(Hello(versions, me.name, me.key, 7, 1, me.certificate))
+
+
+def tcp(there: Host) -> socket.socket:
+    where, _, port = there.address.removeprefix("tcp://").rpartition(":")
+    return socket.create_connection((where, int(port)), timeout=5)
