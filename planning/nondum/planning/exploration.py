@@ -136,8 +136,13 @@ def explore(
     """
     types = {name: found.types for name, found in merged.objects.items()} | dict(objects or {})
     members = members_of(merged, types)
+    derived = {rule.head.predicate for rule in merged.domain.derived}
     believed = [parts(text) for text in sorted(facts)]
-    known = [(predicate, row) for predicate, row in believed if all(o in types for o in row)]
+    known = [
+        (predicate, row)
+        for predicate, row in believed
+        if predicate not in derived and all(name in types for name in row)
+    ]
     return _Fixpoint(merged, known, members, limit, wishes).run()
 
 

@@ -16,7 +16,7 @@ from tests.planning.differential.semantics import (
     distance,
     reachable,
 )
-from tests.planning.differential.texts import TEXTS, Text
+from tests.planning.differential.texts import TEXTS, Text, text
 
 from nondum.planning.draft import drafted
 from nondum.planning.exploration import explore
@@ -62,22 +62,22 @@ def graph_of(problem: Problem, task: GroundTask) -> Graph:
 
 def check_twins(task: GroundTask, state: frozenset[int]) -> None:
     """A twin holds exactly where its fact does not."""
-    number = {text: index for index, text in enumerate(task.facts)}
-    for text, index in number.items():
-        if is_twin(text):
+    number = {fact: index for index, fact in enumerate(task.facts)}
+    for fact, index in number.items():
+        if is_twin(fact):
             assert (index in state) != (
-                number[twin(text)] in state if twin(text) in number else False
-            ), text
+                number[twin(fact)] in state if twin(fact) in number else False
+            ), fact
 
 
 def check_derived(problem: Problem, task: GroundTask, state: frozenset[int], basic: State) -> None:
     """A derived fact holds exactly where its rules say so."""
     derived = {rule.name for rule in problem.domain.derived}
     whole = problem.settled(basic)
-    for index, text in enumerate(task.facts):
-        atom = tuple(text.split(" "))
+    for index, fact in enumerate(task.facts):
+        atom = tuple(fact.split(" "))
         if atom[0] in derived:
-            assert (index in state) == (atom in whole), text
+            assert (index in state) == (atom in whole), fact
 
 
 def all_that_can_be_done(loaded: Standalone) -> GroundTask:
@@ -166,3 +166,19 @@ def test_whatever_is_written_is_written_again(text: Text) -> None:
     others = reachable(Problem.of(written))
     assert Counter(name for after in others.values() for name, _ in after) == names
     assert distance(Problem.of(written), others) == distance(problem, graph)
+
+
+@pytest.mark.parametrize("is_closed", [True, False], ids=["closed", "open"])
+def test_what_follows_from_rules_is_never_just_believed(is_closed: bool) -> None:
+    lamp = text(
+        "lamp",
+        """(:predicates (on) (lit) (done))
+           (:derived (lit) (on))
+           (:action go :parameters () :precondition (not (lit)) :effect (done))""",
+        "(:init) (:goal (done))",
+        1,
+    )
+    loaded = lamp.load()
+    merged = replace(loaded.merged, is_closed=is_closed)
+    task = ground(merged, {"lit"}, loaded.goal)
+    assert isinstance(solve(task, lambda: False), Plan)
