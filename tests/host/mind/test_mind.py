@@ -240,6 +240,17 @@ async def test_more_urgent_goal_goes_first_and_the_other_returns(robot: Robot) -
     assert robot.running == {"recorded-camera.stream", *CHAIN}
 
 
+async def test_goal_put_aside_returns_though_nothing_new_is_known(robot: Robot) -> None:
+    robot.plug(COMPTON_CAMERA)
+    robot.stubborn.add("localise")
+    robot.mind.give(pddl="(bearing-known radiation-source self)")
+    await robot.until(lambda: robot.running == {"compton-camera.localise"})
+    robot.mind.give(pddl="(self self)", priority=5)
+    await robot.until_goal("reached", "2")
+    await robot.until(lambda: robot.started == ["compton-camera.localise"] * 2)
+    assert robot.mind.queue["1"].state.value == "active"
+
+
 async def test_goal_without_plan_does_not_interrupt(robot: Robot) -> None:
     await follow(robot)
     robot.plug(PAN_TILT_UNIT, COMPTON_CAMERA)

@@ -321,6 +321,8 @@ class Pursuit:
     def _take_up(self, found: Planned) -> None:
         goal = self.queue[found.situation.goal]
         reason = self._why_another_plan(goal.id)
+        if self.current is not None and self.current.goal != goal.id:
+            self._tried.pop(self.current.goal, None)  # it is put aside, not given up
         for replaced in self.queue.activate(goal.id):
             self._people.tell(f"goal {replaced.id} is {replaced.reason}: {replaced.text}")
             self._emit(GoalEnded(replaced.id, replaced.reason))
