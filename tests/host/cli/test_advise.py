@@ -75,7 +75,20 @@ def test_nothing_that_helps_is_an_exit_code(shelf: Path) -> None:
     ran = nondum("advise", WRITTEN, "--host-of", "spot", "--wheelhouse", only)
     assert ran.code == 11
     assert "there is no text, which test-scribe.write needs, for (written spot)" in ran.out
-    assert "none of the 1 payloads that are known of would help" in ran.out
+    assert "the one payload that is known of would not help" in ran.out
+
+
+def test_goal_that_a_payload_alone_makes_true_is_said_to_hold_then(shelf: Path) -> None:
+    goal = "(exists (?u - sensor) (ready ?u))"
+    ran = nondum("advise", goal, "--host-of", "spot", "--wheelhouse", shelf).ok()
+    assert "org.example.write 1.0" in ran.out
+    assert "it then holds" in ran.out
+
+
+def test_where_nothing_is_known_it_is_said_how_to_look_further() -> None:
+    ran = nondum("advise", "(exists (?u - camera) (ready ?u))", "--host-of", "spot")
+    assert ran.code == 11
+    assert "no payload is known of; with --wheelhouse, others are looked through" in ran.out
 
 
 def test_words_that_nobody_knows_are_refused(shelf: Path) -> None:

@@ -11,6 +11,7 @@ from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT, RECORDED_CAM
 
 from nondum.host.catalogue.records import ComponentState, MountPose
 from nondum.sdk.description import Fragment, Label, Phrase, PluginDescription
+from nondum.sdk.errors import FragmentRefused
 
 pytestmark = pytest.mark.anyio
 
@@ -111,6 +112,21 @@ async def test_facts_are_explained(robot: Robot) -> None:
     assert (against["component"], against["behaviour"]) == ("pan-tilt-unit", "point")
     assert found["denied_by"] == ["pan-tilt-unit.point"]
     assert all(word["age_s"] >= 0.0 for word in (*found["for"], against))
+
+
+async def test_fact_is_explained_however_it_is_written(robot: Robot) -> None:
+    await point(robot)
+    for asked in (f"(IDLE {HEAD})", f"idle {HEAD}", f"(not (idle {HEAD}))", f" (idle\n{HEAD} )"):
+        assert robot.mind.views.fact(asked)["fact"] == f"idle {HEAD}"
+    for asked, place in {
+        f"(and (idle {HEAD}))": "fact:1:2",
+        f"(idle {HEAD}) (self self)": f"fact:1:{len(HEAD) + 9}",
+        "(idle": "fact:1:6",
+        "(= self rover)": "fact:1:2",
+    }.items():
+        with pytest.raises(FragmentRefused) as error:
+            robot.mind.views.fact(asked)
+        assert error.value.problems[0].where == place
 
 
 async def test_fact_of_an_absent_object_is_parked(robot: Robot) -> None:

@@ -175,7 +175,7 @@ def show(found: Counsel) -> None:
     table(
         list(_rows(advice.ways)),
         ["way", "payload", "where", "plan"],
-        empty=f"none of the {found.known} payloads that are known of would help",
+        empty=_of_no_help(found.known),
     )
     if not advice.is_complete:
         render.sentence("there may be more: not everything could be looked at")
@@ -196,7 +196,16 @@ def in_a_sentence(advice: Advice) -> str:
     names = " and ".join(f"{c.name} ({c.where})" for c in best.payloads)
     more = len(advice.ways) - 1
     others = f", or {more} other way{'s' if more > 1 else ''}" if more else ""
-    return f"{names} would do: {_shortly(best)}{others}"
+    return f"{names} would do: {_shortly(best) or 'it then holds'}{others}"
+
+
+def _of_no_help(known: int) -> str:
+    match known:
+        case 0:
+            return "no payload is known of; with --wheelhouse, others are looked through"
+        case 1:
+            return "the one payload that is known of would not help"
+    return f"none of the {known} payloads that are known of would help"
 
 
 def _rows(ways: Iterable[Way]) -> Iterator[dict[str, Any]]:
@@ -207,7 +216,7 @@ def _rows(ways: Iterable[Way]) -> Iterator[dict[str, Any]]:
                 "way": str(number) if index == 0 else "and",
                 "payload": candidate.name,
                 "where": candidate.where,
-                "plan": _shortly(way) if index == 0 else " ",
+                "plan": _shortly(way) or "it then holds" if index == 0 else " ",
             }
 
 

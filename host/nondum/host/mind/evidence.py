@@ -7,14 +7,16 @@ from typing import Any, TypeAlias
 
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition
-from nondum.planning.caret import nearest
+from nondum.planning.caret import nearest, refusal
 from nondum.planning.conclusions import conclusions
 from nondum.planning.core import HOST_PREDICATES
 from nondum.planning.domain import Action, DerivedRule, Merged
 from nondum.planning.facts import fact, parts
+from nondum.planning.parse import parse_formula
 from nondum.planning.scope import SELF
-from nondum.planning.syntax import Atom
+from nondum.planning.syntax import Atom, Not
 from nondum.planning.testimony import Source, SourceKind
+from nondum.sdk.errors import FragmentRefused
 
 Row: TypeAlias = dict[str, Any]
 
@@ -55,7 +57,8 @@ def explained(asked: str, beliefs: Beliefs, composition: Composition | None) -> 
     `fact`, `holds`, `value`; `for` and `against`: rows of `component`, `kind`, `said`, `behaviour`,
     `age_s`; `instead`: the other value of a functional predicate; `absent`: objects that it waits
     for; `assumed_by`, `denied_by`: actions whose effects would make it true or false;
-    `observed_by`: conditions that keep it; `hint`: what is wrong with the words of it.
+    `observed_by`: conditions that keep it; `hint`: what is wrong with the words of it. Raises
+    `FragmentRefused` (E-SYNTAX) for what is not one fact.
     """
     text = _named(asked, beliefs.snapshot.host)
     found = beliefs.world.evidence(text)
@@ -116,8 +119,18 @@ def _age_s(at_s: float | None, beliefs: Beliefs) -> float | None:
 
 
 def _named(asked: str, host: str) -> str:
-    """A fact as a person writes it, with or without parentheses, as the world model does."""
-    words = asked.replace("(", " ").replace(")", " ").lower().split()
+    """A fact as a person writes it, with or without parentheses, as the world model does.
+
+    Of one that is said not to hold, the fact. Raises `FragmentRefused` (E-SYNTAX).
+    """
+    words = asked.lower().split()
+    if words and words[0].startswith("("):
+        match parse_formula(asked, "fact"):
+            case (Atom() as atom) | Not(part=Atom() as atom):
+                words = [atom.predicate, *(term.name for term in atom.terms)]
+            case other:
+                message = "expected one fact, such as (ready panther__eye__camera)"
+                raise FragmentRefused(refusal("E-SYNTAX", message, other.place, asked))
     return fact(*(host if word == SELF and i else word for i, word in enumerate(words)))
 
 
