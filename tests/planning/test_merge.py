@@ -451,6 +451,15 @@ def test_more_specific_parent_is_kept() -> None:
         assert result.domain.types.parents["cart"] == {"base"}
 
 
+def test_predicate_is_one_whatever_its_variables_are_called() -> None:
+    result = merged(
+        brings("a", "(:predicates (at ?u - base ?p - place))"),
+        brings("b", "(:predicates (at ?x - base ?where - place))"),
+    )
+    assert [origin.component for origin in result.domain.predicates["at"].origins] == ["a", "b"]
+    assert not result.warnings
+
+
 def test_wider_predicate_is_kept_with_a_warning() -> None:
     result = merged(
         brings("a", "(:predicates (at ?u - base))"), brings("b", "(:predicates (at ?u - unit))")
@@ -490,6 +499,14 @@ def test_two_versions_with_other_schemas_conflict() -> None:
         brings("drive", GO, component="a"), brings("drive", other, component="b", version="2.0")
     )
     assert found.code == "E-VERSION"
+
+
+def test_two_versions_with_one_schema_share_it() -> None:
+    result = merged(
+        brings("drive", GO, component="a"),
+        brings("drive", f"\n\n{GO}", component="b", version="2.0"),
+    )
+    assert [origin.version for origin in result.action("drive.go").origins] == ["1.0", "2.0"]
 
 
 def test_component_that_speaks_twice_is_a_mistake() -> None:
