@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import statistics
 from collections.abc import Iterable, Iterator
 from textwrap import fill
@@ -25,13 +26,16 @@ def as_markdown(results: Results, limit_s: float, versions: str) -> str:
         "Solved, by domain": _by_group(results),
         "Median seconds of what was solved, by domain": _seconds(results),
         "Who was wrong, and what was refused": _wrong(results),
-        "Machine": f"{measuring.machine()}; {versions}; limit {limit_s:g} s.",
+        "Machine": f"{measuring.machine()}; {versions}; limit {limit_s:g} s; load average of the "
+        f"last 15 minutes {os.getloadavg()[2]:.1f}.",
     }
     return "\n".join(f"## {title}\n\n{body}\n" for title, body in sections.items())
 
 
 def _list(lines: Iterable[str]) -> str:
-    return "\n".join(fill(f"- {line}", WIDTH, subsequent_indent="  ") for line in lines)
+    return "\n".join(
+        fill(f"- {line}", WIDTH, subsequent_indent="  ", break_on_hyphens=False) for line in lines
+    )
 
 
 def _reading(results: Results, limit_s: float) -> Iterator[str]:
