@@ -187,6 +187,9 @@ async def test_garbage_speaker_is_dropped_and_hurts_nobody(noise: bytes) -> None
         with tcp(base) as speaker:
             speaker.sendall(noise)
             assert await rover.node.call(base.key, "echo", {"a": 1}, deadline_s=5) == {"a": 1}
+            async with asyncio.timeout(PATIENCE_S):
+                while not base.node.refusals.counts:
+                    await asyncio.sleep(0.01)
 
 
 async def test_slow_strangers_are_cut_and_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -199,7 +202,7 @@ async def test_slow_strangers_are_cut_and_bounded(monkeypatch: pytest.MonkeyPatc
         assert await rover.node.call(base.key, "echo", {}, deadline_s=5) == {}
         await counted(base, Reason.CROWDED, 30)
         await counted(base, Reason.SILENT, 20)
-        assert base.node._accepted.strangers == 0
+        assert base.node._arrivals.strangers == 0
         for stranger in idle:
             stranger.close()
         assert await rover.node.call(base.key, "echo", {}, deadline_s=5) == {}
@@ -299,15 +302,12 @@ async def test_host_with_keys_and_host_without_do_not_meet() -> None:
             assert (await here.told(DialFailed)).problem.code == "PEER_MISMATCH"
 
 
-@pytest.mark.parametrize("fault", ["no domain", "lets all in", "nobody answers"])
+@pytest.mark.parametrize("fault", ["lets all in", "nobody answers"])
 async def test_socket_that_lets_strangers_in_is_never_bound(fault: str) -> None:
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     keys = HostKeys.generate()
     broken = None if fault == "nobody answers" else ZapHandler(context, lambda _: Entry.LET_IN)
     sock = listening(context, keys)
-    if fault == "no domain":
-        sock.setsockopt(zmq.ZAP_DOMAIN, b"")
-        sock.setsockopt(zmq.ZAP_ENFORCE_DOMAIN, 0)
     if fault == "nobody answers":
         sock.setsockopt(zmq.ZAP_ENFORCE_DOMAIN, 0)
     with pytest.raises(PeerRefused, match="ZAP_INEFFECTIVE"):
@@ -340,9 +340,8 @@ async def test_judge_that_fails_turns_away_and_goes_on(caplog: pytest.LogCapture
     keys = HostKeys.generate()
     sock = listening(context, keys)
     for _ in range(2):
-        with pytest.raises(PeerRefused):
-            await prove_enforced(sock, keys, lambda _: None)
-    assert len(asked) >= 2
+        await prove_enforced(sock, keys, lambda _: None)
+    assert len(asked) == 2
     assert "no judge today" in caplog.text
     sock.close()
     handler.close()
@@ -364,9 +363,11 @@ def raw_dealer(there: Host, me: Identity) -> Iterator[zmq.Socket[bytes]]:
         sock.curve_publickey = me.keys.public.encode("ascii")
         sock.curve_secretkey = me.keys.secret.encode("ascii")
         sock.curve_serverkey = there.key.encode("ascii")
-        sock.connect(there.address)
-        yield sock
-    context.term()
+        try:
+            sock.connect(there.address)
+            yield sock
+        finally:
+            context.destroy(linger=0)
 
 
 def hello_of(me: Identity, versions: tuple[int, ...] = (1,)) -> bytes:

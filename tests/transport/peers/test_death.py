@@ -211,7 +211,7 @@ async def break_links(one: Host, other: Host) -> None:
     from nondum.transport.peers import accepted
 
     for node in (one.node, other.node):
-        for session in node._sessions.values():
+        for session in node._roster.sessions.values():
             for link in session.links:
                 if not link.dialled:
                     accepted.cut(link.route.descriptor, link.route.address)  # type: ignore[attr-defined]  # accepted

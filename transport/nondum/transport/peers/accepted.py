@@ -31,7 +31,7 @@ class Accepted:
     """One connection."""
 
     end: str
-    """The other end, `address:port`."""
+    """The other end, `address:port`; empty when it was gone before anybody looked."""
     since_s: float
     is_peer: bool = False
 
@@ -51,8 +51,8 @@ class AcceptedConnections:
         """A connection was accepted; ends of those that were cut to make room."""
         end = other_end(descriptor)
         known = self._known.get(descriptor)
-        if not end or (known is not None and known.end == end):
-            return  # gone already, or its first message was quicker than the news of it
+        if end and known is not None and known.end == end:
+            return  # its first message was quicker than the news of it
         self._known[descriptor] = Accepted(end, now_s)
         while self.strangers > MAX_STRANGERS:
             oldest = next(d for d, one in self._known.items() if not one.is_peer)
@@ -64,9 +64,10 @@ class AcceptedConnections:
         """The connection has shown who it is."""
         self._known[descriptor] = Accepted(other_end(descriptor), now_s, is_peer=True)
 
-    def closed(self, descriptor: int) -> None:
-        """The connection is gone."""
-        self._known.pop(descriptor, None)
+    def closed(self, descriptor: int) -> bool:
+        """The connection is gone; whether it was a stranger's that nobody had cut."""
+        known = self._known.pop(descriptor, None)
+        return known is not None and not known.is_peer
 
     def cut_overdue(self, now_s: float) -> Iterator[str]:
         """Cut those that took too long or sent too much, and tell their ends."""

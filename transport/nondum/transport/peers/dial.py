@@ -9,13 +9,15 @@ from __future__ import annotations
 import asyncio
 import random
 from collections.abc import Callable, Sequence
+from typing import TypeAlias
 
 import zmq
 
 from nondum.sdk.errors import Problem
+from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.events import DialFailed
 from nondum.transport.peers.keys import PeerKey
-from nondum.transport.peers.link import DialledRoute
+from nondum.transport.peers.link import DialledRoute, Link
 from nondum.transport.peers.monitor import HANDSHAKE_FAILED, SocketEvent
 
 FIRST_WAIT_S = 0.05
@@ -23,7 +25,7 @@ LONGEST_WAIT_S = 5.0
 ANSWER_S = 8.0
 """How long one attempt may take, greeting included."""
 
-OnData = Callable[["Attempt", list[zmq.Frame]], None]
+OnData: TypeAlias = Callable[[Link, list[zmq.Frame]], None]
 
 
 class Attempt:
@@ -34,17 +36,33 @@ class Attempt:
         self.is_connected = False
         self.is_settled = False
         """Whether it became a peer's link."""
-        self.route = DialledRoute(socket, address, self._on_data, self._on_event)
+        self.link: Link | None = None
+        """Once it is authenticated."""
+        self._route = DialledRoute(socket, address, self._on_data, self._on_event)
+
+    def send(self, data: bytes) -> Sent:
+        """Send without waiting."""
+        return self._route.send(data)
+
+    def cut(self, linger_ms: int = 0) -> None:
+        """End it, and have the dial try again."""
+        self._route.cut(linger_ms)
+        self.dial.over(self, None)
+
+    def drop(self) -> None:
+        """End it without a word."""
+        self._route.cut()
 
     def _on_data(self, frames: list[zmq.Frame]) -> None:
-        self.dial.on_data(self, frames)
+        if self.link is not None:
+            self.dial.on_data(self.link, frames)
 
     def _on_event(self, event: SocketEvent) -> None:
         if event.kind == zmq.EVENT_HANDSHAKE_SUCCEEDED:
             self.is_connected = True
             self.dial.won(self)
         else:
-            self.route.drain()
+            self._route.drain()
             self.dial.over(self, _why(event))
 
 
@@ -99,16 +117,16 @@ class Dial:
         """A connection is authenticated: the others are not needed."""
         for other in self._attempts:
             if other is not attempt:
-                other.route.cut()
+                other.drop()
         self._attempts = [attempt]
         self._on_won(attempt)
 
     def over(self, attempt: Attempt, problem: Problem | None) -> None:
         """An attempt has failed, or its connection broke."""
-        attempt.route.cut()
         if attempt not in self._attempts:
             return
         self._attempts.remove(attempt)
+        attempt.drop()
         if problem is not None and not attempt.is_settled:
             self._tell(attempt.address, problem)
         self._on_over(attempt)
@@ -122,7 +140,7 @@ class Dial:
                 timer.cancel()
         for attempt in self._attempts:
             if not attempt.is_settled:
-                attempt.route.cut()
+                attempt.drop()
         self._attempts = [one for one in self._attempts if one.is_settled]
 
     def _tell(self, address: str, problem: Problem) -> None:

@@ -62,19 +62,19 @@ class Gate:
 
     def __init__(self, identity: Identity, trust: Trust, clock: Callable[[], datetime]) -> None:
         """`clock` tells the time of day: only certificates need it."""
-        self._identity, self._clock = identity, clock
+        self.identity, self._clock = identity, clock
         self.trust = trust
 
     def judge(self, knock: Knock) -> Reason | None:
         """Whether a connection may go on to greet: None, or why not."""
         if knock.domain != DOMAIN:
             return Reason.WRONG_DOMAIN
-        if self._identity.security is Security.DEVELOPMENT:
+        if self.identity.security is Security.DEVELOPMENT:
             is_here = knock.mechanism == "NULL" and is_loopback(knock.address)
             return None if is_here else Reason.MISMATCH
         if knock.mechanism != "CURVE":
             return Reason.MISMATCH
-        if knock.key == self._identity.key:
+        if knock.key == self.identity.key:
             return Reason.DUPLICATE
         match self.trust.standing(PeerKey(knock.key)):
             case Standing.REVOKED:
@@ -98,11 +98,11 @@ class Gate:
         except NondumError as error:
             raise TurnedAway(Reason.VERSION, error.problems[0]) from error
         key = PeerKey(hello.key)
-        if self._identity.security is Security.CURVE and proved != key:
+        if self.identity.security is Security.CURVE and proved != key:
             raise TurnedAway(Reason.NOT_PROVED, _not_proved(hello, proved))
-        if key == self._identity.key:
+        if key == self.identity.key:
             raise TurnedAway(Reason.DUPLICATE, _itself(hello))
-        if self._identity.security is Security.DEVELOPMENT:
+        if self.identity.security is Security.DEVELOPMENT:
             return Admission(key, hello.name, "development")
         try:
             return self.trust.admit(key, hello.certificate, self._clock())
@@ -112,7 +112,7 @@ class Gate:
 
     def still_admits(self, admission: Admission) -> bool:
         """Whether a peer that was let in may stay, by the trust of now."""
-        if self._identity.security is Security.DEVELOPMENT:
+        if self.identity.security is Security.DEVELOPMENT:
             return True
         if admission.by == "pairing":
             return admission.key in self.trust.paired

@@ -6,7 +6,6 @@ Why each setting: docs of zmq_setsockopt(3), and what happened without it is in 
 from __future__ import annotations
 
 import asyncio
-import os
 from collections.abc import Callable
 
 import zmq
@@ -20,8 +19,8 @@ from nondum.transport.peers.zap import DOMAIN
 
 Context = zmq.Context[zmq.Socket[bytes]]
 
-HIGH_WATER = 64
-"""Messages that may wait in each direction of a connection: 16 MiB of the longest."""
+HIGH_WATER = 256
+"""Messages that may wait in each direction of a connection: 32 MiB of the longest."""
 HANDSHAKE_MS = 5000
 CONNECT_MS = 3000
 BACKLOG = 256
@@ -61,15 +60,15 @@ def dialling(context: Context, keys: HostKeys | None, peer: PeerKey | None) -> z
 
 
 async def prove_enforced(
-    socket: zmq.Socket[bytes], keys: HostKeys | None, expect: Callable[[bytes], None]
+    socket: zmq.Socket[bytes], keys: HostKeys | None, expect: Callable[[str], None]
 ) -> None:
     """Dial a socket that is not bound yet, as somebody whom the handler must turn away.
 
     `expect` tells the handler whom. Raises `PeerRefused` (ZAP_INEFFECTIVE) when the connection was
     let in, or not answered: then the socket must not be bound.
     """
-    context, probe_id = socket.context, b"probe-" + os.urandom(16)
-    expect(probe_id)
+    probing = HostKeys.generate() if keys else None
+    expect(probing.public if probing else "")
     turned_away: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
 
     def on_event(event: SocketEvent) -> None:
@@ -79,8 +78,7 @@ async def prove_enforced(
     socket.bind("tcp://127.0.0.1:*")
     address = socket.getsockopt(zmq.LAST_ENDPOINT)
     assert isinstance(address, bytes)
-    probe = dialling(context, HostKeys.generate() if keys else None, keys.public if keys else None)
-    probe.setsockopt(zmq.ROUTING_ID, probe_id)
+    probe = dialling(socket.context, probing, keys.public if keys else None)
     ears = watch(probe, on_event)
     try:
         probe.connect(address.decode("ascii"))

@@ -17,7 +17,7 @@ from nondum.sdk.wire import MAX_ID, MAX_NAME, Body, pack, unpack
 
 VERSIONS: tuple[int, ...] = (1,)
 """Versions of this protocol that this host speaks, newest first."""
-MAX_MESSAGE = 256 * 1024
+MAX_MESSAGE = 128 * 1024
 """Bytes in a message."""
 MAX_CERTIFICATE = 1024
 

@@ -39,7 +39,6 @@ class Knock:
 
     address: str
     """Where from: an IP address."""
-    routing_id: bytes
     domain: bytes
     mechanism: str
     key: str
@@ -51,14 +50,14 @@ Judge: TypeAlias = Callable[[Knock], Entry]
 
 def parse(frames: list[bytes]) -> Knock:
     """Read a request. Raises `ValueError` for one that ZeroMQ did not make."""
-    version, _, domain, address, routing_id, mechanism, *credentials = frames
+    version, _, domain, address, _, mechanism, *credentials = frames  # the fifth is our own id
     if version != b"1.0":
         raise ValueError(f"ZAP version {version!r}")
     key = ""
     if mechanism == b"CURVE":
         (raw,) = credentials
         key = z85.encode(raw).decode("ascii")
-    return Knock(address.decode("ascii"), routing_id, domain, mechanism.decode("ascii"), key)
+    return Knock(address.decode("ascii"), domain, mechanism.decode("ascii"), key)
 
 
 class ZapHandler:
@@ -67,7 +66,7 @@ class ZapHandler:
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], judge: Judge) -> None:
         """Raises `PeerRefused` (ZAP_TAKEN) when the context has a handler already."""
         self._judge = judge
-        self._probes: set[bytes] = set()
+        self._probes: set[str] = set()
         socket = context.socket(zmq.REP)
         socket.linger = 0
         try:
@@ -79,9 +78,9 @@ class ZapHandler:
             ) from error
         self._replies = Drained(socket, self._answer)
 
-    def expect_probe(self, routing_id: bytes) -> None:
-        """Turn away, once, the connection that calls itself so: the self-test's."""
-        self._probes.add(routing_id)
+    def expect_probe(self, key: str) -> None:
+        """Turn away, once, the next connection under this key (or under none): the self-test's."""
+        self._probes.add(key)
 
     def close(self) -> None:
         """Answer no more: nobody is let in then."""
@@ -100,7 +99,7 @@ class ZapHandler:
         self._replies.send([b"1.0", number, entry.value, entry.name.encode("ascii"), user, b""])
 
     def _judged(self, knock: Knock) -> Entry:
-        if knock.routing_id in self._probes:
-            self._probes.discard(knock.routing_id)
+        if knock.key in self._probes:
+            self._probes.discard(knock.key)
             return Entry.TURNED_AWAY
         return self._judge(knock)

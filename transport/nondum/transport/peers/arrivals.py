@@ -1,0 +1,67 @@
+"""What the listening socket tells of those who connect: bounds them, and counts how they ended."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+import zmq
+
+from nondum.transport.peers.accepted import AcceptedConnections
+from nondum.transport.peers.monitor import HANDSHAKE_FAILED, SocketEvent
+from nondum.transport.peers.refusals import Reason, Refusal, Refusals
+
+# From zmq.h: ZMQ_PROTOCOL_ERROR_ZMTP_CRYPTOGRAPHIC and …_MECHANISM_MISMATCH.
+_OTHER_KEYS = frozenset({0x11000001, 0x11000002})
+
+
+class Arrivals:
+    """Connections to this host until they are a peer's."""
+
+    def __init__(self, refusals: Refusals, on_closed: Callable[[int], None]) -> None:
+        """`on_closed` is told the descriptor of every connection that ended."""
+        self._refusals, self._on_closed = refusals, on_closed
+        self._connections = AcceptedConnections()
+        self._failure: SocketEvent | None = None
+        """Of the connection whose end is told next: one thread tells, in order."""
+
+    @property
+    def strangers(self) -> int:
+        """Connections that are no peers yet."""
+        return self._connections.strangers
+
+    def on_event(self, event: SocketEvent) -> None:
+        """Take in what the socket's monitor tells."""
+        now_s = asyncio.get_running_loop().time()
+        if event.kind == zmq.EVENT_ACCEPTED:
+            for end in self._connections.opened(event.value, now_s):
+                self._count(Reason.CROWDED, end)
+        elif event.kind == zmq.EVENT_DISCONNECTED:
+            failure, self._failure = self._failure, None
+            if self._connections.closed(event.value):
+                self._count_failed(failure)
+            self._on_closed(event.value)
+        elif event.kind & HANDSHAKE_FAILED:
+            self._failure = event
+
+    def became_peer(self, descriptor: int) -> None:
+        """A connection has shown who it is."""
+        self._connections.became_peer(descriptor, asyncio.get_running_loop().time())
+
+    def cut_overdue(self) -> None:
+        """Cut those that take too long or send too much."""
+        for end in self._connections.cut_overdue(asyncio.get_running_loop().time()):
+            self._count(Reason.SILENT, end)
+
+    def _count_failed(self, failure: SocketEvent | None) -> None:
+        if failure is None:
+            self._count(Reason.GARBAGE)
+        elif failure.kind == zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL:
+            self._count(Reason.SILENT)
+        elif failure.kind == zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL:
+            self._count(Reason.MISMATCH if failure.value in _OTHER_KEYS else Reason.GARBAGE)
+        # and those that were turned away for their key, the gate has counted
+
+    def _count(self, reason: Reason, end: str = "") -> None:
+        now_s = asyncio.get_running_loop().time()
+        self._refusals.add(Refusal(reason, end, "", f"no peer: {reason.value}", now_s))

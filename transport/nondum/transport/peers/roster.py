@@ -1,0 +1,259 @@
+"""Who is there: greetings make sessions, breaks and silence end them. No sockets."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator, Mapping
+
+from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.transport.peers.dial import Attempt, Dial
+from nondum.transport.peers.drained import Sent
+from nondum.transport.peers.errands import Errand, Handler
+from nondum.transport.peers.events import Loss, PeerEvent, PeerLost, PeerUp
+from nondum.transport.peers.failures import PeerUnreachable
+from nondum.transport.peers.gate import Acquaintance, Gate, TurnedAway
+from nondum.transport.peers.keys import PeerKey
+from nondum.transport.peers.link import Link
+from nondum.transport.peers.messages import (
+    VERSIONS,
+    Bye,
+    Hello,
+    Message,
+    Refused,
+    Welcome,
+    agreed_version,
+    decode,
+)
+from nondum.transport.peers.refusals import Reason, Refusal, Refusals
+from nondum.transport.peers.session import Departed, OutOfPlace, Session
+from nondum.transport.peers.trust import Admission
+
+SILENCE_S = 1.0
+"""A link over which nothing came for so long is dead: three pings were missed."""
+RESUME_S = 0.5
+"""How long a peer may be without a link before it is lost."""
+ACQUAINTANCES = 1024
+"""Peers that are remembered while they are away."""
+LINGER_MS = 200
+"""How long the last words over a link may take."""
+
+
+class Roster:
+    """The sessions of one host, and the wishes to dial."""
+
+    def __init__(
+        self,
+        gate: Gate,
+        epoch: int,
+        handler: Handler,
+        refusals: Refusals,
+        on_event: Callable[[PeerEvent], None],
+        on_peer_link: Callable[[Link], None],
+    ) -> None:
+        """`on_peer_link` is told of every accepted link that became a peer's."""
+        self.gate, self.epoch = gate, epoch
+        self.dials: dict[PeerKey, Dial] = {}
+        self._handler, self._refusals = handler, refusals
+        self._on_event, self._on_peer_link = on_event, on_peer_link
+        self._sessions: dict[PeerKey, Session] = {}
+        self._known: dict[PeerKey, Acquaintance] = {}
+        self._orphans: set[Errand] = set()
+        self._loop = asyncio.get_running_loop()
+
+    @property
+    def sessions(self) -> Mapping[PeerKey, Session]:
+        """Of the peers that can be called now."""
+        return self._sessions
+
+    def session(self, peer: PeerKey) -> Session:
+        """A live peer's. Raises `PeerUnreachable` (PEER_DOWN)."""
+        session = self._sessions.get(peer)
+        if session is None:
+            raise PeerUnreachable(Problem("PEER_DOWN", "there is no link to the peer", where=peer))
+        return session
+
+    def is_unlinked(self, peer: PeerKey) -> bool:
+        """Whether a link to the peer is wanting."""
+        session = self._sessions.get(peer)
+        return session is None or not session.links
+
+    def greet(self, link: Link, peer: PeerKey) -> None:
+        """Begin a link that this host has dialled."""
+        link.tell(self._hello(self._acquaintance(peer)))
+
+    def receive(self, link: Link, data: bytes) -> None:
+        """Take in what came over a link. Nothing is raised: who breaks the rules is turned away."""
+        if link.is_over:
+            return
+        if link.proved is not None and self.gate.is_revoked(link.proved):
+            self.turn_away(link, Reason.REVOKED, _REVOKED)
+            return
+        now_s, session = self._loop.time(), link.session
+        if session is not None and now_s - link.heard_s > SILENCE_S:
+            # This host may have hung itself: what waited meanwhile is of a link that is over.
+            self.break_link(link, Loss.SILENT)
+            return
+        link.heard_s = now_s
+        try:
+            message = decode(data)
+            if session is not None:
+                session.receive(link, message)
+            else:
+                self._greeted(link, message)
+        except ProtocolViolation as violation:
+            self.turn_away(link, Reason.GARBAGE, violation.problems[0])
+        except OutOfPlace as wrong:
+            self.turn_away(link, Reason.GARBAGE, Problem("HANDSHAKE", str(wrong)))
+        except TurnedAway as refused:
+            self.turn_away(link, refused.reason, refused.problem)
+        except Departed as departed:
+            assert session is not None
+            self.lose(session, departed.reason)
+
+    def turn_away(self, link: Link, reason: Reason, problem: Problem) -> None:
+        """Cut a link for what came over it, tell the other end why, and count it."""
+        key, told = link.proved or "", str(problem)
+        self._refusals.add(Refusal(reason, link.route.address, key, told, self._loop.time()))
+        link.tell(Refused(problem))
+        if link.session is not None:
+            is_trust = reason is Reason.REVOKED
+            self.lose(link.session, Loss.REVOKED if is_trust else Loss.VIOLATED)
+        link.cut(LINGER_MS)
+
+    def break_link(self, link: Link, reason: Loss) -> None:
+        """A link is over: the session waits for another, unless the link fell silent."""
+        if link.is_over:
+            return
+        session = link.session
+        link.cut()
+        if session is None or session.leave(link) or session.missing is not None:
+            return
+        key = session.admission.key
+        if self._sessions.get(key) is not session:
+            return
+        if reason is Loss.SILENT:
+            self.lose(session, reason)
+            return
+        session.missing = self._loop.call_later(RESUME_S, self.lose, session, reason)
+        if dial := self.dials.get(key):
+            dial.again()
+
+    def lose(self, session: Session, reason: Loss) -> None:
+        """The peer is lost: end what was between the hosts, on every link."""
+        key = session.admission.key
+        if self._sessions.get(key) is not session:
+            return
+        del self._sessions[key]
+        if reason in _OURS:
+            session.known.term += 1
+        for link in list(session.links):
+            link.cut(LINGER_MS)
+        for errand in session.end(reason):
+            self._keep(errand)
+        self._on_event(PeerLost(key, session.admission.name, reason))
+        if dial := self.dials.get(key):
+            dial.again()
+
+    def check_trust(self) -> None:
+        """Cut the peers that the gate does not let in any more."""
+        for session in list(self._sessions.values()):
+            if not self.gate.still_admits(session.admission):
+                self._part(session, Refused(_REVOKED), Loss.REVOKED)
+
+    def beat(self) -> None:
+        """Ping every link, and find those that are dead."""
+        now_s = self._loop.time()
+        for session in list(self._sessions.values()):
+            if self.gate.has_expired(session.admission):
+                self._part(session, Refused(_EXPIRED), Loss.EXPIRED)
+                continue
+            session.errands.pass_on_waiting()
+            for link in list(session.links):
+                if now_s - link.heard_s > SILENCE_S:
+                    self.break_link(link, Loss.SILENT)
+                else:
+                    self.try_link(link)
+
+    def try_link(self, link: Link) -> None:
+        """Ping a link; one whose connection is gone is broken."""
+        if not link.is_over and link.ping(self._loop.time()) is Sent.GONE:
+            self.break_link(link, Loss.DISCONNECTED)
+
+    def close(self) -> None:
+        """Say goodbye to all; what runs for peers is cancelled."""
+        for dial in self.dials.values():
+            dial.close()
+        for session in list(self._sessions.values()):
+            self._part(session, Bye("closed"), Loss.CLOSED)
+        for errand in list(self._orphans):
+            errand.halt()
+
+    def _greeted(self, link: Link, message: Message) -> None:
+        """The first message of a link. Raises `TurnedAway`, `OutOfPlace`."""
+        match message:
+            case Hello() if not link.dialled:
+                admission, known = self._meet(link, message)
+                link.tell(Welcome(self._hello(known, agreed_version(message))))
+                self._on_peer_link(link)
+            case Welcome(hello) if link.dialled:
+                admission, known = self._meet(link, hello)
+            case Refused(problem) if isinstance(link.route, Attempt):
+                link.route.dial.over(link.route, problem)
+                return
+            case _:
+                raise OutOfPlace("a link begins with a greeting")
+        self._join(link, admission, known)
+
+    def _meet(self, link: Link, hello: Hello) -> tuple[Admission, Acquaintance]:
+        """Let a peer in; what was there before is over if the greeting begins something new."""
+        admission = self.gate.admit(hello, link.proved)
+        known = self._acquaintance(admission.key)
+        former = known.epoch
+        if known.meet(hello) and (session := self._sessions.get(admission.key)):
+            self.lose(session, Loss.GAVE_UP if former == hello.epoch else Loss.RESTARTED)
+        return admission, known
+
+    def _join(self, link: Link, admission: Admission, known: Acquaintance) -> None:
+        key = admission.key
+        session = self._sessions.get(key)
+        if session is None:
+            session = self._sessions[key] = Session(admission, known, self._handler)
+            self._on_event(
+                PeerUp(key, admission.name, known.epoch, link.route.address, admission.by)
+            )
+        for replaced in session.join(link):
+            replaced.cut()
+        if dial := self.dials.get(key):
+            dial.settled()
+
+    def _hello(self, known: Acquaintance, version: int | None = None) -> Hello:
+        me = self.gate.identity
+        versions = VERSIONS if version is None else (version,)
+        return Hello(versions, me.name, me.key, self.epoch, known.term, me.certificate)
+
+    def _acquaintance(self, key: PeerKey) -> Acquaintance:
+        if key not in self._known and len(self._known) >= ACQUAINTANCES:
+            for away in self._away():
+                del self._known[away]
+                break
+        return self._known.setdefault(key, Acquaintance())
+
+    def _away(self) -> Iterator[PeerKey]:
+        return (key for key in list(self._known) if key not in self._sessions)
+
+    def _part(self, session: Session, last: Message, reason: Loss) -> None:
+        for link in session.links:
+            link.tell(last)
+        self.lose(session, reason)
+
+    def _keep(self, errand: Errand) -> None:
+        """Remember an errand that outlives its caller, until it ends."""
+        assert errand.task is not None
+        self._orphans.add(errand)
+        errand.task.add_done_callback(lambda _: self._orphans.discard(errand))
+
+
+_OURS = frozenset({Loss.SILENT, Loss.DISCONNECTED, Loss.VIOLATED, Loss.REVOKED, Loss.EXPIRED})
+"""Losses that this host has found: the peer may not know that what was between them is over."""
+_REVOKED = Problem("KEY_REVOKED", "this key is not accepted any more")
+_EXPIRED = Problem("CERTIFICATE_TIME", "the certificate has ended")
