@@ -56,12 +56,8 @@ class Runner:
             raise
         except Exception as error:
             context.log.exception("a behaviour raised")
-            frame = traceback.extract_tb(error.__traceback__)[-1]
-            problem = Problem(
-                "BEHAVIOUR_RAISED",
-                f"{type(error).__name__}: {error}"[:1000],
-                where=f"{frame.filename}:{frame.lineno}",
-            )
+            message = f"{type(error).__name__}: {error}"[:1000]
+            problem = Problem("BEHAVIOUR_RAISED", message, where=_raised_at(error))
             raise BehaviourFailed(problem) from error
 
     async def _run_ticked(
@@ -88,3 +84,9 @@ class Runner:
             behaviour.terminate(status)
         if status is not Status.SUCCESS:
             raise BehaviourFailed(behaviour.feedback_message or "the last tick came to FAILURE")
+
+
+def _raised_at(error: Exception) -> str:
+    """File and line; nothing where an exception has lost them on its way."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return f"{frames[-1].filename}:{frames[-1].lineno}" if frames else ""
