@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import sys
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -20,6 +22,13 @@ from nondum.sdk.errors import FragmentRefused
 
 NOT_READ_BY_THE_OTHER = {"costs"}
 """It knows no functions."""
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _tracebacks_are_whole_again() -> Iterator[None]:
+    """The package shortens all tracebacks of the process for good."""
+    yield
+    vars(sys).pop("tracebacklimit", None)
 
 
 def without_root(text: str) -> str:
