@@ -11,6 +11,7 @@ import json
 import subprocess
 import sys
 import time
+from collections import defaultdict
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,7 +29,11 @@ from nondum.transport.peers import (
     Loss,
     PeerEvent,
     PeerKey,
+    PeerLost,
     PeerNode,
+    PeerUp,
+    Reason,
+    Refusal,
     Trust,
 )
 
@@ -101,12 +106,31 @@ class Host:
 
     node: PeerNode
     servant: Servant
-    events: asyncio.Queue[PeerEvent]
-    address: str
+    address: str = ""
+    events: asyncio.Queue[PeerEvent] = field(default_factory=asyncio.Queue)
+    linked: dict[PeerKey, asyncio.Event] = field(default_factory=lambda: defaultdict(asyncio.Event))
+    refused: asyncio.Event = field(default_factory=asyncio.Event)
 
     @property
     def key(self) -> PeerKey:
         return self.node.identity.key
+
+    def hear(self, event: PeerEvent) -> None:
+        self.events.put_nowait(event)
+        match event:
+            case PeerUp():
+                self.linked[event.key].set()
+            case PeerLost():
+                self.linked[event.key].clear()
+            case Refusal():
+                self.refused.set()
+
+    async def counted(self, reason: Reason, times: int = 1) -> None:
+        """Wait until so many were turned away for a reason."""
+        async with asyncio.timeout(PATIENCE_S):
+            while self.node.refusals.counts.get(reason, 0) < times:
+                self.refused.clear()
+                await self.refused.wait()
 
     async def told(self, kind: type[E], key: PeerKey | None = None) -> E:
         """Wait for the next event of a kind; others before it are dropped."""
@@ -130,12 +154,12 @@ async def host(
     me: Identity, trust: Trust | None = None, *, address: str = "tcp://127.0.0.1:0"
 ) -> AsyncIterator[Host]:
     """A host that listens, until the end of the block."""
-    events: asyncio.Queue[PeerEvent] = asyncio.Queue()
     servant = Servant()
-    node = PeerNode(me, trust or Trust(), servant, on_event=events.put_nowait)
+    node = PeerNode(me, trust or Trust(), servant, on_event=lambda event: found.hear(event))
+    found = Host(node, servant)
     try:
-        (bound,) = await node.start([address])
-        yield Host(node, servant, events, bound)
+        (found.address,) = await node.start([address])
+        yield found
     finally:
         await node.close()
 
@@ -153,8 +177,8 @@ async def two_hosts() -> AsyncIterator[tuple[Host, Host]]:
 async def up(one: Host, other: Host) -> None:
     """Wait until two hosts can call each other."""
     async with asyncio.timeout(PATIENCE_S):
-        while other.key not in one.node.peers or one.key not in other.node.peers:
-            await asyncio.sleep(0.005)
+        await one.linked[other.key].wait()
+        await other.linked[one.key].wait()
 
 
 @dataclass
@@ -196,7 +220,8 @@ async def _serve(config: dict[str, Any]) -> None:
     for key in config["trusted"]:
         if config["dial"]:
             node.dial(PeerKey(key), config["dial"])
-    print(bound, flush=True)
+    sys.stdout.write(f"{bound}\n")
+    sys.stdout.flush()
     await asyncio.Event().wait()
 
 

@@ -29,6 +29,7 @@ from nondum.transport.peers import (
     PeerLost,
     PeerUp,
     Reason,
+    accepted,
 )
 
 pytestmark = pytest.mark.anyio
@@ -185,17 +186,19 @@ async def test_calls_made_while_the_link_is_broken_are_sent_later() -> None:
 async def test_second_host_with_the_same_key_is_told_and_the_newest_stays() -> None:
     base, rover = identity("base"), identity("rover")
     copy = identity("rover", rover.keys)
-    async with host(base, trusting(rover)) as there:
-        async with host(rover, trusting(base)) as first, host(copy, trusting(base)) as second:
-            first.node.dial(there.key, [there.address])
-            await up(first, there)
-            second.node.dial(there.key, [there.address])
-            await second.told(PeerUp)
-            assert (await there.told(PeerLost)).reason is Loss.RESTARTED
-            failure = await first.told(DialFailed)
-            assert failure.problem.code == "PEER_DUPLICATE"
-            assert there.node.refusals.counts[Reason.DUPLICATE] >= 1
-            assert await second.node.call(there.key, "echo", {}, deadline_s=5) == {}
+    async with (
+        host(base, trusting(rover)) as there,
+        host(rover, trusting(base)) as first,
+        host(copy, trusting(base)) as second,
+    ):
+        first.node.dial(there.key, [there.address])
+        await up(first, there)
+        second.node.dial(there.key, [there.address])
+        await second.told(PeerUp)
+        assert (await there.told(PeerLost)).reason is Loss.RESTARTED
+        assert (await first.told(DialFailed)).problem.code == "PEER_DUPLICATE"
+        assert there.node.refusals.counts[Reason.DUPLICATE] >= 1
+        assert await second.node.call(there.key, "echo", {}, deadline_s=5) == {}
 
 
 async def test_host_does_not_become_its_own_peer() -> None:
@@ -208,8 +211,6 @@ async def test_host_does_not_become_its_own_peer() -> None:
 
 async def break_links(one: Host, other: Host) -> None:
     """Break the connections beneath the links, as a network would."""
-    from nondum.transport.peers import accepted
-
     for node in (one.node, other.node):
         for session in node._roster.sessions.values():
             for link in session.links:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import os
 import stat
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -12,9 +11,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.transport.peers import HostKeys, PeerRefused, Trust, fingerprint, load_or_create
+from nondum.transport.peers import (
+    HostKeys,
+    PeerRefused,
+    Trust,
+    fingerprint,
+    load_or_create,
+    private_file,
+    trust_file,
+)
 from nondum.transport.peers import certificate as certificates
-from nondum.transport.peers import private_file, trust_file
 from nondum.transport.peers.certificate import Certificate, issue, new_fleet, parse, verify
 from nondum.transport.peers.keys import PeerKey, parse_key
 from nondum.transport.peers.trust import Standing
@@ -76,7 +82,7 @@ def test_new_file_never_replaces_one(tmp_path: Path) -> None:
     with pytest.raises(FileExistsError):
         private_file.create(path, "second")
     assert path.read_text(encoding="utf-8") == "first"
-    assert os.listdir(tmp_path) == ["secret"]
+    assert [found.name for found in tmp_path.iterdir()] == ["secret"]
 
 
 @given(st.text(max_size=60))

@@ -25,7 +25,8 @@ class Call:
     """A call on its way: await it for the answer, or iterate over its progress first.
 
     Awaiting raises `CallFailed` with the peer's problems (or DEADLINE, HALTED), or
-    `PeerUnreachable` (PEER_LOST). A task that is cancelled while it awaits cancels the call.
+    `PeerUnreachable` (PEER_LOST). A task that is cancelled while it awaits cancels the call, so
+    only one should.
     """
 
     def __init__(self, request: Request, ends_s: float, cancel: Callable[[int], None]) -> None:
@@ -42,9 +43,9 @@ class Call:
 
     def __await__(self) -> Generator[Any, None, dict[str, Any]]:
         try:
-            return (yield from asyncio.shield(self._outcome).__await__())
+            return (yield from self._outcome)  # no shield: it costs a turn of the loop
         except asyncio.CancelledError:
-            self.cancel()
+            self._cancel(self.number)
             raise
 
     async def __aiter__(self) -> AsyncIterator[dict[str, Any]]:

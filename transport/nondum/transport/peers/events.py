@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 from nondum.sdk.errors import Problem
 from nondum.transport.peers.keys import PeerKey
+from nondum.transport.peers.refusals import Refusal
 
 
 class Loss(Enum):
@@ -54,4 +55,4 @@ class DialFailed:
     problem: Problem
 
 
-PeerEvent: TypeAlias = PeerUp | PeerLost | DialFailed
+PeerEvent: TypeAlias = PeerUp | PeerLost | DialFailed | Refusal

@@ -55,7 +55,7 @@ class PeerNode:
         self.identity = identity
         self.epoch = 1 + secrets.randbelow(MAX_ID)
         """Tells this life of the host from earlier ones: no clock is needed to."""
-        self.refusals = Refusals()
+        self.refusals = Refusals(on_event)
         self._gate = Gate(identity, trust, clock)
         self._on_event = on_event
         self._roster = Roster(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
@@ -52,7 +52,9 @@ class Refusal:
 class Refusals:
     """What was turned away since the start."""
 
-    def __init__(self) -> None:
+    def __init__(self, on_refusal: Callable[[Refusal], None]) -> None:
+        """`on_refusal` is told of each: of many at once, when many strangers knock."""
+        self._on_refusal = on_refusal
         self._counts: Counter[Reason] = Counter()
         self._latest: deque[Refusal] = deque(maxlen=LATEST)
 
@@ -67,6 +69,7 @@ class Refusals:
         return tuple(self._latest)
 
     def add(self, refusal: Refusal) -> None:
-        """Count one more."""
+        """Count one more, and tell of it."""
         self._counts[refusal.reason] += 1
         self._latest.append(refusal)
+        self._on_refusal(refusal)
