@@ -290,6 +290,25 @@ async def test_cancelling_kills_the_search(planner: Make, task: GroundTask) -> N
         os.kill(pid, 0)
 
 
+async def test_child_whose_end_nobody_waited_for_is_waited_for_at_last(
+    planner: Make, task: GroundTask
+) -> None:
+    process = planner("hanger")
+    await process.warm()
+    pid = process.pid
+    search = asyncio.create_task(process.plan(Request(task), 60.0))
+    await asyncio.sleep(0)
+    search.cancel()
+    await asyncio.sleep(0)
+    search.cancel()  # while it waits for the child that the first one killed
+    with pytest.raises(asyncio.CancelledError):
+        await search
+    await process.close()
+    assert pid is not None
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+
+
 async def test_follow_plan_is_the_only_one(planner: Make) -> None:
     task = follow_task()
     found = await Planners([planner("pyperplan")]).plan(task, 5.0)

@@ -43,6 +43,7 @@ class PlannerProcess:
         self._environment = {**os.environ, "PYTHONHASHSEED": "0", **(environment or {})}
         self._process: Process | None = None
         self._is_ready = False
+        self._endings: set[asyncio.Future[tuple[bytes, bytes]]] = set()
         self._language = ""
         self._handles: frozenset[str] = frozenset()
         self._lock = asyncio.Lock()
@@ -83,6 +84,7 @@ class PlannerProcess:
             _end(self._process)
         async with self._lock:
             await self._kill()
+        await asyncio.gather(*self._endings, return_exceptions=True)
 
     def _refusal(self, request: wire.Request) -> str:
         """Why the planner is not one for a task; empty if it is."""
@@ -152,8 +154,12 @@ class PlannerProcess:
         if process is None:
             return
         _end(process)
-        # Also takes both pipes off the loop; shielded, since the caller may be being cancelled.
-        await asyncio.shield(process.communicate())
+        # Also takes both pipes off the loop; shielded, since the caller may be being cancelled,
+        # even again while it waits here: then `close` waits.
+        ending = asyncio.ensure_future(process.communicate())
+        self._endings.add(ending)
+        ending.add_done_callback(self._endings.discard)
+        await asyncio.shield(ending)
 
     def _failure(self, code: str, message: str) -> PlannerFailed:
         return PlannerFailed(Problem(code, message, where=f"planner {self.name}"))
