@@ -36,6 +36,8 @@ def host(tmp_path: Path) -> Iterator[RunningHost]:
 
 def test_stick_pulled_in_the_middle_of_a_behaviour(host: RunningHost, tmp_path: Path) -> None:
     host.bring("write", scribe())
+    goal = host.want("(written spot)")
+    host.until_goal(goal, "suspended")
     before = host.traces()
     with attached(image(tmp_path, talker())) as node:
         host.until_step(PAYLOAD, "active")
@@ -43,7 +45,6 @@ def test_stick_pulled_in_the_middle_of_a_behaviour(host: RunningHost, tmp_path: 
             "safe to pull", lambda v: {d["state"] for d in v["drives"]} == {"idle"}, timeout_s=9
         )
         assert not host.traces().mounts
-        goal = host.want("(written spot)")
         host.until_goal(goal, "holds")
         detach(node)
         host.until_gone(PAYLOAD)

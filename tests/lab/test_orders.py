@@ -35,10 +35,17 @@ def test_halt_now_needs_no_planner(host: RunningHost) -> None:
     }
     host.until_goal(goal, "halted")
     host.until("nothing runs", lambda view: not any_stream(view), timeout_s=5)
-    ends = [entry for entry in host.journal() if entry["event"] == "BehaviourEnded"]
-    outcomes = {entry["subject"]: entry["detail"]["outcome"] for entry in ends}
-    assert {outcomes["talker"], outcomes["scribe"]} == {"HALTED"}
+    host.until(
+        "both have ended", lambda _: {"talker", "scribe"} <= outcomes(host).keys(), timeout_s=5
+    )
+    assert set(outcomes(host).values()) == {"HALTED"}
     assert not any(row["running"] for row in host.ask("behaviours"))
+
+
+def outcomes(host: RunningHost) -> dict[str, str]:
+    """How the behaviours that have ended did, by component."""
+    ends = [entry for entry in host.journal() if entry["event"] == "BehaviourEnded"]
+    return {entry["subject"]: entry["detail"]["outcome"] for entry in ends}
 
 
 def test_actuator_has_one_user_at_a_time(host: RunningHost) -> None:
