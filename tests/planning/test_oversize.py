@@ -89,6 +89,45 @@ def test_derived_facts_count_too() -> None:
     assert set(fit([*followers(), wide]).left_out) == {"wide"}
 
 
+SIX = "?a ?b ?c ?d ?e ?f - pin"
+SAYINGS = {
+    "precondition": f"(forall ({SIX}) (or (up ?a) (near ?b ?c ?d) (up ?e) (up ?f)))",
+    "some": f"(forall ({SIX}) (or (not (up ?a)) (not (near ?b ?c ?d)) (= ?e ?f)))",
+    "nested": "(forall (?a - pin) (exists (?b - pin) (forall (?c - pin) (exists (?d - pin)"
+    " (forall (?e ?f - pin) (or (up ?a) (near ?b ?c ?d) (near ?d ?e ?f)))))))",
+}
+
+
+def pins(saying: str, rule: str = "") -> Contribution:
+    """A unit that makes the robot follow when something is so of its forty pins."""
+    body = f"""(:types pin - object) (:constants {" ".join(f"pin{n}" for n in range(40))} - pin)
+    (:predicates (up ?p - pin) (near ?p ?q ?r - pin) (well)) {rule}
+    (:action lift :parameters (?u - speaker ?p ?q - pin) :precondition (ready ?u)
+      :effect (and (up ?p) (near ?p ?q ?p)))
+    (:action join :parameters (?u - speaker ?h - host ?c - class)
+      :precondition (and (ready ?u) {saying}) :effect (following ?h ?c))"""
+    return brings("pins", body, units={"panel": "speaker"})
+
+
+@pytest.mark.parametrize("saying", SAYINGS.values(), ids=SAYINGS)
+def test_who_quantifies_over_too_much_is_left_out_alone(saying: str) -> None:
+    found = fit([*followers(), pins(saying)])
+    assert set(found.left_out) == {"pins"}
+    assert found.left_out["pins"].code == "PDDL_TOO_MANY"
+    assert isinstance(solve(found.made, lambda: False), Plan)
+
+
+def test_rule_that_quantifies_over_too_much_is_left_out_alone() -> None:
+    rule = f"(:derived (well) {SAYINGS['precondition']})"
+    assert set(fit([*followers(), pins("(well)", rule)]).left_out) == {"pins"}
+
+
+def test_goal_that_quantifies_over_too_much_is_refused() -> None:
+    with pytest.raises(TooManyBindings) as error:
+        fit([*followers(), pins("")], SAYINGS["precondition"])
+    assert "'the goal' says" in error.value.problems[0].message
+
+
 def test_who_is_merely_large_is_let_in_again() -> None:
     """While the huge one is bound in part only, the large one looks widest."""
     large = knobs("a-large", 11, "?x ?y ?z")

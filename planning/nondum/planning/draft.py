@@ -8,9 +8,16 @@ from dataclasses import dataclass
 from nondum.planning.derivation import strata_of
 from nondum.planning.domain import Merged, bind
 from nondum.planning.expansion import Expander, Standing
-from nondum.planning.exploration import Change, Exploration, Instance
+from nondum.planning.exploration import (
+    INSTANCES_LIMIT,
+    Change,
+    Exploration,
+    Instance,
+    work_for,
+)
 from nondum.planning.goal import GoalExpr
 from nondum.planning.literals import Literals
+from nondum.planning.spending import Spending
 from nondum.planning.syntax import Atom, Equal
 
 GOAL = "goal"
@@ -59,16 +66,22 @@ class Draft:
     believed: frozenset[int]
 
 
-def drafted(merged: Merged, found: Exploration, goal: GoalExpr) -> Draft:
-    """Write out the quantifiers and disjunctions of everything that can be reached."""
-    return _Drafting(merged, found).draft(goal)
+def drafted(
+    merged: Merged, found: Exploration, goal: GoalExpr, *, limit: int = INSTANCES_LIMIT
+) -> Draft:
+    """Write out the quantifiers and disjunctions of everything that can be reached.
+
+    Raises `TooManyBindings` where they speak of too much for a domain with `limit` bound actions.
+    """
+    return _Drafting(merged, found, limit).draft(goal)
 
 
 class _Drafting:
-    def __init__(self, merged: Merged, found: Exploration) -> None:
+    def __init__(self, merged: Merged, found: Exploration, limit: int) -> None:
         self._merged = merged
         self._found = found
-        self._expander = Expander(found, merged.is_closed)
+        self._spending = Spending(work_for(limit))
+        self._expander = Expander(found, merged.is_closed, self._spending.work)
         self._groups = strata_of(merged.domain.derived).groups
 
     def draft(self, goal: GoalExpr) -> Draft:
@@ -97,7 +110,9 @@ class _Drafting:
         ):
             rule = derivation.rule
             literals = Literals(derivation.positive, derivation.negative)
-            bodies = self._expander.alternatives(literals, rule.condition.further, derivation.names)
+            further, names = rule.condition.further, derivation.names
+            with self._spending.by(rule.head.predicate, rule.origins):
+                bodies = self._expander.alternatives(literals, further, names)
             number = layer[rule.head.predicate]
             yield from (DraftRule(derivation.head, body, number) for body in bodies)
             yield from self._stood_for(number)
@@ -113,12 +128,15 @@ class _Drafting:
         cost = self._cost(instance)
         if cost is None:
             return
-        always, changes = _sorted_out(self._changes(instance.changes))
+        action = instance.action
+        with self._spending.by(action.name, action.origins):
+            always, changes = _sorted_out(self._changes(instance.changes))
+            literals = Literals(instance.positive, instance.negative)
+            further = action.precondition.further
+            conditions = self._expander.alternatives(literals, further, instance.names)
         add = instance.add.union(*(change.add for change in always))
         delete = instance.delete.union(*(change.delete for change in always)) - add
-        literals = Literals(instance.positive, instance.negative)
-        further = instance.action.precondition.further
-        for condition in self._expander.alternatives(literals, further, instance.names):
+        for condition in conditions:
             yield DraftAction(
                 instance.name, condition, add, delete, tuple(_net(changes, add, delete)), cost
             )
@@ -150,7 +168,8 @@ class _Drafting:
         )
         if not goal.further:
             return literals
-        ways = self._expander.alternatives(Literals(), goal.further, {})
+        with self._spending.by("the goal"):
+            ways = self._expander.alternatives(Literals(), goal.further, {})
         return literals | self._expander.standing_for(ways, GOAL)
 
     def _number(self, atom: Atom) -> int:

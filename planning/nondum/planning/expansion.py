@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from nondum.planning.exploration import Exploration, domains_of
-from nondum.planning.join import Domains, Join, Rule, Values
+from nondum.planning.join import Domains, Join, Rule, Values, Work
 from nondum.planning.literals import Literals
 from nondum.planning.matching import Pattern
 from nondum.planning.normal import condition_of, normal
@@ -30,6 +30,8 @@ from nondum.planning.syntax import (
 
 DISJUNCTS_LIMIT = 12
 """A condition with more is given a derived fact that stands for it."""
+_WORK_OF_BINDING = 10
+"""What writing out one binding of a quantifier counts as."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +68,8 @@ class Expander:
     found: Exploration
     is_closed: bool
     """What is true and cannot change need not be guarded."""
+    work: Work
+    """What writing out quantifiers may take."""
     standing: list[Standing] = field(default_factory=list)
     """The derived facts that had to be made so far."""
     _relations: Relations = field(default_factory=Relations)
@@ -87,7 +91,7 @@ class Expander:
     def alternatives(
         self, literals: Literals, further: Sequence[Formula], names: Names
     ) -> tuple[Literals, ...]:
-        """The ways in which all this can hold; none: it never does."""
+        """The ways in which all this can hold; none: it never does. Raises `TooMuchWork`."""
         plain = self._plain(literals)
         if plain is None:
             return ()
@@ -144,9 +148,10 @@ class Expander:
         size = len(names) + len(apart.variables)
 
         def fire(values: Values) -> None:
+            self.work.spend(_WORK_OF_BINDING)
             found.append(tuple(values[:size]))
 
-        join.run(self._relations, domains, fire, known=tuple(names.values()))
+        join.run(self._relations, domains, fire, known=tuple(names.values()), work=self.work)
         variables = (*names, *(variable.name for variable in apart.variables))
         for row in sorted(set(found)):
             yield apart.part, dict(zip(variables, row, strict=True))

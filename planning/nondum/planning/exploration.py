@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from operator import itemgetter
 
@@ -46,6 +46,17 @@ class TooManyBindings(FragmentRefused):
     def __init__(self, problem: Problem, components: frozenset[str]) -> None:
         super().__init__(problem)
         self.components = components
+
+    @classmethod
+    def of(cls, message: str, origins: Sequence[Origin], *, fix: str) -> TooManyBindings:
+        """PDDL_TOO_MANY, with the places that it is about."""
+        problem = Problem("PDDL_TOO_MANY", message, " and ".join(map(str, origins)), fix=fix)
+        return cls(problem, frozenset(origin.component for origin in origins))
+
+
+def work_for(limit: int) -> Work:
+    """What may be looked at where so many bindings may be made."""
+    return Work(_WORK_PER_INSTANCE * limit)
 
 
 @dataclass(slots=True)
@@ -360,7 +371,7 @@ class _Fixpoint:
         self._domain = merged.domain
         self._members = members
         self._limit = limit
-        self.work = Work(_WORK_PER_INSTANCE * limit)
+        self.work = work_for(limit)
         self._spent: Counter[_Head] = Counter()
         self._counts: Counter[_Head] = Counter()
         self._total = 0
@@ -379,6 +390,7 @@ class _Fixpoint:
             map(self.table.facts.__getitem__, self._believed),
             frozenset(self.added | self._deleted),
             members,
+            self.work,
         )
         self.instances: dict[tuple[str, Row], Instance] = {}
         self.derivations: list[Derivation] = []
@@ -477,10 +489,9 @@ class _Fixpoint:
             if is_fruitless
             else f"more than {self._limit} ways to bind the actions, {count} of them of {name!r}"
         )
-        where = " and ".join(map(str, origins))
-        fix = "add preconditions that say which objects belong together"
-        problem = Problem("PDDL_TOO_MANY", message, where, fix=fix)
-        return TooManyBindings(problem, frozenset(origin.component for origin in origins))
+        return TooManyBindings.of(
+            message, origins, fix="add preconditions that say which objects belong together"
+        )
 
 
 def _by_name(counts: Mapping[_Head, int]) -> dict[str, tuple[int, tuple[Origin, ...]]]:

@@ -41,4 +41,5 @@ def ground(
     known = (text for text in facts if predicate_of(text) in read)
     found = explore(part.merged, known, objects, limit=limit, wishes=part.wishes)
     found = displaced(found, functional_predicates(merged.domain))
-    return positive_task(helpful(drafted(part.merged, found, goal)), found.table)
+    draft = drafted(part.merged, found, goal, limit=limit)
+    return positive_task(helpful(draft), found.table)

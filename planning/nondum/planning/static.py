@@ -7,10 +7,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 
+from nondum.planning.join import Work
 from nondum.planning.relations import Row
 from nondum.planning.syntax import And, Atom, Equal, Formula, Not, Or, Quantified, Term, TypedName
 from nondum.planning.typegraph import ROOT
 
+_WORK_OF_BINDING = 3
+"""What looking at one binding of a quantifier counts as."""
 Names = Mapping[str, str]
 """Variable → object."""
 
@@ -25,9 +28,14 @@ class StaticFacts:
     """The predicates that something writes: of these it knows nothing."""
     domains: Mapping[str, frozenset[str]]
     """Type → the objects of it."""
+    work: Work
+    """What deciding quantifiers may take."""
 
     def may_hold(self, formula: Formula, names: Names) -> bool:
-        """Whether a normal condition can hold, for all that static facts say."""
+        """Whether a normal condition can hold, for all that static facts say.
+
+        Raises `TooMuchWork`.
+        """
         match formula:
             case Atom():
                 return formula.predicate in self.written or self._holds(formula, names)
@@ -54,6 +62,7 @@ class StaticFacts:
     def _bindings(self, formula: Quantified, names: Names) -> Iterator[Names]:
         domains = [sorted(self.objects(variable)) for variable in formula.variables]
         for values in product(*domains):
+            self.work.spend(_WORK_OF_BINDING)
             own = {v.name: value for v, value in zip(formula.variables, values, strict=True)}
             yield {**names, **own}
 
@@ -67,13 +76,15 @@ def static_facts(
     believed: Iterable[tuple[str, Row]],
     written: frozenset[str],
     domains: Mapping[str, frozenset[str]],
+    work: Work,
 ) -> StaticFacts:
     """Those of the believed facts that nothing writes."""
     rows: defaultdict[str, set[Row]] = defaultdict(set)
     for predicate, row in believed:
         if predicate not in written:
             rows[predicate].add(row)
-    return StaticFacts({name: frozenset(found) for name, found in rows.items()}, written, domains)
+    found = {name: frozenset(those) for name, those in rows.items()}
+    return StaticFacts(found, written, domains, work)
 
 
 def value_of(term: Term, names: Names) -> str:
