@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import combinations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from tests.planning.fragments import HOST, brings
 from tests.planning.strangers import (
@@ -332,18 +332,22 @@ def shelves(draw: st.DrawFn) -> tuple[Here, list[Candidate]]:
     return here(present), offered
 
 
-def by_trying_all(present: Here, goal: str, candidates: list[Candidate]) -> set[frozenset[str]]:
-    """The smallest sets with a plan, found by planning for every set."""
+def by_trying_all(
+    present: Here, goal: str, candidates: list[Candidate]
+) -> tuple[set[frozenset[str]], bool]:
+    """The smallest sets with a plan, found by planning for every set, and whether these are
+    certainly all: of a plan that one lasting behaviour cuts short, nothing follows."""
     trials = Trials(present, goal, candidates, search)
     every = range(len(candidates))
-    possible = [
-        frozenset(chosen)
+    outcomes = {
+        frozenset(chosen): trials.of(frozenset(chosen)).outcome
         for size in range(len(candidates) + 1)
         for chosen in combinations(every, size)
-        if trials.of(frozenset(chosen)).outcome is Outcome.POSSIBLE
-    ]
+    }
+    possible = [chosen for chosen, outcome in outcomes.items() if outcome is Outcome.POSSIBLE]
     least = [one for one in possible if not any(other < one for other in possible)]
-    return {frozenset(candidates[number].id for number in chosen) for chosen in least}
+    ids = {frozenset(candidates[number].id for number in chosen) for chosen in least}
+    return ids, Outcome.UNKNOWN not in outcomes.values()
 
 
 @given(
@@ -356,8 +360,9 @@ def test_smallest_sets_are_those_that_trying_all_finds(
 ) -> None:
     present, candidates = world
     advice = advise(present, goal, candidates, search, ways_limit=50, trials_limit=5000)
-    assert advice.is_complete
-    expected = by_trying_all(present, goal, sound(present, goal, candidates))
+    expected, is_certain = by_trying_all(present, goal, sound(present, goal, candidates))
+    assert advice.is_complete or not is_certain
+    assume(is_certain)
     assert (set() if advice.now else sets(advice)) == expected - {frozenset()}
     assert (advice.now is not None) == (frozenset() in expected)
     for way in (*advice.ways, *([advice.now] if advice.now else [])):
