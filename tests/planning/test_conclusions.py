@@ -44,5 +44,20 @@ def test_each_conclusion_names_the_rules_that_give_it() -> None:
     assert [str(rule.origins[0]) for rule in found["dark"]] == ["map 1.0 domain.pddl:3:56"]
 
 
+def test_of_rules_with_too_many_bindings_nothing_is_said() -> None:
+    """What others say is drawn all the same, unless it asks for what is not known then."""
+    pins = " ".join(f"pin{number}" for number in range(100))
+    saying = "(or (lit ?a) (near ?a ?b) (not (lit ?c)) (lit ?d))"
+    wide = f"""(:constants {pins} - place) (:predicates (lit ?p - place) (near ?a ?b - place) (well))
+        (:derived (near ?a ?b - place) (lit ?a))
+        (:derived (well) (forall (?a ?b ?c ?d - place) {saying}))"""
+    words = "(:predicates (dark) (well) (ill) (poor) (lit ?p - place))"
+    others = """(:derived (dark) (not (exists (?p - place) (lit ?p))))
+        (:derived (ill) (not (well))) (:derived (poor) (ill))"""
+    result = merge([brings("wide", wide), brings("other", words + others)], HOST)
+    assert not result.quarantined, result.quarantined
+    assert sorted(conclusions(result, [])) == ["dark"]
+
+
 def test_without_rules_nothing_follows() -> None:
     assert conclusions(merged(""), ["lit hall"]) == {}

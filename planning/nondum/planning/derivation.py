@@ -84,6 +84,11 @@ def strata_of(rules: Sequence[DerivedRule]) -> Strata:
     return Strata(tuple(tuple(groups[number]) for number in sorted(groups)))
 
 
+def asked_by(rule: DerivedRule) -> frozenset[str]:
+    """The predicates that a rule's condition speaks of."""
+    return frozenset(predicate for predicate, _ in _needs(rule))
+
+
 def _needs(rule: DerivedRule) -> Iterator[tuple[str, bool]]:
     for part in rule.condition.parts():
         for atom, is_positive in atoms_in(part):

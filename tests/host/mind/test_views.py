@@ -10,7 +10,14 @@ from tests.host.mind.robot import HOST, Robot
 from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT, RECORDED_CAMERA
 
 from nondum.host.catalogue.records import ComponentState, MountPose
-from nondum.sdk.description import Fragment, Label, Phrase, PluginDescription
+from nondum.sdk.description import (
+    Behaviour,
+    Fragment,
+    Label,
+    Phrase,
+    PluginDescription,
+    Unit,
+)
 from nondum.sdk.errors import FragmentRefused
 
 pytestmark = pytest.mark.anyio
@@ -75,6 +82,27 @@ async def test_goal_that_cannot_be_had_names_who_used_to_help(robot: Robot) -> N
     [row] = robot.mind.views.goals()()["can"]
     assert row["now"] == "cannot"
     assert any("compton-camera used to supply it" in text for text in row["lacks"])
+
+
+async def test_goal_that_speaks_of_too_much_is_listed_as_unknown(robot: Robot) -> None:
+    pins = " ".join(f"pin{number}" for number in range(100))
+    words = f"""(define (domain pins) (:types pin - object) (:constants {pins} - pin)
+        (:predicates (up ?p - pin) (near ?p ?q ?r - pin))
+        (:action lift :parameters (?u - speaker ?p ?q - pin) :precondition (ready ?u)
+          :effect (and (up ?p) (near ?p ?q ?p))))"""
+    wide = "(forall (?a ?b ?c ?d ?e - pin) (or (up ?a) (near ?b ?c ?d) (not (up ?e))))"
+    robot.plug(
+        PluginDescription(
+            name="pins",
+            version="1.0",
+            units=(Unit("panel", "speaker"),),
+            fragments=(Fragment("pins.pddl", words),),
+            phrases=(Phrase("tidy up", wide), Phrase("lift it", "(up pin3)")),
+            behaviours=(Behaviour("lift", "(lift ?u - speaker ?p ?q - pin)"),),
+        )
+    )
+    now = {row["words"]: row["now"] for row in robot.mind.views.goals()()["can"]}
+    assert now == {"tidy up": "unknown", "lift it": "can"}
 
 
 async def test_words_with_two_meanings_are_listed_as_ambiguous(robot: Robot) -> None:

@@ -141,10 +141,16 @@ class _Outlook:
         """`now` and `lacks` of a goal."""
         if self._reachable is None:
             return "unknown", []
+        try:
+            return self._looked_at(goal, self._reachable)
+        except FragmentRefused:  # it speaks of too much
+            return "unknown", []
+
+    def _looked_at(self, goal: Goal, reachable: frozenset[str]) -> tuple[str, list[str]]:
         expr = goal.expr
         wanted = {bind(atom, {}) for atom in expr.positive}
         if expr == Condition(positive=expr.positive):
-            holds, can = wanted <= self._facts, wanted <= self._reachable
+            holds, can = wanted <= self._facts, wanted <= reachable
         else:
             holds = isinstance(self._quick_answer(goal, self._facts), AlreadyTrue)
             can = not isinstance(self._quick_answer(goal, self._bare), Unsolvable)
