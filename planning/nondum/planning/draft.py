@@ -15,6 +15,7 @@ from nondum.planning.exploration import (
     Instance,
     work_for,
 )
+from nondum.planning.facts import parts
 from nondum.planning.goal import GoalExpr
 from nondum.planning.literals import Literals
 from nondum.planning.spending import Spending
@@ -177,6 +178,16 @@ class _Drafting:
 
     def _pair(self, pair: Equal) -> int:
         return self._found.table.number("=", (pair.left.name, pair.right.name))
+
+
+def stands_for_goal(text: str) -> bool:
+    """Whether a fact of a ground task is the one that was made for a disjunctive goal.
+
+    >>> stands_for_goal("goal 0"), stands_for_goal("goal north"), stands_for_goal("goal")
+    (True, False, False)
+    """
+    predicate, arguments = parts(text)
+    return predicate == GOAL and "".join(arguments).isdecimal()
 
 
 def _sorted_out(

@@ -135,7 +135,7 @@ def _words(outcome: Outcome) -> str:
         case "already true":
             return "the goal is true already"
         case "unsolvable" if outcome.proof == "relaxed":
-            facts = ", ".join(f"({fact})" for fact in outcome.facts)
+            facts = ", ".join(f"({fact})" for fact in outcome.facts) or "the goal"
             return f"there is no plan: {facts} cannot be reached, even if nothing were ever undone"
         case "unsolvable":
             return f"there is no plan: {outcome.planner} has looked at all that can be reached"

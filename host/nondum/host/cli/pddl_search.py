@@ -158,6 +158,7 @@ def _planners(limits: Limits) -> Planners:
 
 
 def _outcome(answer: Answer, task: GroundTask, planner: str) -> Outcome:
+    from nondum.planning.draft import stands_for_goal
     from nondum.sdk.planner import AlreadyTrue, GaveUp, Plan, Unsolvable
 
     match answer:
@@ -167,6 +168,7 @@ def _outcome(answer: Answer, task: GroundTask, planner: str) -> Outcome:
         case AlreadyTrue():
             return Outcome("already true", EXIT_ALREADY_TRUE)
         case Unsolvable(proof, facts):
-            return Outcome("unsolvable", EXIT_UNSOLVABLE, proof=proof, facts=facts, planner=planner)
+            named = tuple(fact for fact in facts if not stands_for_goal(fact))
+            return Outcome("unsolvable", EXIT_UNSOLVABLE, proof=proof, facts=named, planner=planner)
         case GaveUp(why):
             return Outcome("gave up", EXIT_GAVE_UP, reason=why)
