@@ -24,7 +24,7 @@ _ARPABET = {
     "j": "Y", "w": "W", "ʍ": "W", "ɾ": "D", "ʔ": "T",
 }  # fmt: skip
 _KNOWN = re.compile(f"({'|'.join(sorted(_ARPABET, key=len, reverse=True))})ː?")
-_UNHEARD = re.compile("[ˈˌ_ \u0300-\u036f\u200d()]|\\([a-z-]+\\)")
+_UNHEARD = re.compile("[ʲˈˌ_ \u0300-\u036f\u200d()]|\\([a-z-]+\\)")
 """Stress, separators, and marks that no phoneme of English depends on."""
 
 
@@ -34,7 +34,7 @@ def arpabet(ipa: str) -> str | None:
     >>> arpabet("ɹ_ˌoʊ_b_ˈɑː_t")
     'R OW B AA T'
     """
-    heard = _UNHEARD.sub("", ipa)
+    heard = _UNHEARD.sub("", ipa.replace(":", "ː"))
     phones: list[str] = []
     position = 0
     while position < len(heard):

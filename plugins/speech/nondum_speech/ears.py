@@ -15,15 +15,15 @@ from nondum_speech.espeak import Espeak
 from nondum_speech.grammar import Vocabulary
 from nondum_speech.inbox import Inbox, may_grow
 from nondum_speech.lexicon import lexicon
-from nondum_speech.recogniser import Recogniser
+from nondum_speech.recogniser import FreeHearing, Recogniser
 from nondum_speech.sentences import Sentences, sentences_of
 from nondum_speech.sound import Sound, SoundInvalid, read_wav
 
 LOOK_S = 0.2
 WAITING = 8
 """So many sentences may wait for a host that does not ask; then the oldest is forgotten."""
-ECHO_S = 0.4
-"""After the own voice has ended, its echo is not listened to either."""
+ECHO_BYTES = 16_000
+"""Half a second: after the own voice has ended, its echo is not listened to either."""
 
 
 class Ears:
@@ -32,6 +32,7 @@ class Ears:
     def __init__(self, espeak: Espeak, log: logging.Logger, *, confidence: float) -> None:
         self.sentences: asyncio.Queue[str] = asyncio.Queue()
         self._espeak, self._log, self._confidence = espeak, log, confidence
+        self._free: FreeHearing | None = None
         self._recogniser: Recogniser | None = None
         self._one_at_a_time = asyncio.Lock()
         self._learnt = asyncio.Event()
@@ -45,11 +46,12 @@ class Ears:
         if words.unsayable:
             told = ", ".join(words.unsayable)
             self._log.warning("phrases and names with these words cannot be heard: %s", told)
-        recogniser = await asyncio.to_thread(
-            Recogniser, vocabulary, words, confidence=self._confidence
-        )
         async with self._one_at_a_time:
-            self._recogniser = recogniser
+            if self._free is None:
+                self._free = await asyncio.to_thread(FreeHearing)
+            self._recogniser = await asyncio.to_thread(
+                Recogniser, vocabulary, words, self._free, confidence=self._confidence
+            )
         self._learnt.set()
 
     async def watch(self, inbox: Inbox) -> None:
@@ -62,13 +64,15 @@ class Ears:
 
     async def attend(self, pieces: AsyncIterator[bytes]) -> None:
         """Hear a flow of samples, as long as it flows; the own voice is not listened to."""
-        cutter = Sentences()
+        cutter, deaf = Sentences(), 0
         async for piece in pieces:
             if self._speaking:
-                cutter = Sentences()
-                continue
-            for sentence in cutter.heard(piece):
-                await self._hear(sentence)
+                cutter, deaf = Sentences(), ECHO_BYTES
+            elif deaf > 0:
+                deaf -= len(piece)
+            else:
+                for sentence in cutter.heard(piece):
+                    await self._hear(sentence)
 
     @contextlib.contextmanager
     def deafened(self) -> Iterator[None]:
@@ -77,10 +81,7 @@ class Ears:
         try:
             yield
         finally:
-            asyncio.get_running_loop().call_later(ECHO_S, self._hear_again)
-
-    def _hear_again(self) -> None:
-        self._speaking -= 1
+            self._speaking -= 1
 
     async def _hear_file(self, inbox: Inbox, path: Path) -> None:
         try:
@@ -102,11 +103,11 @@ class Ears:
             heard = await asyncio.to_thread(self._recogniser.hear, sentence)
         if not heard.said:
             near = (
-                f"; the nearest is {heard.words!r} ({heard.confidence:.1f})" if heard.words else ""
+                f"; the nearest is {heard.words!r} ({heard.confidence:.2f})" if heard.words else ""
             )
             self._log.info("heard %.1f s of no known sentence%s", sentence.seconds, near)
             return
-        self._log.info("heard %r (%.1f)", heard.said, heard.confidence)
+        self._log.info("heard %r (%.2f)", heard.said, heard.confidence)
         if self.sentences.qsize() == WAITING:
             self.sentences.get_nowait()
         self.sentences.put_nowait(heard.said)

@@ -1,7 +1,7 @@
 """eSpeak NG's library, as its wheel carries it: text to sound, and words to phonemes.
 
-https://github.com/espeak-ng/espeak-ng, speak_lib.h. The library keeps its state for itself: there
-is one in a process, used by one thread at a time.
+https://github.com/espeak-ng/espeak-ng, speak_lib.h. The library keeps its state for itself, once in
+a process: one thread at a time uses it.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ _IPA = 0x02
 _RATE = 1  # espeakRATE
 _LONGEST_PATH = 150
 """The library cuts off longer paths of its data, without a word."""
+_IN_USE = threading.Lock()
 
 _Callback = ctypes.CFUNCTYPE(
     ctypes.c_int, ctypes.POINTER(ctypes.c_short), ctypes.c_int, ctypes.c_void_p
@@ -37,23 +38,22 @@ class Espeak:
     """The library, ready. Methods block, and may be called from any thread."""
 
     def __init__(self, scratch: Path) -> None:
-        """`scratch` is where its data are copied to when their own path is too long for it."""
+        """`scratch` gets a link to its data where their own path is too long for it."""
         self._library = ctypes.CDLL(espeakng_loader.get_library_path())
         self._declare()
         data = _reachable(Path(espeakng_loader.get_data_path()), scratch)
         self._rate_hz = self._library.espeak_Initialize(_SYNCHRONOUS, 0, bytes(data), _DONT_EXIT)
         if self._rate_hz <= 0:
             raise OSError(f"eSpeak NG cannot use its data in {data}")
-        self._lock = threading.Lock()
         self._sound = bytearray()
         self._callback = _Callback(self._take)  # the library keeps no reference
-        self._library.espeak_SetSynthCallback(self._callback)
 
     def say(self, text: str, *, voice: str, words_per_minute: int) -> Sound:
         """Make the sound of a text. Raises `VoiceUnknown`."""
         data = text.encode() + b"\0"
-        with self._lock:
+        with _IN_USE:
             self._choose(voice)
+            self._library.espeak_SetSynthCallback(self._callback)
             self._library.espeak_SetParameter(_RATE, words_per_minute, 0)
             self._sound.clear()
             self._library.espeak_Synth(data, len(data), 0, 1, 0, _UTF8, None, None)
@@ -62,7 +62,7 @@ class Espeak:
 
     def phonemes(self, word: str, *, voice: str) -> str:
         """How a voice says a word, in IPA with `_` between phonemes. Raises `VoiceUnknown`."""
-        with self._lock:
+        with _IN_USE:
             self._choose(voice)
             text = ctypes.c_char_p(word.encode())
             said = self._library.espeak_TextToPhonemes(
@@ -96,7 +96,7 @@ def _reachable(data: Path, scratch: Path) -> Path:
     """A path of the data that is short enough for the library."""
     if len(bytes(data)) <= _LONGEST_PATH:
         return data
-    copy = scratch / "e"
-    if not copy.exists():
-        copy.symlink_to(data)
-    return copy
+    link = scratch / "e"
+    if not link.exists():
+        link.symlink_to(data)
+    return link

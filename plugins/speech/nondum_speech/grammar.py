@@ -19,7 +19,7 @@ PHONE_WORDS = {f"__{phone.lower()}": phone for phone in PHONES}
 """Words of one phone: free words are heard as any phones, and understood in a second go."""
 
 _PART = re.compile(r"\{([\w-]+)\}|([\[\]])|([^\s\[\]{}]+)")
-_BREAKS = re.compile(r"[^a-z0-9']+")
+_BREAKS = re.compile(r"[^\w'-]+")
 _ARTICLES = ("the", "a", "an")
 _FREE = "free"
 
@@ -43,12 +43,12 @@ class Vocabulary:
 
 
 def words_of(text: str) -> tuple[str, ...]:
-    """The words of a text as they are said, one by one.
+    """The words of a text, as a host reads them.
 
-    >>> words_of("Radiation-source 2")
-    ('radiation', 'source', '2')
+    >>> words_of("The X-ray, 2!")
+    ('the', 'x-ray', '2')
     """
-    return tuple(word for word in _BREAKS.split(text.casefold()) if word.strip("'"))
+    return tuple(word for word in _BREAKS.split(text.casefold()) if word.strip("'-"))
 
 
 def jsgf(vocabulary: Vocabulary, sayable: frozenset[str]) -> str | None:

@@ -7,6 +7,7 @@ pronounce the words that stand in no dictionary.
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -20,6 +21,7 @@ ACCENTS = ("en-us", "en", "en-gb-x-rp", "en-gb-scotland", "en-gb-x-gbclan", "en-
 """Voices of eSpeak NG whose pronunciations are expected."""
 MOST = 6
 """Pronunciations of one word: more make words alike."""
+_LATIN = re.compile(r"[a-z0-9]")
 _VARIANT = re.compile(r"\(\d+\)$")
 
 Say = Callable[[str, str], str]
@@ -60,6 +62,8 @@ def lexicon(words: Iterable[str], say: Say, accents: Iterable[str] = ACCENTS) ->
 def _pronunciations(
     word: str, known: tuple[str, ...], say: Say, accents: tuple[str, ...]
 ) -> tuple[str, ...]:
+    if not _LATIN.search(unicodedata.normalize("NFKD", word)):
+        return ()  # the voices would spell it
     voices = (arpabet(say(word, accent)) for accent in accents)
     return tuple(dict.fromkeys((*known, *filter(None, voices))))[:MOST]
 

@@ -1,38 +1,36 @@
 """Sound to a sentence that can be said now, or to the reason why it is none.
 
-PocketSphinx hears by the grammar, which gives the nearest sentence whatever was said. A second
-decoder hears the same sound as any phones at all: where the words explain the sound much worse than
-free phones do, something else was said.
+A grammar's decoder gives the nearest sentence, whatever was said. So the same sound is heard freely
+too: as any words of the dictionary, and as any phones. Where the sentence explains the sound worse
+than those do, something else was said.
 """
 
 from __future__ import annotations
 
-import math
-import re
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 from pocketsphinx import Decoder, get_model_path
 
+from nondum_speech.decoding import (
+    Decoding,
+    Segment,
+    decoded,
+    decoder,
+    frames_of,
+    made_audible,
+)
 from nondum_speech.grammar import PHONE_WORDS, Vocabulary, jsgf
 from nondum_speech.lexicon import Lexicon
-from nondum_speech.sound import RATE_HZ, Samples, Sound
+from nondum_speech.sound import Samples, Sound
 
-_MODEL = "en-us/en-us"
-_SILENCE_S = 0.3
-_HISS = 15.0
-"""Rms of noise that is added: the recogniser fails on exact digital silence."""
-_FRAME_S = 0.01
-_NOT_SPOKEN = ("<", "(", "[", "++")
-_VARIANT = re.compile(r"\(\d+\)$")
-_LEAST = -708.0
-"""Stands for the logarithm of a likelihood too small for a number."""
-_UNWEIGHED = frozenset({"the", "a", "an"})
-"""Too short to be sure of, and of no meaning."""
+PHONES_WEIGH = 0.5
+"""What phones count beside words; see the benchmark."""
+_UNSAID = "something"
+"""Stands for free words that are none of the dictionary's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,123 +40,87 @@ class Heard:
     words: str
     """The nearest sentence; empty where there is none."""
     confidence: float
-    """Of its worst word: log-likelihood a frame against free phones. Zero is as good as any."""
+    """How well it explains the sound: log-likelihood a frame, less that of anything free."""
     said: str = ""
-    """`words` if it was said; empty if something else was."""
+    """`words` if that was said; empty if something else was."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Segment:
-    word: str
-    first: int
-    last: int
-    score: float
-    """Log-likelihood of the sound."""
+NOTHING = Heard("", float("-inf"))
 
-    @property
-    def frames(self) -> int:
-        return self.last - self.first + 1
+
+class FreeHearing:
+    """Hears anything: it is what a sentence has to compare with. Takes 0.3 s to make."""
+
+    def __init__(self) -> None:
+        dictionary = get_model_path("en-us/cmudict-en-us.dict")
+        language, phones = (get_model_path(f"en-us/en-us{kind}.lm.bin") for kind in ("", "-phone"))
+        self._words = decoder(dict=dictionary, lm=language, fwdflat=False, maxhmmpf=5000)
+        self._phones = decoder(dict=dictionary, allphone=phones)
+
+    def words(self, samples: Samples) -> Decoding | None:
+        """As words of the dictionary, likely after each other."""
+        return decoded(self._words, samples)
+
+    def phones(self, samples: Samples) -> Decoding | None:
+        """As phones of English, likely after each other."""
+        return decoded(self._phones, samples)
 
 
 class Recogniser:
     """Hears the sentences of one vocabulary; not for several threads at once."""
 
-    def __init__(self, vocabulary: Vocabulary, lexicon: Lexicon, *, confidence: float) -> None:
-        """`confidence`: what the worst word must reach to be taken as said."""
-        self._confidence = confidence
+    def __init__(
+        self, vocabulary: Vocabulary, lexicon: Lexicon, free: FreeHearing, *, confidence: float
+    ) -> None:
+        """`confidence`: what a sentence must reach to be taken as said."""
+        self._free, self._confidence = free, confidence
         grammar = jsgf(vocabulary, frozenset(lexicon.pronunciations))
-        self._words: Decoder | None = None
-        self._free: Decoder | None = None
-        self._dictation: Decoder | None = None
-        if grammar is None:
-            return
-        with tempfile.TemporaryDirectory() as folder:
-            dictionary, rules = Path(folder, "words.dict"), Path(folder, "said.gram")
-            phones = "".join(f"{word} {phone}\n" for word, phone in PHONE_WORDS.items())
-            dictionary.write_text(lexicon.to_dictionary() + phones, encoding="ascii")
-            rules.write_text(grammar + "\n", encoding="ascii")
-            self._words = _decoder(dict=str(dictionary), jsgf=str(rules), bestpath=False)
-            self._free = _decoder(
-                dict=str(dictionary), allphone=get_model_path("en-us/en-us-phone.lm.bin")
-            )
+        self._grammatical = _decoder_of(grammar, lexicon) if grammar else None
 
     def hear(self, sound: Sound) -> Heard:
-        """Recognise one sentence. Takes about a fifth of the time that it took to say it."""
-        if self._words is None or self._free is None:
-            return Heard("", _LEAST)
-        samples = _made_audible(sound)
-        segments = list(_decoded(self._words, samples))
-        words = " ".join(segment.word for segment in segments)
-        if not self._words.get_fsg().accept(words):  # the beginning of a sentence is none
-            return Heard("", _LEAST)
-        confidence = _worst(segments, list(_decoded(self._free, samples)))
-        text = self._in_words(segments, samples)
+        """Recognise one sentence, in about a quarter of the time that it took to say it."""
+        if self._grammatical is None:
+            return NOTHING
+        samples = made_audible(sound)
+        sentence = decoded(self._grammatical, samples)
+        if sentence is None or not self._is_whole(sentence):
+            return NOTHING
+        words, phones = self._free.words(samples), self._free.phones(samples)
+        if words is None or phones is None:
+            return NOTHING
+        worse = sentence.acoustic - words.acoustic
+        worse += PHONES_WEIGH * (sentence.total - phones.total)
+        confidence = worse / frames_of(samples)
+        text = " ".join(_with_free_words(sentence, words))
         return Heard(text, confidence, said=text if confidence >= self._confidence else "")
 
-    def _in_words(self, segments: list[_Segment], samples: Samples) -> str:
-        """The sentence, with words of the whole dictionary where any may stand."""
-        text: list[str] = []
-        free: list[_Segment] = []
-        for segment in (*segments, None):
-            if segment is not None and segment.word in PHONE_WORDS:
-                free.append(segment)
-                continue
-            if free:
-                step = int(RATE_HZ * _FRAME_S)
-                text.append(self._dictated(samples[free[0].first * step : free[-1].last * step]))
-                free = []
-            if segment is not None:
-                text.append(segment.word)
-        return " ".join(text)
-
-    def _dictated(self, samples: Samples) -> str:
-        if self._dictation is None:
-            self._dictation = _decoder(
-                dict=get_model_path("en-us/cmudict-en-us.dict"),
-                lm=get_model_path("en-us/en-us.lm.bin"),
-            )
-        return " ".join(s.word for s in _decoded(self._dictation, samples)) or "something"
+    def _is_whole(self, sentence: Decoding) -> bool:
+        """Whether it is no mere beginning of a sentence."""
+        assert self._grammatical is not None, "only asked of what it decoded"
+        accepts: bool = self._grammatical.get_fsg().accept(" ".join(sentence.words))
+        return accepts
 
 
-def _decoder(**options: Any) -> Decoder:
-    """Scores of different decoders compare: all weigh a frame against the same best state."""
-    return Decoder(
-        hmm=get_model_path(_MODEL), loglevel="FATAL", cmn="batch", compallsen=True, **options
-    )
+def _decoder_of(grammar: str, lexicon: Lexicon) -> Decoder:
+    phones = "".join(f"{word} {phone}\n" for word, phone in PHONE_WORDS.items())
+    with tempfile.TemporaryDirectory() as folder:
+        dictionary, rules = Path(folder, "words.dict"), Path(folder, "said.gram")
+        dictionary.write_text(lexicon.to_dictionary() + phones, encoding="utf-8")
+        rules.write_text(grammar + "\n", encoding="utf-8")
+        return decoder(dict=str(dictionary), jsgf=str(rules))
 
 
-def _made_audible(sound: Sound) -> Samples:
-    """With a little silence around, and none of it exact; the same each time."""
-    silence = np.zeros(int(_SILENCE_S * RATE_HZ), np.int16)
-    samples = np.concatenate([silence, sound.samples, silence]).astype(np.float64)
-    samples += np.random.default_rng(0).normal(0.0, _HISS, len(samples))
-    return np.clip(samples, -32768, 32767).astype(np.int16)
+def _with_free_words(sentence: Decoding, free: Decoding) -> Iterator[str]:
+    """The sentence, with the dictionary's words where any may stand."""
+    for is_free, group in groupby(sentence.segments, lambda s: s.word in PHONE_WORDS):
+        segments = tuple(group)
+        if is_free:
+            yield " ".join(_within(segments, free)) or _UNSAID
+        else:
+            yield from (segment.word for segment in segments)
 
 
-def _decoded(decoder: Decoder, samples: Samples) -> Iterator[_Segment]:
-    """The words, or phones, of a sound, without silence and noise."""
-    decoder.start_utt()
-    decoder.process_raw(samples.tobytes(), full_utt=True)
-    decoder.end_utt()
-    for part in decoder.seg() or ():
-        if not part.word.startswith(_NOT_SPOKEN):
-            score = math.log(part.ascore) if part.ascore > 0 else _LEAST
-            yield _Segment(_VARIANT.sub("", part.word), part.start_frame, part.end_frame, score)
-
-
-def _worst(words: list[_Segment], phones: list[_Segment]) -> float:
-    """How much worse than by free phones the sound of the worst word is explained, a frame."""
-    by_frame = {
-        frame: phone.score / phone.frames
-        for phone in phones
-        for frame in range(phone.first, phone.last + 1)
-    }
-    return min(
-        (
-            (word.score - sum(by_frame.get(f, 0.0) for f in range(word.first, word.last + 1)))
-            / word.frames
-            for word in words
-            if word.word not in PHONE_WORDS and word.word not in _UNWEIGHED
-        ),
-        default=_LEAST,
-    )
+def _within(segments: tuple[Segment, ...], free: Decoding) -> Iterator[str]:
+    for segment in free.segments:
+        if segments[0].first <= (segment.first + segment.last) / 2 <= segments[-1].last:
+            yield segment.word

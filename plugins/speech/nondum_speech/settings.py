@@ -13,8 +13,8 @@ class Settings:
     """A capture device of ALSA; empty: no microphone."""
     inbox: str = ""
     """Folder of WAV files to hear; empty: `inbox` in the component's scratch folder."""
-    confidence: float = -3.0
-    """What the worst word must reach at least to be taken as said; nearer zero is stricter."""
+    confidence: float = -0.85
+    """What a sentence must reach to be taken as said; nearer zero is stricter."""
     said: str = ""
     """Folder for a WAV file of each sentence said; empty: the default sound device."""
     voice: str = "en-us"
@@ -25,4 +25,4 @@ class Settings:
         if not 80 <= self.words_per_minute <= 450:
             raise ValueError("words_per_minute must lie between 80 and 450")
         if self.confidence > 0:
-            raise ValueError("confidence is zero or less")
+            raise ValueError("confidence must not be above zero")

@@ -1,0 +1,46 @@
+"""eSpeak NG as its wheel carries it."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import espeakng_loader
+import pytest
+
+from nondum_speech.espeak import Espeak, VoiceUnknown
+
+SPEAK = """
+import sys
+from pathlib import Path
+import espeakng_loader
+espeakng_loader.get_data_path = lambda: sys.argv[1]
+from nondum_speech.espeak import Espeak
+print(Espeak(Path(sys.argv[2])).phonemes("hello", voice="en-us"))
+"""
+
+
+def test_speed_is_kept(espeak: Espeak) -> None:
+    slow, quick = (
+        espeak.say("search for people", voice="en-us", words_per_minute=speed).seconds
+        for speed in (100, 200)
+    )
+    assert 1.5 < slow / quick < 2.5
+
+
+def test_unknown_voice_is_refused(espeak: Espeak) -> None:
+    with pytest.raises(VoiceUnknown, match="'klingonese'"):
+        espeak.say("hello", voice="klingonese", words_per_minute=160)
+
+
+@pytest.mark.parametrize("length", [100, 150, 160, 170, 250])
+def test_data_are_found_however_long_their_path(tmp_path: Path, length: int) -> None:
+    """Venvs lie deep; the library cuts off long paths. In a process of its own: it looks once."""
+    data = tmp_path / ("d" * max(1, length - len(str(tmp_path)) - 1))
+    shutil.copytree(espeakng_loader.get_data_path(), data)
+    (tmp_path / "s").mkdir()
+    command = [sys.executable, "-c", SPEAK, data, tmp_path / "s"]
+    said = subprocess.run(command, capture_output=True, text=True, check=True, cwd=Path.cwd())
+    assert said.stdout.strip() == "h_ə_l_ˈoʊ"

@@ -1,0 +1,108 @@
+"""Real voices say sentences, and real ears tell which of them can be said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nondum_speech.espeak import Espeak
+from nondum_speech.grammar import Vocabulary
+from nondum_speech.lexicon import cmu_dictionary, lexicon
+from nondum_speech.recogniser import FreeHearing, Recogniser
+from nondum_speech.sentences import sentences_of
+from nondum_speech.sound import RATE_HZ, Sound
+
+SAID = (
+    ("search for people", "en-us", 160),
+    ("please follow people", "en-us+f2", 140),
+    ("follow quadrotors", "en-us", 150),
+    ("point at the radiation source", "en-gb-x-rp", 160),
+    ("please locate the radiation source", "en-us+m3", 180),
+    ("locate the zorgon", "en-us", 150),
+)
+
+
+def noise(seconds: float, rms: float) -> Sound:
+    samples = np.random.default_rng(3).normal(0.0, rms, int(seconds * RATE_HZ))
+    return Sound(samples.astype(np.int16))
+
+
+@pytest.mark.parametrize(("text", "voice", "speed"), SAID, ids=lambda value: str(value))
+def test_phrase_is_heard_by_many_voices(
+    espeak: Espeak, ears: Recogniser, text: str, voice: str, speed: int
+) -> None:
+    heard = ears.hear(espeak.say(text, voice=voice, words_per_minute=speed))
+    assert heard.said == text
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "good morning everyone",
+        "the weather will be fine tomorrow",
+        "please sit down",
+        "search the room",
+        "point at",
+        "people",
+        "turn left at the corner",
+    ],
+)
+def test_sentence_that_is_no_phrase_is_refused(espeak: Espeak, ears: Recogniser, text: str) -> None:
+    assert not ears.hear(espeak.say(text, voice="en-us", words_per_minute=160)).said
+
+
+@pytest.mark.parametrize(
+    "sound",
+    [noise(2.0, 2000.0), noise(1.0, 10.0), Sound(np.zeros(16_000, np.int16)), noise(0.0, 1.0)],
+    ids=["noise", "hiss", "silence", "nothing"],
+)
+def test_no_speech_is_no_sentence(ears: Recogniser, sound: Sound) -> None:
+    assert not ears.hear(sound).said
+
+
+def test_phrase_is_heard_through_noise(espeak: Espeak, ears: Recogniser) -> None:
+    said = espeak.say("search for people", voice="en-us", words_per_minute=160)
+    hiss = noise(said.seconds, 0.1 * float(np.std(said.samples))).samples
+    assert ears.hear(Sound(said.samples + hiss[: len(said.samples)])).said == "search for people"
+
+
+def test_free_words_are_words_of_the_dictionary(espeak: Espeak, ears: Recogniser) -> None:
+    words = ears.hear(said(espeak, "follow people through the old building")).said.split()
+    assert words[:3] == ["follow", "people", "through"]
+    assert "old" in words[3:]
+    assert cmu_dictionary().keys() >= set(words)
+
+
+def test_same_sound_is_heard_the_same(espeak: Espeak, ears: Recogniser) -> None:
+    said = espeak.say("follow people", voice="en-us", words_per_minute=160)
+    assert ears.hear(said) == ears.hear(said)
+
+
+def test_other_words_are_heard_after_others_are_learnt(espeak: Espeak, free: FreeHearing) -> None:
+    vocabulary = Vocabulary(("switch off the lamp", "open the gate"))
+    words = lexicon(vocabulary.words, lambda word, voice: espeak.phonemes(word, voice=voice))
+    others = Recogniser(vocabulary, words, free, confidence=-0.85)
+    assert others.hear(said(espeak, "open the gate")).said == "open the gate"
+    assert not others.hear(said(espeak, "search for people")).said
+
+
+def test_nothing_is_heard_where_nothing_can_be_said(espeak: Espeak, free: FreeHearing) -> None:
+    mute = Recogniser(Vocabulary(), lexicon((), lambda word, voice: ""), free, confidence=-9.0)
+    assert not mute.hear(said(espeak, "follow people")).words
+
+
+def test_pauses_part_sentences(espeak: Espeak, ears: Recogniser) -> None:
+    pause = np.zeros(2 * RATE_HZ, np.int16)
+    texts = ("follow people", "point at the radiation source")
+    pieces = [piece for text in texts for piece in (said(espeak, text).samples, pause)]
+    sentences = sentences_of(Sound(np.concatenate([pause, *pieces])))
+    assert [ears.hear(sentence).said for sentence in sentences] == list(texts)
+
+
+def test_endless_humming_is_cut_off(espeak: Espeak) -> None:
+    many = np.concatenate([said(espeak, "follow people everywhere").samples] * 30)
+    assert all(sentence.seconds < 13 for sentence in sentences_of(Sound(many)))
+
+
+def said(espeak: Espeak, text: str) -> Sound:
+    return espeak.say(text, voice="en-us", words_per_minute=160)
