@@ -48,7 +48,8 @@ def test_of_rules_with_too_many_bindings_nothing_is_said() -> None:
     """What others say is drawn all the same, unless it asks for what is not known then."""
     pins = " ".join(f"pin{number}" for number in range(100))
     saying = "(or (lit ?a) (near ?a ?b) (not (lit ?c)) (lit ?d))"
-    wide = f"""(:constants {pins} - place) (:predicates (lit ?p - place) (near ?a ?b - place) (well))
+    wide = f"""(:constants {pins} - place)
+        (:predicates (lit ?p - place) (near ?a ?b - place) (well))
         (:derived (near ?a ?b - place) (lit ?a))
         (:derived (well) (forall (?a ?b ?c ?d - place) {saying}))"""
     words = "(:predicates (dark) (well) (ill) (poor) (lit ?p - place))"

@@ -14,9 +14,9 @@ from tests.planning.strangers import (
     components,
 )
 
+from nondum.planning.bounds import INSTANCES_LIMIT, TooManyBindings
 from nondum.planning.contribution import Contribution
 from nondum.planning.domain import Merged
-from nondum.planning.exploration import INSTANCES_LIMIT, TooManyBindings
 from nondum.planning.goal import parse_goal
 from nondum.planning.ground import ground
 from nondum.planning.merge import merge

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
+from nondum.planning.bounds import TooManyBindings
 from nondum.planning.derivation import asked_by
 from nondum.planning.domain import DerivedRule, Merged
 from nondum.planning.draft import drafted
-from nondum.planning.exploration import TooManyBindings, explore
+from nondum.planning.exploration import explore
 from nondum.planning.facts import predicate_of
 from nondum.planning.normal import Condition
 from nondum.planning.polarity import positive_task

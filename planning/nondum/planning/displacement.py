@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from dataclasses import replace
 
-from nondum.planning.exploration import Exploration
+from nondum.planning.instances import Exploration
 
 
 def displaced(found: Exploration, functional: frozenset[str]) -> Exploration:

@@ -5,19 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from nondum.planning.bounds import INSTANCES_LIMIT, work_for
 from nondum.planning.derivation import strata_of
 from nondum.planning.domain import Merged, bind
 from nondum.planning.expansion import Expander, Standing
-from nondum.planning.exploration import (
-    INSTANCES_LIMIT,
-    Change,
-    Exploration,
-    Instance,
-    work_for,
-)
 from nondum.planning.facts import parts
 from nondum.planning.goal import GoalExpr
+from nondum.planning.instances import Change, Exploration, Instance
 from nondum.planning.literals import Literals
+from nondum.planning.reach import reachable
 from nondum.planning.spending import Spending
 from nondum.planning.syntax import Atom, Equal
 
@@ -212,51 +208,3 @@ def _net(
         others = deleted - added - add - delete
         if mine or others:
             yield DraftChange(condition, mine, others)
-
-
-def reachable(draft: Draft) -> Draft:
-    """Only what can happen if nothing is ever deleted; negative conditions count as met."""
-    reached = reached_in(draft)
-    return Draft(
-        tuple(action for action in draft.actions if action.condition.positive <= reached),
-        tuple(rule for rule in draft.rules if rule.body.positive <= reached),
-        draft.layers,
-        draft.goal,
-        draft.believed,
-    )
-
-
-def reached_in(draft: Draft) -> frozenset[int]:
-    """The facts that can become true if nothing is ever deleted."""
-    needs: dict[int, list[int]] = {}
-    gives: list[frozenset[int]] = []
-    missing: list[int] = []
-    for condition, given in _givers(draft):
-        for fact in condition.positive:
-            needs.setdefault(fact, []).append(len(gives))
-        gives.append(given)
-        missing.append(len(condition.positive))
-    reached = set(draft.believed)
-    waiting = list(reached)
-    ready = [index for index, count in enumerate(missing) if not count]
-    while ready or waiting:
-        while ready:
-            new = gives[ready.pop()] - reached
-            reached |= new
-            waiting += new
-        if waiting:
-            for index in needs.get(waiting.pop(), ()):
-                missing[index] -= 1
-                if not missing[index]:
-                    ready.append(index)
-    return frozenset(reached)
-
-
-def _givers(draft: Draft) -> Iterator[tuple[Literals, frozenset[int]]]:
-    """Everything that makes facts true, with what it needs."""
-    for action in draft.actions:
-        yield action.condition, action.add
-        for change in action.changes:
-            yield action.condition | change.condition, change.add
-    for rule in draft.rules:
-        yield rule.body, frozenset((rule.head,))

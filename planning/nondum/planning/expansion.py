@@ -9,10 +9,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from nondum.planning.exploration import Exploration, domains_of
+from nondum.planning.instances import Exploration
 from nondum.planning.join import Domains, Join, Rule, Values, Work
 from nondum.planning.literals import Literals
 from nondum.planning.matching import Pattern
+from nondum.planning.members import domains_of
 from nondum.planning.normal import condition_of, normal
 from nondum.planning.relations import Relations, Row
 from nondum.planning.static import Names, value_of

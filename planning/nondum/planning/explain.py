@@ -12,12 +12,13 @@ from nondum.planning.conflict import Conflict, Search, conflict_of
 from nondum.planning.contribution import Contribution
 from nondum.planning.core import core_graph
 from nondum.planning.domain import Merged
-from nondum.planning.draft import Draft, drafted, reached_in
+from nondum.planning.draft import Draft, drafted
 from nondum.planning.exploration import explore
 from nondum.planning.facts import parts, predicate_of
 from nondum.planning.goal import GoalExpr
 from nondum.planning.matching import Relations
 from nondum.planning.missing import Outlook
+from nondum.planning.reach import reached_in
 from nondum.planning.syntax import Atom
 from nondum.planning.tracing import Tracer
 from nondum.planning.typegraph import TypeGraph, types_or_root

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from nondum.planning.bounds import INSTANCES_LIMIT
 from nondum.planning.concern import concern
 from nondum.planning.displacement import displaced
 from nondum.planning.domain import Merged, functional_predicates
 from nondum.planning.draft import drafted
-from nondum.planning.exploration import INSTANCES_LIMIT, explore
+from nondum.planning.exploration import explore
 from nondum.planning.facts import predicate_of
 from nondum.planning.goal import GoalExpr
 from nondum.planning.polarity import positive_task

@@ -12,8 +12,8 @@ from itertools import product
 
 from nondum.planning.derivation import strata_of
 from nondum.planning.domain import Action, Merged
-from nondum.planning.exploration import domains_of, members_of
 from nondum.planning.facts import parts
+from nondum.planning.members import domains_of, members_of
 from nondum.planning.normal import Condition, condition_of, normal
 from nondum.planning.relations import Row
 from nondum.planning.static import Names, value_of

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice, product
 
-from nondum.planning.exploration import domains_of
 from nondum.planning.matching import Binding, Pattern, Relations, matched
+from nondum.planning.members import domains_of
 from nondum.planning.normal import Condition
 from nondum.planning.syntax import (
     And,

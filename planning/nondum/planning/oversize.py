@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from nondum.planning.bounds import TooManyBindings
 from nondum.planning.contribution import Contribution
 from nondum.planning.domain import Merged
-from nondum.planning.exploration import TooManyBindings
 from nondum.planning.merge import merge
 from nondum.sdk.errors import Problem
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+from nondum.planning.bounds import TooManyBindings
 from nondum.planning.domain import Origin
-from nondum.planning.exploration import TooManyBindings
 from nondum.planning.join import TooMuchWork, Work
 
 

@@ -14,10 +14,10 @@ from dataclasses import dataclass, field, replace
 from nondum.planning.cause import Cause, Lack, distinct
 from nondum.planning.core import HOST_PREDICATES
 from nondum.planning.domain import Merged
-from nondum.planning.exploration import domains_of
 from nondum.planning.facts import fact, parts
 from nondum.planning.goal import GoalExpr
 from nondum.planning.matching import Binding, Pattern, Relations, matched
+from nondum.planning.members import domains_of
 from nondum.planning.missing import Missing, Outlook, Shortfall
 from nondum.planning.normal import Condition
 from nondum.planning.syntax import (

@@ -11,9 +11,9 @@ from nondum.host.mind.composition import Composition
 from nondum.host.mind.diagnosis import Seen, why_not, words_gone
 from nondum.host.mind.goals import GivenGoal
 from nondum.host.mind.planners import Planners
+from nondum.planning.bounds import INSTANCES_LIMIT
 from nondum.planning.cutting import cut_short
 from nondum.planning.domain import Merged
-from nondum.planning.exploration import INSTANCES_LIMIT
 from nondum.planning.goal import Goal, goal_problems, parse_goal
 from nondum.planning.ground import ground
 from nondum.planning.oversize import Fitted, fitted

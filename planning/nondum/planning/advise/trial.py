@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 from enum import Enum, auto
 
 from nondum.planning.advise.candidate import Candidate, Here
+from nondum.planning.bounds import TooManyBindings
 from nondum.planning.conflict import Search
 from nondum.planning.contribution import Contribution
 from nondum.planning.cutting import cut_short
 from nondum.planning.domain import Merged, Origin
-from nondum.planning.exploration import TooManyBindings
 from nondum.planning.facts import parts
 from nondum.planning.goal import GoalExpr, parse_goal
 from nondum.planning.ground import ground
