@@ -8,7 +8,7 @@ import pytest
 from tests.transport.peers.hosts import Host, host, identity, raises, trusting, two_hosts, up
 
 from nondum.sdk.errors import ProtocolViolation
-from nondum.transport.peers import PeerUnreachable, PeerUp, Security
+from nondum.transport.peers import DialFailed, PeerUnreachable, PeerUp, Security
 from nondum.transport.peers.calls import CREDIT
 
 pytestmark = pytest.mark.anyio
@@ -166,6 +166,14 @@ async def test_first_address_that_works_wins() -> None:
         here.node.dial(there.key, ["tcp://192.0.2.1:9", "tcp://127.0.0.1:1", there.address])
         await up(here, there)
         assert (await here.told(PeerUp)).address == there.address
+
+
+async def test_address_that_cannot_be_dialled_is_told() -> None:
+    rover, base = identity("rover"), identity("base")
+    async with host(base, trusting(rover)) as there, host(rover, trusting(base)) as here:
+        here.node.dial(there.key, ["tcp://nobody:port", there.address])
+        assert (await here.told(DialFailed)).problem.code == "ADDRESS_MALFORMED"
+        await up(here, there)
 
 
 async def test_round_trip_is_measured() -> None:

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
 
-AWAITED_S = 5.0
-"""How long a connection may take to become a peer's."""
+AWAITED_S = 4.5
+"""How long a connection may take to become a peer's: a little less than ZeroMQ's own handshake."""
 MAX_STRANGERS = 256
 """Connections that are no peers yet; the oldest makes room."""
 STRANGERS_BYTES = 64 * 1024

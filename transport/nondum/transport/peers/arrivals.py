@@ -8,7 +8,7 @@ from collections.abc import Callable
 import zmq
 
 from nondum.transport.peers.accepted import AcceptedConnections
-from nondum.transport.peers.monitor import HANDSHAKE_FAILED, SocketEvent
+from nondum.transport.peers.monitor import SocketEvent
 from nondum.transport.peers.refusals import Reason, Refusal, Refusals
 
 # From zmq.h: ZMQ_PROTOCOL_ERROR_ZMTP_CRYPTOGRAPHIC and …_MECHANISM_MISMATCH.
@@ -22,8 +22,8 @@ class Arrivals:
         """`on_closed` is told the descriptor of every connection that ended."""
         self._refusals, self._on_closed = refusals, on_closed
         self._connections = AcceptedConnections()
-        self._failure: SocketEvent | None = None
-        """Of the connection whose end is told next: one thread tells, in order."""
+        self._explained = 0
+        """Connections whose failure was told, and counted, but not yet their end."""
 
     @property
     def strangers(self) -> int:
@@ -37,12 +37,14 @@ class Arrivals:
             for end in self._connections.opened(event.value, now_s):
                 self._count(Reason.CROWDED, end)
         elif event.kind == zmq.EVENT_DISCONNECTED:
-            failure, self._failure = self._failure, None
             if self._connections.closed(event.value):
-                self._count_failed(failure)
+                self._count_end()
             self._on_closed(event.value)
-        elif event.kind & HANDSHAKE_FAILED:
-            self._failure = event
+        elif event.kind == zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL:
+            self._explained += 1
+            self._count(Reason.MISMATCH if event.value in _OTHER_KEYS else Reason.GARBAGE)
+        elif event.kind == zmq.EVENT_HANDSHAKE_FAILED_AUTH:
+            self._explained += 1  # the gate has counted it
 
     def became_peer(self, descriptor: int) -> None:
         """A connection has shown who it is."""
@@ -53,14 +55,12 @@ class Arrivals:
         for end in self._connections.cut_overdue(asyncio.get_running_loop().time()):
             self._count(Reason.SILENT, end)
 
-    def _count_failed(self, failure: SocketEvent | None) -> None:
-        if failure is None:
+    def _count_end(self) -> None:
+        """A connection ended that was no peer's: some end without a reason told."""
+        if self._explained:
+            self._explained -= 1
+        else:
             self._count(Reason.GARBAGE)
-        elif failure.kind == zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL:
-            self._count(Reason.SILENT)
-        elif failure.kind == zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL:
-            self._count(Reason.MISMATCH if failure.value in _OTHER_KEYS else Reason.GARBAGE)
-        # and those that were turned away for their key, the gate has counted
 
     def _count(self, reason: Reason, end: str = "") -> None:
         now_s = asyncio.get_running_loop().time()

@@ -153,12 +153,9 @@ class Dial:
         if not self._is_wanted(self.key):
             return
         for address in self.addresses:
-            socket = self._connect(self.key)
             try:
-                self._attempts.append(Attempt(self, socket, address))
+                self._attempts.append(Attempt(self, self._connect(self.key), address))
             except zmq.ZMQError as error:
-                socket.disable_monitor()
-                socket.close(0)
                 self._tell(address, _unusable(error))
         if self._limit is not None:
             self._limit.cancel()

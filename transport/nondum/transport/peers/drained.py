@@ -68,7 +68,6 @@ class Drained:
         self._loop.remove_reader(self._descriptor)
         if self._again is not None:
             self._again.cancel()
-        self._socket.disable_monitor()
         self._socket.close(linger_ms)
 
     def _look_again(self) -> None:

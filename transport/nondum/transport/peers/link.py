@@ -12,7 +12,7 @@ from nondum.transport.peers import accepted
 from nondum.transport.peers.drained import Drained, Sent
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.messages import Message, Ping, encode
-from nondum.transport.peers.monitor import SocketEvent, watch
+from nondum.transport.peers.monitor import SocketEvent, Watch
 
 if TYPE_CHECKING:
     from nondum.transport.peers.session import Session
@@ -91,7 +91,7 @@ class AcceptedRoute:
 
 
 class DialledRoute:
-    """Over a socket of its own."""
+    """Over a socket of its own. Raises `zmq.ZMQError` for an address that cannot be dialled."""
 
     def __init__(
         self,
@@ -101,9 +101,13 @@ class DialledRoute:
         on_event: Callable[[SocketEvent], None],
     ) -> None:
         self.address = address
-        self._ears = watch(socket, on_event)
+        self._ears = Watch(socket, on_event)
         self._socket = Drained(socket, on_data)
-        socket.connect(address)
+        try:
+            socket.connect(address)
+        except zmq.ZMQError:
+            self.cut()
+            raise
 
     def send(self, data: bytes) -> Sent:
         """Send without waiting."""

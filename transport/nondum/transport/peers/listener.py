@@ -14,7 +14,7 @@ from nondum.sdk.errors import Problem
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import HostKeys, PeerKey
 from nondum.transport.peers.messages import MAX_MESSAGE
-from nondum.transport.peers.monitor import HANDSHAKE_FAILED, SocketEvent, watch
+from nondum.transport.peers.monitor import HANDSHAKE_FAILED, SocketEvent, Watch
 from nondum.transport.peers.zap import DOMAIN
 
 Context = zmq.Context[zmq.Socket[bytes]]
@@ -79,7 +79,7 @@ async def prove_enforced(
     address = socket.getsockopt(zmq.LAST_ENDPOINT)
     assert isinstance(address, bytes)
     probe = dialling(socket.context, probing, keys.public if keys else None)
-    ears = watch(probe, on_event)
+    ears = Watch(probe, on_event)
     try:
         probe.connect(address.decode("ascii"))
         async with asyncio.timeout(PROVED_S):
@@ -88,7 +88,6 @@ async def prove_enforced(
         is_enforced = False
     finally:
         ears.close()
-        probe.disable_monitor()
         probe.close(0)
         socket.unbind(address)
     if not is_enforced:

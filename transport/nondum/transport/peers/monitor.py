@@ -43,17 +43,26 @@ class SocketEvent:
     """The listening or the dialled end."""
 
 
-def watch(socket: zmq.Socket[bytes], on_event: Callable[[SocketEvent], None]) -> Drained:
-    """Tell of a socket's connections until the result is closed (before the socket is)."""
-    # Not pyzmq's own name, made of the descriptor: descriptors come back, names linger.
-    address = f"inproc://nondum.monitor.{next(_numbers)}"
-    socket.monitor(address, WATCHED)
-    ears = socket.context.socket(zmq.PAIR)
-    ears.linger = 0
-    ears.connect(address)
+class Watch:
+    """Tells of a socket's connections. `close` it before the socket."""
 
-    def on_frames(frames: list[zmq.Frame]) -> None:
+    def __init__(self, socket: zmq.Socket[bytes], on_event: Callable[[SocketEvent], None]) -> None:
+        self._socket, self._on_event = socket, on_event
+        # Not pyzmq's own name, made of the descriptor: descriptors come back, names linger.
+        address = f"inproc://nondum.monitor.{next(_numbers)}"
+        socket.monitor(address, WATCHED)
+        ears = socket.context.socket(zmq.PAIR)
+        ears.linger = 0
+        ears.rcvhwm = 0  # or ZeroMQ's own thread waits, while this host hangs, for news to be read
+        ears.connect(address)
+        self._ears = Drained(ears, self._on_frames)
+
+    def close(self) -> None:
+        """Stop, in this order: ZeroMQ waits for ever to tell its end to ears that are gone."""
+        if not self._ears.is_closed:
+            self._socket.disable_monitor()
+            self._ears.close()
+
+    def _on_frames(self, frames: list[zmq.Frame]) -> None:
         kind, value = _FORMAT.unpack(frames[0].bytes)
-        on_event(SocketEvent(kind, value, frames[1].bytes.decode("ascii", "replace")))
-
-    return Drained(ears, on_frames)
+        self._on_event(SocketEvent(kind, value, frames[1].bytes.decode("ascii", "replace")))

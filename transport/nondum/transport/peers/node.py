@@ -24,7 +24,7 @@ from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.link import AcceptedRoute, Link
 from nondum.transport.peers.listener import dialling, listening, prove_enforced
 from nondum.transport.peers.messages import Notice, Ping, encode
-from nondum.transport.peers.monitor import watch
+from nondum.transport.peers.monitor import Watch
 from nondum.transport.peers.refusals import Reason, Refusal, Refusals
 from nondum.transport.peers.roster import LINGER_MS, Roster
 from nondum.transport.peers.trust import Admission, Trust
@@ -67,7 +67,7 @@ class PeerNode:
         self._inbound: dict[bytes, Link] = {}
         self._zap: ZapHandler | None = None
         self._listener: Drained | None = None
-        self._ears: Drained | None = None
+        self._ears: Watch | None = None
         self._beating: asyncio.TimerHandle | None = None
 
     @property
@@ -97,12 +97,11 @@ class PeerNode:
         socket = listening(self._context, self.identity.keys)
         try:
             await prove_enforced(socket, self.identity.keys, self._zap.expect_probe)
-            self._ears = watch(socket, self._arrivals.on_event)
+            self._ears = Watch(socket, self._arrivals.on_event)
             bound = tuple(_bind(socket, address) for address in addresses)
         except BaseException:
             if self._ears is not None:
                 self._ears.close()
-            socket.disable_monitor()
             socket.close(0)
             raise
         self._listener = Drained(socket, self._on_frames)
@@ -160,9 +159,10 @@ class PeerNode:
         if self._beating is not None:
             self._beating.cancel()
         self._roster.close()
-        for drained in (self._ears, self._listener):
-            if drained is not None:
-                drained.close(LINGER_MS)
+        if self._ears is not None:
+            self._ears.close()
+        if self._listener is not None:
+            self._listener.close(LINGER_MS)
         if self._zap is not None:
             self._zap.close()
         await asyncio.to_thread(self._context.term)
