@@ -570,5 +570,5 @@ def test_owner_of_a_unit_is_found() -> None:
 def test_local_name_and_types_of_objects_are_kept() -> None:
     result = merged(brings("cam", units={"lens": "camera"}, slots={"frames": "image"}))
     assert result.objects["rover__cam__frames"].local == "frames"
-    assert result.stream_type("rover__cam__frames") == "image"
+    assert result.objects["rover__cam__frames"].types == ("image",)
     assert list(result.objects_of("unit")) == ["rover__cam__lens"]

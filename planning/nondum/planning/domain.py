@@ -172,10 +172,6 @@ class Merged:
             if self.domain.types.all_kind_of(parameter.types, ("stream",))
         )
 
-    def stream_type(self, name: str) -> str:
-        """The type of a stream object. Raises `KeyError`."""
-        return self.objects[name].types[0]
-
     def valued_facts(self, ground: GroundAction) -> tuple[str, ...]:
         """The facts among a ground action's preconditions that carry a value."""
         bound = {f"?{name}": value for name, value in self.bound(ground).items()}
