@@ -18,6 +18,7 @@ from nondum.host.announcements import announced
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.config import HostConfig
 from nondum.host.control.server import ControlServer
+from nondum.host.conversation import Conversation
 from nondum.host.devices.slots import DeviceSlotSource
 from nondum.host.devices.source import DeviceSource
 from nondum.host.devices.udev import UdevSource
@@ -37,7 +38,6 @@ from nondum.host.mind.system_tree import load_system_tree
 from nondum.host.news import News
 from nondum.host.orders import Orders
 from nondum.host.questions import Questions
-from nondum.host.speech import Speech
 from nondum.host.workers.spec import Limits, Timing
 from nondum.host.workers.workers import Workers
 from nondum.planning.attempts import Patience
@@ -109,7 +109,7 @@ async def _run(
             stop,
             manager.run(),
             mind.run(),
-            Speech(mind, workers.plugins, workers.pids).run(),
+            Conversation(mind, workers.plugins, workers.pids).run(),
             *(source.watch(bus.emit) for source in device_sources(config)),
         )
     finally:

@@ -41,7 +41,7 @@ class Speaking(Protocol):
         ...
 
 
-class Speech:
+class Conversation:
     """Speaks and listens for one mind, while `run` runs."""
 
     def __init__(
