@@ -156,6 +156,14 @@ def test_wrong_usage_is_told_with_its_own_exit_code(arguments: list[str]) -> Non
     nondum(*arguments).refused(2, "Error: ")
 
 
+def test_wrong_usage_is_json_where_json_was_asked_for(tmp_path: Path) -> None:
+    ran = nondum("pddl", "check", tmp_path / "none.pddl", "--json")
+    assert ran.code == 2
+    [problem] = ran.json["problems"]
+    assert problem["code"] == "USAGE"
+    assert "none.pddl' does not exist" in problem["message"]
+
+
 def test_no_daemon_is_told_with_its_own_exit_code(tmp_path: Path) -> None:
     nowhere = tmp_path / "control.sock"
     ran = nondum("--control", nowhere, "status")

@@ -64,6 +64,7 @@ def json_option(command: _F) -> _F:
         "--json",
         "as_json",
         is_flag=True,
+        is_eager=True,
         expose_value=False,
         callback=_keep_as_json,
         help="Print JSON for machines.",

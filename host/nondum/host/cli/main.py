@@ -125,7 +125,10 @@ def _run(arguments: list[str]) -> int:
     except (click.exceptions.Abort, KeyboardInterrupt):
         return failure.EXIT_INTERRUPTED
     except click.ClickException as error:
-        error.show()
+        if session.as_json:
+            failure.tell(NondumError(Problem("USAGE", error.format_message())), as_json=True)
+        else:
+            error.show()
         return failure.EXIT_BAD_INPUT
     except NondumError as error:
         return failure.tell(error, as_json=session.as_json)
