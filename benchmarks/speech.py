@@ -21,6 +21,7 @@ from pathlib import Path
 
 import measuring
 import numpy as np
+
 from nondum_speech.espeak import Espeak
 from nondum_speech.grammar import Vocabulary
 from nondum_speech.lexicon import lexicon
@@ -217,8 +218,15 @@ def page(results: Sequence[Result]) -> str:
         ]
         for t in THRESHOLDS
     ]
-    heads = ["confidence", "right: espeak-ng", "right: flite", "of those not right, taken for another",
-             "taken: near misses", "taken: other sentences", "taken: people reading"]  # fmt: skip
+    heads = [
+        "confidence",
+        "right: espeak-ng",
+        "right: flite",
+        "of those not right, taken for another",
+        "taken: near misses",
+        "taken: other sentences",
+        "taken: people reading",
+    ]
     parts = [
         "# Spoken goals: heard, mistaken, refused\n",
         "`benchmarks/speech.py` wrote this page. " + METHOD,
@@ -231,7 +239,7 @@ def page(results: Sequence[Result]) -> str:
         _by("words a minute", mine, shipped, lambda r: str(r.clip.speed)),
         "",
         _by("white noise, dB below", mine, shipped, lambda r: str(r.clip.noise or "none")),
-        "\n## Near misses that are taken most\n",
+        "\n## What is mistaken most\n",
         _mistaken(kinds["near"] + kinds["far"] + kinds["people"], shipped),
         "\n## Time\n",
         _time(results),
@@ -246,7 +254,8 @@ A phrase is *right* when the goal that it asks for is taken: articles, *please*,
 words may be mistaken. Everything was said by machines, and synthesised voices flatter a recogniser:
 real rooms, real people and microphones were not measured, but for recordings of people who say
 other things (the test data of PocketSphinx: a novel read aloud, and names of playing cards).
-The pronunciations come from espeak-ng too, so its voices flatter twice; flite's do not."""
+The pronunciations come from espeak-ng too, so its voices flatter twice; flite's do not. The shipped
+confidence was chosen on two of espeak-ng's voices, before this page was made."""
 
 
 def _by(
@@ -270,7 +279,8 @@ def _time(results: Sequence[Result]) -> str:
     relative = [r.cpu_s / r.clip.sound.seconds for r in results if r.clip.sound.seconds > 0.2]
     total_s = sum(r.clip.sound.seconds for r in results)
     return (
-        f"{len(results)} clips, {total_s / 60:.0f} minutes: CPU seconds per second of sound, median "
+        f"{len(results)} clips, {total_s / 60:.0f} minutes. "
+        f"CPU seconds per second of sound: median "
         f"{measuring.percentile(relative, 50):.2f}, p95 {measuring.percentile(relative, 95):.2f}."
     )
 

@@ -53,6 +53,7 @@ class Ears:
                 Recogniser, vocabulary, words, self._free, confidence=self._confidence
             )
         self._learnt.set()
+        self._log.info("%d phrases can be heard", len(vocabulary.phrases))
 
     async def watch(self, inbox: Inbox) -> None:
         """Hear the files that are put into a folder, for ever."""

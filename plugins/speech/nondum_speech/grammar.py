@@ -15,7 +15,7 @@ PHONES = (
     "UW", "V", "W", "Y", "Z", "ZH",
 )  # fmt: skip
 """The recogniser's phones, without silence and noise."""
-PHONE_WORDS = {f"__{phone.lower()}": phone for phone in PHONES}
+PHONE_WORDS = {f"phone.{phone.lower()}": phone for phone in PHONES}
 """Words of one phone: free words are heard as any phones, and understood in a second go."""
 
 _PART = re.compile(r"\{([\w-]+)\}|([\[\]])|([^\s\[\]{}]+)")
@@ -105,7 +105,7 @@ def _expansion(
             parts += words_of(word)
         else:
             return None
-    return " ".join(parts).replace("[ ", "[").replace(" ]", "]")
+    return " ".join(parts).replace("[ ", "[").replace(" ]", "]").replace("[]", "")
 
 
 def _rule(slot: str) -> str:

@@ -20,8 +20,13 @@ def test_phrases_become_alternatives() -> None:
 
 def test_slot_without_names_takes_any_phones() -> None:
     free, said = rules(Vocabulary(("note [that {text}]",)))
-    assert free.startswith("<free> = (__aa | __ae")
+    assert free.startswith("<free> = (phone.aa | phone.ae")
     assert said == "public <said> = note [that <free>];"
+
+
+def test_part_without_words_is_left_out() -> None:
+    (said,) = rules(Vocabulary(("[!] stop",)))
+    assert said.split() == ["public", "<said>", "=", "stop;"]
 
 
 def test_words_stay_as_the_host_wrote_them() -> None:

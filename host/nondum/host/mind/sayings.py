@@ -34,11 +34,11 @@ def sayings(book: Phrasebook) -> Sayings:
             names.update({_called(slot): words for slot, words in slots.items()})
             phrases[_pattern(phrase)] = None
     told = list(phrases)
-    while _size(told, names) > SAYINGS_BYTES:
+    while told and _size(told, names) > SAYINGS_BYTES:
         if all(len(words) < 2 for words in names.values()):
             told = told[: len(told) // 2]
         names = {slot: words[: (len(words) + 1) // 2] for slot, words in names.items()}
-    return {"phrases": told, "names": names}
+    return {"phrases": told, "names": names if told else {}}
 
 
 def _names(book: Phrasebook, slot: Slot) -> list[str]:

@@ -1,0 +1,61 @@
+"""What recognisers are told: patterns with slots, and the names that fit."""
+
+from __future__ import annotations
+
+import json
+
+from tests.planning.strangers import ROVER
+
+from nondum.host.mind.sayings import SAYINGS_BYTES, sayings
+from nondum.planning.contribution import Contribution
+from nondum.planning.merge import merge
+from nondum.planning.phrases import Phrasebook, phrasebook
+from nondum.sdk.description import Fragment, Label, Phrase, PluginDescription
+
+DOMAIN = "(define (domain d) (:predicates (seen ?c - class) (met ?t - target)))"
+
+
+def book(
+    *phrases: str, classes: tuple[str, ...] = (), labels: tuple[Label, ...] = ()
+) -> Phrasebook:
+    objects = f"(:objects {' '.join(classes)} - class)" if classes else ""
+    problem = f"(define (problem p) (:domain d) {objects})"
+    described = PluginDescription(
+        name="plain",
+        version="1",
+        fragments=(Fragment("domain.pddl", DOMAIN), Fragment("problem.pddl", problem)),
+        phrases=tuple(Phrase(p, "(seen ?c)" if "{c:" in p else "(met ?t)") for p in phrases),
+        labels=labels,
+    )
+    contributions = (Contribution.from_description(described, host=ROVER, component="plain"),)
+    return phrasebook(contributions, merge(contributions, ROVER))
+
+
+def test_patterns_are_told_with_all_names_that_fit() -> None:
+    labels = (Label("person", "people"), Label("person", "the persons"))
+    told = sayings(
+        book("[please] find {c:class} [in {words:text}]", classes=("person", "dog"), labels=labels)
+    )
+    assert told == {
+        "phrases": ["[please] find {class} [in {text}]"],
+        "names": {"class": ["dog", "people", "person", "persons"]},
+    }
+
+
+def test_phrase_without_a_name_for_a_slot_cannot_be_said() -> None:
+    told = sayings(book("find {c:class}", "meet {t:target}", classes=("dog",)))
+    assert told == {"phrases": ["find {class}"], "names": {"class": ["dog"]}}
+
+
+def test_names_that_no_packet_has_room_for_are_left_out() -> None:
+    classes = tuple(f"thing-number-{n}-of-very-many" for n in range(2000))
+    told = sayings(book("find {c:class}", classes=classes))
+    assert told["phrases"] == ["find {class}"]
+    assert SAYINGS_BYTES / 4 < len(json.dumps(told)) <= SAYINGS_BYTES + 100
+
+
+def test_phrases_are_left_out_when_names_do_not_suffice() -> None:
+    many = [f"find {{c:class}} number {n} {'very ' * 20}soon" for n in range(2000)]
+    told = sayings(book(*many, classes=("dog",)))
+    assert told["names"] == {"class": ["dog"]}
+    assert 0 < len(json.dumps(told)) <= SAYINGS_BYTES + 100

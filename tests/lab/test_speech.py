@@ -1,0 +1,78 @@
+"""The speech payload on a real host: a recording becomes a goal, and what is told a recording."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from pathlib import Path
+
+import pytest
+from demo.drives import build
+from tests.host.cli.daemon import BEACON
+from tests.lab.running_host import READY_S, Row, RunningHost
+from tests.payloads import Part
+
+pytestmark = pytest.mark.lab
+
+PLUGINS = Path(__file__).parents[2] / "plugins"
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> Path:
+    """A drive with the payload, as `nondum payload build` makes it, for a machine without sound."""
+    plugin = tmp_path / "speech"
+    shutil.copytree(PLUGINS / "speech", plugin)
+    with (plugin / "payload.toml").open("a", encoding="utf-8") as manifest:
+        folders = f'inbox = "{tmp_path / "in"}"\nsaid = "{tmp_path / "out"}"\n'
+        manifest.write(f'\n[component.settings]\nmicrophone = ""\n{folders}')
+    return build([plugin], libraries=[PLUGINS / "sdk"], cache=tmp_path / "cache")["speech"]
+
+
+def test_spoken_goal_is_reached_and_told_aloud(
+    host: RunningHost, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(PLUGINS / "speech")
+    from nondum_speech.espeak import Espeak
+    from nondum_speech.grammar import Vocabulary
+    from nondum_speech.lexicon import lexicon
+    from nondum_speech.recogniser import FreeHearing, Recogniser
+    from nondum_speech.sentences import sentences_of
+    from nondum_speech.sound import read_wav
+
+    espeak = Espeak(tmp_path)
+    host.plug(drive)
+    host.until_component("speech", "ready")
+    host.bring("beacon", Part("beacon", BEACON))
+    until_logged(host, "2 phrases can be heard")
+    for name, text in (("no phrase", "the weather is fine today"), ("goal", "greet people")):
+        sound = espeak.say(text, voice="en-us", words_per_minute=150)
+        (tmp_path / "unfinished").write_bytes(sound.to_wav())
+        (tmp_path / "unfinished").rename(tmp_path / "in" / f"{name}.wav")
+    host.until_told("speech heard 'greet people': that is goal")
+    host.until("the goal is reached", greeted, timeout_s=30)
+    assert not any("weather" in goal["text"] for goal in host.view["goals"])
+
+    said = Vocabulary(("speech heard greet people that is goal one", "speech is active"))
+    words = lexicon(said.words, lambda word, voice: espeak.phonemes(word, voice=voice))
+    ears = Recogniser(said, words, FreeHearing(), confidence=-0.85)
+
+    def repeated(_view: object) -> bool:
+        return any(
+            ears.hear(sentence).said == said.phrases[0]
+            for file in (tmp_path / "out").glob("*.wav")
+            for sentence in sentences_of(read_wav(file))
+        )
+
+    host.until("the answer was said", repeated, timeout_s=60)
+
+
+def greeted(view: Row) -> bool:
+    return any((goal["text"], goal["holds"]) == ("greet people", True) for goal in view["goals"])
+
+
+def until_logged(host: RunningHost, words: str) -> None:
+    """Wait until the payload has written something; nothing tells of that."""
+    deadline_s = time.monotonic() + READY_S
+    while not any(row["message"] == words for row in host.ask("logs", component="speech")):
+        assert time.monotonic() < deadline_s, host.ask("logs", component="speech")
+        time.sleep(0.1)
