@@ -53,8 +53,11 @@ def test_graphviz_and_groot_can_read_it(daemon: Daemon, shining: dict[str, Any])
 
 
 def test_one_way_of_drawing_at_a_time(daemon: Daemon) -> None:
-    for wrong in (["--graphviz", "--groot"], ["--watch", "--groot"], ["--graphviz", "--json"]):
+    for wrong in (["--graphviz", "--groot"], ["--watch", "--groot"]):
         daemon.run("tree", *wrong).refused(2, "one way of drawing at a time")
+    told = daemon.run("tree", "--graphviz", "--json")
+    assert told.code == 2
+    assert "one way of drawing at a time" in told.json["problems"][0]["message"]
 
 
 def test_watching_prints_a_line_of_json_for_each_change(daemon: Daemon) -> None:
