@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Iterator, Mapping
 
 from nondum.planning.bounds import INSTANCES_LIMIT, TooManyBindings, work_for
@@ -119,7 +119,9 @@ class Fixpoint:
             raise self._too_many()
 
     def run(self) -> Exploration:
-        joins = [(join, trigger, head) for head in self._heads() for trigger, join in head.joins]
+        heads = list(self._heads())
+        joins = [(j, trigger, h) for h in heads if not h.is_bound for trigger, j in h.joins]
+        tally = _Tally(head for head in heads if head.is_bound)
         relations = Relations()
         triggered: defaultdict[str, list[tuple[Join, Head]]] = defaultdict(list)
         for join, trigger, head in joins:
@@ -131,11 +133,16 @@ class Fixpoint:
                 self._waiting.append(number)
             else:
                 relations.add(predicate, row)
+                tally.take(number)
+        self._fire(tally)  # first: changes find the instance that they belong to
         for join, trigger, head in joins:
             if not trigger:
                 self._join(join, head, relations)
         while self._waiting:
-            predicate, row = self.table.facts[self._waiting.pop()]
+            number = self._waiting.pop()
+            tally.take(number)
+            self._fire(tally)
+            predicate, row = self.table.facts[number]
             relations.add(predicate, row)
             for join, head in triggered.get(predicate, ()):
                 self._join(join, head, relations, row)
@@ -162,9 +169,21 @@ class Fixpoint:
         try:
             join.run(relations, head.domains, head.fire, row, work=self.work)
         except TooMuchWork:
-            self._spent[head] += before
-            raise self._too_many() from None
+            raise self._exhausted_by(head, before) from None
         self._spent[head] += before - self.work.left
+
+    def _fire(self, tally: _Tally) -> None:
+        while tally.complete:
+            head, before = tally.complete.popleft(), self.work.left
+            try:
+                head.fire([])
+            except TooMuchWork:
+                raise self._exhausted_by(head, before) from None
+            self._spent[head] += before - self.work.left
+
+    def _exhausted_by(self, head: Head, before: int) -> TooManyBindings:
+        self._spent[head] += before
+        return self._too_many()
 
     def _too_many(self) -> TooManyBindings:
         """Those count who made most bindings or, where none were made, looked at most."""
@@ -181,6 +200,29 @@ class Fixpoint:
         return TooManyBindings.of(
             message, origins, fix="add preconditions that say which objects belong together"
         )
+
+
+class _Tally:
+    """Rules without variables: each is complete when the last of its facts is there."""
+
+    def __init__(self, heads: Iterable[Head]) -> None:
+        self.complete: deque[Head] = deque()
+        self._waiting: defaultdict[int, list[Head]] = defaultdict(list)
+        self._missing: dict[Head, int] = {}
+        for head in heads:
+            needs = head.needs
+            self._missing[head] = len(needs)
+            for fact in needs:
+                self._waiting[fact].append(head)
+            if not needs:
+                self.complete.append(head)
+
+    def take(self, fact: int) -> None:
+        """A fact is there."""
+        for head in self._waiting.get(fact, ()):
+            self._missing[head] -= 1
+            if not self._missing[head]:
+                self.complete.append(head)
 
 
 def _by_name(counts: Mapping[Head, int]) -> dict[str, tuple[int, tuple[Origin, ...]]]:

@@ -45,8 +45,12 @@ class _Template:
 def _row_of(atom: Atom, at: Mapping[str, int]) -> Callable[[Values], Row]:
     """What makes an atom's row of a rule's values; the usual kinds of it quickly."""
     terms = tuple((at.get(term.name, -1), term.name) for term in atom.terms)
-    if len(terms) > 1 and all(index >= 0 for index, _ in terms):
-        return itemgetter(*(index for index, _ in terms))
+    if all(index >= 0 for index, _ in terms):
+        if len(terms) > 1:
+            return itemgetter(*(index for index, _ in terms))
+        if terms:
+            only = terms[0][0]
+            return lambda values: (values[only],)
     return lambda values: tuple([values[i] if i >= 0 else name for i, name in terms])
 
 
@@ -65,6 +69,16 @@ class Head:
         self.domains = tuple(domains[name] for name in self.variables)
         """The objects of each variable."""
         self._negative = self.template(found.negative)
+
+    @property
+    def is_bound(self) -> bool:
+        """Whether there is nothing to bind, nor to compare."""
+        return not (self.variables or self._flat.equal or self._flat.unequal)
+
+    @property
+    def needs(self) -> frozenset[int]:
+        """The facts that it waits for, where it is bound."""
+        return self.template(self._flat.positive).numbers([])
 
     @property
     def joins(self) -> tuple[tuple[str, Join], ...]:
