@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from nondum.sdk import Problem, ProtocolViolation
 from nondum.sdk.wire import (
     MAX_DEPTH,
-    MAX_ID,
     MAX_PACKET,
     Cancel,
     Event,
@@ -27,6 +26,7 @@ from nondum.sdk.wire import (
     encode,
     pack,
 )
+from nondum.sdk.wire_fields import MAX_ID
 
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 names = st.text(st.characters(codec="utf-8"), min_size=1, max_size=64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from operator import itemgetter
 from typing import TYPE_CHECKING
@@ -54,7 +55,7 @@ def _row_of(atom: Atom, at: Mapping[str, int]) -> Callable[[Values], Row]:
     return lambda values: tuple([values[i] if i >= 0 else name for i, name in terms])
 
 
-class Head:
+class Head(ABC):
     """A rule of the join, and what happens when it fires."""
 
     def __init__(
@@ -103,9 +104,9 @@ class Head:
         """Variable → object."""
         return dict(zip(self.variables, values, strict=False))
 
+    @abstractmethod
     def fire(self, values: Values) -> None:
         """Record one binding."""
-        raise NotImplementedError
 
 
 class ActionHead(Head):

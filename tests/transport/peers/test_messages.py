@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nondum.sdk.errors import Problem, ProtocolViolation
-from nondum.sdk.wire import MAX_ID
+from nondum.sdk.wire_fields import MAX_ID
 from nondum.transport.peers.messages import (
     MAX_MESSAGE,
     Bye,

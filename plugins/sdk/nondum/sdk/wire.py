@@ -14,6 +14,12 @@ from typing import Any, TypeAlias
 import msgpack
 
 from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.wire_fields import (
+    read_body,
+    read_number,
+    read_problem,
+    read_text,
+)
 
 PROTOCOL_VERSIONS: tuple[int, ...] = (1,)
 """Versions that this SDK speaks, newest first. A host speaks its own and the one before."""
@@ -24,9 +30,6 @@ MAX_DEPTH = 16
 """Tables and lists within each other, the envelope included."""
 MAX_ITEMS = 10_000
 """Entries in one table or list."""
-MAX_NAME = 64
-"""Characters in a verb or an event's name."""
-MAX_ID = 2**53
 
 Body: TypeAlias = Mapping[str, Any]
 
@@ -214,35 +217,37 @@ def _read_hello(fields: list[Any]) -> Hello:
     versions = fields[1]
     if not isinstance(versions, list) or not versions:
         raise _violation("PACKET_FIELDS", "versions are a list of whole numbers")
-    return Hello(tuple(_id(v) for v in versions), _text(fields[2]), _id(fields[3]))
+    return Hello(
+        tuple(read_number(v) for v in versions), read_text(fields[2]), read_number(fields[3])
+    )
 
 
 def _read_welcome(fields: list[Any]) -> Welcome:
-    return Welcome(_id(fields[1]), _body(fields[2]))
+    return Welcome(read_number(fields[1]), read_body(fields[2]))
 
 
 def _read_request(fields: list[Any]) -> Request:
-    return Request(_id(fields[1]), _text(fields[2]), _body(fields[3]))
+    return Request(read_number(fields[1]), read_text(fields[2]), read_body(fields[3]))
 
 
 def _read_reply(fields: list[Any]) -> Reply:
-    return Reply(_id(fields[1]), _body(fields[2]))
+    return Reply(read_number(fields[1]), read_body(fields[2]))
 
 
 def _read_failure(fields: list[Any]) -> Failure:
     problems = fields[2]
     if not isinstance(problems, list) or not problems:
         raise _violation("PACKET_FIELDS", "a failure names at least one problem")
-    return Failure(_id(fields[1]), tuple(_problem(problem) for problem in problems))
+    return Failure(read_number(fields[1]), tuple(read_problem(problem) for problem in problems))
 
 
 def _read_event(fields: list[Any]) -> Event:
-    call_id = None if fields[2] is None else _id(fields[2])
-    return Event(_text(fields[1]), call_id, _body(fields[3]))
+    call_id = None if fields[2] is None else read_number(fields[2])
+    return Event(read_text(fields[1]), call_id, read_body(fields[3]))
 
 
 def _read_cancel(fields: list[Any]) -> Cancel:
-    return Cancel(_id(fields[1]))
+    return Cancel(read_number(fields[1]))
 
 
 _READERS: tuple[tuple[int, Callable[[list[Any]], WireMessage]], ...] = (
@@ -255,36 +260,6 @@ _READERS: tuple[tuple[int, Callable[[list[Any]], WireMessage]], ...] = (
     (2, _read_cancel),
 )
 """By kind: how many fields a packet has, and how they are read."""
-
-_PROBLEM_KEYS = frozenset({"code", "message", "where", "need", "have", "fix"})
-
-
-def _problem(data: object) -> Problem:
-    if (
-        not isinstance(data, dict)
-        or not {"code", "message"} <= data.keys() <= _PROBLEM_KEYS
-        or not all(type(text) is str for text in data.values())
-    ):
-        raise _violation("PACKET_FIELDS", "a problem is a table of texts with code and message")
-    return Problem(**data)
-
-
-def _id(value: object) -> int:
-    if type(value) is not int or not 0 < value <= MAX_ID:
-        raise _violation("PACKET_FIELDS", f"expected a positive whole number, found {value!r:.40}")
-    return value
-
-
-def _text(value: object) -> str:
-    if type(value) is not str or not 0 < len(value) <= MAX_NAME:
-        raise _violation("PACKET_FIELDS", f"expected a short name, found {value!r:.40}")
-    return value
-
-
-def _body(value: object) -> dict[str, Any]:
-    if type(value) is not dict:
-        raise _violation("PACKET_FIELDS", f"expected a table, found {type(value).__name__}")
-    return value
 
 
 def _violation(code: str, message: str) -> ProtocolViolation:

@@ -13,7 +13,14 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from nondum.sdk.errors import Problem, ProtocolViolation
-from nondum.sdk.wire import MAX_ID, MAX_NAME, Body, pack, unpack
+from nondum.sdk.wire import Body, pack, unpack
+from nondum.sdk.wire_fields import (
+    MAX_ID,
+    read_body,
+    read_number,
+    read_problem,
+    read_text,
+)
 
 VERSIONS: tuple[int, ...] = (1,)
 """Versions of this protocol that this host speaks, newest first."""
@@ -224,11 +231,11 @@ def _read_hello(fields: list[Any]) -> Hello:
     if type(certificate) is not bytes or len(certificate) > MAX_CERTIFICATE:
         raise _violation("PACKET_FIELDS", f"a certificate has up to {MAX_CERTIFICATE} bytes")
     return Hello(
-        tuple(_number(v) for v in versions),
-        _text(fields[2]),
-        _text(fields[3]),
-        _number(fields[4]),
-        _number(fields[5]),
+        tuple(read_number(v) for v in versions),
+        read_text(fields[2]),
+        read_text(fields[3]),
+        read_number(fields[4]),
+        read_number(fields[5]),
         certificate,
     )
 
@@ -241,49 +248,53 @@ def _read_welcome(fields: list[Any]) -> Welcome:
 
 
 def _read_refused(fields: list[Any]) -> Refused:
-    return Refused(_problem(fields[1]))
+    return Refused(read_problem(fields[1]))
 
 
 def _read_request(fields: list[Any]) -> Request:
     _, number, settled, remaining_ms, method, args = fields
     return Request(
-        _number(number), _number(settled), _number(remaining_ms), _text(method), _body(args)
+        read_number(number),
+        read_number(settled),
+        read_number(remaining_ms),
+        read_text(method),
+        read_body(args),
     )
 
 
 def _read_reply(fields: list[Any]) -> Reply:
-    return Reply(_number(fields[1]), _body(fields[2]))
+    return Reply(read_number(fields[1]), read_body(fields[2]))
 
 
 def _read_failure(fields: list[Any]) -> Failure:
     problems = fields[2]
     if not isinstance(problems, list) or not 0 < len(problems) <= 64:
         raise _violation("PACKET_FIELDS", "a failure names between one and 64 problems")
-    return Failure(_number(fields[1]), tuple(_problem(problem) for problem in problems))
+    return Failure(read_number(fields[1]), tuple(read_problem(problem) for problem in problems))
 
 
 def _read_progress(fields: list[Any]) -> Progress:
-    return Progress(_number(fields[1]), _body(fields[2]))
+    return Progress(read_number(fields[1]), read_body(fields[2]))
 
 
 def _read_cancel(fields: list[Any]) -> Cancel:
-    return Cancel(_number(fields[1]))
+    return Cancel(read_number(fields[1]))
 
 
 def _read_notice(fields: list[Any]) -> Notice:
-    return Notice(_text(fields[1]), _body(fields[2]))
+    return Notice(read_text(fields[1]), read_body(fields[2]))
 
 
 def _read_ping(fields: list[Any]) -> Ping:
-    return Ping(_number(fields[1]))
+    return Ping(read_number(fields[1]))
 
 
 def _read_pong(fields: list[Any]) -> Pong:
-    return Pong(_number(fields[1]))
+    return Pong(read_number(fields[1]))
 
 
 def _read_bye(fields: list[Any]) -> Bye:
-    return Bye(_text(fields[1]))
+    return Bye(read_text(fields[1]))
 
 
 _READERS: tuple[tuple[int, Callable[[list[Any]], Message]], ...] = (
@@ -301,36 +312,6 @@ _READERS: tuple[tuple[int, Callable[[list[Any]], Message]], ...] = (
     (2, _read_bye),
 )
 """By kind: how many fields a message has, and how they are read."""
-
-_PROBLEM_KEYS = frozenset({"code", "message", "where", "need", "have", "fix"})
-
-
-def _problem(data: object) -> Problem:
-    if (
-        not isinstance(data, dict)
-        or not {"code", "message"} <= data.keys() <= _PROBLEM_KEYS
-        or not all(type(text) is str for text in data.values())
-    ):
-        raise _violation("PACKET_FIELDS", "a problem is a table of texts with code and message")
-    return Problem(**data)
-
-
-def _number(value: object) -> int:
-    if type(value) is not int or not 0 < value <= MAX_ID:
-        raise _violation("PACKET_FIELDS", f"expected a positive whole number, found {value!r:.40}")
-    return value
-
-
-def _text(value: object) -> str:
-    if type(value) is not str or not 0 < len(value) <= MAX_NAME:
-        raise _violation("PACKET_FIELDS", f"expected a short name, found {value!r:.40}")
-    return value
-
-
-def _body(value: object) -> dict[str, Any]:
-    if type(value) is not dict:
-        raise _violation("PACKET_FIELDS", f"expected a table, found {type(value).__name__}")
-    return value
 
 
 def milliseconds(seconds: float) -> int:

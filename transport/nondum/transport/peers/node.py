@@ -10,7 +10,8 @@ from datetime import UTC, datetime
 import zmq
 
 from nondum.sdk.errors import Problem
-from nondum.sdk.wire import MAX_ID, Body
+from nondum.sdk.wire import Body
+from nondum.sdk.wire_fields import MAX_ID
 from nondum.transport.peers.arrivals import Arrivals
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.dial import Attempt, Dial
