@@ -100,6 +100,29 @@ class PlanningSection:
 
 
 @dataclass(frozen=True, slots=True)
+class PeersSection:
+    """Other hosts: whether they are looked for, and what they may have of this one."""
+
+    enabled: bool = True
+    """Listen for other hosts, and look for them."""
+    listen: tuple[str, ...] = ("tcp://*:7410",)
+    """Where this host listens; port 0 picks one."""
+    discover: bool = True
+    """Announce this host by multicast, and listen for others."""
+    static: tuple[str, ...] = ()
+    """Hosts to look for where multicast does not reach: `HOST` or `HOST:PORT`."""
+    development: bool = False
+    """No keys: every host on this machine is a peer. Nothing leaves the machine; every status says
+    so."""
+    offer_actuators: tuple[str, ...] = ()
+    """Components whose actuators peers may use; those of no other may move for a peer."""
+    accept_goals: bool = True
+    """Whether goals that a peer heard are taken."""
+    place: bool = True
+    """Whether payloads that do not fit here are offered to peers, and theirs are taken here."""
+
+
+@dataclass(frozen=True, slots=True)
 class HostConfig:
     """All of it."""
 
@@ -109,6 +132,7 @@ class HostConfig:
     install: InstallSection = field(default_factory=InstallSection)
     workers: WorkersSection = field(default_factory=WorkersSection)
     planning: PlanningSection = field(default_factory=PlanningSection)
+    peers: PeersSection = field(default_factory=PeersSection)
 
 
 def default_name(hostname: str) -> str:
@@ -135,6 +159,7 @@ def user_config() -> HostConfig:
         host=HostSection(state=state, control=control),
         drives=DrivesSection(slots=(state / "slots",), block_devices=False),
         devices=DevicesSection(slots=(state / "device-slots",)),
+        peers=PeersSection(enabled=False),
     )
 
 
@@ -209,6 +234,7 @@ _KINDS: Mapping[Any, str] = {
     bool: "true or false",
     Path: "a path as a string",
     tuple[Path, ...]: "a list of paths",
+    tuple[str, ...]: "a list of strings",
 }
 
 
