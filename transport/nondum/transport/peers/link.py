@@ -13,6 +13,7 @@ from nondum.transport.peers.drained import Drained, Sent
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.messages import Message, Ping, encode
 from nondum.transport.peers.monitor import SocketEvent, Watch
+from nondum.transport.peers.pulse import State
 
 if TYPE_CHECKING:
     from nondum.transport.peers.session import Session
@@ -55,11 +56,11 @@ class Link:
         """Send what may be lost."""
         return self.send(encode(message))
 
-    def ping(self, now_s: float) -> Sent:
+    def ping(self, now_s: float, state: State | None) -> Sent:
         """Ask for a sign of life, and give one."""
         self._pings += 1
         self._pinged_s = now_s
-        return self.tell(Ping(self._pings))
+        return self.tell(Ping(self._pings, state))
 
     def heard_pong(self, number: int, now_s: float) -> None:
         """A ping was answered."""

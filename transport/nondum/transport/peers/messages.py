@@ -21,6 +21,7 @@ from nondum.sdk.wire_fields import (
     read_problem,
     read_text,
 )
+from nondum.transport.peers.pulse import DIGEST_BYTES, State
 
 VERSIONS: tuple[int, ...] = (1,)
 """Versions of this protocol that this host speaks, newest first."""
@@ -116,6 +117,8 @@ class Ping:
     """The sender's loop is working."""
 
     number: int
+    state: State | None = None
+    """How far the sender's account of itself is; two more fields, or none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,8 +162,10 @@ def encode(message: Message) -> bytes:
             fields: tuple[Any, ...] = (3, number, settled, remaining_ms, method, args)
         case Reply(number, body):
             fields = (4, number, body)
-        case Ping(number):
+        case Ping(number, None):
             fields = (9, number)
+        case Ping(number, State(revision, digest)):
+            fields = (9, number, revision, digest)
         case Pong(number):
             fields = (10, number)
         case Failure(number, problems):
@@ -189,10 +194,11 @@ def decode(data: bytes | memoryview) -> Message:
         raise _violation("PACKET_KIND", "a message is a list that begins with its kind")
     if not 0 <= fields[0] < len(_READERS):
         raise _violation("PACKET_KIND", f"no kind of message has the number {fields[0]}")
-    length, read = _READERS[fields[0]]
-    if len(fields) != length:
+    lengths, read = _READERS[fields[0]]
+    if len(fields) not in lengths:
+        expected = " or ".join(map(str, lengths))
         raise _violation(
-            "PACKET_FIELDS", f"kind {fields[0]} has {length} fields, found {len(fields)}"
+            "PACKET_FIELDS", f"kind {fields[0]} has {expected} fields, found {len(fields)}"
         )
     return read(fields)
 
@@ -286,7 +292,12 @@ def _read_notice(fields: list[Any]) -> Notice:
 
 
 def _read_ping(fields: list[Any]) -> Ping:
-    return Ping(read_number(fields[1]))
+    if len(fields) == 2:
+        return Ping(read_number(fields[1]))
+    digest = fields[3]
+    if type(digest) is not bytes or len(digest) != DIGEST_BYTES:
+        raise _violation("PACKET_FIELDS", f"a digest has {DIGEST_BYTES} bytes")
+    return Ping(read_number(fields[1]), State(read_number(fields[2]), digest))
 
 
 def _read_pong(fields: list[Any]) -> Pong:
@@ -297,19 +308,19 @@ def _read_bye(fields: list[Any]) -> Bye:
     return Bye(read_text(fields[1]))
 
 
-_READERS: tuple[tuple[int, Callable[[list[Any]], Message]], ...] = (
-    (7, _read_hello),
-    (7, _read_welcome),
-    (2, _read_refused),
-    (6, _read_request),
-    (3, _read_reply),
-    (3, _read_failure),
-    (3, _read_progress),
-    (2, _read_cancel),
-    (3, _read_notice),
-    (2, _read_ping),
-    (2, _read_pong),
-    (2, _read_bye),
+_READERS: tuple[tuple[tuple[int, ...], Callable[[list[Any]], Message]], ...] = (
+    ((7,), _read_hello),
+    ((7,), _read_welcome),
+    ((2,), _read_refused),
+    ((6,), _read_request),
+    ((3,), _read_reply),
+    ((3,), _read_failure),
+    ((3,), _read_progress),
+    ((2,), _read_cancel),
+    ((3,), _read_notice),
+    ((2, 4), _read_ping),
+    ((2,), _read_pong),
+    ((2,), _read_bye),
 )
 """By kind: how many fields a message has, and how they are read."""
 

@@ -26,6 +26,7 @@ from nondum.transport.peers.link import AcceptedRoute, Link
 from nondum.transport.peers.listener import dialling, listening, prove_enforced
 from nondum.transport.peers.messages import Notice, Ping, encode
 from nondum.transport.peers.monitor import Watch
+from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.refusals import Reason, Refusal, Refusals
 from nondum.transport.peers.roster import LINGER_MS, Roster
 from nondum.transport.peers.trust import Admission, Trust
@@ -35,6 +36,7 @@ BEAT_S = 0.3
 """Time between two pings: sent by the loop that does the work, so that its hanging is noticed."""
 SECOND_LOOK_S = 0.02
 """ZeroMQ tells of a broken connection a little before sending over it fails."""
+_NO_PULSE = Pulse()
 
 
 class PeerNode:
@@ -47,11 +49,13 @@ class PeerNode:
         handler: Handler,
         *,
         on_event: Callable[[PeerEvent], None],
+        pulse: Pulse = _NO_PULSE,
         clock: Callable[[], datetime] = lambda: datetime.now(UTC),
     ) -> None:
         """Made on the running loop. `trust` is not asked in development mode.
 
-        `clock` tells the time of day, which only certificates need.
+        `pulse` is what rides in pings; `clock` tells the time of day, which only certificates
+        need.
         """
         self.identity = identity
         self.epoch = 1 + secrets.randbelow(MAX_ID)
@@ -60,7 +64,7 @@ class PeerNode:
         self._gate = Gate(identity, trust, clock)
         self._on_event = on_event
         self._roster = Roster(
-            self._gate, self.epoch, handler, self.refusals, on_event, self._became_peer
+            self._gate, self.epoch, handler, self.refusals, on_event, self._became_peer, pulse
         )
         self._arrivals = Arrivals(self.refusals, self._on_closed)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
@@ -149,6 +153,20 @@ class PeerNode:
         """
         if self._roster.session(peer).notify(Notice(method, args)) is Sent.FULL:
             raise PeerUnreachable(Problem("PEER_BUSY", "as many messages wait for it as may"))
+
+    def notify_all(self, method: str, args: Body) -> None:
+        """Tell every peer something; those that cannot take it now miss it.
+
+        Raises `ProtocolViolation`, `TypeError` for what cannot be sent.
+        """
+        data = encode(Notice(method, args))
+        for session in list(self._roster.sessions.values()):
+            session.send(data)
+
+    def turn_away(self, peer: PeerKey, problem: Problem) -> None:
+        """Cut a peer that breaks the rules in what it answers; counted, and it is told why."""
+        for link in list(self._roster.session(peer).links):
+            self._roster.turn_away(link, Reason.GARBAGE, problem)
 
     def set_trust(self, trust: Trust) -> None:
         """Exchange the trust: peers that it does not let in any more are cut at once."""

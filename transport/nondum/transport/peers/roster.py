@@ -12,7 +12,7 @@ from nondum.transport.peers.errands import Errand, Handler
 from nondum.transport.peers.events import Loss, PeerEvent, PeerLost, PeerUp
 from nondum.transport.peers.failures import PeerUnreachable
 from nondum.transport.peers.gate import Acquaintance, Gate, TurnedAway
-from nondum.transport.peers.keys import PeerKey
+from nondum.transport.peers.keys import PeerKey, fingerprint
 from nondum.transport.peers.link import Link
 from nondum.transport.peers.messages import (
     VERSIONS,
@@ -24,6 +24,7 @@ from nondum.transport.peers.messages import (
     agreed_version,
     decode,
 )
+from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.refusals import Reason, Refusal, Refusals
 from nondum.transport.peers.session import Departed, OutOfPlace, Session
 from nondum.transport.peers.trust import Admission
@@ -49,12 +50,13 @@ class Roster:
         refusals: Refusals,
         on_event: Callable[[PeerEvent], None],
         on_peer_link: Callable[[Link], None],
+        pulse: Pulse,
     ) -> None:
         """`on_peer_link` is told of every accepted link that became a peer's."""
         self.gate, self.epoch = gate, epoch
         self.dials: dict[PeerKey, Dial] = {}
         self._handler, self._refusals = handler, refusals
-        self._on_event, self._on_peer_link = on_event, on_peer_link
+        self._on_event, self._on_peer_link, self._pulse = on_event, on_peer_link, pulse
         self._sessions: dict[PeerKey, Session] = {}
         self._known: dict[PeerKey, Acquaintance] = {}
         self._orphans: set[Errand] = set()
@@ -176,7 +178,7 @@ class Roster:
 
     def try_link(self, link: Link) -> None:
         """Ping a link; one whose connection is gone is broken."""
-        if not link.is_over and link.ping(self._loop.time()) is Sent.GONE:
+        if not link.is_over and link.ping(self._loop.time(), self._pulse.state()) is Sent.GONE:
             self.break_link(link, Loss.DISCONNECTED)
 
     def close(self) -> None:
@@ -207,17 +209,30 @@ class Roster:
     def _meet(self, link: Link, hello: Hello) -> tuple[Admission, Acquaintance]:
         """Let a peer in; what was there before is over if the greeting begins something new."""
         admission = self.gate.admit(hello, link.proved)
+        self._check_name(admission)
         known = self._acquaintance(admission.key)
         former = known.epoch
         if known.meet(hello) and (session := self._sessions.get(admission.key)):
             self.lose(session, Loss.GAVE_UP if former == hello.epoch else Loss.RESTARTED)
         return admission, known
 
+    def _check_name(self, admission: Admission) -> None:
+        """Names are what objects are called by: two hosts of one name cannot both be there.
+
+        Raises `TurnedAway`.
+        """
+        me = self.gate.identity
+        names = {me.key: me.name}
+        names |= {key: session.admission.name for key, session in self._sessions.items()}
+        for key, name in names.items():
+            if name == admission.name and key != admission.key:
+                raise TurnedAway(Reason.DUPLICATE, _name_taken(name, key, admission.key))
+
     def _join(self, link: Link, admission: Admission, known: Acquaintance) -> None:
         key = admission.key
         session = self._sessions.get(key)
         if session is None:
-            session = self._sessions[key] = Session(admission, known, self._handler)
+            session = self._sessions[key] = Session(admission, known, self._handler, self._pulse)
             self._on_event(
                 PeerUp(key, admission.name, known.epoch, link.route.address, admission.by)
             )
@@ -257,3 +272,13 @@ _OURS = frozenset({Loss.SILENT, Loss.DISCONNECTED, Loss.VIOLATED, Loss.REVOKED, 
 """Losses that this host has found: the peer may not know that what was between them is over."""
 _REVOKED = Problem("KEY_REVOKED", "this key is not accepted any more")
 _EXPIRED = Problem("CERTIFICATE_TIME", "the certificate has ended")
+
+
+def _name_taken(name: str, holder: PeerKey, newcomer: PeerKey) -> Problem:
+    return Problem(
+        "PEER_NAME_TAKEN",
+        f"two hosts are called {name}: {fingerprint(holder)} was here first, and "
+        f"{fingerprint(newcomer)} is not let in",
+        where=name,
+        fix="give one of the hosts another name",
+    )

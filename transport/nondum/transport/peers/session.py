@@ -10,7 +10,7 @@ import asyncio
 import logging
 from typing import Any, assert_never
 
-from nondum.sdk.errors import Problem
+from nondum.sdk.errors import Problem, ProtocolViolation
 from nondum.transport.peers.calls import Calls
 from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.errands import Errand, Errands, Handler
@@ -33,6 +33,7 @@ from nondum.transport.peers.messages import (
     Welcome,
     encode,
 )
+from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.trust import Admission
 
 log = logging.getLogger(__name__)
@@ -53,7 +54,9 @@ class OutOfPlace(Exception):
 class Session:
     """A live peer."""
 
-    def __init__(self, admission: Admission, known: Acquaintance, handler: Handler) -> None:
+    def __init__(
+        self, admission: Admission, known: Acquaintance, handler: Handler, pulse: Pulse
+    ) -> None:
         self.admission, self.known = admission, known
         self.links: list[Link] = []
         """The last one is sent over."""
@@ -61,7 +64,7 @@ class Session:
         """Ends the session, when the last link has broken."""
         self.calls = Calls(admission.name, self.send, known.next_number)
         self.errands = Errands(admission, known.once, handler, self.send)
-        self._handler = handler
+        self._handler, self._pulse = handler, pulse
         self._loop = asyncio.get_running_loop()
 
     def send(self, data: bytes) -> Sent:
@@ -102,15 +105,18 @@ class Session:
     def receive(self, link: Link, message: Message) -> None:
         """Take a message in.
 
-        Raises `Departed`, and `OutOfPlace` for one that has no place in a session.
+        Raises `Departed`, `OutOfPlace` for one that has no place in a session, and
+        `ProtocolViolation` when the handler says so of a notice.
         """
         match message:
             case Request():
                 self.errands.take(message)
             case Reply(number, body):
                 self.calls.succeed(number, dict(body))
-            case Ping(number):
+            case Ping(number, state):
                 link.tell(Pong(number))
+                if state is not None:
+                    self._pulse.heard(self.admission.key, state)
             case Pong(number):
                 link.heard_pong(number, self._loop.time())
             case Failure(number, problems):
@@ -133,6 +139,8 @@ class Session:
     def _notice(self, method: str, args: dict[str, Any]) -> None:
         try:
             self._handler.notice(self.admission, method, args)
+        except ProtocolViolation:
+            raise
         except Exception:
             log.exception("a notice of %s could not be taken in", self.admission.name)
 

@@ -1,0 +1,35 @@
+"""What rides in every ping: how far a host's own account of itself has come."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from nondum.transport.peers.keys import PeerKey
+
+DIGEST_BYTES = 8
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """Of what a host tells its peers about itself: enough to see whether anything was missed."""
+
+    revision: int
+    """Counts up from 1 in one life of the host."""
+    digest: bytes
+    """Over all of it, `DIGEST_BYTES` long."""
+
+
+def _nothing() -> None:
+    return None
+
+
+def _unheard(_peer: PeerKey, _state: State) -> None: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Pulse:
+    """Where pings get this host's state, and who is told of the peers'."""
+
+    state: Callable[[], State | None] = _nothing
+    heard: Callable[[PeerKey, State], None] = _unheard
