@@ -10,7 +10,7 @@ from tests.planning.fragments import HOST, brings
 from nondum.planning.contribution import Contribution
 from nondum.planning.domain import Merged
 from nondum.planning.merge import merge
-from nondum.sdk.description import Behaviour
+from nondum.sdk.description import Behaviour, PluginDescription, Unit
 from nondum.sdk.errors import Problem
 
 
@@ -514,8 +514,13 @@ def test_component_that_speaks_twice_is_a_mistake() -> None:
         merge([brings("drive", GO), brings("drive", "(:types x)")], HOST)
 
 
-def test_peers_component_is_quarantined_under_its_host() -> None:
-    assert list(merge([brings("a", "(:typos)", host="mule")], HOST).quarantined) == ["mule/a"]
+def test_peers_component_owns_what_it_owns_at_home() -> None:
+    described = PluginDescription("a", "1.0", units=(Unit("one", "camera"),))
+    ours = Contribution.from_description(described, host="rover", component="a")
+    theirs = Contribution.from_description(described, host="mule", component="a@mule")
+    found = merge([ours, theirs], "rover")
+    assert found.owner("rover__a__one") == ("rover", "a")
+    assert found.owner("mule__a__one") == ("mule", "a@mule")
 
 
 # Facts

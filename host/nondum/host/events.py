@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
-from nondum.host.catalogue.records import ComponentRecord, MountPose
+from nondum.host.catalogue.records import ComponentRecord, MountPose, PeerRecord
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
 
@@ -447,6 +447,53 @@ class DeviceReleased(Event):
     device: str
     component: str
     need: str
+
+
+# Peers
+
+
+@dataclass(frozen=True, slots=True)
+class PeerShared(Event):
+    """A peer is there, or offers something else than before."""
+
+    host: str
+    """Its name."""
+    peer: PeerRecord = field(repr=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Only names: what its components are stands in the catalogue."""
+        offered = [component.id for component in self.peer.components]
+        return {"host": self.host, "address": self.peer.address, "components": offered}
+
+
+@dataclass(frozen=True, slots=True)
+class PeerLeft(Event):
+    """A peer is gone: nothing that it offered may be used from now on."""
+
+    key: str
+    host: str
+    """Its name."""
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class PeerTurnedAway(Event):
+    """Somebody who may not be a peer tried to be one."""
+
+    host: str
+    """Its name, as far as it is known, or its address."""
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class UnitsTaken(Event):
+    """What others have in use, as one host tells it: all of it, each time."""
+
+    JOURNALLED: ClassVar[bool] = False
+    host: str
+    """Who tells."""
+    taken: Mapping[str, str] = field(default_factory=dict)
+    """Fact that does not hold, `idle` or `free` → the host that uses what it is about."""
 
 
 # People and plans

@@ -127,14 +127,14 @@ class Orders:
     async def forget(self, arguments: Arguments) -> Row:
         """Forget a payload that was here. Raises `InstallFailed` (FORGET_UNKNOWN)."""
         payload_id = arguments.text("payload")
-        known = [former.payload_id for former in self.catalogue.snapshot().former]
+        known = [former.key for former in self.catalogue.snapshot().former]
         if payload_id not in known:
             message = f"nothing is remembered of a payload {payload_id!r} that was here"
             fix = f"remembered are: {', '.join(sorted(known)) or 'none'}"
             raise InstallFailed(Problem("FORGET_UNKNOWN", message, fix=fix))
         self.bus.emit(ForgetAsked(payload_id))
         await self._until(
-            lambda snapshot: all(former.payload_id != payload_id for former in snapshot.former)
+            lambda snapshot: all(former.key != payload_id for former in snapshot.former)
         )
         return {"payload": payload_id}
 

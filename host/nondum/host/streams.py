@@ -16,7 +16,7 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from socket import socket as Connection
 
-from nondum.host.catalogue.records import object_name
+from nondum.planning.contribution import object_name
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, Problem, WorkerFailed
 from nondum.sdk.messages import MESSAGES

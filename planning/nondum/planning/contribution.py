@@ -10,12 +10,24 @@ from nondum.sdk.description import Behaviour, Fragment, Label, Phrase, PluginDes
 
 
 def object_name(host: str, component: str, local: str) -> str:
-    """The planning object of a unit or an output slot.
+    """The planning object of a unit or an output slot; the same on every host.
 
     >>> object_name("rover", "front-eye", "camera")
     'rover__front-eye__camera'
+    >>> object_name("mule", "front-eye@mule", "camera")
+    'mule__front-eye__camera'
     """
-    return f"{host}__{component}__{local}"
+    return f"{host}__{id_at_home(component)}__{local}"
+
+
+def peers_id(component: str, host: str) -> str:
+    """What a component of a peer is called here, where its id may be another's."""
+    return f"{component}@{host}"
+
+
+def id_at_home(component: str) -> str:
+    """What a component is called on its own host."""
+    return component.partition("@")[0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +57,7 @@ class Contribution:
     """One component's part in planning. Equal contributions merge equally, whenever they came."""
 
     component: str
+    """Its id here: a peer's has its host behind it."""
     host: str
     plugin: str
     """The distribution's normalised name; its actions become `plugin.action`."""

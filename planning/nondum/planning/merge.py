@@ -24,8 +24,8 @@ def merge(contributions: Iterable[Contribution], self_host: str) -> Merged:
     """Merge all contributions; `self_host` is the host that plans.
 
     A component whose fragments are wrong, or contradict those of one that precedes it, is left out
-    whole and named in `quarantined` (a peer's as `host/component`). Raises `ValueError` when two
-    contributions speak for one component.
+    whole and named in `quarantined`. Raises `ValueError` when two contributions speak for one
+    component.
     """
     ordered = sorted(set(contributions), key=lambda c: (c.rank, c.component, c.host))
     _refuse_doubles(ordered)
@@ -39,7 +39,7 @@ def merge(contributions: Iterable[Contribution], self_host: str) -> Merged:
         report.problems.extend(claims.problems)
         wider = agreement if claims.problems else _joined(agreement, claims, report)
         if report.problems:
-            quarantined[quarantine_key(contribution, self_host)] = tuple(report.problems)
+            quarantined[contribution.component] = tuple(report.problems)
             continue
         agreement = wider
         admitted.append(claims)
@@ -58,12 +58,6 @@ def _refuse_doubles(ordered: Sequence[Contribution]) -> None:
     for first, second in pairwise(ordered):
         if (first.host, first.component) == (second.host, second.component):
             raise ValueError(f"two contributions of {second.component} on {second.host}")
-
-
-def quarantine_key(contribution: Contribution, self_host: str) -> str:
-    """How `Merged.quarantined` names a component: a peer's with its host."""
-    here = contribution.host == self_host
-    return contribution.component if here else f"{contribution.host}/{contribution.component}"
 
 
 def _report(contribution: Contribution) -> Report:

@@ -10,7 +10,6 @@ from itertools import islice
 from nondum.planning.contribution import Contribution
 from nondum.planning.domain import Merged
 from nondum.planning.goal import Goal
-from nondum.planning.merge import quarantine_key
 from nondum.planning.pattern import (
     Part,
     Said,
@@ -176,7 +175,7 @@ class Phrasebook:
 def phrasebook(contributions: Iterable[Contribution], merged: Merged) -> Phrasebook:
     """Collect what the admitted contributions let people say."""
     present = sorted(
-        (c for c in contributions if quarantine_key(c, merged.self_host) not in merged.quarantined),
+        (c for c in contributions if c.component not in merged.quarantined),
         key=lambda contribution: (contribution.host, contribution.component),
     )
     phrases, problems = known_phrases(present, merged)

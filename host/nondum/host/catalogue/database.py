@@ -117,7 +117,7 @@ def load(connection: sqlite3.Connection, host: str) -> HostState:
         devices={d.id: d for d in map(rows.device, every("devices"))},
         mounts={m.unit: m for m in map(rows.mount, every("mounts"))},
         goals={g.id: g for g in map(rows.goal, every("goals"))},
-        former={f.payload_id: f for f in map(rows.former, every("former")) if f is not None},
+        former={f.key: f for f in map(rows.former, every("former")) if f is not None},
         highwater={
             (row["fleet"], row["payload_id"]): Highwater(row["release"], row["digest"])
             for row in every("highwater")

@@ -143,6 +143,51 @@ class ComponentRecord:
 
 
 @dataclass(frozen=True, slots=True)
+class PeerComponent:
+    """What a peer offers this host of one of its components."""
+
+    id: str
+    """Its id here, `component@host`."""
+    life: str
+    """Names the run of its host: a component that comes back after that ended is another one."""
+    payload_id: str
+    version: str
+    description: PluginDescription
+    is_ready: bool
+    rank: int
+    """Below all of this host's own."""
+    withheld: tuple[str, ...] = ()
+    """Its units that this host may not use."""
+
+    @property
+    def payload(self) -> str:
+        """Tells it from another component of that id, as payload keys do at home."""
+        return self.life
+
+
+@dataclass(frozen=True, slots=True)
+class PeerRecord:
+    """A peer that is there, and what it shares."""
+
+    key: str
+    """Its public key."""
+    name: str
+    address: str
+    admitted_by: str
+    """`pairing`, `certificate` or `development`."""
+    life: str
+    """Names its run: another one after it was started anew."""
+    components: tuple[PeerComponent, ...] = ()
+    mounts: tuple[MountPose, ...] = ()
+    devices: Mapping[str, str] = field(default_factory=dict)
+    """Device → the component that has it."""
+    compute: Mapping[str, Any] = field(default_factory=dict)
+    """`machine`, `python`, `processors`, `memory_mb`, `gpu_memory_mb` …, see `peers.compute`."""
+    problems: tuple[Problem, ...] = ()
+    """What it said that could not be understood."""
+
+
+@dataclass(frozen=True, slots=True)
 class DriveRecord:
     """A drive that is in."""
 
@@ -213,6 +258,13 @@ class FormerPayload:
     one started."""
     size: int
     """Length of `components` as JSON."""
+    host: str = ""
+    """The peer whose payload it was; empty: this host's."""
+
+    @property
+    def key(self) -> str:
+        """One memory for each."""
+        return f"{self.payload_id}@{self.host}" if self.host else self.payload_id
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,6 +283,20 @@ class Snapshot:
     """In the order they were given."""
     former: tuple[FormerPayload, ...] = ()
     """Those that left first come first."""
+    peers: tuple[PeerRecord, ...] = ()
+    """By name."""
+
+    def everyone(self) -> Iterator[tuple[str, ComponentRecord | PeerComponent]]:
+        """Each component, this host's own first, with the name of its host."""
+        for component in self.components:
+            yield self.host, component
+        for peer in self.peers:
+            for offered in peer.components:
+                yield peer.name, offered
+
+    def peer(self, name: str) -> PeerRecord | None:
+        """The peer of that name, if it is there."""
+        return next((peer for peer in self.peers if peer.name == name), None)
 
     def component(self, id: str) -> ComponentRecord | None:
         """The component of that id, if it is active."""
@@ -241,8 +307,9 @@ class Snapshot:
         return (c for c in self.components if c.is_ready)
 
     def mount(self, unit: str) -> MountPose | None:
-        """The pose of a unit's frame in the body frame, where it is known."""
-        return next((m for m in self.mounts if m.unit == unit), None)
+        """The pose of a unit's frame in the frame of its body, where it is known."""
+        every = (self.mounts, *(peer.mounts for peer in self.peers))
+        return next((m for mounts in every for m in mounts if m.unit == unit), None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,12 +328,3 @@ class JournalEntry:
     """The step that the payload came to, where there is one."""
     problems: tuple[Problem, ...] = ()
     detail: Mapping[str, Any] = field(default_factory=dict)
-
-
-def object_name(host: str, component: str, local: str) -> str:
-    """Full name of a unit or of an output slot's stream.
-
-    >>> object_name("panther", "front-camera", "camera")
-    'panther__front-camera__camera'
-    """
-    return f"{host}__{component}__{local}"

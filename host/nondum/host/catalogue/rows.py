@@ -227,7 +227,7 @@ def goal(row: sqlite3.Row) -> GoalRecord:
 def former_row(former: FormerPayload) -> Row:
     """A row of `former`."""
     return {
-        "payload_id": former.payload_id,
+        "payload_id": former.key,
         "version": former.version,
         "components": as_json(former.components),
         "left_wall_s": former.left_wall_s,
@@ -246,7 +246,8 @@ def former(row: sqlite3.Row) -> FormerPayload | None:
     except (NondumError, TypeError, ValueError):
         return None
     size = len(row["components"])
-    return FormerPayload(row["payload_id"], row["version"], components, row["left_wall_s"], size)
+    payload_id, _, host = row["payload_id"].partition("@")
+    return FormerPayload(payload_id, row["version"], components, row["left_wall_s"], size, host)
 
 
 def entry_row(entry: JournalEntry) -> Row:

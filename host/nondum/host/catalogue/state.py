@@ -13,6 +13,7 @@ from nondum.host.catalogue.records import (
     GoalRecord,
     MountPose,
     PayloadRecord,
+    PeerRecord,
     Snapshot,
 )
 
@@ -41,7 +42,9 @@ class HostState:
     goals: Mapping[str, GoalRecord] = field(default_factory=dict)
     """Those that are not over."""
     former: Mapping[str, FormerPayload] = field(default_factory=dict)
-    """Payload id → what is remembered of it; none of these payloads is active."""
+    """Key → what is remembered of a payload; none of them is active."""
+    peers: Mapping[str, PeerRecord] = field(default_factory=dict)
+    """Key → a peer that is there. Not kept when the daemon ends: who is there is found out anew."""
 
     def snapshot(self) -> Snapshot:
         """The state as readers get it."""
@@ -55,4 +58,5 @@ class HostState:
             mounts=tuple(self.mounts.values()),
             goals=tuple(self.goals.values()),
             former=tuple(sorted(self.former.values(), key=lambda f: f.left_wall_s)),
+            peers=tuple(sorted(self.peers.values(), key=lambda p: p.name)),
         )

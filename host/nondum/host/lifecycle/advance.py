@@ -13,7 +13,14 @@ from nondum.host import events
 from nondum.host.catalogue.records import Moment
 from nondum.host.catalogue.state import HostState
 from nondum.host.events import Event
-from nondum.host.lifecycle import claims, component_rules, drive_rules, goal_rules, payload_rules
+from nondum.host.lifecycle import (
+    claims,
+    component_rules,
+    drive_rules,
+    goal_rules,
+    payload_rules,
+    peer_rules,
+)
 from nondum.host.lifecycle.turn import Outcome, Turn
 from nondum.host.transitions import TRANSITIONS
 
@@ -39,6 +46,8 @@ RULES: Mapping[type[Event], _Rule] = {
     events.GoalGiven: goal_rules.on_goal_given,
     events.GoalReached: goal_rules.on_goal_over,
     events.GoalEnded: goal_rules.on_goal_over,
+    events.PeerShared: peer_rules.on_peer_shared,
+    events.PeerLeft: peer_rules.on_peer_left,
 }
 """Event → rule. Other events change nothing here; the journal keeps those that ask for it."""
 
@@ -65,7 +74,7 @@ def settle(turn: Turn, before: HostState) -> Outcome:
     drive_rules.release_idle_drives(turn)
     if turn.state.components != before.components or turn.state.devices != before.devices:
         claims.settle(turn)
-    parts = ("components", "mounts", "former")
+    parts = ("components", "mounts", "former", "peers")
     if any(getattr(turn.state, part) != getattr(before, part) for part in parts):
         turn.change(revision=before.revision + 1)
         turn.events.append(events.Recomposed(turn.state.revision, turn.events[0].name))

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from nondum.host.catalogue.records import ComponentRecord, FormerPayload, PayloadRecord
+from nondum.host.catalogue.records import (
+    ComponentRecord,
+    FormerPayload,
+    PayloadRecord,
+    PeerComponent,
+)
 from nondum.host.catalogue.rows import as_json
+from nondum.sdk.description import PluginDescription
 
 PAYLOADS_LIMIT = 200
 """So many are remembered."""
@@ -22,10 +28,36 @@ def remembering(
     """What is remembered once a payload has left with its components: beyond the limits those that
     left first are forgotten."""
     described = {component.id: component.description for component in components}
-    new = FormerPayload(
-        payload.payload_id, payload.version, described, wall_s, len(as_json(described))
+    new = _former(payload.payload_id, payload.version, described, wall_s)
+    return _within_limits({**former, new.key: new})
+
+
+def remembering_peer(
+    former: Mapping[str, FormerPayload],
+    host: str,
+    components: Iterable[PeerComponent],
+    wall_s: float,
+) -> dict[str, FormerPayload]:
+    """What is remembered once a peer, or some of what it offered, is gone."""
+    payloads: dict[tuple[str, str], dict[str, PluginDescription]] = {}
+    for component in components:
+        known = payloads.setdefault((component.payload_id, component.version), {})
+        known[component.id] = component.description
+    new = (
+        _former(payload_id, version, described, wall_s, host)
+        for (payload_id, version), described in payloads.items()
     )
-    return _within_limits({**former, new.payload_id: new})
+    return _within_limits({**former, **{one.key: one for one in new}})
+
+
+def _former(
+    payload_id: str,
+    version: str,
+    described: Mapping[str, PluginDescription],
+    wall_s: float,
+    host: str = "",
+) -> FormerPayload:
+    return FormerPayload(payload_id, version, described, wall_s, len(as_json(described)), host)
 
 
 def _within_limits(former: Mapping[str, FormerPayload]) -> dict[str, FormerPayload]:
@@ -34,6 +66,6 @@ def _within_limits(former: Mapping[str, FormerPayload]) -> dict[str, FormerPaylo
     room = SIZE_LIMIT
     for payload in sorted(former.values(), key=lambda f: f.left_wall_s, reverse=True):
         if payload.size <= room and len(kept) < PAYLOADS_LIMIT:
-            kept[payload.payload_id] = payload
+            kept[payload.key] = payload
             room -= payload.size
     return kept

@@ -12,9 +12,9 @@ from nondum.host.catalogue.records import (
     ComponentState,
     DeviceClaim,
     MountPose,
-    object_name,
 )
 from nondum.host.workers import Limits, WorkerSpec, base_interpreter
+from nondum.planning.contribution import object_name
 from nondum.sdk.description import PluginDescription
 
 

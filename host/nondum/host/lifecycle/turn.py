@@ -6,11 +6,18 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, TypeVar
 
-from nondum.host.catalogue.records import ComponentRecord, DriveRecord, Moment, PayloadRecord, Step
+from nondum.host.catalogue.records import (
+    ComponentRecord,
+    DriveRecord,
+    Moment,
+    PayloadRecord,
+    PeerRecord,
+    Step,
+)
 from nondum.host.catalogue.state import HostState
 from nondum.host.effects import Effect
 from nondum.host.events import Event
-from nondum.host.lifecycle.former import remembering
+from nondum.host.lifecycle.former import remembering, remembering_peer
 
 _V = TypeVar("_V")
 
@@ -78,9 +85,30 @@ class Turn:
         if gone:
             self._remember(self.state.payloads[payload], gone.values())
 
-    def forget(self, payload_id: str) -> None:
+    def put_peer(self, peer: PeerRecord) -> None:
+        """Enter or replace a peer; what it offers no more is remembered."""
+        self._remember_peer(peer)
+        back = {f"{c.payload_id}@{peer.name}" for c in peer.components}
+        former = {key: one for key, one in self.state.former.items() if key not in back}
+        self.change(peers=_with(self.state.peers, peer.key, peer), former=former)
+
+    def drop_peer(self, key: str) -> None:
+        """Withdraw a peer; what it offered is remembered."""
+        self._remember_peer(replace(self.state.peers[key], components=()))
+        self.change(peers=_without(self.state.peers, key))
+
+    def forget(self, key: str) -> None:
         """Remember nothing of a payload that was here."""
-        self.change(former=_without(self.state.former, payload_id))
+        self.change(former=_without(self.state.former, key))
+
+    def _remember_peer(self, now: PeerRecord) -> None:
+        """Keep what a peer offered until now."""
+        before = self.state.peers.get(now.key)
+        offered = {component.id for component in now.components}
+        gone = [c for c in before.components if c.id not in offered] if before else []
+        if gone:
+            kept = remembering_peer(self.state.former, now.name, gone, self.at.wall_s)
+            self.change(former=kept)
 
     def _remember(self, payload: PayloadRecord, gone: Iterable[ComponentRecord]) -> None:
         """Keep what a payload could do, unless it is still here in another version."""

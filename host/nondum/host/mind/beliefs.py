@@ -7,7 +7,14 @@ import re
 from collections.abc import Callable, Mapping
 
 from nondum.host.catalogue.records import Snapshot
-from nondum.host.events import Event, FactForgotten, FactKnown, StreamFlowing, WorkerExited
+from nondum.host.events import (
+    Event,
+    FactForgotten,
+    FactKnown,
+    StreamFlowing,
+    UnitsTaken,
+    WorkerExited,
+)
 from nondum.host.mind.composition import Composition, always_produced, body_facts, own_objects
 from nondum.planning.core import HOST_PREDICATES
 from nondum.planning.facts import fact, is_twin
@@ -34,6 +41,8 @@ class Beliefs:
         """The clock, in seconds."""
         self._names: dict[str, Mapping[str, str]] = {}
         self._always: frozenset[str] = frozenset()
+        self._taken: dict[str, Mapping[str, str]] = {}
+        """Host that told → facts that do not hold, since somebody else uses what they are about."""
         self._looked_at = -1
         self._contradicted: frozenset[str] = frozenset()
 
@@ -43,18 +52,26 @@ class Beliefs:
         Gives the ids of the components that are gone, and of those that are new.
         """
         old, self.snapshot = self.snapshot, snapshot
-        before = {(component.id, component.payload) for component in old.components}
-        now = {(component.id, component.payload) for component in snapshot.components}
-        gone = [c for c in old.components if (c.id, c.payload) not in now]
-        for component in gone:
-            objects = own_objects(old.host, component).values()
+        before = {(c.id, c.payload) for _, c in old.everyone()}
+        now = {(c.id, c.payload) for _, c in snapshot.everyone()}
+        gone = [(host, c) for host, c in old.everyone() if (c.id, c.payload) not in now]
+        for host, component in gone:
+            objects = own_objects(host, component).values()
             self.world.remove_component(component.id, set(objects))
             self.flowing -= set(objects)
-        self._names = {c.id: own_objects(snapshot.host, c) for c in snapshot.components}
+        self._names = {c.id: own_objects(host, c) for host, c in snapshot.everyone()}
         self._always = always_produced(snapshot)
-        self.world.set_host_facts(snapshot.host, body_facts(snapshot), self.now_s())
-        new = (c.id for c in snapshot.components if (c.id, c.payload) not in before)
-        return tuple(component.id for component in gone), tuple(new)
+        self._say_as_host()
+        new = (c.id for _, c in snapshot.everyone() if (c.id, c.payload) not in before)
+        return tuple(component.id for _, component in gone), tuple(new)
+
+    def _say_as_host(self) -> None:
+        """Assert what the host knows by itself, but for what others have in use."""
+        facts = body_facts(self.snapshot)
+        for taken in self._taken.values():
+            for text in taken:
+                facts.pop(text, None)
+        self.world.set_host_facts(self.snapshot.host, facts, self.now_s())
 
     def adopt(self, composition: Composition) -> None:
         """Take over what merging made of the snapshot: objects, and what fragments say."""
@@ -88,6 +105,9 @@ class Beliefs:
                 self.world.forget(text, component, self.now_s())
             case StreamFlowing(component, stream, flowing) if component in self._names:
                 self._on_flow(component, stream, is_flowing=flowing)
+            case UnitsTaken(host, taken):
+                self._taken[host] = taken
+                self._say_as_host()
             case WorkerExited(component):
                 self.world.silence(component)
                 self.flowing -= set(self._names.get(component, {}).values())

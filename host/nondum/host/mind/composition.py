@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from nondum.host.catalogue.records import ComponentRecord, Snapshot
+from nondum.host.catalogue.records import ComponentRecord, PeerComponent, Snapshot
 from nondum.planning.contribution import Contribution, object_name
 from nondum.planning.domain import Merged
 from nondum.planning.facts import fact
@@ -56,9 +56,9 @@ def contributions_of(snapshot: Snapshot) -> tuple[Contribution, ...]:
     """What each component brings to planning."""
     return tuple(
         Contribution.from_description(
-            component.description, host=snapshot.host, component=component.id, rank=component.rank
+            component.description, host=host, component=component.id, rank=component.rank
         )
-        for component in snapshot.components
+        for host, component in snapshot.everyone()
     )
 
 
@@ -74,7 +74,7 @@ def compose(snapshot: Snapshot) -> Composition:
         exclusive=frozenset(_exclusive(snapshot, merged)),
         observed=frozenset(
             predicate
-            for component in snapshot.components
+            for _, component in snapshot.everyone()
             for condition in component.description.conditions
             for predicate in condition.predicates
         ),
@@ -83,9 +83,9 @@ def compose(snapshot: Snapshot) -> Composition:
 
 def _exclusive(snapshot: Snapshot, merged: Merged) -> Iterator[str]:
     types = merged.domain.types
-    for component in snapshot.components:
+    for host, component in snapshot.everyone():
         for unit in component.description.units:
-            name = object_name(snapshot.host, component.id, unit.name)
+            name = object_name(host, component.id, unit.name)
             found = merged.objects.get(name)
             if unit.users == 1 or (found and types.is_one_of(found.types, tuple(ACTUATORS))):
                 yield name
@@ -97,9 +97,8 @@ def body_facts(snapshot: Snapshot) -> dict[str, str]:
     A unit is idle and a slot free unless a running behaviour takes it; slots that are always
     produced are never free.
     """
-    host = snapshot.host
-    facts = {fact("self", host): "this is the host that plans"}
-    for component in snapshot.components:
+    facts = {fact("self", snapshot.host): "this is the host that plans"}
+    for host, component in snapshot.everyone():
         facts |= component_facts(
             host, component.id, component.description, is_ready=component.is_ready
         )
@@ -113,7 +112,7 @@ def component_facts(
     facts: dict[str, str] = {}
     for unit in description.units:
         name = object_name(host, component, unit.name)
-        facts[fact("on", name, host)] = f"{component} is plugged into this host"
+        facts[fact("on", name, host)] = f"{component} is part of {host}"
         if is_ready:
             facts[fact("ready", name)] = f"{component} is healthy and its devices are there"
             facts[fact("idle", name)] = "nobody uses it"
@@ -128,7 +127,7 @@ def component_facts(
     return facts
 
 
-def own_objects(host: str, component: ComponentRecord) -> dict[str, str]:
+def own_objects(host: str, component: ComponentRecord | PeerComponent) -> dict[str, str]:
     """Local name → object: a component's units and slots."""
     names = [unit.name for unit in component.description.units]
     names += [output.name for unit in component.description.units for output in unit.outputs]
@@ -138,8 +137,8 @@ def own_objects(host: str, component: ComponentRecord) -> dict[str, str]:
 def always_produced(snapshot: Snapshot) -> frozenset[str]:
     """The streams that are produced from their worker's start on."""
     return frozenset(
-        object_name(snapshot.host, component.id, output.name)
-        for component in snapshot.components
+        object_name(host, component.id, output.name)
+        for host, component in snapshot.everyone()
         for unit in component.description.units
         for output in unit.outputs
         if output.always

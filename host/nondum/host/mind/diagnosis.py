@@ -34,22 +34,34 @@ class Seen:
     """The payload's."""
     left_wall_s: float
     """When it went, in seconds since 1970."""
+    host: str = ""
+    """The peer that had it; empty: this host."""
 
     @classmethod
     def of(cls, former: FormerPayload, host: str) -> Iterator[Seen]:
         """The components of a payload that was here."""
         for component, description in former.components.items():
             contribution = Contribution.from_description(
-                description, host=host, component=component
+                description, host=former.host or host, component=component
             )
             yield cls(
-                contribution, description, former.payload_id, former.version, former.left_wall_s
+                contribution,
+                description,
+                former.payload_id,
+                former.version,
+                former.left_wall_s,
+                former.host,
             )
 
     @property
     def payload(self) -> str:
         """The payload's id and version."""
         return f"{self.payload_id} {self.version}"
+
+    @property
+    def remedy(self) -> str:
+        """How a person gets it back."""
+        return f"bring the host {self.host} back" if self.host else f"plug in {self.payload}"
 
 
 def seen_in(snapshot: Snapshot) -> tuple[Seen, ...]:
@@ -95,11 +107,11 @@ def _used_to_supply(gone: Iterable[Seen]) -> tuple[Problem, ...]:
     names = ", ".join(seen.contribution.component for seen in known)
     until = moment(max(seen.left_wall_s for seen in known))
     message = f"{names} used to supply it, until {until}"
-    return (Problem("WHY_SUPPLIER", message, fix=f"plug in {_payloads(known)}"),)
+    return (Problem("WHY_SUPPLIER", message, fix=_remedies(known)),)
 
 
-def _payloads(gone: Iterable[Seen]) -> str:
-    return " or ".join(dict.fromkeys(seen.payload for seen in gone))
+def _remedies(gone: Iterable[Seen]) -> str:
+    return " or ".join(dict.fromkeys(seen.remedy for seen in gone))
 
 
 def words_gone(merged: Merged, pddl: str, seen: Iterable[Seen]) -> tuple[Problem, ...]:
@@ -112,7 +124,7 @@ def words_gone(merged: Merged, pddl: str, seen: Iterable[Seen]) -> tuple[Problem
         return ()
     names = ", ".join(sorted(known.contribution.component for known in bringers))
     message = f"{words} means nothing without {names}, which brought it"
-    return (Problem("WHY_WORDS_GONE", message, fix=f"plug in {_payloads(bringers)}"),)
+    return (Problem("WHY_WORDS_GONE", message, fix=_remedies(bringers)),)
 
 
 def _names(contribution: Contribution) -> set[str]:

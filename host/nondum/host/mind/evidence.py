@@ -160,7 +160,7 @@ def _fits(name: str, types: tuple[str, ...] | None, merged: Merged) -> bool:
 
 def _observers(text: str, beliefs: Beliefs) -> Iterator[str]:
     predicate, _ = parts(text)
-    for component in beliefs.snapshot.components:
+    for _, component in beliefs.snapshot.everyone():
         for condition in component.description.conditions:
             if predicate in condition.predicates:
                 yield f"{condition.name} of {component.id}"

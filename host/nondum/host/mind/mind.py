@@ -106,7 +106,7 @@ class Mind:
         if self._composing is not None:
             self._composing.cancel()
             self._composing = None
-        if len(snapshot.components) > SMALL:
+        if sum(1 for _ in snapshot.everyone()) > SMALL:
             self._composing = asyncio.create_task(asyncio.to_thread(composed, snapshot))
             self._composing.add_done_callback(lambda _: self.wake())
         else:

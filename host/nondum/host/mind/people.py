@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TypeAlias
 
-from nondum.host.catalogue.records import ComponentRecord
+from nondum.host.catalogue.records import ComponentRecord, PeerComponent
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.frames import mount_warnings
-from nondum.planning.merge import quarantine_key
 
 MAX_SENTENCES = 1000
+
+_Component: TypeAlias = ComponentRecord | PeerComponent
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +56,8 @@ class People:
 
 def recomposed(old: Composition | None, new: Composition) -> list[str]:
     """Sentences on what a recomposition gains, loses and changes."""
-    before = {c.id: c for c in old.snapshot.components} if old else {}
-    after = {c.id: c for c in new.snapshot.components}
+    before = {c.id: c for _, c in old.snapshot.everyone()} if old else {}
+    after = {c.id: c for _, c in new.snapshot.everyone()}
     sentences = [f"{id} is gone: {_offered(before[id])}" for id in before if id not in after]
     for id, component in after.items():
         earlier = before.get(id)
@@ -85,7 +87,7 @@ def _doubts(old: Composition | None, new: Composition) -> list[str]:
 
 def _kept_out(old: Composition | None, new: Composition) -> list[str]:
     known = old.merged.quarantined if old else {}
-    present = {quarantine_key(c, new.host) for c in new.contributions}
+    present = {c.component for c in new.contributions}
     return [
         f"{key} is kept out of planning: {problem}"
         for key, problems in new.merged.quarantined.items()
@@ -94,23 +96,25 @@ def _kept_out(old: Composition | None, new: Composition) -> list[str]:
     ]
 
 
-def _offers(component: ComponentRecord) -> str:
+def _offers(component: _Component) -> str:
     names = _abilities(component)
     return f"it can {names}" if names else "it has no behaviours"
 
 
-def _offered(component: ComponentRecord) -> str:
+def _offered(component: _Component) -> str:
     names = _abilities(component)
     return f"it could {names}" if names else "it had no behaviours"
 
 
-def _abilities(component: ComponentRecord) -> str:
+def _abilities(component: _Component) -> str:
     return ", ".join(behaviour.name for behaviour in component.description.behaviours)
 
 
-def _health(component: ComponentRecord) -> str:
+def _health(component: _Component) -> str:
     if component.is_ready:
         return "ready"
+    if isinstance(component, PeerComponent):
+        return "not ready, says its host"
     missing = [c.name for c in component.devices if c.device is None and not c.optional]
     if missing:
         return f"not ready: it waits for the device {', '.join(missing)}"

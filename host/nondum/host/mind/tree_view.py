@@ -188,8 +188,8 @@ class TreeView:
     def _rank(self, unit: str) -> int | None:
         """The place of a unit's component: the smaller wins where two contradict each other."""
         composition, name = self._composition(), self._component(unit)
-        components = composition.snapshot.components if composition else ()
-        return next((c.rank for c in components if c.id == name), None)
+        everyone = composition.snapshot.everyone() if composition else ()
+        return next((c.rank for _, c in everyone if c.id == name), None)
 
     def _others(self, leaf: StepLeaf) -> tuple[GroundAction, ...]:
         tree, composition = leaf.parent, self._composition()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from nondum.host.catalogue.records import object_name
+from nondum.planning.contribution import object_name
 from nondum.sdk.description import PluginDescription
 
 

@@ -15,7 +15,7 @@ from nondum.planning.domain import Merged, Origin
 from nondum.planning.facts import parts
 from nondum.planning.goal import GoalExpr, parse_goal
 from nondum.planning.ground import ground
-from nondum.planning.merge import merge, quarantine_key
+from nondum.planning.merge import merge
 from nondum.planning.relaxed import quick_answer
 from nondum.planning.validate import validate
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
@@ -115,7 +115,7 @@ class Trials:
             number
             for number in chosen
             for contribution in self._contributions[number]
-            if quarantine_key(contribution, self._here.host) in merged.quarantined
+            if contribution.component in merged.quarantined
         )
 
     def sound(self, number: int) -> Candidate:
@@ -125,12 +125,11 @@ class Trials:
         caveats: list[Problem] = []
         kept: list[Contribution] = []
         for contribution in candidate.contributions:
-            key = quarantine_key(contribution, self._here.host)
             if self._is_taken(contribution):
                 message = f"component {contribution.component!r} is here already"
                 caveats.append(Problem("COMPONENT_TAKEN", message, where=candidate.name))
-            elif key in found.quarantined:
-                caveats += found.quarantined[key]
+            elif contribution.component in found.quarantined:
+                caveats += found.quarantined[contribution.component]
             else:
                 kept.append(contribution)
         return replace(candidate, contributions=tuple(kept), caveats=(*candidate.caveats, *caveats))
