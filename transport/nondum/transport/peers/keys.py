@@ -55,8 +55,8 @@ def parse_key(text: str) -> PeerKey:
     raise PeerRefused(_malformed(text))
 
 
-def fingerprint(key: PeerKey) -> str:
-    """A key for people: 100 bits of its SHA-256, in base32.
+def fingerprint(key: str) -> str:
+    """A key for people, a host's or a fleet's: 100 bits of its SHA-256, in base32.
 
     >>> fingerprint(PeerKey("rq:rM>}U?@Lns47E1%kR.o@n%FcmmsL/@{H8]yf7"))
     'QQIS-PBOR-BEVH-576C-LECF'

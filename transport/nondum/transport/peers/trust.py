@@ -6,12 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from enum import Enum
+from typing import TypeVar
 
 from nondum.sdk.errors import Problem
 from nondum.transport.peers import certificate as certificates
 from nondum.transport.peers.certificate import FleetKey
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import PeerKey, fingerprint
+
+_Key = TypeVar("_Key", bound=str)
 
 
 class Standing(Enum):
@@ -63,6 +66,12 @@ class Trust:
         paired = {known: name for known, name in self.paired.items() if known != key}
         return replace(self, paired=paired, revoked={**self.revoked, key: why})
 
+    def without(self, key: str) -> Trust:
+        """Forget a paired host or a fleet, or that a key was revoked."""
+        return Trust(
+            _without(self.fleets, key), _without(self.paired, key), _without(self.revoked, key)
+        )
+
     def standing(self, key: PeerKey) -> Standing:
         """What is known of a key alone."""
         if key in self.revoked:
@@ -103,6 +112,10 @@ class Trust:
         return Problem(
             "KEY_REVOKED", f"this key was revoked: {self.revoked[key]}", where=fingerprint(key)
         )
+
+
+def _without(part: Mapping[_Key, str], key: str) -> dict[_Key, str]:
+    return {known: told for known, told in part.items() if known != key}
 
 
 def _unknown(key: PeerKey) -> Problem:
