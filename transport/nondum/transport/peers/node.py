@@ -39,6 +39,11 @@ SECOND_LOOK_S = 0.02
 _NO_PULSE = Pulse()
 
 
+def fresh_epoch() -> int:
+    """Draw a number that tells this life of a host from its others: no clock is needed to."""
+    return 1 + secrets.randbelow(MAX_ID)
+
+
 class PeerNode:
     """Links to other hosts. `await start(…)` it, and `await close()` it."""
 
@@ -50,16 +55,17 @@ class PeerNode:
         *,
         on_event: Callable[[PeerEvent], None],
         pulse: Pulse = _NO_PULSE,
+        epoch: int | None = None,
         clock: Callable[[], datetime] = lambda: datetime.now(UTC),
     ) -> None:
         """Made on the running loop. `trust` is not asked in development mode.
 
-        `pulse` is what rides in pings; `clock` tells the time of day, which only certificates
-        need.
+        `pulse` is what rides in pings; `epoch` is drawn when it is not given; `clock` tells the
+        time of day, which only certificates need.
         """
         self.identity = identity
-        self.epoch = 1 + secrets.randbelow(MAX_ID)
-        """Tells this life of the host from earlier ones: no clock is needed to."""
+        self.epoch = epoch or fresh_epoch()
+        """Tells this life of the host from earlier ones."""
         self.refusals = Refusals(on_event)
         self._gate = Gate(identity, trust, clock)
         self._on_event = on_event

@@ -230,14 +230,16 @@ class Roster:
 
     def _join(self, link: Link, admission: Admission, known: Acquaintance) -> None:
         key = admission.key
-        session = self._sessions.get(key)
-        if session is None:
-            session = self._sessions[key] = Session(admission, known, self._handler, self._pulse)
+        known_session = self._sessions.get(key)
+        session = known_session or Session(admission, known, self._handler, self._pulse)
+        self._sessions[key] = session
+        for replaced in session.join(link):
+            replaced.cut()
+        if known_session is None:
+            # After the link has joined: whoever hears of it may call at once.
             self._on_event(
                 PeerUp(key, admission.name, known.epoch, link.route.address, admission.by)
             )
-        for replaced in session.join(link):
-            replaced.cut()
         if dial := self.dials.get(key):
             dial.settled()
 

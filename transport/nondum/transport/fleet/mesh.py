@@ -1,0 +1,149 @@
+"""The fleet as a full mesh: an authenticated link to every other host."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol, TypeAlias
+
+from nondum.sdk.wire import Body
+from nondum.transport.fleet.catalogues import Catalogues
+from nondum.transport.fleet.meeting import Meeting
+from nondum.transport.fleet.seam import FleetEvent, Peer
+from nondum.transport.peers.calls import Call
+from nondum.transport.peers.errands import Handler
+from nondum.transport.peers.events import PeerEvent, PeerLost, PeerUp
+from nondum.transport.peers.identity import Identity, Security
+from nondum.transport.peers.keys import PeerKey
+from nondum.transport.peers.node import PeerNode, fresh_epoch
+from nondum.transport.peers.pulse import Pulse
+from nondum.transport.peers.refusals import Refusals
+from nondum.transport.peers.trust import Standing, Trust
+
+
+class Finder(Protocol):
+    """Looks for hosts, and tells where they are by `Mesh.meet` and `Mesh.no_more_hints`."""
+
+    async def start(self) -> None:
+        """Begin to look."""
+
+    async def close(self) -> None:
+        """Look no more."""
+
+
+Find: TypeAlias = Callable[["Mesh"], Finder]
+"""Makes a finder for a mesh that listens already (`addresses`)."""
+
+
+class Mesh:
+    """A `Fleet` over `PeerNode`."""
+
+    def __init__(
+        self,
+        identity: Identity,
+        trust: Trust,
+        handler: Handler,
+        *,
+        on_event: Callable[[FleetEvent], None],
+        listen: Sequence[str] = ("tcp://*:0",),
+        find: Find | None = None,
+    ) -> None:
+        """Made on the running loop. Without `find`, hosts meet by `meet` only."""
+        self.epoch = fresh_epoch()
+        self.addresses: tuple[str, ...] = ()
+        """Where it listens, once it has started."""
+        self._trust, self._listen, self._find = trust, tuple(listen), find
+        self._catalogues = Catalogues(self.epoch, handler, on_event, lambda: self._node)
+        self._node = PeerNode(
+            identity,
+            trust,
+            self._catalogues,
+            on_event=self._on_event,
+            pulse=Pulse(self._catalogues.state, self._catalogues.heard),
+            epoch=self.epoch,
+        )
+        self._meeting = Meeting(identity.key, self._node, self._is_welcome)
+        self._finder: Finder | None = None
+
+    @property
+    def key(self) -> PeerKey:
+        """What peers know this host by."""
+        return self._node.identity.key
+
+    @property
+    def name(self) -> str:
+        """What people call it."""
+        return self._node.identity.name
+
+    @property
+    def security(self) -> Security:
+        """How links are secured."""
+        return self._node.security
+
+    @property
+    def refusals(self) -> Refusals:
+        """Who was turned away, and why."""
+        return self._node.refusals
+
+    @property
+    def peers(self) -> Mapping[PeerKey, Peer]:
+        """Who can be called now."""
+        return self._catalogues.peers
+
+    async def start(self) -> None:
+        """Listen, then look for others. Raises `PeerRefused` as `PeerNode.start`."""
+        self.addresses = await self._node.start(self._listen)
+        if self._find is not None:
+            self._finder = self._find(self)
+            await self._finder.start()
+
+    def meet(self, key: PeerKey, addresses: Sequence[str], epoch: int = 0) -> None:
+        """A host may be at these addresses, in this epoch if that is known; where it is let in, it
+        is dialled. Raises `PeerRefused` as `PeerNode.dial`."""
+        for address in addresses:
+            self._node.identity.check_address(address)
+        self._meeting.hinted(key, addresses, epoch)
+
+    def no_more_hints(self, key: PeerKey) -> None:
+        """Nobody says any more where a host is. A link to it stays while it works."""
+        self._meeting.gone(key)
+
+    def set_trust(self, trust: Trust) -> None:
+        """Exchange the trust: peers that it does not let in any more are cut at once."""
+        self._trust = trust
+        self._node.set_trust(trust)
+        self._meeting.trust_changed()
+
+    def publish(self, changes: Mapping[str, Body | None]) -> None:
+        """Change this host's catalogue."""
+        self._catalogues.publish(changes)
+
+    def call(self, peer: PeerKey, method: str, args: Body, *, deadline_s: float) -> Call:
+        """Call a peer."""
+        return self._node.call(peer, method, args, deadline_s=deadline_s)
+
+    def notify(self, peer: PeerKey, method: str, args: Body) -> None:
+        """Tell a peer something."""
+        self._node.notify(peer, method, args)
+
+    async def close(self) -> None:
+        """Say goodbye and let go of everything."""
+        if self._finder is not None:
+            await self._finder.close()
+        self._meeting.close()
+        await self._node.close()
+        self._catalogues.close()
+
+    def _is_welcome(self, key: PeerKey) -> bool:
+        if self.security is Security.DEVELOPMENT:
+            return True
+        return self._trust.standing(key) in (Standing.ADMITTED, Standing.MUST_CERTIFY)
+
+    def _on_event(self, event: PeerEvent) -> None:
+        match event:
+            case PeerUp():
+                self._meeting.up(event)
+            case PeerLost():
+                self._meeting.lost(event.key)
+            case _:
+                pass
+        self._catalogues.on_event(event)
