@@ -108,6 +108,14 @@ class Pairing:
     peer_agreed: bool = False
 
     @property
+    def has_told_nonce(self) -> bool:
+        """Whether the other end knows the code by now, so that giving up would be a guess made."""
+        unknowing = [Step.AWAITING_ASK, Step.AWAITING_COMMIT]
+        if self.role is Role.ANSWERING:
+            unknowing.append(Step.AWAITING_NONCE)
+        return self.step not in unknowing
+
+    @property
     def code(self) -> str:
         """What both people must see. Raises `ValueError` before it is known."""
         if self.step not in (Step.COMPARING, Step.AWAITING_AGREED, Step.PAIRED):

@@ -1,0 +1,393 @@
+"""Carries a pairing between two hosts: at most one try at a time, in a window that a person opened.
+
+Addresses and keys to ask at are hints, and names are claims. What proves them is the code that two
+people compare (see `pairing`).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import zmq
+
+from nondum.sdk.errors import NondumError, Problem
+from nondum.transport.peers import accepted, pairing
+from nondum.transport.peers.dial import ANSWER_S, Attempt, Dial
+from nondum.transport.peers.drained import Sent
+from nondum.transport.peers.events import DialFailed
+from nondum.transport.peers.failures import PeerRefused
+from nondum.transport.peers.identity import Identity
+from nondum.transport.peers.keys import PeerKey, fingerprint
+from nondum.transport.peers.link import Link
+from nondum.transport.peers.listener import Context, dialling
+from nondum.transport.peers.pairing import (
+    NONCE_BYTES,
+    TRIES,
+    Ask,
+    Commit,
+    Pairing,
+    PairingWindow,
+    Role,
+    Step,
+)
+from nondum.transport.peers.pairing_door import MOST_SENT, Asker, Door
+from nondum.transport.peers.pairing_messages import MAX_BYTES, Beat, Ended, Ending, decode, encode
+from nondum.transport.peers.pairing_state import (
+    Agreed,
+    Comparing,
+    Failed,
+    Idle,
+    PairingState,
+    Waiting,
+)
+from nondum.transport.peers.refusals import Refusal, Refusals
+
+BEAT_S = 0.25
+LINGER_MS = 500
+"""How long the last words have to leave."""
+
+
+@dataclass(slots=True)
+class Try:
+    """One attempt to pair, from either end."""
+
+    link: Link
+    asker: Asker | None
+    """None where this host has asked."""
+    pairing: Pairing
+    before: PairingWindow
+    """As it was, should this try not count."""
+    begun_s: float
+
+
+class PairingHost:
+    """One window, in which this host can ask and be asked. `open` it, and `await close()` it."""
+
+    def __init__(
+        self,
+        identity: Identity,
+        on_change: Callable[[PairingState], None],
+        *,
+        is_wanted: Callable[[PeerKey, str], bool] = lambda key, name: True,
+        on_refusal: Callable[[Refusal], None] = lambda refusal: None,
+    ) -> None:
+        """`on_change` is told of every new state, the last of which is `Agreed` or `Failed`, and
+        `on_refusal` of everybody who was turned away.
+
+        `is_wanted` says whether this host may be paired with a key that calls itself so.
+        Raises `PeerRefused` (PAIRING_DEVELOPMENT) for a host without keys.
+        """
+        if identity.keys is None:
+            told = "a host without keys has nothing to be paired by"
+            fix = "set `development = false` under [peers]"
+            raise PeerRefused(Problem("PAIRING_DEVELOPMENT", told, fix=fix))
+        self._name, self._keys = identity.name, identity.keys
+        self._on_change, self._is_wanted = on_change, is_wanted
+        self.refusals = Refusals(on_refusal)
+        self._loop = asyncio.get_running_loop()
+        self._context: Context = zmq.Context()
+        self._window = PairingWindow(0.0)
+        self._door: Door | None = None
+        self._dial: Dial | None = None
+        self._try: Try | None = None
+        self._timers: list[asyncio.TimerHandle] = []
+        self.state: PairingState = Idle()
+
+    @property
+    def seconds_left(self) -> float:
+        """Until the window closes."""
+        ends_s = self._window.opened_s + pairing.WINDOW_S
+        return 0.0 if self._is_over else max(0.0, ends_s - self._loop.time())
+
+    def open(self, address: str = "tcp://*:*") -> int:
+        """Open the window, once; the port at which this host can be asked from now on.
+
+        Raises `PeerRefused` (ZAP_TAKEN, ADDRESS_UNUSABLE).
+        """
+        self._door = Door(self._context, self._keys, address, self._on_asked, self.refusals)
+        now_s = self._loop.time()
+        self._window = PairingWindow(now_s)
+        self._timers = [
+            self._loop.call_at(now_s + pairing.WINDOW_S, self._time_is_over),
+            self._loop.call_later(BEAT_S, self._beat),
+        ]
+        self._become(self._waiting(None))
+        return self._door.port
+
+    def ask(self, key: PeerKey, addresses: Sequence[str]) -> None:
+        """Ask the host that may be at one of these addresses, until it answers.
+
+        Asking another one gives up the last. Nothing happens once the window is closed.
+        """
+        assert self._door is not None, "the window is opened first"
+        if self._is_over:
+            return
+        if self._dial is not None:
+            self._dial.close()
+        self._dial = Dial(
+            key,
+            addresses,
+            connect=self._dialling,
+            is_wanted=lambda _: self._try is None and not self._is_over,
+            on_won=self._on_won,
+            on_over=self._on_attempt_over,
+            on_data=self._on_answered,
+            on_event=self._on_dial_failed,
+        )
+
+    def confirm(self, code: str) -> None:
+        """The person here sees this code on both hosts.
+
+        Raises `PeerRefused`: PAIRING_ORDER when there is none to confirm, PAIRING_CODE for another
+        than the one that is shown now.
+        """
+        shown = self.state
+        if not isinstance(shown, Comparing) or self._try is None:
+            raise PeerRefused(Problem("PAIRING_ORDER", "there is no code to confirm"))
+        if _digits(code) != _digits(shown.code):
+            told = "this is not the code that is shown here"
+            fix = "if both hosts show different codes, say no: somebody is between them"
+            raise PeerRefused(Problem("PAIRING_CODE", told, need=shown.code, have=code, fix=fix))
+        self._try.pairing, said = pairing.confirm(self._try.pairing, self._loop.time())
+        for message in said:
+            self._try.link.send(encode(message))
+        self._moved(self._try)
+
+    def refuse(self) -> None:
+        """The person here says no, or wants no pairing any more."""
+        if not self._is_over:
+            self._end(Failed(_SAID_NO), Ending.REFUSED)
+
+    async def close(self) -> None:
+        """Close the window, if it is open still, and let go of everything."""
+        if not self._is_over:
+            self._end(Failed(_CLOSED), Ending.OVER)
+        await asyncio.to_thread(self._context.term)
+
+    @property
+    def _is_over(self) -> bool:
+        return isinstance(self.state, Agreed | Failed)
+
+    # Being asked
+
+    def _on_asked(self, asker: Asker, data: bytes) -> None:
+        if self._door is None or self._is_over:
+            return
+        current = self._try.asker if self._try else None
+        if current is not None and current.id == asker.id:
+            self._hear(data, asker.proved)  # ids are the other end's choice, keys are not
+            return
+        try:
+            message = decode(data)
+        except NondumError as error:
+            self._door.turn_away(asker, str(error))
+            return
+        if isinstance(message, Ask):
+            self._on_ask(asker, self._door.link(asker), data, message.name)
+        else:
+            self._door.turn_away(asker, "nothing was asked for yet")
+
+    def _on_ask(self, asker: Asker, link: Link, data: bytes, name: str) -> None:
+        if self._try is not None:
+            _part(link, Ending.BUSY)
+        elif not self._is_wanted(asker.proved, name):
+            _part(link, Ending.UNWANTED)
+        elif self._begin(Role.ANSWERING, link, asker):
+            self._hear(data, asker.proved)
+
+    # Asking
+
+    def _dialling(self, key: PeerKey) -> zmq.Socket[bytes]:
+        socket = dialling(self._context, self._keys, key)
+        socket.setsockopt(zmq.MAXMSGSIZE, MAX_BYTES)
+        return socket
+
+    def _on_won(self, attempt: Attempt) -> None:
+        key = attempt.dial.key
+        attempt.link = Link(attempt, key, self._loop.time(), dialled=True)
+        if self._try is not None:
+            attempt.link.cut()
+        elif begun := self._begin(Role.ASKING, attempt.link, None):
+            attempt.link.send(encode(pairing.ask(begun.pairing)))
+
+    def _on_answered(self, link: Link, frames: list[zmq.Frame]) -> None:
+        if self._try is None or self._try.link is not link:
+            return
+        if len(frames) == 1:
+            assert link.proved is not None
+            self._hear(frames[0].bytes, link.proved)
+        else:
+            self._give_up(_BROKEN, Ending.BROKEN)
+
+    def _on_attempt_over(self, attempt: Attempt) -> None:
+        if self._try is not None and self._try.link is attempt.link:
+            self._give_up(_VANISHED, None)
+
+    def _on_dial_failed(self, event: DialFailed) -> None:
+        if isinstance(self.state, Waiting):
+            self._become(self._waiting(event.problem))
+
+    # One try
+
+    def _begin(self, role: Role, link: Link, asker: Asker | None) -> Try | None:
+        """Begin a try; or, if there were too many, end it all."""
+        now_s = self._loop.time()
+        nonce = secrets.token_bytes(NONCE_BYTES)
+        try:
+            window, begun = self._window.begin(role, self._keys.public, self._name, nonce, now_s)
+        except PeerRefused as refused:
+            _part(link, Ending.TRIES)
+            self._end(Failed(refused.problems[0]), None)
+            return None
+        self._try = Try(link, asker, begun, self._window, now_s)
+        self._window = window
+        return self._try
+
+    def _hear(self, data: bytes, proved: PeerKey) -> None:
+        """A message of the try came."""
+        current = self._try
+        assert current is not None
+        try:
+            said = decode(data)
+            match said:
+                case Beat():
+                    return
+                case Ended(why):
+                    self._other_ended(current, why)
+                    return
+                case Commit(key, name, _):
+                    self._check_wanted(key, name)
+            current.pairing, answers = pairing.receive(
+                current.pairing, said, proved, self._loop.time()
+            )
+        except NondumError as error:
+            self._give_up(error.problems[0], Ending.BROKEN)
+            return
+        for answer in answers:
+            current.link.send(encode(answer))
+        self._moved(current)
+
+    def _check_wanted(self, key: PeerKey, name: str) -> None:
+        if not self._is_wanted(key, name):
+            told = "another host answered than the one that is awaited, or a revoked one"
+            raise PeerRefused(Problem("PAIRING_UNWANTED", told, where=f"{name} {fingerprint(key)}"))
+
+    def _moved(self, current: Try) -> None:
+        """Show how far the try is."""
+        found = current.pairing
+        assert found.peer_key is not None
+        if found.step is Step.PAIRED:
+            self._end(Agreed(found.peer_key, found.peer_name), None)
+        elif found.step in (Step.COMPARING, Step.AWAITING_AGREED):
+            if self._dial is not None and current.link.dialled:
+                self._dial.settled()  # people take longer than its attempts may
+            is_confirmed = found.step is Step.AWAITING_AGREED
+            self._become(Comparing(found.code, found.peer_name, found.peer_key, is_confirmed))
+
+    def _other_ended(self, current: Try, why: Ending) -> None:
+        if why is Ending.REFUSED and current.pairing.has_told_nonce:
+            told = "the person at the other host said no: the codes differ, or it was not wanted"
+            problem = Problem("PAIRING_REFUSED", told, where=current.pairing.peer_name, fix=_ANEW)
+            self._end(Failed(problem), None)
+        else:
+            self._give_up(_ENDINGS[why], None)
+
+    def _give_up(self, problem: Problem, told: Ending | None) -> None:
+        """The try came to nothing; the window stays open for others."""
+        current, self._try = self._try, None
+        assert current is not None
+        if not current.pairing.has_told_nonce:
+            self._window = current.before
+        if told is not None:
+            _part(current.link, told)
+        else:
+            current.link.cut()
+        self._become(self._waiting(problem))
+        if self._dial is not None:
+            self._dial.again()
+
+    # The window
+
+    def _end(self, state: Agreed | Failed, told: Ending | None) -> None:
+        """Close the window; all of it goes, and `state` stays."""
+        current, self._try = self._try, None
+        for timer in self._timers:
+            timer.cancel()
+        if current is not None:
+            if told is not None:
+                current.link.send(encode(Ended(told)))
+            current.link.cut(LINGER_MS)
+        if self._dial is not None:
+            self._dial.close()  # after the link, of which it would leave nothing
+        if self._door is not None:
+            self._door.close(LINGER_MS)
+        self._become(state)
+
+    def _time_is_over(self) -> None:
+        last = self.state.problem if isinstance(self.state, Waiting) else None
+        told = f"the {pairing.WINDOW_S:.0f} seconds for pairing are over"
+        if last is not None:
+            told += f"; the last try ended with {last.code}: {last.message}"
+        self._end(Failed(Problem("PAIRING_OVER", told, fix=_BOTH)), Ending.OVER)
+
+    def _beat(self) -> None:
+        """Look after what nobody tells of."""
+        self._timers[-1] = self._loop.call_later(BEAT_S, self._beat)
+        assert self._door is not None
+        self._door.cut_overdue()
+        if self._try is None:
+            return
+        is_slow = self._loop.time() - self._try.begun_s > ANSWER_S
+        if self._try.link.send(encode(Beat())) is Sent.GONE:
+            self._give_up(_VANISHED, None)
+        elif is_slow and not self._try.pairing.has_told_nonce:
+            self._give_up(_VANISHED, Ending.BROKEN)
+        elif self._try.asker is not None and _sent_too_much(self._try.asker):
+            self._give_up(_BROKEN, Ending.BROKEN)
+
+    def _waiting(self, problem: Problem | None) -> Waiting:
+        return Waiting(TRIES - self._window.tries, problem)
+
+    def _become(self, state: PairingState) -> None:
+        self.state = state
+        self._on_change(state)
+
+
+def _part(link: Link, why: Ending) -> None:
+    link.send(encode(Ended(why)))
+    link.cut(LINGER_MS)
+
+
+def _sent_too_much(asker: Asker) -> bool:
+    """ZeroMQ bounds messages, but not their number of parts: see `accepted`."""
+    return accepted.bytes_received(asker.descriptor) > MOST_SENT
+
+
+def _digits(code: str) -> str:
+    return "".join(code.split())
+
+
+_ANEW = "begin anew on both hosts, `nondum peers pair`, where it was not meant"
+_BOTH = "run `nondum peers pair` on both hosts at the same time, on one network"
+_SAID_NO = Problem("PAIRING_REFUSED", "the person at this host said no")
+_CLOSED = Problem("PAIRING_OVER", "pairing was given up at this host", fix=_BOTH)
+_VANISHED = Problem("PAIRING_VANISHED", "the other host is gone, or says nothing any more")
+_BROKEN = Problem("PAIRING_BROKEN", "the other host does not speak as nondum does")
+_ENDINGS = {
+    Ending.REFUSED: Problem("PAIRING_REFUSED", "the other host does not want to"),
+    Ending.BUSY: Problem("PAIRING_BUSY", "the other host is being paired with another one"),
+    Ending.UNWANTED: Problem(
+        "PAIRING_UNWANTED",
+        "the other host waits for another one, or has revoked this one's key",
+        fix="look at `nondum peers trust` there",
+    ),
+    Ending.TRIES: Problem(
+        "PAIRING_TRIES", "the other host has had too many tries", fix="begin anew on both hosts"
+    ),
+    Ending.OVER: Problem("PAIRING_OVER", "the other host has closed its window", fix=_BOTH),
+    Ending.BROKEN: Problem("PAIRING_BROKEN", "the other host did not understand this one"),
+}
+"""What is told of a try that the other end has ended."""
