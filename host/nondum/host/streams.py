@@ -2,7 +2,8 @@
 
 An action's stream parameters are wired for as long as the action runs; the plan chose them.
 Optional inputs are in no plan: each gets the first stream by name that flows, is of its type, and
-comes from another component of this host, and is wired anew whenever that changes.
+comes from another component of this host, and is wired anew whenever that changes. A stream of
+another host is wired by whoever reaches it (`Remote`), and only where a plan asks for it.
 """
 
 from __future__ import annotations
@@ -11,10 +12,11 @@ import asyncio
 import itertools
 import logging
 from collections import Counter
-from collections.abc import AsyncIterator, Iterable, Iterator, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from socket import socket as Connection
+from typing import Protocol
 
 from nondum.planning.contribution import object_name
 from nondum.sdk.description import PluginDescription
@@ -53,9 +55,32 @@ class StreamStatus:
     stream: str
     type: str
     component: str
+    """One of a peer is `component@host`."""
     is_flowing: bool
     readers: tuple[str, ...]
     """Components, or `component.unit.slot` for optional inputs."""
+
+
+class Remote(Protocol):
+    """Reaches the streams of other hosts."""
+
+    def owner(self, stream: str) -> str | None:
+        """The component of a peer that has a stream, as it is known here; None if none has."""
+
+    def is_open(self, stream: str) -> bool:
+        """Whether a stream is being received."""
+
+    async def connect(
+        self, stream: str, kind: str, reader: str, consume: Callable[[Connection], Awaitable[None]]
+    ) -> None:
+        """Have a reader wired until `disconnect`; wait for the first time. Raises `NondumError`.
+
+        `consume` gives a consumer's half of a connection to the reader, again after the stream had
+        to be opened anew.
+        """
+
+    def disconnect(self, stream: str, reader: str) -> None:
+        """Feed a reader no more; unknown ones are ignored."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +105,11 @@ class Streams:
         self._wires: dict[Wire, asyncio.Task[None]] = {}
         self._disconnecting: set[asyncio.Task[None]] = set()
         self._taps = itertools.count(1)
+        self._remote: Remote | None = None
+
+    def reach(self, remote: Remote) -> None:
+        """From now on, plans may wire streams of other hosts."""
+        self._remote = remote
 
     def join(self, component: str, link: WorkerLink, description: PluginDescription) -> None:
         """A component's worker runs: its outputs and inputs are there."""
@@ -123,17 +153,22 @@ class Streams:
             self._settle()
 
     def listing(self) -> tuple[StreamStatus, ...]:
-        """Every stream of every running component, by name."""
+        """Every stream of every running component, by name, then those of peers that are read."""
+        remote = {w.stream: Source(w.stream, w.type, w.producer) for w in self._remote_wires()}
         return tuple(
             StreamStatus(
                 source.stream,
                 source.type,
                 source.component,
-                source.stream in self._flowing,
+                source.stream in self._flowing or self._is_open(source.stream),
                 tuple(sorted(w.reader for w in self._wires if w.stream == source.stream)),
             )
-            for source in self._sources()
+            for source in (*self._sources(), *sorted(remote.values()))
         )
+
+    def kind(self, stream: str) -> str:
+        """The type of a running component's stream. Raises `WorkerFailed` (STREAM_UNKNOWN)."""
+        return self._source(stream).type
 
     async def tap(self, stream: str, connection: Connection) -> None:
         """Give a stream's producer one more consumer, from outside the host.
@@ -141,9 +176,7 @@ class Streams:
         `connection` stays the caller's to close. Raises `WorkerFailed` (STREAM_UNKNOWN, or why the
         producer refused), `LinkClosed`.
         """
-        source = next((source for source in self._sources() if source.stream == stream), None)
-        if source is None:
-            raise WorkerFailed(_unknown(stream, "tap"))
+        source = self._source(stream)
         body = {"stream": stream, "type": source.type, "consumer": f"tap-{next(self._taps)}"}
         await self._members[source.component].link.request("produce", body, (connection.fileno(),))
 
@@ -157,6 +190,18 @@ class Streams:
     def _sources(self) -> list[Source]:
         return sorted(source for member in self._members.values() for source in member.sources)
 
+    def _source(self, stream: str) -> Source:
+        for source in self._sources():
+            if source.stream == stream:
+                return source
+        raise WorkerFailed(_unknown(stream, "tap"))
+
+    def _remote_wires(self) -> Iterator[Wire]:
+        return (wire for wire in self._wires if _is_remote(wire))
+
+    def _is_open(self, stream: str) -> bool:
+        return self._remote is not None and self._remote.is_open(stream)
+
     def _wires_of(
         self, component: str, behaviour: str, arguments: Mapping[str, str]
     ) -> Iterator[Wire]:
@@ -168,10 +213,16 @@ class Streams:
         for parameter, argument in arguments.items():
             source = sources.get(argument)
             if source is None:
-                if types.get(parameter) in MESSAGES:
-                    raise WorkerFailed(_unknown(argument, component))
+                if (kind := types.get(parameter, "")) in MESSAGES:
+                    yield self._remote_wire(argument, kind, component)
             elif source.component != component:
                 yield Wire(source.stream, source.type, source.component, component)
+
+    def _remote_wire(self, stream: str, kind: str, component: str) -> Wire:
+        owner = self._remote.owner(stream) if self._remote is not None else None
+        if owner is None:
+            raise WorkerFailed(_unknown(stream, component))
+        return Wire(stream, kind, owner, component)
 
     def _settle(self) -> None:
         """Bring the wires up to date with who is there, what flows and what is required."""
@@ -179,7 +230,11 @@ class Streams:
         flowing = [source for source in sources if source.stream in self._flowing]
         sockets = [socket for member in self._members.values() for socket in member.sockets]
         present = self._members.keys()
-        wanted = {w for w in self._required if {w.producer, w.consumer} <= present}
+        wanted = {
+            wire
+            for wire in self._required
+            if wire.consumer in present and (wire.producer in present or _is_remote(wire))
+        }
         wanted.update(optional_wires(sockets, flowing))
         for wire in sorted(self._wires.keys() - wanted):
             self._disconnect(wire)
@@ -187,8 +242,15 @@ class Streams:
             self._connect(wire)
 
     def _connect(self, wire: Wire) -> None:
-        producer, consumer = self._members[wire.producer].link, self._members[wire.consumer].link
-        connecting = asyncio.create_task(self._broker.connect(wire, producer, consumer))
+        consumer = self._members[wire.consumer].link
+        if self._remote is not None and _is_remote(wire):
+            introducing = self._remote.connect(
+                wire.stream, wire.type, wire.reader, self._broker.half(wire, consumer)
+            )
+        else:
+            producer = self._members[wire.producer].link
+            introducing = self._broker.connect(wire, producer, consumer)
+        connecting = asyncio.create_task(introducing)
         self._wires[wire] = connecting
         connecting.add_done_callback(lambda done: self._on_connected(wire, done))
 
@@ -202,7 +264,10 @@ class Streams:
             log.warning("%s cannot be wired to %s: %s", wire.stream, wire.reader, error)
 
     def _disconnect(self, wire: Wire) -> None:
-        del self._wires[wire]
+        connecting = self._wires.pop(wire)
+        if self._remote is not None and _is_remote(wire):
+            connecting.cancel()
+            self._remote.disconnect(wire.stream, wire.reader)
         links = (self._members.get(name) for name in (wire.producer, wire.consumer))
         producer, consumer = (member.link if member else None for member in links)
         # Whatever is still being connected was asked first, so it is also undone by this.
@@ -250,6 +315,11 @@ def _parameter_types(description: PluginDescription, behaviour: str) -> dict[str
             parameters = parse_signature(described.action).parameters
             return {parameter.name: parameter.types[0] for parameter in parameters}
     return {}
+
+
+def _is_remote(wire: Wire) -> bool:
+    """Component ids have no `@`: those of peers do."""
+    return "@" in wire.producer
 
 
 def _unknown(stream: str, component: str) -> Problem:

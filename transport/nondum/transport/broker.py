@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from socket import socket as Connection
 from typing import Any
 
 from nondum.sdk.errors import NondumError
@@ -61,6 +63,17 @@ class StreamBroker:
         if errors:
             await self.disconnect(wire, producer, consumer)
             raise errors[0]
+
+    def half(self, wire: Wire, consumer: WorkerLink) -> Callable[[Connection], Awaitable[None]]:
+        """What gives the consuming worker one half of a connection, whoever has the other.
+
+        The half stays the caller's to close. Raises `WorkerFailed` or `LinkClosed`.
+        """
+
+        async def consume(connection: Connection) -> None:
+            await consumer.request("consume", wire._input(), (connection.fileno(),))
+
+        return consume
 
     async def disconnect(
         self, wire: Wire, producer: WorkerLink | None, consumer: WorkerLink | None

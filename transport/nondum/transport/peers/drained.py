@@ -42,8 +42,8 @@ class Drained:
         self._loop.add_reader(self._descriptor, self.drain)
         self._look_again()
 
-    def send(self, frames: Sequence[bytes]) -> Sent:
-        """Send one message, without waiting."""
+    def send(self, frames: Sequence[bytes | zmq.Frame]) -> Sent:
+        """Send one message, without waiting. Frames are sent from where they lie."""
         if self.is_closed:
             return Sent.GONE
         try:

@@ -1,0 +1,193 @@
+"""One stream of another host, as its bridge here reads it: over one connection, claimed once."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import zmq
+
+from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.transport.bridge import packets, sockets, tcp
+from nondum.transport.bridge.clocks import Clocks
+from nondum.transport.bridge.packets import Claim, Frame, Handled, Opened, Over, Ping, Pong
+from nondum.transport.peers.drained import Drained
+from nondum.transport.peers.keys import HostKeys, PeerKey
+from nondum.transport.peers.monitor import SocketEvent, Watch
+
+BEAT_S = 0.3
+SILENT_S = 1.2
+"""A connection over which no byte came for so long is dead: pings are answered every beat, and what
+is slow still trickles."""
+OPEN_S = 5.0
+"""How long it may take to reach the other bridge."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a stream is to be had."""
+
+    addresses: tuple[str, ...]
+    """`tcp://HOST:PORT`, all tried at once."""
+    owner: PeerKey
+    """The key of the bridge there."""
+    token: str
+    """Of the grant."""
+
+
+class Incoming:
+    """A stream's connection. `close` it."""
+
+    def __init__(
+        self,
+        context: sockets.Context,
+        keys: HostKeys,
+        place: Place,
+        *,
+        on_opened: Callable[[str], None],
+        on_frame: Callable[[Frame], None],
+        on_over: Callable[[Problem], None],
+    ) -> None:
+        """`on_opened` is told the stream's type. Each `on_frame` is answered by `handled`, in order.
+
+        `on_over` is called once, at the end or instead of the beginning; not after `close`.
+        """
+        self.clocks = Clocks()
+        self.bytes_received = 0
+        self._place = place
+        self._on_opened, self._on_frame, self._on_over = on_opened, on_frame, on_over
+        self._loop = asyncio.get_running_loop()
+        self._began_s = self._loop.time()
+        self._is_opened = False
+        self._is_closed = False
+        self._descriptor: int | None = None
+        self._winner: _Attempt | None = None
+        self._problem = Problem("STREAM_UNREACHABLE", "no address of its bridge was given")
+        self._attempts: list[_Attempt] = []
+        self._beating = self._loop.call_later(BEAT_S, self._beat)
+        for address in place.addresses:
+            self._dial(sockets.dialling(context, keys, place.owner), address)
+        if not self._attempts:
+            self._loop.call_soon(self._lose, self._problem)
+
+    def handled(self, seq: int) -> None:
+        """A frame was taken in: there is room for another one."""
+        self._say(Handled(seq))
+
+    def close(self) -> None:
+        """Let go of it."""
+        if not self._is_closed:
+            self._is_closed = True
+            self._beating.cancel()
+            for attempt in self._attempts:
+                attempt.close()
+
+    def _dial(self, socket: zmq.Socket[bytes], address: str) -> None:
+        try:
+            self._attempts.append(_Attempt(self, socket, address))
+        except zmq.ZMQError as error:
+            self._problem = Problem("ADDRESS_MALFORMED", str(error), where=address)
+
+    def connected(self, attempt: _Attempt) -> None:
+        """A connection stands, and both ends have proved their keys: the first one is kept."""
+        if self._winner is not None or self._is_closed:
+            return
+        self._winner = attempt
+        for other in self._attempts:
+            if other is not attempt:
+                other.close()
+        self._attempts = [attempt]
+        self._say(Claim(packets.VERSION, self._place.token))
+        self._say(Ping(self._loop.time()))
+
+    def failed(self, attempt: _Attempt, problem: Problem) -> None:
+        """A connection has failed, or has ended."""
+        attempt.close()
+        if attempt in self._attempts:
+            self._attempts.remove(attempt)
+            if not self._attempts:
+                self._lose(problem)
+
+    def receive(self, frames: list[zmq.Frame]) -> None:
+        """A message came over the connection that was kept."""
+        now_s = self._loop.time()
+        if self._descriptor is None:
+            self._descriptor = int(frames[0].get(zmq.SRCFD))
+        self.bytes_received += sum(len(frame) for frame in frames)
+        try:
+            message = packets.read_told([frame.buffer for frame in frames])
+        except ProtocolViolation as violation:
+            self._lose(violation.problems[0])
+            return
+        match message:
+            case Opened(kind) if not self._is_opened:
+                self._is_opened = True
+                self._on_opened(kind)
+            case Frame() if self._is_opened:
+                self._on_frame(message)
+            case Pong(at_s, clock_s):
+                if at_s:
+                    self.clocks.heard(at_s, clock_s, now_s)
+            case Over(problem):
+                self._lose(problem)
+            case _:
+                self._lose(Problem("BRIDGE_PACKET", "a message out of its turn"))
+
+    def _say(self, message: packets.Asked) -> None:
+        if self._winner is not None and not self._is_closed:
+            self._winner.send(packets.asked(message))
+
+    def _beat(self) -> None:
+        self._beating = self._loop.call_later(BEAT_S, self._beat)
+        self._say(Ping(self._loop.time()))
+        if not self._is_opened:
+            if self._loop.time() - self._began_s > OPEN_S:
+                told = f"its bridge did not answer in {OPEN_S:g} s"
+                self._lose(Problem("STREAM_UNREACHABLE", told))
+            return
+        state = None if self._descriptor is None else tcp.state(self._descriptor)
+        if state is None:
+            return  # the monitor tells
+        if state.quiet_s > SILENT_S:
+            self._lose(Problem("STREAM_SILENT", f"nothing came for {SILENT_S:g} s"))
+        elif state.bytes_received > self.bytes_received * 1.25 + 2 * packets.MAX_BULK:
+            self._lose(Problem("BRIDGE_PACKET", "a message that does not end"))
+
+    def _lose(self, problem: Problem) -> None:
+        if not self._is_closed:
+            self.close()
+            self._on_over(problem)
+
+
+class _Attempt:
+    """One connection to one address. Raises `zmq.ZMQError` for an address that is none."""
+
+    def __init__(self, incoming: Incoming, socket: zmq.Socket[bytes], address: str) -> None:
+        self._incoming = incoming
+        self._address = address
+        self._ears = Watch(socket, self._on_event)
+        self._socket = Drained(socket, incoming.receive)
+        try:
+            socket.connect(address)
+        except zmq.ZMQError:
+            self.close()
+            raise
+
+    def send(self, data: bytes) -> None:
+        self._socket.send([data])
+
+    def close(self) -> None:
+        self._ears.close()
+        self._socket.close()
+
+    def _on_event(self, event: SocketEvent) -> None:
+        if event.kind == zmq.EVENT_HANDSHAKE_SUCCEEDED:
+            self._incoming.connected(self)
+            return
+        self._socket.drain()  # the last words
+        if event.kind == zmq.EVENT_HANDSHAKE_FAILED_AUTH:
+            problem = Problem("STREAM_NOT_GRANTED", "the bridge there does not let this one in")
+        else:
+            problem = Problem("STREAM_LOST", "the connection to its host has ended, or never began")
+        self._incoming.failed(self, problem)

@@ -1,0 +1,173 @@
+"""What two bridges say to each other over the connection of one stream: values and their parts.
+
+Pure: whatever a hostile bridge sends, `read_asked` and `read_told` give a value or raise
+`ProtocolViolation`. A message has one part, a frame with bulk bytes two.
+
+    reader → owner   [1, version, token]              a grant is claimed: the first message
+                     [2, seq]                         a frame has been handled
+                     [3, at_s]                        a sign of life
+    owner → reader   [1, type]                        the claim holds: frames follow
+                     [2, seq, coding, header], bulk   a frame
+                     [3, at_s, clock_s]               a sign of life, and the owner's clock
+                     [4, problem]                     the stream is over
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, TypeAlias
+
+from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.messages import Buffer
+from nondum.sdk.wire import pack, unpack
+from nondum.sdk.wire_fields import read_body, read_number, read_problem, read_text
+
+VERSION = 1
+MAX_ASKED = 1024
+"""Bytes of a reader's message."""
+MAX_BULK = 64 * 1024 * 1024
+"""Bulk bytes of one frame; longer ones stay on their host."""
+
+
+class Coding(Enum):
+    """How a frame's bulk bytes travel."""
+
+    RAW = 0
+    """As they are."""
+    JPEG = 1
+    """An image as JPEG; the header tells what it was, and is to be again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """The reader has been granted a stream."""
+
+    version: int
+    token: str
+
+
+@dataclass(frozen=True, slots=True)
+class Handled:
+    """A frame was taken in: there is room for another one."""
+
+    seq: int
+
+
+@dataclass(frozen=True, slots=True)
+class Ping:
+    """A sign of life of the reader."""
+
+    at_s: float
+    """On the reader's clock."""
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """The claim holds."""
+
+    kind: str
+    """The stream's type."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A message of the stream."""
+
+    seq: int
+    coding: Coding
+    header: Mapping[str, Any]
+    bulk: Buffer | None
+
+
+@dataclass(frozen=True, slots=True)
+class Pong:
+    """The answer to a ping."""
+
+    at_s: float
+    """As the ping had it."""
+    clock_s: float
+    """The owner's clock, when it answered."""
+
+
+@dataclass(frozen=True, slots=True)
+class Over:
+    """The stream has ended, or was never to be had."""
+
+    problem: Problem
+
+
+Asked: TypeAlias = Claim | Handled | Ping
+Told: TypeAlias = Opened | Frame | Pong | Over
+
+
+def asked(message: Asked) -> bytes:
+    """The one part of a reader's message."""
+    match message:
+        case Claim(version, token):
+            return pack([1, version, token])
+        case Handled(seq):
+            return pack([2, seq])
+        case Ping(at_s):
+            return pack([3, at_s])
+
+
+def read_asked(data: bytes) -> Asked:
+    """Read a reader's message. Raises `ProtocolViolation`."""
+    match unpack(data, MAX_ASKED):
+        case [1, int(version), token]:
+            return Claim(read_number(version), read_text(token))
+        case [2, seq]:
+            return Handled(read_number(seq))
+        case [3, at_s]:
+            return Ping(_clock(at_s))
+    raise _violation("no message of a reader")
+
+
+def told(message: Opened | Pong | Over) -> bytes:
+    """The one part of an owner's message that is no frame."""
+    match message:
+        case Opened(kind):
+            return pack([1, kind])
+        case Pong(at_s, clock_s):
+            return pack([3, at_s, clock_s])
+        case Over(problem):
+            return pack([4, problem.to_dict()])
+
+
+def head(frame: Frame) -> bytes:
+    """A frame's first part; its bulk is the second, if it has any.
+
+    Raises `ProtocolViolation` for a header that fits no packet.
+    """
+    return pack([2, frame.seq, frame.coding.value, frame.header])
+
+
+def read_told(parts: Sequence[Buffer]) -> Told:
+    """Read an owner's message; a frame's bulk stays where it is. Raises `ProtocolViolation`."""
+    if not 1 <= len(parts) <= 2:
+        raise _violation(f"a message has one part or two, not {len(parts)}")
+    bulk = parts[1] if len(parts) == 2 else None
+    fields = unpack(bytes(parts[0]))
+    match fields:
+        case [2, seq, 0 | 1 as coding, header] if type(coding) is int:
+            return Frame(read_number(seq), Coding(coding), read_body(header), bulk)
+        case [1, kind] if bulk is None:
+            return Opened(read_text(kind))
+        case [3, at_s, clock_s] if bulk is None:
+            return Pong(_clock(at_s), _clock(clock_s))
+        case [4, problem] if bulk is None:
+            return Over(read_problem(problem))
+    raise _violation("no message of a stream's owner")
+
+
+def _clock(value: object) -> float:
+    if type(value) is not float or not math.isfinite(value):
+        raise _violation("a clock is a finite number of seconds")
+    return value
+
+
+def _violation(message: str) -> ProtocolViolation:
+    return ProtocolViolation(Problem("BRIDGE_PACKET", message))
