@@ -12,6 +12,8 @@ from nondum.host.events import (
     PayloadFailed,
     PayloadRefused,
     PayloadWithdrawn,
+    PeerJoined,
+    PeerLeft,
 )
 from nondum.sdk.errors import Problem
 
@@ -27,6 +29,10 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return f"{_name(event.payload, snapshot)} is withdrawn: {event.reason}"
         case DriveUnreadable():
             return f"drive {event.drive} cannot be used: {_joined(event.problems)}"
+        case PeerJoined():
+            return f"the host {event.host} is here"
+        case PeerLeft():
+            return f"the host {event.host} is gone: {event.reason}"
         case DriveRead() if not event.payloads:
             return f"drive {event.drive} carries no payload"
     return None

@@ -10,8 +10,8 @@ import asyncio
 import logging
 import os
 import signal
-from collections.abc import Coroutine, Iterator, Sequence
-from typing import Any
+from collections.abc import Callable, Coroutine, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
 
 from nondum.host import verbs
 from nondum.host.announcements import announced
@@ -31,7 +31,7 @@ from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
 from nondum.host.lifecycle.folders import Folders, claim
 from nondum.host.lifecycle.installation import InstallOptions
-from nondum.host.mind.frames import mounts_to_wire
+from nondum.host.mind.frames import mounts_of_all
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.system_tree import load_system_tree
@@ -43,6 +43,9 @@ from nondum.host.workers.workers import Workers
 from nondum.planning.attempts import Patience
 from nondum.sdk.errors import ConfigRefused, Problem
 from nondum.wheelhouse.signatures import UnsignedAllowed
+
+if TYPE_CHECKING:
+    from nondum.host.peers.neighbourhood import Neighbourhood
 
 log = logging.getLogger(__name__)
 
@@ -80,9 +83,10 @@ async def _run(
     manager = ComponentManager(catalogue, executor, bus)
     for source in (*drive_sources(config, folders), *more_drives):
         manager.add_source(source)
+    neighbours = await _neighbours(config, folders, workers, catalogue, bus, lambda: mind)
     mind = Mind(
         config.host.name,
-        workers,
+        neighbours.calls if neighbours else workers,
         Planners.installed(memory_mb=config.planning.memory_mb),
         emit=bus.emit,
         deadline_s=config.planning.deadline_s,
@@ -92,10 +96,12 @@ async def _run(
         system_tree=load_system_tree(config.host.system_tree),
     )
     bus.subscribe(_Listener(catalogue, mind, workers).on_event)
+    if neighbours is not None:
+        bus.subscribe(neighbours.on_event)
     news = News()
     bus.subscribe(news.on_event)
     listing = executor.installation.listing
-    warnings = tuple(_warnings(config, catalogue))
+    warnings = (*_warnings(config, catalogue), *(neighbours.warnings if neighbours else ()))
     questions = Questions(catalogue, mind, workers, news, listing, warnings)
     orders = Orders(catalogue, mind, workers, news, bus, config.planning.translate_s)
     control = ControlServer(
@@ -105,6 +111,8 @@ async def _run(
     log.info("host %s listens at %s", config.host.name, config.host.control)
     try:
         workers.keep_spare()
+        if neighbours is not None:
+            await neighbours.start()
         await _until(
             stop,
             manager.run(),
@@ -115,7 +123,29 @@ async def _run(
     finally:
         await control.close()
         await mind.close()
+        if neighbours is not None:
+            await neighbours.close()
         await workers.close()
+
+
+async def _neighbours(
+    config: HostConfig,
+    folders: Folders,
+    workers: Workers,
+    catalogue: Catalogue,
+    bus: Bus,
+    mind: Callable[[], Mind],
+) -> Neighbourhood | None:
+    """What this host has to do with others; None where it is to have nothing. Imported only where
+    it is wanted: it needs some ten megabytes.
+
+    Raises `PeerRefused`.
+    """
+    if not config.peers.enabled:
+        return None
+    from nondum.host.peers.neighbourhood import Neighbourhood
+
+    return await Neighbourhood.open(config, folders, workers, catalogue, bus.emit, mind)
 
 
 def drive_sources(config: HostConfig, folders: Folders) -> list[DriveSource]:
@@ -163,7 +193,7 @@ class _Listener:
         """A start or a recomposition is a new snapshot; everything else is news."""
         if isinstance(event, HostStarted | Recomposed):
             snapshot = self._catalogue.snapshot()
-            self._workers.remount(mounts_to_wire(snapshot.host, snapshot.mounts))
+            self._workers.remount(mounts_of_all(snapshot))
             self._mind.see(snapshot)
             if isinstance(event, HostStarted):
                 self._mind.restore(snapshot.goals)

@@ -14,7 +14,7 @@ from typing import Any
 from nondum.host.mind.diagnosis import Seen, moment, why_not, words_gone
 from nondum.host.shelf import Shelved, candidate_of, distinct, on_shelf
 from nondum.planning.advise import Advice, Candidate, Here, advise, understood
-from nondum.planning.contribution import Contribution
+from nondum.planning.contribution import Contribution, id_at_home
 from nondum.planning.goal import GoalKind, goal_text, parse_goal
 from nondum.planning.merge import merge
 from nondum.planning.search import solve
@@ -68,7 +68,7 @@ class Surroundings:
         seen = tuple(_seen(row, host) for row in told["seen"])
         present = tuple(
             Contribution.from_description(
-                _description(row), host=host, component=row["component"], rank=row["rank"]
+                _description(row), host=row["host"], component=row["component"], rank=row["rank"]
             )
             for row in told["components"]
         )
@@ -170,7 +170,7 @@ def _remembered(seen: Iterable[Seen]) -> list[Shelved]:
     left: dict[tuple[str, str], float] = {}
     for known in seen:
         key = (known.payload_id, known.version)
-        found.setdefault(key, {})[known.contribution.component] = known.description
+        found.setdefault(key, {})[id_at_home(known.contribution.component)] = known.description
         left[key] = known.left_wall_s
     return [
         Shelved(*key, f"here until {moment(left[key])}", described)
@@ -180,8 +180,10 @@ def _remembered(seen: Iterable[Seen]) -> list[Shelved]:
 
 def _seen(row: Mapping[str, Any], host: str) -> Seen:
     description = _description(row)
-    contribution = Contribution.from_description(description, host=host, component=row["component"])
-    return Seen(contribution, description, row["payload"], row["version"], row["left"])
+    contribution = Contribution.from_description(
+        description, host=row["host"] or host, component=row["component"]
+    )
+    return Seen(contribution, description, row["payload"], row["version"], row["left"], row["host"])
 
 
 def _description(row: Mapping[str, Any]) -> PluginDescription:

@@ -453,8 +453,22 @@ class DeviceReleased(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class PeerJoined(Event):
+    """A peer is there; what it offers is told by `PeerShared`."""
+
+    key: str
+    host: str
+    """Its name."""
+    address: str
+    admitted_by: str
+    """`pairing`, `certificate` or `development`."""
+    life: str
+    """Names its run."""
+
+
+@dataclass(frozen=True, slots=True)
 class PeerShared(Event):
-    """A peer is there, or offers something else than before."""
+    """A peer offers something, or something else than before."""
 
     host: str
     """Its name."""

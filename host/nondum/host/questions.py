@@ -20,6 +20,7 @@ from nondum.host.rows import (
     drive_row,
     host_state,
     journal_row,
+    offered_row,
     payload_row,
     problems_of,
     stream_row,
@@ -65,7 +66,13 @@ class Questions:
     async def components(self, arguments: Arguments) -> list[Row]:
         """What the robot is made of."""
         pids = self.workers.pids()
-        return [component_row(c, pids.get(c.id)) for c in self.catalogue.snapshot().components]
+        snapshot = self.catalogue.snapshot()
+        own = [component_row(c, snapshot.host, pids.get(c.id)) for c in snapshot.components]
+        return own + [
+            offered_row(offered, peer.name)
+            for peer in snapshot.peers
+            for offered in peer.components
+        ]
 
     async def behaviours(self, arguments: Arguments) -> list[Row]:
         """What can be done."""

@@ -13,6 +13,7 @@ from nondum.host.catalogue.records import (
     DriveRecord,
     JournalEntry,
     PayloadRecord,
+    PeerComponent,
     Snapshot,
     Step,
 )
@@ -82,11 +83,12 @@ def device_row(device: DeviceRecord, claims: Mapping[str, tuple[str, DeviceClaim
     }
 
 
-def component_row(component: ComponentRecord, pid: int | None) -> Row:
+def component_row(component: ComponentRecord, host: str, pid: int | None) -> Row:
     """A component: how it is, and what it brings."""
     described = component.description
     return {
         "component": component.id,
+        "host": host,
         "state": _state(component),
         "ready": component.is_ready,
         "plugin": component.distribution,
@@ -97,6 +99,26 @@ def component_row(component: ComponentRecord, pid: int | None) -> Row:
         "devices": {claim.name: claim.device for claim in component.devices},
         "pid": pid,
         "problem": "; ".join(str(problem) for problem in component.problems),
+    }
+
+
+def offered_row(component: PeerComponent, host: str) -> Row:
+    """A component of a peer, in the same columns; what is withheld is its problem."""
+    described = component.description
+    withheld = ", ".join(component.withheld)
+    return {
+        "component": component.id,
+        "host": host,
+        "state": "ready" if component.is_ready else "not ready",
+        "ready": component.is_ready,
+        "plugin": described.name,
+        "version": component.version,
+        "payload": component.payload_id,
+        "units": [unit.name for unit in described.units],
+        "behaviours": [behaviour.name for behaviour in described.behaviours],
+        "devices": {},
+        "pid": None,
+        "problem": f"its host does not offer {withheld}" if withheld else "",
     }
 
 

@@ -13,6 +13,7 @@ ROWS: dict[str, set[str]] = {
     "behaviours": {"behaviour", "component", "kind", "running", "phrases"},
     "components": {
         "component",
+        "host",
         "state",
         "ready",
         "plugin",
@@ -101,7 +102,7 @@ FACTS = """\
 FACT                                        SINCE  SOURCE                                      VALUE
 free panther__beacon__brightness            AGE    nobody uses it                              -
 idle panther__beacon__lamp                  AGE    nobody uses it                              -
-on panther__beacon__lamp panther            AGE    beacon is plugged into this host            -
+on panther__beacon__lamp panther            AGE    beacon is plugged into panther              -
 output panther__beacon__lamp                AGE    beacon declares it                          -
 panther__beacon__brightness
 ready panther__beacon__lamp                 AGE    beacon is healthy and its devices are       -

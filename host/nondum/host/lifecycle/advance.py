@@ -46,6 +46,7 @@ RULES: Mapping[type[Event], _Rule] = {
     events.GoalGiven: goal_rules.on_goal_given,
     events.GoalReached: goal_rules.on_goal_over,
     events.GoalEnded: goal_rules.on_goal_over,
+    events.PeerJoined: peer_rules.on_peer_joined,
     events.PeerShared: peer_rules.on_peer_shared,
     events.PeerLeft: peer_rules.on_peer_left,
 }
@@ -74,8 +75,9 @@ def settle(turn: Turn, before: HostState) -> Outcome:
     drive_rules.release_idle_drives(turn)
     if turn.state.components != before.components or turn.state.devices != before.devices:
         claims.settle(turn)
-    parts = ("components", "mounts", "former", "peers")
-    if any(getattr(turn.state, part) != getattr(before, part) for part in parts):
+    parts = ("components", "mounts", "former")
+    is_recomposed = any(getattr(turn.state, part) != getattr(before, part) for part in parts)
+    if is_recomposed or peer_rules.offers(turn.state) != peer_rules.offers(before):
         turn.change(revision=before.revision + 1)
         turn.events.append(events.Recomposed(turn.state.revision, turn.events[0].name))
     return turn.outcome()

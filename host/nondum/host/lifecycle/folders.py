@@ -45,6 +45,11 @@ class Folders:
         """The scratch folders of all components."""
         return self.root / "scratch"
 
+    @property
+    def peers(self) -> Path:
+        """Key, certificate and trust."""
+        return self.root / "peers"
+
     def staging(self, payload: str) -> Path:
         """A payload while it is copied and checked."""
         return self.root / "staging" / payload

@@ -112,7 +112,7 @@ def component_facts(
     facts: dict[str, str] = {}
     for unit in description.units:
         name = object_name(host, component, unit.name)
-        facts[fact("on", name, host)] = f"{component} is part of {host}"
+        facts[fact("on", name, host)] = f"{component} is plugged into {host}"
         if is_ready:
             facts[fact("ready", name)] = f"{component} is healthy and its devices are there"
             facts[fact("idle", name)] = "nobody uses it"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 
-from nondum.host.catalogue.records import MountPose
+from nondum.host.catalogue.records import MountPose, Snapshot
 from nondum.sdk.geometry import FrameTree, Transform
 
 MAX_DISTANCE_M = 5.0
@@ -33,6 +33,14 @@ def mounts_to_wire(host: str, mounts: Iterable[MountPose]) -> dict[str, list[obj
         frame: [parent, list(pose.translation), list(pose.rotation)]
         for frame, (parent, pose) in transforms(host, mounts).items()
     }
+
+
+def mounts_of_all(snapshot: Snapshot) -> dict[str, list[object]]:
+    """The mount tables of this host and its peers, each peer a body of its own."""
+    found = mounts_to_wire(snapshot.host, snapshot.mounts)
+    for peer in snapshot.peers:
+        found |= mounts_to_wire(peer.name, peer.mounts)
+    return found
 
 
 def implausible(mount: MountPose) -> Iterator[str]:

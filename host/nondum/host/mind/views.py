@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Protocol
 
 from py_trees.behaviour import Behaviour
 
-from nondum.host.catalogue.records import ComponentRecord
+from nondum.host.catalogue.records import ComponentRecord, PeerComponent
 from nondum.host.mind import evidence, offers
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition, own_objects
@@ -147,10 +147,11 @@ class Views:
             "components": [
                 {
                     "component": component.id,
+                    "host": host,
                     "rank": component.rank,
                     "description": component.description.to_dict(),
                 }
-                for component in self._components()
+                for host, component in self._everyone()
                 if component.id not in kept_out
             ],
             "facts": sorted(beliefs.world.bare_facts),
@@ -160,6 +161,7 @@ class Views:
                     "component": seen.contribution.component,
                     "payload": seen.payload_id,
                     "version": seen.version,
+                    "host": seen.host,
                     "left": seen.left_wall_s,
                     "description": seen.description.to_dict(),
                 }
@@ -178,15 +180,15 @@ class Views:
                 "running": (component.id, behaviour.name) in running,
                 "phrases": list(behaviour.phrases),
             }
-            for component in self._components()
+            for _, component in self._everyone()
             for behaviour in component.description.behaviours
         ]
 
     def units(self) -> list[Row]:
         """What there is to act with: `unit`, `type`, `component`, `ready`, mount and doubts."""
         rows = []
-        for component in self._components():
-            names = own_objects(self._mind.beliefs.snapshot.host, component)
+        for host, component in self._everyone():
+            names = own_objects(host, component)
             for unit in component.description.units:
                 pose = self._mind.beliefs.snapshot.mount(names[unit.name])
                 row = {
@@ -210,8 +212,8 @@ class Views:
             for stream in run.streams:
                 consumers.setdefault(stream, []).append(run.component)
         rows = []
-        for component in self._components():
-            names = own_objects(self._mind.beliefs.snapshot.host, component)
+        for host, component in self._everyone():
+            names = own_objects(host, component)
             for unit in component.description.units:
                 for output in unit.outputs:
                     stream = names[output.name]
@@ -228,8 +230,8 @@ class Views:
             for told in self._mind.people.since(since)
         ]
 
-    def _components(self) -> tuple[ComponentRecord, ...]:
-        return self._mind.beliefs.snapshot.components
+    def _everyone(self) -> Iterator[tuple[str, ComponentRecord | PeerComponent]]:
+        return self._mind.beliefs.snapshot.everyone()
 
     def _last_few(self) -> int:
         return max(0, self._mind.people.last_number - 5)

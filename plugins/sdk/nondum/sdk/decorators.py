@@ -24,6 +24,7 @@ def behaviour(
     action: str,
     lasting: bool = False,
     phrase: str | Sequence[str] | None = None,
+    when_lost: str = "stop",
 ) -> Callable[[_Marked], _Marked]:
     """Mark a function, method or `TickedBehaviour` subclass as a behaviour.
 
@@ -36,11 +37,14 @@ def behaviour(
     `await ctx.established()` when its effects begin to hold.
 
     `phrase` is one pattern, or several, of words that ask for it: `"point at {t}"`.
+
+    `when_lost` says what becomes of it when another host asked for it and is lost: `stop`, `hold`
+    what it does, or `finish` it (see `nondum.sdk.description.WHEN_LOST`).
     """
     phrases = (phrase,) if isinstance(phrase, str) else tuple(phrase or ())
 
     def mark(marked: _Marked) -> _Marked:
-        described = Behaviour(name, action, lasting, phrases, _first_line(marked))
+        described = Behaviour(name, action, lasting, phrases, _first_line(marked), when_lost)
         setattr(marked, BEHAVIOUR_MARK, described)
         return marked
 

@@ -19,6 +19,11 @@ ACTUATORS = frozenset({"base", "pointer", "arm", "gripper"})
 """Unit types that move the body: one user at a time, whatever their plugin says."""
 
 
+WHEN_LOST = ("stop", "hold", "finish")
+"""`stop`: it is halted at once. `hold`: it goes on until a person halts it, or the same host asks
+for it again. `finish`: it goes on to its end; a lasting behaviour has none, so it is held."""
+
+
 @dataclass(frozen=True, slots=True)
 class Fragment:
     """A piece of PDDL, a domain or a problem, that a component contributes.
@@ -82,6 +87,8 @@ class Behaviour:
     """False: finishing. True: its effects hold while it runs."""
     phrases: tuple[str, ...] = ()
     doc: str = ""
+    when_lost: str = "stop"
+    """What becomes of it when another host asked for it and is lost: one of `WHEN_LOST`."""
 
 
 @dataclass(frozen=True, slots=True)

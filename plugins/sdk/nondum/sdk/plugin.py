@@ -18,7 +18,7 @@ import pluggy
 
 from nondum.sdk import hooks
 from nondum.sdk.decorators import behaviour_of, condition_of
-from nondum.sdk.description import Behaviour, Condition, PluginDescription, Unit
+from nondum.sdk.description import WHEN_LOST, Behaviour, Condition, PluginDescription, Unit
 from nondum.sdk.errors import NondumError, Problem, WorkerFailed
 from nondum.sdk.signature import parse_signature
 from nondum.sdk.ticked import TickedBehaviour
@@ -169,6 +169,15 @@ def _parameter_problems(function: Callable[..., Any]) -> Iterator[Problem]:
     if described is None:
         return
     where = f"behaviour {described.name!r}"
+    if described.when_lost not in WHEN_LOST:
+        need, have = " or ".join(map(repr, WHEN_LOST)), repr(described.when_lost)
+        yield Problem(
+            "DESCRIPTION_INVALID",
+            "`when_lost` says what becomes of it without its caller",
+            where=where,
+            need=need,
+            have=have,
+        )
     try:
         action = parse_signature(described.action)
     except NondumError as error:

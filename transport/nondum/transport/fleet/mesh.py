@@ -103,6 +103,10 @@ class Mesh:
             self._node.identity.check_address(address)
         self._meeting.hinted(key, addresses, epoch)
 
+    def check_address(self, address: str) -> None:
+        """Refuse addresses that this host does not dial. Raises `PeerRefused`."""
+        self._node.identity.check_address(address)
+
     def no_more_hints(self, key: PeerKey) -> None:
         """Nobody says any more where a host is. A link to it stays while it works."""
         self._meeting.gone(key)

@@ -1,0 +1,1 @@
+"""Other hosts: what is shared with them, and what is done for them."""

@@ -1,0 +1,28 @@
+"""What a host offers to compute with: the resource that a compute payload is."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from nondum.wheelhouse import preflight
+
+Compute = dict[str, Any]
+
+
+def probed(state: Path, *, reserve_mb: int) -> Compute:
+    """Look at this machine. Takes some ten milliseconds; `gpu_memory_mb` is None without a GPU.
+
+    `machine`, `python`, `processors`, `memory_mb` and `disk_mb` that are free, `nondum`.
+    """
+    facts = preflight.probe(state, reserve_mb=reserve_mb, confinement=0)
+    return {
+        "machine": facts.architecture,
+        "python": facts.python,
+        "processors": len(os.sched_getaffinity(0)),
+        "memory_mb": facts.free_memory_mb,
+        "gpu_memory_mb": facts.gpu_memory_mb,
+        "disk_mb": facts.free_disk_mb,
+        "nondum": facts.nondum,
+    }

@@ -1,0 +1,64 @@
+"""Has a mesh look for hosts: its announcements and its hints, by multicast and static hosts."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from nondum.host.config import PeersSection
+from nondum.transport.discovery import Announcement, Discovery, DiscoveryStatus, Hint
+from nondum.transport.fleet import Mesh
+from nondum.transport.peers import PeerRefused
+
+
+class PeerFinder:
+    """A mesh's `Finder`."""
+
+    def __init__(self, mesh: Mesh, config: PeersSection) -> None:
+        """Made once the mesh listens."""
+        self._mesh = mesh
+        self._announcement = Announcement(mesh.key, mesh.name, mesh.epoch, mesh.addresses)
+        self._discovery = Discovery(
+            self._announcement,
+            on_hint=self._on_hint,
+            on_gone=mesh.no_more_hints,
+            static=config.static,
+            multicast=config.discover,
+        )
+
+    async def start(self) -> None:
+        """Begin to look."""
+        await self._discovery.start()
+
+    async def close(self) -> None:
+        """Look no more."""
+        await self._discovery.close()
+
+    @property
+    def status(self) -> DiscoveryStatus:
+        """What was announced and heard."""
+        return self._discovery.status()
+
+    @property
+    def hints(self) -> tuple[Hint, ...]:
+        """Who may be where."""
+        return tuple(self._discovery.hints.values())
+
+    def announce_pairing(self, port: int | None) -> None:
+        """Tell where this host can be asked to pair, or that it cannot any more."""
+        self._announcement = dataclasses.replace(self._announcement, pairing_port=port)
+        self._discovery.announce(self._announcement)
+
+    def _on_hint(self, hint: Hint) -> None:
+        try:
+            self._mesh.meet(hint.key, hint.addresses, hint.epoch)
+        except PeerRefused:  # in development mode, hints lead beyond this machine, too
+            local = [one for one in hint.addresses if self._is_usable(one)]
+            if local:
+                self._mesh.meet(hint.key, local, hint.epoch)
+
+    def _is_usable(self, address: str) -> bool:
+        try:
+            self._mesh.check_address(address)
+        except PeerRefused:
+            return False
+        return True

@@ -1,0 +1,155 @@
+"""All that this host has to do with others, made and tied together; the host's root uses it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from nondum.host.catalogue.catalogue import Catalogue
+from nondum.host.config import HostConfig, PeersSection
+from nondum.host.events import Emit, Event, UnitsTaken
+from nondum.host.lifecycle.folders import Folders
+from nondum.host.mind.composition import Composition
+from nondum.host.mind.mind import Mind
+from nondum.host.peers.compute import Compute, probed
+from nondum.host.peers.desk import Desk
+from nondum.host.peers.finder import PeerFinder
+from nondum.host.peers.offered import Policy
+from nondum.host.peers.peering import Peering
+from nondum.host.peers.remote_calls import AllCalls, RemoteCalls, is_peers
+from nondum.host.peers.serving import Serving
+from nondum.host.peers.trust_keeper import TrustKeeper
+from nondum.host.workers.workers import Workers
+from nondum.planning.core import TAKEN_PREDICATES
+from nondum.planning.facts import predicate_of
+from nondum.sdk.description import ACTUATORS
+from nondum.transport.fleet import Mesh
+from nondum.transport.peers import Security
+
+ON_LOOPBACK = ("tcp://127.0.0.1:0",)
+
+
+class Neighbourhood:
+    """`await open(…)` it, then `start`; `close` it before the workers."""
+
+    def __init__(
+        self,
+        config: HostConfig,
+        keeper: TrustKeeper,
+        workers: Workers,
+        catalogue: Catalogue,
+        emit: Emit,
+        compute: Compute,
+        mind: Callable[[], Mind],
+    ) -> None:
+        """Use `open`. `mind` is asked for once the host runs."""
+        host = config.host.name
+        self.keeper = keeper
+        self._host, self._emit, self._mind = host, emit, mind
+        self._movable = frozenset(config.peers.offer_actuators)
+        self.serving = Serving(
+            workers,
+            catalogue.snapshot,
+            self._composition,
+            self._policy,
+            self._own_uses,
+            self._on_taken,
+        )
+        self.desk = Desk()
+        self.desk.add("behave", self.serving.behave, self.serving.orphaned)
+        self.desk.hear("values", self.serving.values)
+        self.finder: PeerFinder | None = None
+        self.mesh = Mesh(
+            keeper.identity(development=config.peers.development),
+            keeper.trust,
+            self.desk,
+            on_event=lambda event: self.peering.on_fleet(event),
+            listen=_listen(config.peers),
+            find=lambda mesh: self._find(mesh, config.peers),
+        )
+        self.peering = Peering(
+            host,
+            self.mesh,
+            emit,
+            snapshot=catalogue.snapshot,
+            policy=self._policy,
+            claims=workers.claims,
+            taken=lambda: {**dict.fromkeys(self._own_uses(), host), **self.serving.taken},
+            compute=compute,
+        )
+        self._remote = RemoteCalls(self.peering, emit, self.peering.claims)
+        self.calls = AllCalls(workers, self._remote)
+
+    @classmethod
+    async def open(
+        cls,
+        config: HostConfig,
+        folders: Folders,
+        workers: Workers,
+        catalogue: Catalogue,
+        emit: Emit,
+        mind: Callable[[], Mind],
+    ) -> Neighbourhood:
+        """Read keys and trust, and look at this machine. Raises `PeerRefused`."""
+        keeper = await TrustKeeper.open(
+            folders.peers, config.host.name, on_change=lambda trust: made.mesh.set_trust(trust)
+        )
+        compute = await asyncio.to_thread(
+            probed, config.host.state, reserve_mb=config.install.reserve_mb
+        )
+        made = cls(config, keeper, workers, catalogue, emit, compute, mind)
+        return made
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What every status says of it."""
+        is_open = self.mesh.security is Security.DEVELOPMENT
+        unsafe = ("peers need no keys: every host on this machine is one",) if is_open else ()
+        return (*unsafe, *map(str, self.keeper.warnings))
+
+    async def start(self) -> None:
+        """Be there for peers. Raises `PeerRefused`."""
+        await self.mesh.start()
+
+    def on_event(self, event: Event) -> None:
+        """Take in what happens on this host."""
+        self.serving.on_event(event)
+        self.peering.on_event(event)
+
+    async def close(self) -> None:
+        """Say goodbye; what runs for peers, and at peers, is halted."""
+        await self._remote.close()
+        await self.mesh.close()
+
+    def _find(self, mesh: Mesh, config: PeersSection) -> PeerFinder:
+        self.finder = PeerFinder(mesh, config)
+        return self.finder
+
+    def _composition(self) -> Composition | None:
+        return self._mind().composition
+
+    def _policy(self) -> Policy:
+        composition = self._composition()
+        if composition is None:
+            return Policy(self._movable)
+        types = composition.merged.domain.types
+        moving = (name for name in types.parents if types.is_one_of((name,), ACTUATORS))
+        return Policy(self._movable, ACTUATORS | frozenset(moving))
+
+    def _own_uses(self) -> frozenset[str]:
+        """The facts that this host's own behaviours take of its own components."""
+        return frozenset(
+            text
+            for run in self._mind().runner
+            if not is_peers(run.component)
+            for text in run.step.delete
+            if predicate_of(text) in TAKEN_PREDICATES
+        )
+
+    def _on_taken(self) -> None:
+        self._emit(UnitsTaken(self._host, self.serving.taken))
+
+
+def _listen(config: PeersSection) -> tuple[str, ...]:
+    is_default = config.listen == PeersSection().listen
+    return ON_LOOPBACK if config.development and is_default else config.listen

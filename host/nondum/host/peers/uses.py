@@ -1,0 +1,24 @@
+"""What behaviours have in use: facts, `idle` and `free`, that do not hold while they run. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from nondum.planning.core import TAKEN_PREDICATES
+from nondum.planning.domain import Merged, bind
+
+
+def taken_by(
+    merged: Merged, plugin: str, behaviour: str, arguments: Mapping[str, str]
+) -> frozenset[str]:
+    """The facts that a behaviour of a plugin takes, called with these objects; none where no
+    action of the plugin is carried out by it."""
+    bound = {f"?{name}": thing for name, thing in arguments.items()}
+    return frozenset(
+        bind(atom, bound)
+        for action in merged.domain.actions.values()
+        if action.plugin == plugin and action.behaviour == behaviour
+        if set(action.parameter_names) == arguments.keys()
+        for atom in action.effect.delete
+        if atom.predicate in TAKEN_PREDICATES
+    )

@@ -1,0 +1,120 @@
+"""Hosts that know each other, on this machine's loopback: whole daemons, one process each."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from tests.lab.running_host import READY_S, RunningHost
+from tests.payloads import Part
+
+
+def free_port() -> int:
+    """A port that nobody listens at just now."""
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        port: int = found.getsockname()[1]
+        return port
+
+
+@contextmanager
+def neighbours(work: Path, *names: str, more: str = "") -> Iterator[list[RunningHost]]:
+    """Hosts in development mode that look for each other; `more` are further lines of [peers]."""
+    ports = {name: free_port() for name in names}
+    with ExitStack() as stack:
+        hosts = []
+        for name in names:
+            others = [f"127.0.0.1:{port}" for other, port in ports.items() if other != name]
+            section = _section(ports[name], others)
+            (work / name).mkdir(parents=True, exist_ok=True)
+            host = RunningHost(work / name, name=name, more=section + more)
+            stack.callback(host.stop)
+            host.start()
+            hosts.append(host)
+        for host in hosts:
+            for other in names:
+                if other != host.name:
+                    until_peer(host, other)
+        yield hosts
+
+
+def until_peer(host: RunningHost, other: str) -> None:
+    """Wait until a host has another one as its peer."""
+    host.until_told(f"the host {other} is here")
+
+
+def until_shared(host: RunningHost, component: str) -> None:
+    """Wait until a component, `name@host`, is known."""
+    host.until(
+        f"{component} is shared",
+        lambda view: any(row["component"] == component for row in view["components"]),
+        timeout_s=READY_S,
+    )
+
+
+def _section(port: int, others: list[str]) -> str:
+    return f"""
+[peers]
+enabled = true
+development = true
+discover = false
+listen = ["tcp://127.0.0.1:{port}"]
+static = {others}
+"""
+
+
+BEACON = '''"""Shines, and remembers how often."""
+from nondum.sdk import Fragment, Unit, behaviour, hookimpl
+
+DOMAIN = """
+(define (domain beacon)
+  (:predicates (lit ?h - host) (seen ?h - host))
+  (:action shine
+    :parameters (?u - LAMP ?h - host)
+    :precondition (and (ready ?u) (idle ?u))
+    :effect (and (not (idle ?u)) (lit ?h)))
+  (:action blink
+    :parameters (?u - LAMP ?h - host)
+    :precondition (and (ready ?u))
+    :effect (seen ?h)))
+"""
+
+@hookimpl
+def units():
+    return [Unit("lamp", "LAMP", users=1)]
+
+@hookimpl
+def fragments():
+    return [Fragment("beacon.pddl", DOMAIN)]
+
+@behaviour("shine", action="(shine ?u - LAMP ?h - host)", lasting=True, when_lost="LOST")
+async def shine(ctx, u, h):
+    note(ctx, "on")
+    try:
+        await ctx.established()
+        while True:
+            await ctx.sleep(60)
+    finally:
+        note(ctx, "off")
+
+@behaviour("blink", action="(blink ?u - LAMP ?h - host)", phrase="blink")
+async def blink(ctx, u, h):
+    note(ctx, "blink")
+
+def note(ctx, word):
+    with open("LOG", "a") as log:
+        log.write(word + "\\n")
+'''
+
+
+def beacon(log: Path, *, type: str = "light", when_lost: str = "stop") -> Part:
+    """A lamp that writes down when it shines."""
+    code = BEACON.replace("LAMP", type).replace("LOST", when_lost).replace("LOG", str(log))
+    return Part("beacon", code)
+
+
+def written(log: Path) -> list[str]:
+    """What a beacon has written down."""
+    return log.read_text(encoding="utf-8").split() if log.exists() else []
