@@ -16,6 +16,8 @@ class Security(Enum):
 
     CURVE = "keys"
     """Every link is encrypted, and both ends have proved their keys."""
+    ROUTER = "router: whoever it lets in is believed to be who they say"
+    """The link to a router is secured; peers have not proved their keys to each other."""
     DEVELOPMENT = "development: no keys, this machine only"
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import zmq
 
+from nondum.sdk.errors import Problem
 from nondum.transport.peers import accepted
 from nondum.transport.peers.drained import Drained, Sent
 from nondum.transport.peers.keys import PeerKey
@@ -44,6 +45,8 @@ class Link:
         self.session: Session | None = None
         """The peer's, once greetings were exchanged."""
         self.is_over = False
+        self.on_refused: Callable[[Problem], None] | None = None
+        """Told why, when a link that this host began is turned away."""
         self.round_trip_s: float | None = None
         self._pings = 0
         self._pinged_s = now_s

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import secrets
 from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
@@ -225,6 +226,7 @@ class PeerNode:
     def _on_won(self, attempt: Attempt) -> None:
         proved = attempt.dial.key if self.security is Security.CURVE else None
         attempt.link = Link(attempt, proved, self._loop.time(), dialled=True)
+        attempt.link.on_refused = functools.partial(attempt.dial.over, attempt)
         self._roster.greet(attempt.link, attempt.dial.key)
 
     def _on_attempt_over(self, attempt: Attempt) -> None:

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable, Iterator, Mapping
 
 from nondum.sdk.errors import Problem, ProtocolViolation
-from nondum.transport.peers.dial import Attempt, Dial
+from nondum.transport.peers.dial import Dial
 from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.errands import Errand, Handler
 from nondum.transport.peers.events import Loss, PeerEvent, PeerLost, PeerUp
@@ -51,10 +51,13 @@ class Roster:
         on_event: Callable[[PeerEvent], None],
         on_peer_link: Callable[[Link], None],
         pulse: Pulse,
+        silence_s: float = SILENCE_S,
     ) -> None:
-        """`on_peer_link` is told of every accepted link that became a peer's."""
+        """`on_peer_link` is told of every accepted link that became a peer's; a link is dead after
+        `silence_s`."""
         self.gate, self.epoch = gate, epoch
         self.dials: dict[PeerKey, Dial] = {}
+        self.silence_s = silence_s
         self._handler, self._refusals = handler, refusals
         self._on_event, self._on_peer_link, self._pulse = on_event, on_peer_link, pulse
         self._sessions: dict[PeerKey, Session] = {}
@@ -91,7 +94,7 @@ class Roster:
             self.turn_away(link, Reason.REVOKED, _REVOKED)
             return
         now_s, session = self._loop.time(), link.session
-        if session is not None and now_s - link.heard_s > SILENCE_S:
+        if session is not None and now_s - link.heard_s > self.silence_s:
             # This host may have hung itself: what waited meanwhile is of a link that is over.
             self.break_link(link, Loss.SILENT)
             return
@@ -164,6 +167,13 @@ class Roster:
 
     def beat(self) -> None:
         """Ping every link, and find those that are dead."""
+        self.tend()
+        for session in list(self._sessions.values()):
+            for link in list(session.links):
+                self.try_link(link)
+
+    def tend(self) -> None:
+        """What is due from time to time: end what is over, send what has waited."""
         now_s = self._loop.time()
         for session in list(self._sessions.values()):
             if self.gate.has_expired(session.admission):
@@ -171,10 +181,8 @@ class Roster:
                 continue
             session.errands.pass_on_waiting()
             for link in list(session.links):
-                if now_s - link.heard_s > SILENCE_S:
+                if now_s - link.heard_s > self.silence_s:
                     self.break_link(link, Loss.SILENT)
-                else:
-                    self.try_link(link)
 
     def try_link(self, link: Link) -> None:
         """Ping a link; one whose connection is gone is broken."""
@@ -199,8 +207,8 @@ class Roster:
                 self._on_peer_link(link)
             case Welcome(hello) if link.dialled:
                 admission, known = self._meet(link, hello)
-            case Refused(problem) if isinstance(link.route, Attempt):
-                link.route.dial.over(link.route, problem)
+            case Refused(problem) if link.on_refused is not None:
+                link.on_refused(problem)
                 return
             case _:
                 raise OutOfPlace("a link begins with a greeting")
