@@ -12,6 +12,7 @@ from nondum.sdk.errors import Problem, ProtocolViolation
 from nondum.transport.bridge import packets, sockets, tcp
 from nondum.transport.bridge.clocks import Clocks
 from nondum.transport.bridge.packets import Claim, Frame, Handled, Opened, Over, Ping, Pong
+from nondum.transport.bridge.window import Window
 from nondum.transport.peers.drained import Drained
 from nondum.transport.peers.keys import HostKeys, PeerKey
 from nondum.transport.peers.monitor import SocketEvent, Watch
@@ -22,6 +23,9 @@ SILENT_S = 1.2
 is slow still trickles."""
 OPEN_S = 5.0
 """How long it may take to reach the other bridge."""
+
+
+_NEVER_SLOW_S = float("inf")
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +63,8 @@ class Incoming:
         self._on_opened, self._on_frame, self._on_over = on_opened, on_frame, on_over
         self._loop = asyncio.get_running_loop()
         self._began_s = self._loop.time()
+        self._window = Window()
+        """As the owner must keep it: what breaks it would fill the memory here."""
         self._is_opened = False
         self._is_closed = False
         self._descriptor: int | None = None
@@ -73,6 +79,7 @@ class Incoming:
 
     def handled(self, seq: int) -> None:
         """A frame was taken in: there is room for another one."""
+        self._window.handled(seq, self._loop.time(), _NEVER_SLOW_S)
         self._say(Handled(seq))
 
     def close(self) -> None:
@@ -114,7 +121,8 @@ class Incoming:
         now_s = self._loop.time()
         if self._descriptor is None:
             self._descriptor = int(frames[0].get(zmq.SRCFD))
-        self.bytes_received += sum(len(frame) for frame in frames)
+        length = sum(len(frame) for frame in frames)
+        self.bytes_received += length
         try:
             message = packets.read_told([frame.buffer for frame in frames])
         except ProtocolViolation as violation:
@@ -124,7 +132,8 @@ class Incoming:
             case Opened(kind) if not self._is_opened:
                 self._is_opened = True
                 self._on_opened(kind)
-            case Frame() if self._is_opened:
+            case Frame(seq) if self._is_opened and self._window.has_room:
+                self._window.sent(seq, length, now_s)
                 self._on_frame(message)
             case Pong(at_s, clock_s):
                 if at_s:

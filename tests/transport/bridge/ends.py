@@ -1,0 +1,143 @@
+"""Both ends of streams between hosts, in one process: over real sockets, without a daemon."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable
+from typing import TypeVar
+
+import zmq
+
+from nondum.sdk.errors import Problem
+from nondum.transport.bridge import Coding, Exporter, Frame, Incoming, Outgoing, Place, packets
+from nondum.transport.bridge.sockets import dialling
+from nondum.transport.peers.drained import Drained
+from nondum.transport.peers.keys import HostKeys
+
+PATIENCE_S = 20.0
+T = TypeVar("T")
+
+
+async def within(wanted: asyncio.Future[T]) -> T:
+    async with asyncio.timeout(PATIENCE_S):
+        return await asyncio.shield(wanted)
+
+
+class Granted:
+    """One granted stream at its owner's."""
+
+    def __init__(self, exporter: Exporter, reader: HostKeys, kind: str = "image") -> None:
+        loop = asyncio.get_running_loop()
+        self.claimed: asyncio.Future[None] = loop.create_future()
+        self.over: asyncio.Future[Problem] = loop.create_future()
+        self.outgoing: Outgoing = exporter.grant(
+            reader.public, kind, self._on_room, self.over.set_result
+        )
+
+    def _on_room(self) -> None:
+        if not self.claimed.done():
+            self.claimed.set_result(None)
+
+    def send(self, bulk: bytes = b"pixels") -> None:
+        self.outgoing.send(Coding.RAW, {"number": self.outgoing.frames_sent + 1}, bulk)
+
+
+class Reading:
+    """One stream at its reader's."""
+
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], keys: HostKeys, place: Place):
+        loop = asyncio.get_running_loop()
+        self.frames: list[Frame] = []
+        self.opened: asyncio.Future[str] = loop.create_future()
+        self.over: asyncio.Future[Problem] = loop.create_future()
+        self.handles = True
+        self._news = asyncio.Event()
+        self.incoming = Incoming(
+            context,
+            keys,
+            place,
+            on_opened=self.opened.set_result,
+            on_frame=self._on_frame,
+            on_over=self.over.set_result,
+        )
+
+    async def until(self, count: int) -> Frame:
+        """Wait for so many frames; the last of them."""
+        async with asyncio.timeout(PATIENCE_S):
+            while len(self.frames) < count:
+                self._news.clear()
+                await self._news.wait()
+        return self.frames[count - 1]
+
+    def _on_frame(self, frame: Frame) -> None:
+        self.frames.append(frame)
+        self._news.set()
+        if self.handles:
+            self.incoming.handled(frame.seq)
+
+
+class Raw:
+    """A stranger's socket, or a peer's that does what it likes."""
+
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], keys: HostKeys, place: Place):
+        self.said: asyncio.Queue[packets.Told] = asyncio.Queue()
+        socket = dialling(context, keys, place.owner)
+        socket.connect(place.addresses[0])
+        self.socket = Drained(socket, self._on_frames)
+
+    def say(self, *parts: bytes) -> None:
+        self.socket.send(parts)
+
+    async def hears(self) -> packets.Told:
+        async with asyncio.timeout(PATIENCE_S):
+            return await self.said.get()
+
+    def _on_frames(self, frames: list[zmq.Frame]) -> None:
+        self.said.put_nowait(packets.read_told([frame.bytes for frame in frames]))
+
+
+class Owner:
+    """A host's end, and what reads of it."""
+
+    def __init__(self, exporter: Exporter, keys: HostKeys, port: int) -> None:
+        self.exporter, self.keys, self.port = exporter, keys, port
+        self.context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._closing: list[Callable[[], None]] = []
+
+    def grant(self, reader: HostKeys, kind: str = "image") -> Granted:
+        return Granted(self.exporter, reader, kind)
+
+    def place(self, granted: Granted | str, *, port: int = 0) -> Place:
+        token = granted if isinstance(granted, str) else granted.outgoing.token
+        return Place((f"tcp://127.0.0.1:{port or self.port}",), self.keys.public, token)
+
+    def read(self, keys: HostKeys, granted: Granted | str, *, port: int = 0) -> Reading:
+        reading = Reading(self.context, keys, self.place(granted, port=port))
+        self._closing.append(reading.incoming.close)
+        return reading
+
+    def raw(self, keys: HostKeys, granted: Granted | str) -> Raw:
+        raw = Raw(self.context, keys, self.place(granted))
+        self._closing.append(raw.socket.close)
+        return raw
+
+    async def close(self) -> None:
+        for close in self._closing:
+            close()
+        await asyncio.to_thread(self.context.term)
+
+
+@contextlib.asynccontextmanager
+async def owner() -> AsyncIterator[Owner]:
+    """A host that exports, until the end of the block."""
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    keys = HostKeys.generate()
+    exporter = Exporter(context, keys)
+    made = Owner(exporter, keys, await exporter.start(("127.0.0.1",)))
+    try:
+        yield made
+    finally:
+        await made.close()
+        exporter.close()
+        await asyncio.to_thread(context.term)
