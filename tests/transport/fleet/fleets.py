@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import socket
 import subprocess
 import sys
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
@@ -15,10 +16,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
+import zenoh
 from tests.transport.peers.hosts import Servant
 
 from nondum.sdk.wire import Body
 from nondum.transport.fleet import Fleet, FleetEvent, Mesh, PeerChanged
+from nondum.transport.fleet.zenoh import ZenohFleet
+from nondum.transport.fleet.zenoh_line import RouterAccess
 from nondum.transport.peers import (
     HostKeys,
     Identity,
@@ -108,6 +112,9 @@ class World(Protocol):
     ) -> contextlib.AbstractContextManager[subprocess.Popen[str]]:
         """A host in a process of its own."""
 
+    def close(self) -> None:
+        """End what was between the hosts."""
+
 
 @dataclass
 class MeshWorld:
@@ -143,6 +150,9 @@ class MeshWorld:
             self._place(keys.public, address)
             yield started
 
+    def close(self) -> None:
+        assert not self.members
+
     def _know(self, key: PeerKey, name: str) -> None:
         self.names[key] = name
         for one in self.members:
@@ -154,6 +164,77 @@ class MeshWorld:
         for one in self.members:
             assert isinstance(one.fleet, Mesh)
             one.fleet.meet(key, [address])
+
+
+@dataclass
+class ZenohWorld:
+    """A router on loopback, and a table of trust that the world keeps."""
+
+    names: dict[PeerKey, str] = field(default_factory=dict)
+    members: list[ZenohFleet] = field(default_factory=list)
+    port: int = 0
+
+    def __post_init__(self) -> None:
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            self.port = free.getsockname()[1]
+        self.router = router(self.port)
+
+    @property
+    def access(self) -> RouterAccess:
+        return RouterAccess("test", (f"tcp/127.0.0.1:{self.port}",))
+
+    @contextlib.asynccontextmanager
+    async def member(self, name: str, keys: HostKeys | None = None) -> AsyncIterator[Member]:
+        keys = keys or HostKeys.generate()
+        self._know(keys.public, name)
+        fleet, found = zenoh_member(name, keys, Trust(paired=dict(self.names)), self.access)
+        await fleet.start()
+        self.members.append(fleet)
+        try:
+            yield found
+        finally:
+            self.members.remove(fleet)
+            await fleet.close()
+
+    @contextlib.contextmanager
+    def child(
+        self, name: str, keys: HostKeys, entries: Mapping[str, Body]
+    ) -> Iterator[subprocess.Popen[str]]:
+        self._know(keys.public, name)
+        config = {"trusted": self.names, "endpoint": self.access.endpoints[0]}
+        with process("zenoh", name, keys, entries, config) as (started, _):
+            yield started
+
+    def close(self) -> None:
+        self.router.close()  # type: ignore[no-untyped-call]  # so it is in Zenoh's stubs
+
+    def _know(self, key: PeerKey, name: str) -> None:
+        self.names[key] = name
+        for fleet in self.members:
+            fleet.set_trust(Trust(paired=dict(self.names)))
+
+
+def router(port: int) -> zenoh.Session:
+    config = zenoh.Config()
+    for name, value in {
+        "mode": "router",
+        "listen/endpoints": [f"tcp/127.0.0.1:{port}"],
+        "scouting/multicast/enabled": False,
+        "transport/shared_memory/enabled": False,
+    }.items():
+        config.insert_json5(name, json.dumps(value))
+    return zenoh.open(config)
+
+
+def zenoh_member(
+    name: str, keys: HostKeys | None, trust: Trust, access: RouterAccess
+) -> tuple[ZenohFleet, Member]:
+    servant = Servant()
+    fleet = ZenohFleet(
+        Identity(name, keys), trust, servant, access, on_event=lambda event: found.hear(event)
+    )
+    found = Member(name, fleet, servant)
+    return fleet, found
 
 
 def mesh_member(name: str, keys: HostKeys | None, trust: Trust) -> tuple[Mesh, Member]:
@@ -196,10 +277,21 @@ async def _serve_mesh(config: dict[str, Any]) -> None:
     await asyncio.Event().wait()
 
 
+async def _serve_zenoh(config: dict[str, Any]) -> None:
+    keys = HostKeys(PeerKey(config["public"]), config["secret"])
+    access = RouterAccess("test", (config["endpoint"],))
+    fleet, _ = zenoh_member(config["name"], keys, Trust(paired=config["trusted"]), access)
+    fleet.publish(config["entries"])
+    await fleet.start()
+    sys.stdout.write("started\n")
+    sys.stdout.flush()
+    await asyncio.Event().wait()
+
+
 def refusals(member: Member) -> list[Refusal]:
     return [event for event in member.events if isinstance(event, Refusal)]
 
 
 if __name__ == "__main__":
-    serve = {"mesh": _serve_mesh}[sys.argv[1]]
+    serve = {"mesh": _serve_mesh, "zenoh": _serve_zenoh}[sys.argv[1]]
     asyncio.run(serve(json.loads(sys.argv[2])))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from collections.abc import Iterator
 
 import pytest
-from tests.transport.fleet.fleets import MeshWorld, World
+from tests.transport.fleet.fleets import MeshWorld, World, ZenohWorld
 from tests.transport.peers.hosts import PATIENCE_S, raises
 
 from nondum.sdk.errors import ProtocolViolation
@@ -20,10 +21,11 @@ CAMERA = {"component/camera": {"units": ["camera"], "rank": 1}}
 LONG = {f"fact/{number}": {"text": "x" * 60_000} for number in range(8)}
 
 
-@pytest.fixture(params=[MeshWorld], ids=["mesh"])
-def world(request: pytest.FixtureRequest) -> World:
+@pytest.fixture(params=[MeshWorld, ZenohWorld], ids=["mesh", "zenoh"])
+def world(request: pytest.FixtureRequest) -> Iterator[World]:
     made: World = request.param()
-    return made
+    yield made
+    made.close()
 
 
 async def test_hosts_meet_and_read_each_other(world: World) -> None:

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 from nondum.sdk.errors import Problem, ProtocolViolation
 from nondum.sdk.wire import Body
-from nondum.transport.fleet.chunk import Chunk, parse
+from nondum.transport.fleet.chunk import Chunk, parse, read_state
 from nondum.transport.fleet.ledger import Ledger
 from nondum.transport.fleet.replica import Replica
 from nondum.transport.fleet.seam import OWN_METHODS, FleetEvent, Peer, PeerChanged
@@ -32,6 +32,8 @@ READ = "fleet.read"
 """Call: epoch and revision that the caller knows (0 and 0 for none); chunks are the answer."""
 CHANGED = "fleet.changed"
 """Notice: one chunk."""
+STATE = "fleet.state"
+"""Notice: revision and digest, where no pings carry them."""
 CONFLATED_S = 0.02
 """Changes within so long are told as one."""
 AT_ONCE = 4
@@ -107,6 +109,11 @@ class Catalogues:
         """For pings."""
         return self._told
 
+    def tell_state(self) -> None:
+        """Tell it to all, where no pings do."""
+        told = {"revision": self._told.revision, "digest": self._told.digest}
+        self._links().notify_all(STATE, told)
+
     def heard(self, peer: PeerKey, state: State) -> None:
         """A peer's ping told its state."""
         if known := self._known.get(peer):
@@ -140,6 +147,8 @@ class Catalogues:
         if method == CHANGED:
             if known := self._known.get(caller.key):
                 self._take(known, parse(args))
+        elif method == STATE:
+            self.heard(caller.key, read_state(args))
         elif not method.startswith(OWN_METHODS):
             self._handler.notice(caller, method, args)
 

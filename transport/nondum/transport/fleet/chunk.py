@@ -70,15 +70,21 @@ def parse(body: Body) -> Chunk:
         raise _violation("since, part and parts are whole numbers")
     if not 0 <= part < parts <= MAX_PARTS:
         raise _violation(f"part {part!r:.20} of {parts!r:.20}: at most {MAX_PARTS} are taken")
-    state = State(read_number(body["revision"]), body["digest"])
+    state = read_state(body)
     if not 0 <= since <= state.revision:
         raise _violation("changes lead from a revision to a later one")
-    if type(state.digest) is not bytes or len(state.digest) != DIGEST_BYTES:
-        raise _violation(f"a digest has {DIGEST_BYTES} bytes")
     changes = body["changes"]
     if type(changes) is not dict or not all(map(_is_change, changes.items())):
         raise _violation("changes are packed entries by short keys")
     return Chunk(read_number(body["epoch"]), since, state, part, parts, changes)
+
+
+def read_state(body: Body) -> State:
+    """Read revision and digest. Raises `ProtocolViolation`."""
+    digest = body.get("digest")
+    if type(digest) is not bytes or len(digest) != DIGEST_BYTES:
+        raise _violation(f"a digest has {DIGEST_BYTES} bytes")
+    return State(read_number(body.get("revision")), digest)
 
 
 def read_entry(packed: bytes) -> Body:

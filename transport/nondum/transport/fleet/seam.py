@@ -25,7 +25,7 @@ class Peer:
     epoch: int
     address: str
     admitted_by: str
-    """`pairing`, `certificate`, or `development`."""
+    """`pairing`, `certificate`, `development`, or `router` (by whose word it has this key)."""
     revision: int
     """Of its catalogue; 0 before that was read for the first time."""
     entries: Mapping[str, Body]

@@ -1,0 +1,309 @@
+"""A host's end of all links to other hosts by way of a Zenoh router.
+
+The sessions are those of `PeerNode`; only what carries their messages is another. The router tells
+who is there, so no link is pinged: instead every host tells all others its state now and then, from
+the loop that does the work, so that a hung one is noticed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+
+from nondum.sdk.errors import Problem
+from nondum.sdk.wire import Body
+from nondum.transport.fleet.zenoh_line import Ears, Line, Place, RouterAccess
+from nondum.transport.peers.calls import Call
+from nondum.transport.peers.dial import FIRST_WAIT_S, LONGEST_WAIT_S
+from nondum.transport.peers.drained import Sent
+from nondum.transport.peers.errands import Handler
+from nondum.transport.peers.events import DialFailed, Loss, PeerEvent
+from nondum.transport.peers.failures import PeerUnreachable
+from nondum.transport.peers.gate import Gate
+from nondum.transport.peers.identity import Identity, Security
+from nondum.transport.peers.keys import PeerKey
+from nondum.transport.peers.link import Link
+from nondum.transport.peers.messages import Notice, encode
+from nondum.transport.peers.pulse import Pulse
+from nondum.transport.peers.refusals import Reason, Refusals
+from nondum.transport.peers.roster import Roster
+from nondum.transport.peers.trust import Admission, Standing, Trust
+
+SILENCE_S = 10.0
+"""A peer that has told nothing for so long hangs: three of its tellings were missed."""
+TEND_S = 0.5
+ANSWER_S = 3.0
+"""How long a greeting may take to be answered."""
+START_S = 3.0
+"""How long the start waits for a router; it is looked for ever after."""
+DOORS = 1024
+"""Lives of peers that are remembered."""
+
+
+@dataclass(slots=True)
+class _Door:
+    """What is between this host and one life of another."""
+
+    number: int = 0
+    """Of the last link; counts up, so that messages of earlier ones are known."""
+    link: Link | None = None
+    wait_s: float = FIRST_WAIT_S
+    timer: asyncio.TimerHandle | None = field(default=None, repr=False)
+
+
+class _Route:
+    """Messages to one place under one number."""
+
+    def __init__(self, line: Line, place: Place, number: int, on_cut: Callable[[], None]) -> None:
+        self.address = f"zenoh:{place.epoch}"
+        self._line, self._place, self._number, self._on_cut = line, place, number, on_cut
+
+    def send(self, data: bytes) -> Sent:
+        """Send without waiting."""
+        return self._line.send(self._place, self._number, data)
+
+    def cut(self, linger_ms: int = 0) -> None:
+        """End it: there is no connection that would, so the other end is told."""
+        self._line.send(self._place, self._number, _OVER)
+        self._on_cut()
+
+
+class ZenohNode:
+    """Links to the other hosts of a router. `await start()` it, and `await close()` it."""
+
+    def __init__(
+        self,
+        identity: Identity,
+        trust: Trust,
+        handler: Handler,
+        access: RouterAccess,
+        *,
+        epoch: int,
+        on_event: Callable[[PeerEvent], None],
+        clock: Callable[[], datetime] = lambda: datetime.now(UTC),
+    ) -> None:
+        """Made on the running loop.
+
+        Raises `PeerRefused` (ZENOH_MISSING, ADDRESS_MALFORMED, FLEET_NAME, DEVELOPMENT_LOOPBACK).
+        """
+        if identity.security is Security.DEVELOPMENT:
+            for endpoint in access.endpoints:
+                identity.check_address(endpoint.replace("/", "://", 1))
+        self.identity = identity
+        self.refusals = Refusals(on_event)
+        self._me = Place(identity.key, epoch)
+        self._endpoints = ", ".join(access.endpoints)
+        self._on_event = on_event
+        self._gate = Gate(identity, trust, clock)
+        self._roster = Roster(
+            self._gate,
+            epoch,
+            handler,
+            self.refusals,
+            on_event,
+            lambda _link: None,
+            Pulse(),
+            silence_s=SILENCE_S,
+        )
+        self._loop = asyncio.get_running_loop()
+        ears = Ears(self._on_present, self._on_message, self._on_to_all, self._on_trouble)
+        self._line = Line(access, self._me, ears)
+        self._present: set[Place] = set()
+        self._doors: dict[Place, _Door] = {}
+        self._told: dict[PeerKey, str] = {}
+        self._tending: asyncio.TimerHandle | None = None
+        self._is_closed = False
+
+    @property
+    def peers(self) -> Mapping[PeerKey, Admission]:
+        """Who can be called now."""
+        return {key: session.admission for key, session in self._roster.sessions.items()}
+
+    def round_trip_s(self, peer: PeerKey) -> float | None:
+        """Not measured: nobody is pinged."""
+        return None
+
+    async def start(self) -> None:
+        """Reach a router; goes on trying when there is none yet."""
+        self._line.start()
+        self._tending = self._loop.call_later(TEND_S, self._tend)
+        try:
+            async with asyncio.timeout(START_S):
+                await self._line.opened.wait()
+        except TimeoutError:
+            pass  # told already, by the line
+
+    def call(self, peer: PeerKey, method: str, args: Body, *, deadline_s: float) -> Call:
+        """Call a peer. Raises `PeerUnreachable` and more, as `PeerNode.call`."""
+        return self._roster.session(peer).calls.begin(method, args, deadline_s)
+
+    def notify(self, peer: PeerKey, method: str, args: Body) -> None:
+        """Tell a peer something. Raises as `call` does."""
+        if self._roster.session(peer).notify(Notice(method, args)) is Sent.FULL:
+            raise PeerUnreachable(Problem("PEER_BUSY", "as many messages wait for it as may"))
+
+    def notify_all(self, method: str, args: Body) -> None:
+        """Tell every peer something, in one message to the router."""
+        self._line.send_all(encode(Notice(method, args)))
+
+    def turn_away(self, peer: PeerKey, problem: Problem) -> None:
+        """Cut a peer that breaks the rules. Raises `PeerUnreachable`."""
+        for link in list(self._roster.session(peer).links):
+            self._roster.turn_away(link, Reason.GARBAGE, problem)
+
+    def set_trust(self, trust: Trust) -> None:
+        """Exchange the trust: peers that it does not let in any more are cut at once."""
+        self._gate.trust = trust
+        self._roster.check_trust()
+        for place in self._present:
+            self._greet_in(place, 0)
+
+    async def close(self) -> None:
+        """Say goodbye and let go of everything; what runs for peers is cancelled."""
+        self._is_closed = True
+        if self._tending is not None:
+            self._tending.cancel()
+        self._roster.close()
+        for door in self._doors.values():
+            if door.timer is not None:
+                door.timer.cancel()
+        await self._line.close()
+
+    def _on_present(self, place: Place, is_there: bool) -> None:  # noqa: FBT001  # told by the line
+        if self._is_closed or place.key == self._me.key:
+            return
+        if is_there:
+            self._present.add(place)
+            self._greet_in(place, 0)
+            return
+        self._present.discard(place)
+        door = self._doors.get(place)
+        if door is not None and door.link is not None:
+            self._roster.break_link(door.link, Loss.DISCONNECTED)
+
+    def _on_message(self, place: Place, number: int, data: bytes) -> None:
+        if self._is_closed or place.key == self._me.key:
+            return
+        door = self._door(place)
+        if data == _OVER:
+            if door.link is not None and number == door.number:
+                self._roster.break_link(door.link, Loss.DISCONNECTED)
+            return
+        if number > door.number and not self._is_greeter(place):
+            self._open(door, place, number, dialled=False)
+        if number == door.number and door.link is not None:
+            self._roster.receive(door.link, data)
+
+    def _on_to_all(self, place: Place, data: bytes) -> None:
+        door = self._doors.get(place)
+        if door is None:
+            return
+        if door.link is None:
+            self._line.send(place, door.number, _OVER)  # if it has not heard so yet
+        elif door.link.session is not None:
+            self._roster.receive(door.link, data)
+
+    def _on_trouble(self, problem: Problem) -> None:
+        self._tell(PeerKey(""), problem)
+
+    def _is_greeter(self, place: Place) -> bool:
+        """Of two hosts, the one with the smaller key greets."""
+        return self._me.key < place.key
+
+    def _is_welcome(self, key: PeerKey) -> bool:
+        if self.identity.security is Security.DEVELOPMENT:
+            return True
+        return self._gate.trust.standing(key) in (Standing.ADMITTED, Standing.MUST_CERTIFY)
+
+    def _door(self, place: Place) -> _Door:
+        if place not in self._doors and len(self._doors) >= DOORS:
+            self._forget_door()
+        return self._doors.setdefault(place, _Door())
+
+    def _forget_door(self) -> None:
+        unused = (at for at, door in self._doors.items() if door.link is None and not door.timer)
+        others = (at for at, door in self._doors.items() if _is_stranger(door))
+        gone = next(unused, None) or next(others, None)
+        if gone is not None:
+            del self._doors[gone]
+
+    def _open(self, door: _Door, place: Place, number: int, *, dialled: bool) -> Link:
+        replaced, door.link = door.link, None
+        if replaced is not None:
+            replaced.cut()
+        door.number = number
+        route = _Route(self._line, place, number, lambda: self._on_cut(place, number))
+        # The key is not proved: whoever the router lets in is believed.
+        proved = place.key if self.identity.security is Security.CURVE else None
+        door.link = Link(route, proved, self._loop.time(), dialled=dialled)
+        return door.link
+
+    def _greet_in(self, place: Place, wait_s: float) -> None:
+        if not self._is_greeter(place):
+            return
+        door = self._door(place)
+        if door.timer is None:
+            door.timer = self._loop.call_later(wait_s, self._greet, place, door)
+
+    def _greet(self, place: Place, door: _Door) -> None:
+        door.timer = None
+        if place not in self._present or door.link is not None or not self._is_welcome(place.key):
+            return
+        number = max(door.number + 1, int(self._loop.time() * 1000))
+        link = self._open(door, place, number, dialled=True)
+        link.on_refused = functools.partial(self._on_refused, link, place)
+        door.timer = self._loop.call_later(ANSWER_S, self._expect, place, door, link)
+        self._roster.greet(link, place.key)
+
+    def _expect(self, place: Place, door: _Door, link: Link) -> None:
+        """The greeting should have been answered by now."""
+        door.timer = None
+        if link.session is None and not link.is_over:
+            self._on_refused(link, place, _UNANSWERED)
+        elif link.is_over:
+            self._greet_in(place, door.wait_s)
+
+    def _on_refused(self, link: Link, place: Place, problem: Problem) -> None:
+        self._tell(place.key, problem)
+        link.cut()
+
+    def _on_cut(self, place: Place, number: int) -> None:
+        """A link is over: greet again, if the other is still there."""
+        door = self._doors.get(place)
+        if door is None or door.number != number or door.link is None:
+            return
+        link, door.link = door.link, None
+        if door.timer is not None:
+            door.timer.cancel()
+            door.timer = None
+        if link.session is not None:
+            door.wait_s = FIRST_WAIT_S
+            self._told.pop(place.key, None)
+        if not self._is_closed and place in self._present:
+            self._greet_in(place, door.wait_s)
+            door.wait_s = min(2 * door.wait_s, LONGEST_WAIT_S)
+
+    def _tell(self, key: PeerKey, problem: Problem) -> None:
+        if self._told.get(key) != problem.code:
+            self._told[key] = problem.code
+            self._on_event(DialFailed(key, self._endpoints, problem))
+
+    def _tend(self) -> None:
+        self._tending = self._loop.call_later(TEND_S, self._tend)
+        self._roster.tend()
+        now_s = self._loop.time()
+        for door in list(self._doors.values()):
+            if _is_stranger(door) and door.link and now_s - door.link.heard_s > SILENCE_S:
+                door.link.cut()
+
+
+def _is_stranger(door: _Door) -> bool:
+    return door.link is None or door.link.session is None
+
+
+_OVER = b""
+"""A message without a word: the link of that number is over."""
+_UNANSWERED = Problem("PEER_SILENT", "it is with the router, but does not answer")
