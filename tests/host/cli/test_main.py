@@ -42,10 +42,12 @@ Commands:
   halt        Halt what the robot is doing.
   host        Run the daemon.
   journal     What happened on this host, oldest first.
+  keys        Make the keys of a fleet, and certify its hosts.
   logs        What components have written.
   mount       Tell where on the body a unit is mounted.
   payload     Make, judge and install payloads.
   pddl        Check, merge and plan PDDL files, without a host.
+  peers       Other hosts: who is here, and whom this host trusts.
   plan        The plan that is being carried out.
   retry       Try again what was refused or quarantined.
   status      The host, its payloads and its goals at a glance.
@@ -85,9 +87,15 @@ def commands() -> Iterator[tuple[str, click.Command]]:
     for name in cli.list_commands(context):
         found = cli.get_command(context, name)
         assert found is not None
-        yield name, found
-        if isinstance(found, click.Group):
-            yield from ((f"{name} {inner}", command) for inner, command in found.commands.items())
+        yield from of(name, found)
+
+
+def of(name: str, command: click.Command) -> Iterator[tuple[str, click.Command]]:
+    """A command, and if it is a group, all that are in it."""
+    yield name, command
+    if isinstance(command, click.Group):
+        for inner, found in command.commands.items():
+            yield from of(f"{name} {inner}", found)
 
 
 ALL_COMMANDS = dict(commands())

@@ -76,6 +76,14 @@ def installed(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[C
     return list(_items(pairs, incomplete))
 
 
+def trusted(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Completes hosts and fleets that are trusted."""
+    view = _asked(ctx, "peers_trust") or {}
+    rows = [*_rows(view.get("paired")), *_rows(view.get("fleets"))]
+    pairs = {row["name"]: row["fingerprint"] for row in rows}
+    return list(_items(pairs.items(), incomplete))
+
+
 def former(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Completes payloads that were here and are remembered."""
     seen = _rows((_asked(ctx, "composition") or {}).get("seen"))

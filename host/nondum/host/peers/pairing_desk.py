@@ -106,13 +106,17 @@ class PairingDesk:
         """
         return self._window.row() if self._window else None
 
-    async def confirm(self, code: str) -> Row:
-        """The person sees this code on both hosts: how it ended, once the one there has answered.
+    def confirm(self, code: str) -> None:
+        """The person sees this code on both hosts. Raises `PeerRefused` (PAIRING_ORDER,
+        PAIRING_CODE)."""
+        self._open_window().host.confirm(code)
 
-        Raises `PeerRefused` (PAIRING_ORDER, PAIRING_CODE).
+    async def ended(self) -> Row:
+        """Wait for the end of the window, and tell how it stands then.
+
+        Raises `PeerRefused` (PAIRING_ORDER).
         """
         window = self._open_window()
-        window.host.confirm(code)
         while not window.is_over:
             await window.changed()
         return window.row()

@@ -56,8 +56,12 @@ class TrustOrders:
         return self.desk.pair(arguments.optional_text("host"))
 
     async def confirm(self, arguments: Arguments) -> Row:
-        """Both hosts show this `code`: how the pairing ended. Raises `PeerRefused`."""
-        return await self.desk.confirm(arguments.text("code"))
+        """Both hosts show this `code`: how the window stands now, or with `wait`, at its end.
+
+        Raises `PeerRefused` (PAIRING_ORDER, PAIRING_CODE).
+        """
+        self.desk.confirm(arguments.text("code"))
+        return await self.desk.ended() if arguments.flag("wait") else self.desk.row() or {}
 
     async def refuse(self, arguments: Arguments) -> Row:
         """Close the window. Raises `PeerRefused` (PAIRING_ORDER)."""
