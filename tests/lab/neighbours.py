@@ -109,6 +109,34 @@ def note(ctx, word):
 '''
 
 
+EAR = '''"""Hears what somebody writes into a file."""
+import asyncio
+from pathlib import Path
+from nondum.sdk import hookimpl
+
+@hookimpl
+async def listen(ctx):
+    said = Path("FILE")
+    while not said.exists():
+        await asyncio.sleep(0.05)
+    words = said.read_text()
+    said.unlink()
+    return {"words": words}
+'''
+
+
+def ear(said: Path) -> Part:
+    """Something that listens; a person says something by `say`."""
+    return Part("ear", EAR.replace("FILE", str(said)))
+
+
+def say(said: Path, words: str) -> None:
+    """Say something to an ear."""
+    written = said.with_suffix(".part")
+    written.write_text(words, encoding="utf-8")
+    written.rename(said)
+
+
 def beacon(log: Path, *, type: str = "light", when_lost: str = "stop") -> Part:
     """A lamp that writes down when it shines."""
     code = BEACON.replace("LAMP", type).replace("LOST", when_lost).replace("LOG", str(log))

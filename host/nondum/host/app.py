@@ -18,7 +18,7 @@ from nondum.host.announcements import announced
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.config import HostConfig
 from nondum.host.control.server import ControlServer
-from nondum.host.conversation import Conversation
+from nondum.host.conversation import Conversation, Take
 from nondum.host.devices.slots import DeviceSlotSource
 from nondum.host.devices.source import DeviceSource
 from nondum.host.devices.udev import UdevSource
@@ -117,7 +117,7 @@ async def _run(
             stop,
             manager.run(),
             mind.run(),
-            Conversation(mind, workers.plugins, workers.pids).run(),
+            Conversation(mind, workers.plugins, workers.pids, _take(neighbours)).run(),
             *(source.watch(bus.emit) for source in device_sources(config)),
         )
     finally:
@@ -146,6 +146,10 @@ async def _neighbours(
     from nondum.host.peers.neighbourhood import Neighbourhood
 
     return await Neighbourhood.open(config, folders, workers, catalogue, bus.emit, mind)
+
+
+def _take(neighbours: Neighbourhood | None) -> Take | None:
+    return neighbours.goals.take if neighbours else None
 
 
 def drive_sources(config: HostConfig, folders: Folders) -> list[DriveSource]:

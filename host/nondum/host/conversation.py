@@ -7,8 +7,8 @@ nobody is asked to confirm it. Who listens is told what can be said, and again w
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any, Protocol, TypeAlias
 
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.sayings import sayings
@@ -41,6 +41,10 @@ class Speaking(Protocol):
         ...
 
 
+Take: TypeAlias = Callable[[str], Awaitable[str]]
+"""What a person said → what becomes of it, in words. Raises `GoalRefused`."""
+
+
 class Conversation:
     """Speaks and listens for one mind, while `run` runs."""
 
@@ -49,10 +53,13 @@ class Conversation:
         mind: Mind,
         plugins: Callable[[], Mapping[str, Speaking]],
         processes: Callable[[], Mapping[str, int]],
+        take: Take | None = None,
     ) -> None:
         """`plugins` are those that run now, by component, `processes` their ids: one that does not
-        listen is asked again when its component has a new process."""
+        listen is asked again when its component has a new process. `take` makes goals of words,
+        here or elsewhere; without it, they are all this host's."""
         self._mind = mind
+        self._take = take or self._taken_here
         self._plugins = plugins
         self._processes = processes
 
@@ -70,14 +77,16 @@ class Conversation:
             for task in late:
                 task.cancel()
 
-    def heard(self, component: str, words: str) -> None:
+    async def heard(self, component: str, words: str) -> None:
         """Want what a person has said; tell people where that cannot be."""
         try:
-            given = self._mind.give(words=words)
+            told = await self._take(words)
         except GoalRefused as refused:
-            self._mind.people.tell(f"{component} heard {words!r}: {refused.problems[0]}")
-        else:
-            self._mind.people.tell(f"{component} heard {words!r}: that is goal {given.id}")
+            told = str(refused.problems[0])
+        self._mind.people.tell(f"{component} heard {words!r}: {told}")
+
+    async def _taken_here(self, words: str) -> str:
+        return f"that is goal {self._mind.give(words=words).id}"
 
     async def _speak(self) -> None:
         version, said = self._mind.version, self._mind.people.last_number
@@ -131,7 +140,7 @@ class Conversation:
             words = (await plugin.listen() or {}).get("words")
             if not isinstance(words, str) or not words.strip():
                 return
-            self.heard(component, words)
+            await self.heard(component, words)
             await asyncio.sleep(PAUSE_S)
 
 

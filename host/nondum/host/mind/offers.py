@@ -72,6 +72,13 @@ def offers(
     return sorted([*rows, *_mute(composition)], key=lambda row: (row["words"], row["goal"]))
 
 
+def prospect(
+    composition: Composition, facts: frozenset[str], bare_facts: frozenset[str], goal: Goal
+) -> str:
+    """`now` of one goal: `holds`, `can`, `cannot` or `unknown`, see `offers`."""
+    return _Outlook(composition, facts, bare_facts, ()).of(goal)[0]
+
+
 def _row(
     same: list[Reading], outlook: _Outlook, composition: Composition, *, is_clear: bool
 ) -> Row:

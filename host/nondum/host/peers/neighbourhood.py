@@ -14,6 +14,7 @@ from nondum.host.mind.mind import Mind
 from nondum.host.peers.compute import Compute, probed
 from nondum.host.peers.desk import Desk
 from nondum.host.peers.finder import PeerFinder
+from nondum.host.peers.goals import Goals
 from nondum.host.peers.offered import Policy
 from nondum.host.peers.peering import Peering
 from nondum.host.peers.remote_calls import AllCalls, RemoteCalls, is_peers
@@ -77,6 +78,16 @@ class Neighbourhood:
             taken=lambda: {**dict.fromkeys(self._own_uses(), host), **self.serving.taken},
             compute=compute,
         )
+        self.goals = Goals(
+            host,
+            mind,
+            self.peering,
+            self.peering.names,
+            accepts=config.peers.accept_goals,
+        )
+        self.desk.add("goal.ask", self.goals.serve_ask)
+        self.desk.add("goal.give", self.goals.serve_give)
+        self.desk.hear("goal.news", self.goals.hear_news)
         self._remote = RemoteCalls(self.peering, emit, self.peering.claims)
         self.calls = AllCalls(workers, self._remote)
 
@@ -115,6 +126,7 @@ class Neighbourhood:
         """Take in what happens on this host."""
         self.serving.on_event(event)
         self.peering.on_event(event)
+        self.goals.on_event(event)
 
     async def close(self) -> None:
         """Say goodbye; what runs for peers, and at peers, is halted."""

@@ -169,6 +169,10 @@ class Peering:
 
     # Reaching peers by name
 
+    def names(self) -> tuple[str, ...]:
+        """The peers that are there."""
+        return tuple(sorted(one.name for one in self._introduced.values()))
+
     def key_of(self, host: str) -> PeerKey | None:
         """The key of the peer of that name, if it is there."""
         return next((key for key, one in self._introduced.items() if one.name == host), None)

@@ -1,0 +1,170 @@
+"""Whose goal it is what a person said: this host's, or that of the one peer that can have it.
+
+A compute node hears "search for people" and cannot go anywhere; the robot beside it can. Words that
+begin with a host's name are that host's, whatever others could do.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from nondum.host.events import Event, GoalEnded, GoalReached, PlanMissing
+from nondum.host.mind.mind import Mind
+from nondum.host.mind.offers import prospect
+from nondum.host.peers.remote_calls import Reaches
+from nondum.host.printable import printable
+from nondum.planning.pattern import words_of
+from nondum.sdk.errors import GoalRefused, NondumError, Problem
+from nondum.sdk.wire import Body
+from nondum.transport.peers import CallFailed, Errand
+
+ASK_S = 2.0
+"""How long a peer has to say whether it can."""
+MAX_WORDS = 1000
+"""Characters of what a person said."""
+
+
+class Goals:
+    """Takes what a person said, here or for a peer."""
+
+    def __init__(
+        self,
+        host: str,
+        mind: Callable[[], Mind],
+        reach: Reaches,
+        peers: Callable[[], Sequence[str]],
+        *,
+        accepts: bool,
+    ) -> None:
+        """`accepts`: whether goals that peers heard are taken."""
+        self._host, self._mind, self._reach, self._peers = host, mind, reach, peers
+        self._accepts = accepts
+        self._givers: dict[str, str] = {}
+        """Goal → the peer that gave it."""
+
+    # What is heard here
+
+    async def take(self, words: str) -> str:
+        """Make a goal of what was said, here or at a peer; says in words what became of it.
+
+        Raises `GoalRefused` (PHRASE_…, WHOSE_GOAL), and as the peer refuses it.
+        """
+        addressed, rest = addressed_to(words, (self._host, *self._peers()))
+        if addressed == self._host:
+            return self._given_here(rest)
+        if addressed is not None:
+            return await self._given_to(addressed, rest)
+        if not self._peers() or await self._prospect(words) == "can":
+            return self._given_here(words)
+        return await self._given_to_whoever_can(words)
+
+    async def _given_to_whoever_can(self, words: str) -> str:
+        peers = self._peers()
+        answers = await asyncio.gather(*(self._ask(peer, words) for peer in peers))
+        for wish in ("can", "holds"):
+            able = [peer for peer, now in zip(peers, answers, strict=True) if now == wish]
+            if len(able) == 1:
+                return await self._given_to(able[0], words)
+            if able:
+                told = f"{' and '.join(able)} could do that"
+                fix = f'say which: "{able[0]}, {words}"'
+                raise GoalRefused(Problem("WHOSE_GOAL", told, fix=fix))
+        return self._given_here(words)
+
+    async def _ask(self, peer: str, words: str) -> str:
+        try:
+            call = self._reach.call(peer, "goal.ask", {"words": words}, deadline_s=ASK_S)
+            return str((await call).get("now", ""))
+        except NondumError:
+            return ""
+
+    async def _given_to(self, peer: str, words: str) -> str:
+        try:
+            call = self._reach.call(peer, "goal.give", {"words": words}, deadline_s=ASK_S)
+            given = await call
+        except NondumError as error:
+            raise GoalRefused(*error.problems) from error
+        return f"that is goal {printable(str(given.get('goal')))} of {peer}"
+
+    def _given_here(self, words: str) -> str:
+        return f"that is goal {self._mind().give(words=words).id}"
+
+    # What peers heard
+
+    async def serve_ask(self, errand: Errand) -> Body:
+        """Whether a peer's person can have that here: `now`, see `offers`. Raises `CallFailed`."""
+        return {"now": await self._prospect(self._words(errand))}
+
+    def serve_give(self, errand: Errand) -> Body:
+        """Take a goal that a peer heard: its `goal` id. Raises `GoalRefused`, `CallFailed`."""
+        words = self._words(errand)
+        given = self._mind().give(words=words)
+        self._givers[given.id] = errand.caller.name
+        self._mind().people.tell(f"{errand.caller.name} heard {words!r}: that is goal {given.id}")
+        return {"goal": given.id, "text": given.text}
+
+    def on_event(self, event: Event) -> None:
+        """Tell those who gave a goal what became of it."""
+        match event:
+            case GoalReached(goal):
+                self._tell_giver(goal, "is reached", is_over=True)
+            case GoalEnded(goal, reason):
+                self._tell_giver(goal, reason, is_over=True)
+            case PlanMissing(goal, problems):
+                self._tell_giver(goal, "cannot be had now: " + problems[0].message, is_over=False)
+
+    def hear_news(self, peer: str, args: Mapping[str, Any]) -> None:
+        """A peer tells what became of a goal that was given from here."""
+        if isinstance(text := args.get("text"), str):
+            self._mind().people.tell(f"{peer}: {printable(text[:MAX_WORDS])}")
+
+    def _tell_giver(self, goal: str, what: str, *, is_over: bool) -> None:
+        giver = self._givers.get(goal)
+        if giver is None:
+            return
+        if is_over:
+            del self._givers[goal]
+        text = f"{self._mind().queue[goal].text!r} {what}"
+        try:
+            self._reach.notify(giver, "goal.news", {"text": text[:MAX_WORDS]})
+        except NondumError:
+            return  # it is gone, or busy: the goal is this host's own matter now
+
+    def _words(self, errand: Errand) -> str:
+        words = errand.args.get("words")
+        if not isinstance(words, str) or not 0 < len(words) <= MAX_WORDS:
+            raise CallFailed(Problem("CALL_MALFORMED", "a goal is given in words"))
+        if not self._accepts:
+            fix = "the integrator says so: `accept_goals` under [peers]"
+            raise CallFailed(Problem("GOALS_NOT_TAKEN", "it takes no goals from peers", fix=fix))
+        return words
+
+    async def _prospect(self, words: str) -> str:
+        """`now` of what was said; empty where it means nothing here."""
+        mind = self._mind()
+        composition, world = mind.composition, mind.beliefs.world
+        if composition is None:
+            return ""
+        try:
+            goal = composition.book.goal(words)
+        except GoalRefused:
+            return ""
+        return await asyncio.to_thread(prospect, composition, world.facts, world.bare_facts, goal)
+
+
+def addressed_to(words: str, hosts: Sequence[str]) -> tuple[str | None, str]:
+    """The host whose name words begin with, if they do, and the rest of them.
+
+    >>> addressed_to("big mule, search for people", ["rover", "big-mule"])
+    ('big-mule', 'search for people')
+    >>> addressed_to("search for people", ["rover"])
+    (None, 'search for people')
+    """
+    said = words_of(words)
+    for host in sorted(hosts, key=len, reverse=True):
+        for name in ((host,), tuple(host.split("-"))):
+            if said[: len(name)] == name and len(said) > len(name):
+                return host, " ".join(said[len(name) :])
+    return None, words
