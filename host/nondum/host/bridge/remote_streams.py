@@ -132,14 +132,16 @@ class RemoteStreams:
 
     async def _keep(self, stream: str, wanted: _Import) -> None:
         """Have a stream open as long as it is wanted."""
-        wait_s = FIRST_WAIT_S
+        loop, wait_s = asyncio.get_running_loop(), FIRST_WAIT_S
         while True:
+            begun_s = loop.time()
             try:
                 await self._read(stream, wanted)
-                wait_s = FIRST_WAIT_S
             except NondumError as error:
                 log.info("%s cannot be read: %s", stream, error)
                 self._refuse(wanted, error)
+            if loop.time() - begun_s > LONGEST_WAIT_S:  # it went well for long
+                wait_s = FIRST_WAIT_S
             await asyncio.sleep(wait_s)
             wait_s = min(2 * wait_s, LONGEST_WAIT_S)
 
