@@ -31,16 +31,20 @@ def all_commands() -> Iterator[tuple[str, click.Command, click.Context]]:
     for name in cli.list_commands(root):
         found = cli.get_command(root, name)
         assert found is not None
-        context = click.Context(found, info_name=name, parent=root)
-        if not isinstance(found, click.Group):
-            yield f"nondum {name}", found, context
-            continue
-        for inner in sorted(found.commands):
-            command = found.commands[inner]
-            yield (
-                f"nondum {name} {inner}",
-                command,
-                click.Context(command, info_name=inner, parent=context),
+        yield from _of(f"nondum {name}", found, click.Context(found, info_name=name, parent=root))
+
+
+def _of(
+    name: str, command: click.Command, context: click.Context
+) -> Iterator[tuple[str, click.Command, click.Context]]:
+    """A command; or those of a group, and the group where it does something by itself."""
+    if not isinstance(command, click.Group) or command.invoke_without_command:
+        yield name, command, context
+    if isinstance(command, click.Group):
+        for inner in sorted(command.commands):
+            found = command.commands[inner]
+            yield from _of(
+                f"{name} {inner}", found, click.Context(found, info_name=inner, parent=context)
             )
 
 

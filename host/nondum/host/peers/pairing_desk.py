@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
+from collections.abc import AsyncGenerator, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -68,7 +68,7 @@ class PairingDesk:
         self._is_development = is_development
         self._window: _Window | None = None
 
-    async def pair(self, wanted: str | None = None) -> AsyncIterator[Row]:
+    async def pair(self, wanted: str | None = None) -> AsyncGenerator[Row, None]:
         """Open the window, and tell how it stands whenever that changes, until it is closed.
 
         `wanted` is the name, fingerprint or key of the only host to be paired with. Whoever stops
