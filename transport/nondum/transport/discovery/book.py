@@ -65,6 +65,10 @@ class HintBook:
         """Every hint, the oldest peer first."""
         return tuple(one for by_source in self._heard.values() for one in by_source.values())
 
+    def knows(self, key: PeerKey) -> bool:
+        """Whether a peer is hinted at."""
+        return key in self._heard
+
     def add(self, hint: Hint, now_s: float) -> Change:
         """Take a hint. Those of this host itself are kept apart."""
         if hint.key == self._key:

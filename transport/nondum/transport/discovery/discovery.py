@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -25,6 +26,8 @@ from nondum.transport.peers.keys import PeerKey
 
 if TYPE_CHECKING:
     from nondum.transport.discovery.multicast import Multicast
+
+log = logging.getLogger(__name__)
 
 AGAIN_S = 5.0
 """Time between two announcements of this host; more where there are many hosts."""
@@ -81,8 +84,8 @@ class Discovery:
         return self._book.hints
 
     async def start(self) -> None:
-        """Begin to look and to be found. What does not work is told by `status`, and tried again:
-        a network may come later."""
+        """Begin to look and to be found. A network may come later: what does not work yet is told
+        by `status`, and tried again. Raises `OSError` when there are no sockets at all."""
         if self._wants_multicast:
             self._multicast = self._new_multicast()
         self._watch.start()
@@ -143,7 +146,12 @@ class Discovery:
                 async with asyncio.timeout(wait_s):
                     await self._dirty.wait()
             self._dirty.clear()
-            await self._follow()
+            try:
+                await self._follow()
+            except OSError as error:  # no descriptors, no memory: such things pass
+                log.warning("the network cannot be followed: %s", error)
+                self._dirty.set()
+                await asyncio.sleep(RETRY_S)
 
     async def _follow(self) -> None:
         """Be on the interfaces that there are, with what is to be announced."""
@@ -153,8 +161,7 @@ class Discovery:
         if self._multicast is not None:
             await self._multicast.reconcile(self._announcement, found)
             if is_new:
-                self._multicast.announce(found)
-                self._multicast.ask()
+                self._multicast.appear()
         if is_new:
             self._asker.hurry()
 
@@ -177,7 +184,7 @@ class Discovery:
     def _say_again(self) -> None:
         self._again = self._loop.call_later(self._again_s(), self._say_again)
         if self._multicast is not None:
-            self._multicast.announce(self._interfaces)
+            self._multicast.announce()
         for one in self._book.heard:
             is_silent = self._loop.time() - one.at_s > SILENT_S
             if one.hint.source is Source.MULTICAST and is_silent:
@@ -191,7 +198,11 @@ class Discovery:
                 return self._refused(_NOWHERE)
         interface = network.of_host(host_of(addresses[0]), self._interfaces)
         found = replace(hint, addresses=addresses, interface=interface)
-        return self._tell(self._book.add(found, self._loop.time()))
+        is_new = not self._book.knows(hint.key)
+        change = self._book.add(found, self._loop.time())
+        if is_new and change.told is not None and self._multicast is not None:
+            self._multicast.greet()
+        return self._tell(change)
 
     def _refused(self, problem: Problem) -> None:
         self._book.refused[problem.code] += 1

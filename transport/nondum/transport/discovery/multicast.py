@@ -10,10 +10,11 @@ import asyncio
 import contextlib
 import ipaddress
 import logging
+import random
 import re
 import socket
 from collections import Counter
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,8 @@ from zeroconf import (  # type: ignore[attr-defined] # zeroconf keeps the DNS…
     DNSOutgoing,
     DNSPointer,
     DNSQuestion,
+    DNSText,
+    Error,
     IPVersion,
     RecordUpdate,
     RecordUpdateListener,
@@ -43,7 +46,12 @@ from nondum.transport.discovery.interfaces import Flags, Interface, has_ipv6
 from nondum.transport.peers.identity import Security
 from nondum.transport.peers.keys import PeerKey, fingerprint
 
-ASK_AGAIN_S = 1.0
+APPEAR_S = (0.0, 1.25, 2.5)
+"""When a host is announced after a change: those who heard it take a second to forget an address
+that is named no more (RFC 6762, section 10.2), and the first packets over a new link get lost."""
+GREET_S = 0.25
+"""Time between two greetings at least, whoever comes: a hundred hosts may boot at once."""
+GREET_JITTER_S = 0.02
 MAX_NAMES = 1024
 """Instance names whose owners are remembered, so that their goodbyes can be told."""
 MEMBERSHIPS = Path("/proc/sys/net/ipv4/igmp_max_memberships")
@@ -62,14 +70,16 @@ class Multicast:
         on_refused: Callable[[Problem], None],
     ) -> None:
         """Only hosts that are secured alike are told of."""
-        self._on_refused = on_refused
         self._ears = _Ears(security, on_hint, on_gone, on_refused)
         self._loop = asyncio.get_running_loop()
         self._zeroconf: AsyncZeroconf | None = None
         self._info: AsyncServiceInfo | None = None
         self._choice: list[str | int] = []
         self._tasks: set[asyncio.Task[Any]] = set()
-        self._asking: asyncio.TimerHandle | None = None
+        self._timers: list[asyncio.TimerHandle] = []
+        self._greeting: asyncio.TimerHandle | None = None
+        self._greeted_s = -GREET_S
+        self._on_air: list[str] = []
         self.problem: Problem | None = None
         """Why it does not work at all."""
         self.unused: dict[str, Problem] = {}
@@ -86,31 +96,38 @@ class Multicast:
         info = _info(announcement, interfaces)
         try:
             await self._join(choice, info)
-        except (OSError, RuntimeError) as error:
+        except (OSError, RuntimeError, Error) as error:
             self.problem = _unusable(error)
         else:
             self.problem = None
             self.unused = self._find_unused(interfaces)
-        self._note_announced(interfaces)
+        self._on_air = [one.name for one in interfaces if one.name not in self.unused]
 
-    def announce(self, interfaces: Sequence[Interface]) -> None:
+    def announce(self) -> None:
         """Say once more that this host is there."""
         if self._zeroconf is not None and self._info is not None:
             zeroconf = self._zeroconf.zeroconf
             zeroconf.async_send(zeroconf.generate_service_broadcast(self._info, None))
-            self._note_announced(interfaces)
+            self.announced_s = dict.fromkeys(self._on_air, self._loop.time())
 
-    def ask(self) -> None:
-        """Ask who is there, now and once more soon."""
-        self._ask()
-        if self._asking is not None:
-            self._asking.cancel()
-        self._asking = self._loop.call_later(ASK_AGAIN_S, self._ask)
+    def appear(self) -> None:
+        """Say that this host is there and ask who else is, now and a few times soon."""
+        for timer in self._timers:
+            timer.cancel()
+        self._timers = [self._loop.call_later(delay_s, self._appear) for delay_s in APPEAR_S]
+
+    def greet(self) -> None:
+        """Somebody new was heard, and need not wait for the next announcement to hear this host."""
+        if self._greeting is None:
+            since_s = self._loop.time() - self._greeted_s
+            wait_s = max(GREET_S - since_s, random.uniform(0, GREET_JITTER_S))
+            self._greeting = self._loop.call_later(wait_s, self._greet)
 
     async def close(self) -> None:
         """Say goodbye, and let go of everything."""
-        if self._asking is not None:
-            self._asking.cancel()
+        for timer in (*self._timers, self._greeting):
+            if timer is not None:
+                timer.cancel()
         for task in self._tasks:
             task.cancel()
         if self._zeroconf is not None:
@@ -119,12 +136,8 @@ class Multicast:
 
     async def _join(self, choice: list[str | int], info: AsyncServiceInfo) -> None:
         if self._zeroconf is None:
-            version = IPVersion.All if has_ipv6() else IPVersion.V4Only
-            self._zeroconf = AsyncZeroconf(interfaces=choice, ip_version=version)
+            self._zeroconf = await self._open(choice)
             self._choice = choice
-            zeroconf = self._zeroconf.zeroconf
-            await zeroconf.async_wait_for_start()
-            zeroconf.async_add_listener(self._ears, None)
         if self._info is None:
             # Names are unique by construction, so nobody need be asked for a second.
             told = self._zeroconf.async_register_service(info, cooperating_responders=True)
@@ -136,13 +149,29 @@ class Multicast:
             self._choice = choice
             await self._zeroconf.async_update_interfaces(interfaces=choice)
 
+    async def _open(self, choice: list[str | int]) -> AsyncZeroconf:
+        version = IPVersion.All if has_ipv6() else IPVersion.V4Only
+        opened = AsyncZeroconf(interfaces=choice, ip_version=version)
+        try:
+            await opened.zeroconf.async_wait_for_start()
+        except BaseException:
+            await opened.async_close()
+            raise
+        opened.zeroconf.async_add_listener(self._ears, None)
+        return opened
+
     def _keep(self, task: Awaitable[Any]) -> None:
         future = asyncio.ensure_future(task)
         self._tasks.add(future)
         future.add_done_callback(self._tasks.discard)
 
-    def _ask(self) -> None:
-        self._asking = None
+    def _greet(self) -> None:
+        self._greeting = None
+        self._greeted_s = self._loop.time()
+        self.announce()
+
+    def _appear(self) -> None:
+        self.announce()
         if self._zeroconf is not None:
             question = DNSOutgoing(_QUERY)
             question.add_question(DNSQuestion(SERVICE, _POINTER, _INTERNET))
@@ -159,10 +188,6 @@ class Multicast:
                 unused[one.name] = _not_joined(one, len(interfaces))
         return unused
 
-    def _note_announced(self, interfaces: Sequence[Interface]) -> None:
-        on_air = (one.name for one in interfaces if one.name not in self.unused)
-        self.announced_s = dict.fromkeys(on_air, self._loop.time()) if not self.problem else {}
-
 
 class _Ears(RecordUpdateListener):
     """Makes hints of records. It hears every announcement, not only those with something new."""
@@ -178,6 +203,7 @@ class _Ears(RecordUpdateListener):
         self._on_hint, self._on_gone, self._on_refused = on_hint, on_gone, on_refused
         self._zeroconf: Zeroconf | None = None
         self._named: set[str] = set()
+        self._texts: dict[str, bytes] = {}
         self._owners: dict[str, PeerKey] = {}
 
     def async_update_records(self, zc: Zeroconf, now: float, records: list[RecordUpdate]) -> None:
@@ -192,12 +218,15 @@ class _Ears(RecordUpdateListener):
                     self._on_gone(owner)
             elif record.key.endswith(SERVICE) and not record.is_expired(now):
                 self._named.add(record.name)
+                if isinstance(record, DNSText):
+                    self._texts[record.name] = record.text
 
     def async_update_records_complete(self) -> None:
         """Read what the packet was about."""
         for name in self._named:
             self._read(name)
         self._named.clear()
+        self._texts.clear()
 
     def _read(self, name: str) -> None:
         if not _INSTANCE.fullmatch(name):
@@ -207,7 +236,7 @@ class _Ears(RecordUpdateListener):
         if not info.load_from_cache(self._zeroconf):
             return None  # the rest of it is to come
         try:
-            txt = {k.decode("ascii"): (v or b"").decode() for k, v in info.properties.items()}
+            txt = {k.decode("ascii"): (v or b"").decode() for k, v in self._properties(info)}
             hosts = [_named_scope(host) for host in info.parsed_scoped_addresses()]
             hint = from_txt(txt, info.port, hosts, source=Source.MULTICAST, security=self._security)
         except UnicodeDecodeError:
@@ -218,6 +247,12 @@ class _Ears(RecordUpdateListener):
             return self._on_refused(_ODD_NAME)
         self._remember(name, hint.key)
         return self._on_hint(hint)
+
+    def _properties(self, info: AsyncServiceInfo) -> Iterable[tuple[bytes, bytes | None]]:
+        """The TXT record of the packet itself: of two in the cache, nobody knows which is newer."""
+        if (text := self._texts.get(info.name)) is not None:
+            info = AsyncServiceInfo(SERVICE, info.name, properties=text)
+        return info.properties.items()
 
     def _remember(self, name: str, owner: PeerKey) -> None:
         self._owners.pop(name, None)

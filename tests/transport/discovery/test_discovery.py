@@ -1,0 +1,185 @@
+"""Hosts that look for each other by multicast, on this machine's loopback."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from dataclasses import replace
+
+import pytest
+from tests.transport.discovery import spoofing
+from tests.transport.discovery.hosts import PATIENCE_S, Seeker, here, seeking, until
+
+from nondum.transport.discovery import Announcement
+from nondum.transport.discovery.book import MAX_PEERS
+from nondum.transport.discovery.hint import MAX_ADDRESSES, instance, to_txt
+from nondum.transport.peers.keys import PeerKey
+
+pytestmark = pytest.mark.anyio
+
+LOOPBACK = ("127.0.0.1",)
+
+
+async def until_refused(seeker: Seeker, code: str) -> None:
+    await until(lambda: seeker.discovery.status().refused.get(code, 0) > 0)
+
+
+async def until_duplicate(seeker: Seeker) -> str:
+    """Wait until it is told of another host with its key; where that is."""
+    await until(lambda: len(seeker.discovery.status().problems) > 0)
+    (problem,) = seeker.discovery.status().problems
+    assert problem.code == "IDENTITY_DUPLICATE"
+    return problem.message
+
+
+def spoof(*packets: bytes) -> None:
+    with spoofing.on_loopback() as stranger:
+        for packet in packets:
+            stranger.sendto(packet, spoofing.GROUP)
+
+
+def spoofed(announcement: Announcement, *addresses: str, **changes: str) -> bytes:
+    txt = {**to_txt(announcement), **changes}
+    return spoofing.announced(instance(announcement.key), txt, addresses or ("127.0.0.1",))
+
+
+async def test_hosts_find_each_other_in_both_directions() -> None:
+    async with seeking(here("rover")) as rover, seeking(here("base")) as base:
+        hint = await rover.found(base)
+        assert hint.addresses == base.announcement.listening
+        assert hint.name == "base"
+        await base.found(rover)
+        assert rover.discovery.hints.keys() == {base.announcement.key}
+
+
+async def test_a_goodbye_ends_the_hint() -> None:
+    async with seeking(here("rover")) as rover:
+        async with seeking(here("base")) as base:
+            await rover.found(base)
+        async with asyncio.timeout(PATIENCE_S):
+            assert await rover.gone.get() == base.announcement.key
+        assert rover.discovery.hints == {}
+
+
+async def test_what_changes_is_told() -> None:
+    base = here("base")
+    async with seeking(here("rover")) as rover, seeking(base) as there:
+        await rover.found(there)
+        there.discovery.announce(replace(base, pairing_port=7411))
+        await rover.told(lambda hint: hint.pairing_port == 7411)
+        there.discovery.announce(base)
+        await rover.told(lambda hint: hint.key == base.key and hint.pairing_port is None)
+
+
+async def test_hosts_without_keys_find_each_other_and_nobody_else() -> None:
+    async with (
+        seeking(here("rover", key="development:rover")) as rover,
+        seeking(here("base", key="development:base")) as base,
+        seeking(here("secured")) as secured,
+    ):
+        await rover.found(base)
+        await until_refused(rover, "HINT_SECURITY")
+        await until_refused(secured, "HINT_SECURITY")
+        assert rover.discovery.hints.keys() == {base.announcement.key}
+        assert secured.discovery.hints == {}
+
+
+async def test_without_multicast_nobody_is_heard_or_told() -> None:
+    async with (
+        seeking(here("rover")) as rover,
+        seeking(here("quiet"), multicast=False) as quiet,
+        seeking(here("base")) as base,
+    ):
+        await rover.found(base)
+        assert rover.discovery.hints.keys() == {base.announcement.key}
+        assert quiet.discovery.hints == {}
+
+
+async def test_a_copy_of_the_key_is_reported_by_both() -> None:
+    rover = here("rover", epoch=1)
+    copy = here("copy", epoch=2, key=rover.key)
+    async with seeking(rover) as one, seeking(copy) as other:
+        assert copy.listening[0] in await until_duplicate(one)
+        assert rover.listening[0] in await until_duplicate(other)
+        assert one.discovery.hints == other.discovery.hints == {}
+
+
+async def test_the_own_echo_is_no_copy() -> None:
+    async with seeking(here("rover")) as rover, seeking(here("base")) as base:
+        await base.found(rover)  # so the announcement has gone round
+        assert rover.discovery.status().problems == ()
+
+
+async def test_the_status_tells_what_was_announced_and_heard_and_where() -> None:
+    async with seeking(here("rover")) as rover, seeking(here("base")) as base:
+        await rover.found(base)
+        (row,) = (one for one in rover.discovery.status().interfaces if one.is_looked_on)
+        assert (row.interface, row.heard, row.problem) == ("lo", 1, None)
+        assert row.announced_s is not None and row.heard_s is not None
+        assert rover.discovery.status().hints == 1
+
+
+class TestStrangers:
+    @pytest.mark.parametrize(
+        ("packet", "code"),
+        [
+            (spoofed(here("liar"), pk="~" * 40), "HINT_MALFORMED"),
+            (spoofed(here("liar"), epoch="no number"), "HINT_MALFORMED"),
+            (spoofed(here("liar"), pk=here("other").key), "HINT_NAME"),
+            (
+                spoofing.announced("rover._nondum._tcp.local.", {"id": "x"}, ["127.0.0.1"]),
+                "HINT_NAME",
+            ),
+            (
+                spoofing.announced(instance(here("l").key), b"\x03pk\xff", ["127.0.0.1"]),
+                "HINT_MALFORMED",
+            ),
+            (spoofed(here("liar"), "8.8.8.8", "224.0.0.1", "0.0.0.0"), "HINT_NOWHERE"),
+        ],
+        ids=["key", "epoch", "name of another key", "name of no key", "no text", "far away"],
+    )
+    async def test_lies_are_counted_and_harm_nothing(self, packet: bytes, code: str) -> None:
+        async with seeking(here("rover")) as rover, seeking(here("base")) as base:
+            spoof(packet)
+            await until_refused(rover, code)
+            await rover.found(base)
+            assert rover.discovery.hints.keys() == {base.announcement.key}
+
+    async def test_garbage_harms_nothing(self) -> None:
+        good = spoofed(here("liar"))
+        garbage = [os.urandom(n) for n in (0, 1, 11, 12, 500, 8000)]
+        cut = [good[:n] for n in range(0, len(good), 7)]
+        async with seeking(here("rover")) as rover:
+            spoof(*garbage, *cut)
+            async with seeking(here("base")) as base:
+                await rover.found(base)
+
+    async def test_of_too_many_addresses_some_are_kept(self) -> None:
+        liar = here("liar")
+        async with seeking(here("rover")) as rover:
+            spoof(spoofed(liar, *(f"127.0.0.{number}" for number in range(1, 100))))
+            hint = await rover.told(lambda hint: hint.key == liar.key)
+            assert len(hint.addresses) == MAX_ADDRESSES
+
+    async def test_ten_thousand_invented_hosts_cost_a_bounded_number_of_hints(self) -> None:
+        friend = here("friend")
+
+        def prefers(key: PeerKey) -> bool:
+            return key == friend.key
+
+        async with seeking(here("rover"), prefers=prefers) as rover:
+            with spoofing.on_loopback() as stranger:
+                for number in range(10_000):
+                    liar = Announcement(_invented(number), "liar", 1, ("tcp://[::]:7410",))
+                    stranger.sendto(spoofed(liar), spoofing.GROUP)
+                    if number % 20 == 0:
+                        await asyncio.sleep(0)
+            await until_refused(rover, "HINT_CROWDED")
+            assert len(rover.discovery.hints) == MAX_PEERS
+            async with seeking(friend) as known:
+                await rover.found(known)
+            assert len(rover.discovery.hints) <= MAX_PEERS
+
+
+def _invented(number: int) -> PeerKey:
+    return PeerKey(f"{number:040d}")

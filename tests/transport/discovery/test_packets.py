@@ -1,0 +1,47 @@
+"""The question who is there, and its answer."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nondum.sdk.errors import ProtocolViolation
+from nondum.transport.discovery import Announcement, packets
+from nondum.transport.discovery.hint import to_txt
+from nondum.transport.peers.keys import HostKeys
+
+KEY = HostKeys.generate().public
+LONGEST = Announcement(KEY, "n" * 63, 2**53, ("tcp://[::]:65535",), 65_535, (2**53,) * 16)
+
+nonces = st.binary(min_size=packets.NONCE, max_size=packets.NONCE)
+
+
+@given(nonces)
+def test_an_answer_says_what_was_announced(nonce: bytes) -> None:
+    asked = packets.nonce_of(packets.question(nonce))
+    assert asked == nonce
+    answer = packets.read_answer(packets.answer(asked, LONGEST))
+    assert (answer.nonce, answer.port) == (nonce, 65_535)
+    assert answer.txt == to_txt(LONGEST)
+
+
+@given(nonces)
+def test_no_answer_is_longer_than_its_question(nonce: bytes) -> None:
+    assert len(packets.answer(nonce, LONGEST)) <= len(packets.question(nonce))
+
+
+@given(st.integers(0, packets.LENGTH - 1))
+def test_a_question_that_is_too_short_is_none(length: int) -> None:
+    assert packets.nonce_of(packets.question(bytes(packets.NONCE))[:length]) is None
+
+
+@given(st.binary(max_size=600), st.booleans())
+def test_anything_else_is_a_violation(data: bytes, is_headed: bool) -> None:
+    start = packets.answer(bytes(packets.NONCE), LONGEST)[: 8 + packets.NONCE] if is_headed else b""
+    try:
+        answer = packets.read_answer(start + data)
+    except ProtocolViolation as error:
+        assert error.code == "HINT_MALFORMED"
+    else:
+        assert type(answer.port) is int
+        assert all(type(text) is str for pair in answer.txt.items() for text in pair)
