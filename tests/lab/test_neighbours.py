@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from tests.lab.neighbours import beacon, ear, neighbours, say, until_shared, written
+from tests.lab.plugins import scribe, talker
 from tests.lab.running_host import READY_S, RunningHost
 
 pytestmark = pytest.mark.lab
@@ -142,6 +143,29 @@ def test_actuators_are_not_offered_unless_the_integrator_says_so(tmp_path: Path)
         mule.bring("light", beacon(log, type="pointer"))
         until_shared(rover, "beacon@mule")
         rover.until_goal(rover.want("(lit rover)"), "holds")
+
+
+def test_stream_of_one_host_is_read_on_the_other(tmp_path: Path) -> None:
+    with neighbours(tmp_path, "rover", "mule") as (rover, mule):
+        rover.bring("talk", talker("talker"))
+        mule.bring("write", scribe())
+        until_shared(rover, "scribe@mule")
+        goal = rover.want("(written rover)")
+        rover.until_goal(goal, "holds")
+        (row,) = mule.ask("streams")
+        assert (row["component"], row["consumers"]) == ("talker@rover", ["scribe"])
+        rover.ask("halt", id=goal)
+        mule.until("it is read no more", lambda view: not view["streams"], timeout_s=READY_S)
+
+
+def test_camera_of_another_body_is_not_planned_with(tmp_path: Path) -> None:
+    with neighbours(tmp_path, "rover", "scout", "mule") as (rover, scout, mule):
+        rover.bring("talk", talker("talker"))
+        mule.bring("write", scribe())
+        for component in ("talker@rover", "scribe@mule"):
+            until_shared(scout, component)
+        scout.until_goal(scout.want("(written scout)"), "suspended")
+        rover.until_goal(rover.want("(written rover)"), "holds")
 
 
 def test_goal_that_is_heard_goes_to_the_peer_that_can_have_it(tmp_path: Path) -> None:

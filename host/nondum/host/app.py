@@ -105,7 +105,9 @@ async def _run(
     questions = Questions(catalogue, mind, workers, news, listing, warnings)
     orders = Orders(catalogue, mind, workers, news, bus, config.planning.translate_s)
     control = ControlServer(
-        config.host.control, verbs.answering(questions, orders), verbs.following(questions, orders)
+        config.host.control,
+        verbs.answering(questions, orders, neighbours),
+        verbs.following(questions, orders, neighbours),
     )
     await control.open()
     log.info("host %s listens at %s", config.host.name, config.host.control)

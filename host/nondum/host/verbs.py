@@ -3,16 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from nondum.host.control.arguments import Arguments
 from nondum.host.control.server import Follow, Verb
 from nondum.host.orders import Orders
 from nondum.host.questions import Questions
 from nondum.host.rows import Row
+from nondum.sdk.errors import ConfigRefused, Problem
+
+if TYPE_CHECKING:  # its import costs ten megabytes, which hosts without peers need not pay
+    from nondum.host.peers.neighbourhood import Neighbourhood
+
+PEER_VERBS = (
+    "peers",
+    "peers_certify",
+    "peers_confirm",
+    "peers_forget",
+    "peers_key",
+    "peers_refuse",
+    "peers_revoke",
+    "peers_trust",
+    "peers_trust_fleet",
+    "peers_why",
+)
+"""What a host without peers refuses to answer, and why."""
 
 
-def answering(questions: Questions, orders: Orders) -> dict[str, Verb]:
+def answering(
+    questions: Questions, orders: Orders, neighbours: Neighbourhood | None
+) -> dict[str, Verb]:
     """Verbs that answer once."""
     verbs: dict[str, Callable[[Arguments], Awaitable[Any]]] = {
         "behaviours": questions.behaviours,
@@ -39,10 +59,13 @@ def answering(questions: Questions, orders: Orders) -> dict[str, Verb]:
         "units": questions.units,
         "why": questions.why,
     }
+    verbs |= neighbours.answering() if neighbours else dict.fromkeys(PEER_VERBS, _no_peers)
     return {name: _parsing(verb) for name, verb in verbs.items()}
 
 
-def following(questions: Questions, orders: Orders) -> dict[str, Follow]:
+def following(
+    questions: Questions, orders: Orders, neighbours: Neighbourhood | None
+) -> dict[str, Follow]:
     """Verbs that go on answering."""
     verbs: dict[str, Callable[[Arguments], AsyncIterator[Row]]] = {
         "follow_goal": questions.follow_goal,
@@ -50,7 +73,18 @@ def following(questions: Questions, orders: Orders) -> dict[str, Follow]:
         "install": orders.install,
         "watch": questions.watch,
     }
+    verbs |= neighbours.following() if neighbours else {"peers_pair": _no_peers_to_follow}
     return {name: _parsing(verb) for name, verb in verbs.items()}
+
+
+async def _no_peers(arguments: Arguments) -> Any:
+    """Answer for a host that has nothing to do with others. Raises `ConfigRefused` (PEERS_OFF)."""
+    told = "this host has nothing to do with others"
+    raise ConfigRefused(Problem("PEERS_OFF", told, fix="set `enabled = true` under [peers]"))
+
+
+async def _no_peers_to_follow(arguments: Arguments) -> AsyncIterator[Row]:
+    yield await _no_peers(arguments)
 
 
 def _parsing(verb: Callable[[Arguments], Any]) -> Callable[[Mapping[str, Any]], Any]:

@@ -3,31 +3,46 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
+from typing import Any
 
+from nondum.host.bridge.bridge import Bridge
+from nondum.host.bridge.remote_streams import RemoteStreams
+from nondum.host.bridge.shared_streams import SharedStreams
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.config import HostConfig, PeersSection
+from nondum.host.control.arguments import Arguments
 from nondum.host.events import Emit, Event, UnitsTaken
 from nondum.host.lifecycle.folders import Folders
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.mind import Mind
+from nondum.host.peers import trust_orders
 from nondum.host.peers.compute import Compute, probed
 from nondum.host.peers.desk import Desk
 from nondum.host.peers.finder import PeerFinder
 from nondum.host.peers.goals import Goals
 from nondum.host.peers.offered import Policy
+from nondum.host.peers.pairing_desk import PairingDesk
 from nondum.host.peers.peering import Peering
 from nondum.host.peers.remote_calls import AllCalls, RemoteCalls, is_peers
 from nondum.host.peers.serving import Serving
 from nondum.host.peers.trust_keeper import TrustKeeper
+from nondum.host.peers.trust_orders import TrustOrders
+from nondum.host.peers.view import PeersView
+from nondum.host.rows import Row
 from nondum.host.workers.workers import Workers
 from nondum.planning.core import TAKEN_PREDICATES
 from nondum.planning.facts import predicate_of
 from nondum.sdk.description import ACTUATORS
-from nondum.transport.fleet import Mesh
-from nondum.transport.peers import Security
+from nondum.sdk.errors import Problem
+from nondum.sdk.wire import Body
+from nondum.transport.discovery import Hint
+from nondum.transport.fleet import FleetEvent, Mesh
+from nondum.transport.peers import CallFailed, Errand, PeerLost, Security
 
 ON_LOOPBACK = ("tcp://127.0.0.1:0",)
+OPEN_S = 10.0
+"""What a peer has to open a stream."""
 
 
 class Neighbourhood:
@@ -46,6 +61,7 @@ class Neighbourhood:
         """Use `open`. `mind` is asked for once the host runs."""
         host = config.host.name
         self.keeper = keeper
+        self._tasks: set[asyncio.Task[None]] = set()
         self._host, self._emit, self._mind = host, emit, mind
         self._movable = frozenset(config.peers.offer_actuators)
         self.serving = Serving(
@@ -64,7 +80,7 @@ class Neighbourhood:
             keeper.identity(development=config.peers.development),
             keeper.trust,
             self.desk,
-            on_event=lambda event: self.peering.on_fleet(event),
+            on_event=self._on_fleet,
             listen=_listen(config.peers),
             find=lambda mesh: self._find(mesh, config.peers),
         )
@@ -77,6 +93,31 @@ class Neighbourhood:
             claims=workers.claims,
             taken=lambda: {**dict.fromkeys(self._own_uses(), host), **self.serving.taken},
             compute=compute,
+        )
+        self.view = PeersView(
+            security=self.mesh.security,
+            snapshot=catalogue.snapshot,
+            peers=lambda: self.mesh.peers,
+            trust=lambda: keeper.trust,
+            hints=self._hints,
+            network=lambda: self.finder.status if self.finder else None,
+            refusals=self.mesh.refusals,
+        )
+        self._bridge = Bridge(_listen(config.peers))
+        self._shared = SharedStreams(self._bridge, workers.streams)
+        self._remote_streams = RemoteStreams(self._bridge, self._ask, self._addresses)
+        workers.streams.reach(self._remote_streams)
+        self.desk.add("stream.open", self._open_stream)
+        self.desk.add("stream.close", self._close_stream)
+        self.trust = TrustOrders(
+            keeper,
+            PairingDesk(
+                keeper,
+                announce=self._announce_pairing,
+                candidates=self._hints,
+                is_development=config.peers.development,
+            ),
+            self.view.known,
         )
         self.goals = Goals(
             host,
@@ -118,6 +159,15 @@ class Neighbourhood:
         unsafe = ("peers need no keys: every host on this machine is one",) if is_open else ()
         return (*unsafe, *map(str, self.keeper.warnings))
 
+    def answering(self) -> dict[str, Callable[[Arguments], Awaitable[Any]]]:
+        """Verbs that answer once."""
+        own = {"peers": self.view.rows, "peers_why": self.view.why}
+        return {**own, **trust_orders.answering(self.trust)}
+
+    def following(self) -> dict[str, Callable[[Arguments], AsyncIterator[Row]]]:
+        """Verbs that go on answering."""
+        return trust_orders.following(self.trust)
+
     async def start(self) -> None:
         """Be there for peers. Raises `PeerRefused`."""
         await self.mesh.start()
@@ -131,7 +181,53 @@ class Neighbourhood:
     async def close(self) -> None:
         """Say goodbye; what runs for peers, and at peers, is halted."""
         await self._remote.close()
+        await self._remote_streams.close()
+        await self._bridge.close()
         await self.mesh.close()
+
+    def _on_fleet(self, event: FleetEvent) -> None:
+        self.view.on_fleet(event)
+        self.peering.on_fleet(event)
+        if isinstance(event, PeerLost):
+            self._aside(self._shared.caller_lost(event.key))
+
+    def _aside(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    # Streams
+
+    async def _open_stream(self, errand: Errand) -> Body:
+        """Let a peer read a stream of an offered unit. Raises `CallFailed` (NOT_OFFERED)."""
+        if errand.args.get("stream") not in self.peering.offered_streams():
+            told = "no such stream is offered to peers"
+            raise CallFailed(Problem("NOT_OFFERED", told))
+        return await self._shared.serve_open(errand.caller.key, errand.args)
+
+    async def _close_stream(self, errand: Errand) -> Body:
+        return await self._shared.serve_close(errand.caller.key, errand.args)
+
+    async def _ask(self, host: str, method: str, args: Body) -> Body:
+        return await self.peering.call(host, method, args, deadline_s=OPEN_S)
+
+    def _addresses(self, host: str) -> tuple[str, ...]:
+        """Where a peer is reached now; none for a host that is no peer."""
+        key = self.peering.key_of(host)
+        peer = self.mesh.peers.get(key) if key else None
+        if key is None or peer is None:
+            return ()
+        hinted = (
+            address for hint in self._hints() if hint.key == key for address in hint.addresses
+        )
+        return tuple(dict.fromkeys((_as_endpoint(peer.address), *hinted)))
+
+    def _hints(self) -> tuple[Hint, ...]:
+        return self.finder.hints if self.finder else ()
+
+    def _announce_pairing(self, port: int | None) -> None:
+        if self.finder is not None:
+            self.finder.announce_pairing(port)
 
     def _find(self, mesh: Mesh, config: PeersSection) -> PeerFinder:
         self.finder = PeerFinder(mesh, config)
@@ -160,6 +256,11 @@ class Neighbourhood:
 
     def _on_taken(self) -> None:
         self._emit(UnitsTaken(self._host, self.serving.taken))
+
+
+def _as_endpoint(address: str) -> str:
+    """Where a peer is, whether it was dialled (`tcp://HOST:PORT`) or has dialled (`HOST:PORT`)."""
+    return address if address.startswith("tcp://") else f"tcp://{address}"
 
 
 def _listen(config: PeersSection) -> tuple[str, ...]:

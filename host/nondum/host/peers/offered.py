@@ -73,7 +73,7 @@ def standing(snapshot: Snapshot, policy: Policy, compute: Mapping[str, Any]) -> 
     shared: set[str] = set()
     for component in snapshot.components:
         offer = policy.offer(component)
-        shared |= _objects(snapshot.host, component, offer)
+        shared |= objects_of(snapshot.host, component, offer)
         entries[f"component/{component.id}"] = {
             "payload": component.payload_id,
             "version": component.version,
@@ -104,7 +104,7 @@ def passing(
     entries: Entries = {f"taken/{text}": {"by": user} for text, user in taken.items()}
     for component in snapshot.components:
         names = {SELF: snapshot.host, **own_objects(snapshot.host, component)}
-        shared = _objects(snapshot.host, component, policy.offer(component))
+        shared = objects_of(snapshot.host, component, policy.offer(component))
         entries |= _claimed(component.id, claims(component.id), names, shared)
     return entries
 
@@ -121,7 +121,7 @@ def changes(before: Entries, after: Entries) -> dict[str, dict[str, Any] | None]
     return new | {key: None for key in before if key not in after}
 
 
-def _objects(host: str, component: ComponentRecord, offer: Offer) -> set[str]:
+def objects_of(host: str, component: ComponentRecord, offer: Offer) -> set[str]:
     """The units and streams of a component that peers may use."""
     names = own_objects(host, component)
     units = offer.description.units

@@ -35,7 +35,7 @@ from nondum.host.peers.heard import (
     taken_in,
     withdrawal,
 )
-from nondum.host.peers.offered import Entries, Policy, changes, passing, standing
+from nondum.host.peers.offered import Entries, Policy, changes, objects_of, passing, standing
 from nondum.host.peers.remote_calls import host_of, is_peers
 from nondum.sdk.errors import NondumError, Problem
 from nondum.sdk.wire import Body
@@ -168,6 +168,15 @@ class Peering:
         self._emit(PeerLeft(key, name, reason))
 
     # Reaching peers by name
+
+    def offered_streams(self) -> frozenset[str]:
+        """The streams that peers may read."""
+        snapshot, policy = self._snapshot(), self._policy()
+        return frozenset(
+            name
+            for component in snapshot.components
+            for name in objects_of(snapshot.host, component, policy.offer(component))
+        )
 
     def names(self) -> tuple[str, ...]:
         """The peers that are there."""
