@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import pytest
 import zmq
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.transport.peers.hosts import PATIENCE_S, identity
 
@@ -29,6 +29,7 @@ from nondum.transport.peers import (
 from nondum.transport.peers import pairing_channel as channel
 from nondum.transport.peers.listener import dialling
 from nondum.transport.peers.pairing import TRIES, Ask, Commit, Nonce
+from nondum.transport.peers.pairing import Agreed as yes
 from nondum.transport.peers.pairing_channel import PairingHost
 from nondum.transport.peers.pairing_door import MOST_SENT
 from nondum.transport.peers.pairing_messages import (
@@ -153,7 +154,7 @@ class Stranger:
         """The next message that is not there for the connection's sake only."""
         said: Said = Beat()
         while isinstance(said, Beat):
-            is_there = await asyncio.to_thread(self.socket.poll, PATIENCE_S * 1000)
+            is_there = await asyncio.to_thread(self.socket.poll, int(PATIENCE_S) * 1000)
             assert is_there, "nothing was said"
             said = decode(self.socket.recv())
         return said
@@ -495,6 +496,41 @@ async def test_window_that_was_never_opened_closes() -> None:
     host = PairingHost(identity("rover"), lambda state: None)
     assert host.state == Idle()
     await host.close()
+
+
+THINGS_SAID = st.one_of(
+    st.builds(Ask, st.just(HostKeys.generate().public), st.just("stranger")),
+    st.builds(Commit, st.just(HostKeys.generate().public), st.just("x"), st.just(bytes(32))),
+    st.builds(Nonce, st.binary(min_size=16, max_size=16)),
+    st.builds(yes, st.binary(min_size=32, max_size=32)),
+    st.builds(Ended, st.sampled_from(Ending)),
+    st.just(Beat()),
+    st.binary(max_size=40),
+)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(st.lists(THINGS_SAID, max_size=6), max_size=3), st.booleans())
+async def test_whatever_strangers_say_nobody_is_paired_with_them(
+    talks: list[list[bytes | Said]], is_own_key: bool
+) -> None:
+    """And the next host is still answered, unless the tries are used up."""
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    async with end("base") as base, end("rover") as rover:
+        strangers = [Stranger(context, base) for _ in talks]
+        for stranger, talk in zip(strangers, talks, strict=True):
+            for said in talk:
+                own = stranger.keys.public if is_own_key else HostKeys.generate().public
+                stranger.says(Ask(own, "stranger") if isinstance(said, Ask) else said)
+            stranger.socket.close(1000)
+        rover.asks(base)
+        over = asyncio.ensure_future(base.sees(Failed))
+        met = asyncio.ensure_future(base.sees(Comparing, lambda state: state.name == "rover"))
+        await asyncio.wait({over, met}, return_when=asyncio.FIRST_COMPLETED)
+        over.cancel()
+        met.cancel()
+        assert not any(isinstance(state, Agreed) for state in base.states)
+    await asyncio.to_thread(context.term)
 
 
 @given(st.binary(max_size=2 * MAX_BYTES))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import queue
 import select
 import sys
+import termios
 import threading
 from contextlib import closing
 from typing import Any
@@ -120,6 +121,7 @@ def _show_code(row: Row) -> None:
 
 def _ask(session: Session, rows: _Rows, row: Row) -> None:
     """Ask whether the codes are equal, as long as the question stands."""
+    termios.tcflush(sys.stdin, termios.TCIFLUSH)  # an answer to an earlier question is none to this
     click.echo(f"Does {row['name']} show the same code? [y/N]: ", nl=False)
     while not rows.is_news:
         if not select.select([sys.stdin], [], [], LOOK_S)[0]:

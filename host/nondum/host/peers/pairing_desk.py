@@ -60,10 +60,13 @@ class PairingDesk:
         *,
         announce: Callable[[int | None], None],
         candidates: Callable[[], Iterable[Hint]],
+        address: str = "tcp://*:*",
         is_development: bool = False,
     ) -> None:
         """`announce` tells the network at which port this host can be asked, and when it cannot
-        any more (None); `candidates` gives what is known of others now."""
+        any more (None); `candidates` gives what is known of others now. `address` is where to be
+        asked, as ZeroMQ binds it."""
+        self._address = address
         self._keeper, self._announce, self._candidates = keeper, announce, candidates
         self._is_development = is_development
         self._window: _Window | None = None
@@ -81,7 +84,7 @@ class PairingDesk:
             raise PeerRefused(Problem("PAIRING_OPEN", told, fix=fix))
         window = self._window = _Window(self._keeper, wanted, is_development=self._is_development)
         try:
-            self._announce(window.host.open())
+            self._announce(window.host.open(self._address))
             last: Row = {}
             while True:
                 window.look(self._candidates())

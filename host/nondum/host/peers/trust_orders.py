@@ -7,7 +7,7 @@ verbs |= trust_orders.following(orders)      # in `verbs.following`
 from __future__ import annotations
 
 from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any
 
@@ -16,6 +16,7 @@ from nondum.host.peers.pairing_desk import PairingDesk
 from nondum.host.peers.trust_keeper import TrustKeeper
 from nondum.host.rows import Row
 from nondum.sdk.errors import NondumError, Problem
+from nondum.transport.peers.certificate import check_name
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import PeerKey, fingerprint, parse_key
 from nondum.transport.peers.public_file import parse_fleet
@@ -95,7 +96,7 @@ class TrustOrders:
             "fleet": trust.fleets,
             "revocation": trust.revoked,
         }
-        (kind,) = (kind for kind, part in kinds.items() if key in part)
+        kind = next(kind for kind, part in kinds.items() if key in part)
         await self.keeper.forget(key)
         return _row(key, name=names[key], kind=kind)
 
@@ -112,11 +113,9 @@ class TrustOrders:
         Raises `PeerRefused` (FILE_MALFORMED, KEY_MALFORMED, HOST_NAME, PEERS_FOLDER).
         """
         fleet = parse_fleet(arguments.text("fleet"))
-        name = arguments.optional_text("name")
-        if name is not None:
-            fleet = parse_fleet(type(fleet)(fleet.key, name).to_text())
-        await self.keeper.trust_fleet(fleet)
-        return _row(fleet.key, name=fleet.name)
+        name = check_name(arguments.optional_text("name") or fleet.name)
+        await self.keeper.trust_fleet(replace(fleet, name=name))
+        return _row(fleet.key, name=name)
 
     def _certificate_row(self) -> Row | None:
         found = self.keeper.certificate

@@ -147,6 +147,14 @@ def verify(found: Certificate, fleets: Container[FleetKey], now: datetime) -> No
     _check_time(found, now)
 
 
+def check_name(name: str, where: str = "") -> str:
+    """The name, if hosts and fleets may have it. Raises `PeerRefused` (HOST_NAME)."""
+    if not HOST_NAME.fullmatch(name):
+        told = "a name has up to 63 of a-z, 0-9 and -, with no - at the ends"
+        raise PeerRefused(Problem("HOST_NAME", told, where=where, have=repr(name)))
+    return name
+
+
 def _check_time(found: Certificate, now: datetime) -> None:
     early = (found.not_before - now).total_seconds() > SKEW_S
     late = (now - found.not_after).total_seconds() > SKEW_S
@@ -164,14 +172,7 @@ def _check_time(found: Certificate, now: datetime) -> None:
 
 
 def _check(found: Certificate) -> None:
-    if not HOST_NAME.fullmatch(found.host):
-        raise PeerRefused(
-            Problem(
-                "HOST_NAME",
-                "a host's name has up to 63 of a-z, 0-9 and -, with no - at the ends",
-                have=repr(found.host),
-            )
-        )
+    check_name(found.host)
     if found.not_after <= found.not_before:
         raise PeerRefused(
             Problem("CERTIFICATE_VALIDITY", "it ends before it begins", where=found.host)

@@ -17,7 +17,7 @@ from nondum.transport.peers import certificate as certificates
 from nondum.transport.peers import private_file
 from nondum.transport.peers.certificate import SKEW_S, Certificate
 from nondum.transport.peers.failures import PeerRefused
-from nondum.transport.peers.public_file import FleetPublic, HostPublic, parse_fleet
+from nondum.transport.peers.public_file import FleetPublic, HostPublic
 
 SECRET_NAME = "fleet.key"
 PUBLIC_NAME = "fleet.pub"
@@ -27,7 +27,7 @@ _HEADER = "nondum-fleet-key@1"
 def create(folder: Path, name: str) -> FleetPublic:
     """Make a fleet. Raises `PeerRefused` (FLEET_EXISTS, HOST_NAME), `OSError`."""
     key, secret = certificates.new_fleet()
-    public = parse_fleet(FleetPublic(key, name).to_text(), str(folder / PUBLIC_NAME))
+    public = FleetPublic(key, certificates.check_name(name, str(folder)))
     try:
         private_file.create(
             folder / SECRET_NAME, f"{_HEADER} {base64.b64encode(secret).decode('ascii')}\n"

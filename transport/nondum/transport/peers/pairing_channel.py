@@ -165,7 +165,8 @@ class PairingHost:
         """Close the window, if it is open still, and let go of everything."""
         if not self._is_over:
             self._end(Failed(_CLOSED), Ending.OVER)
-        await asyncio.to_thread(self._context.term)
+        # Shielded: whoever waits for this may be cancelled, the context must still go.
+        await asyncio.shield(asyncio.to_thread(self._context.term))
 
     @property
     def _is_over(self) -> bool:

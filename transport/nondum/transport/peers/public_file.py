@@ -13,7 +13,7 @@ import binascii
 from dataclasses import dataclass
 
 from nondum.sdk.errors import Problem
-from nondum.transport.peers.certificate import HOST_NAME, FleetKey
+from nondum.transport.peers.certificate import FleetKey, check_name
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import PeerKey, parse_key
 
@@ -88,7 +88,4 @@ def _fields(text: str, kind: str, where: str) -> tuple[str, str]:
                 fix="see `nondum peers key --help` and `nondum keys fleet new --help`",
             )
         )
-    if not HOST_NAME.fullmatch(parts[2]):
-        told = "a name has up to 63 of a-z, 0-9 and -, with no - at the ends"
-        raise PeerRefused(Problem("HOST_NAME", told, where=where, have=repr(parts[2])))
-    return parts[1], parts[2]
+    return parts[1], check_name(parts[2], where)
