@@ -15,7 +15,14 @@ from nondum.sdk.errors import Problem
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import PeerKey, fingerprint
 from nondum.transport.peers.pairing_channel import PairingHost
-from nondum.transport.peers.pairing_state import Agreed, Comparing, Failed, PairingState, Waiting
+from nondum.transport.peers.pairing_state import (
+    Agreed,
+    Comparing,
+    Failed,
+    Idle,
+    PairingState,
+    Waiting,
+)
 from nondum.transport.peers.refusals import Refusal
 
 LOOK_S = 0.25
@@ -145,7 +152,8 @@ class _Window:
         self._asked: Candidate | None = None
         self._news = asyncio.Event()
         self._keeping: asyncio.Task[None] | None = None
-        self._unkept: Problem | None = None
+        self._shown: PairingState = Idle()
+        """As the host has it, but that whom it agreed with is first kept."""
         identity = keeper.identity(development=is_development)
         self.host = PairingHost(
             identity, self._on_change, is_wanted=self._is_wanted, on_refusal=_log_refusal
@@ -154,9 +162,8 @@ class _Window:
     @property
     def is_over(self) -> bool:
         """Whether all is done, also to the trust."""
-        if isinstance(self.host.state, Agreed):
-            return self._keeping is not None and self._keeping.done()
-        return isinstance(self.host.state, Failed)
+        is_kept = self._keeping is not None and self._keeping.done()
+        return is_kept or isinstance(self._shown, Failed)
 
     async def changed(self) -> None:
         """Wait until there may be something to tell, or to look at."""
@@ -189,8 +196,7 @@ class _Window:
             ],
             "problem": None,
         }
-        state = Failed(self._unkept) if self._unkept else self.host.state
-        return found | self._state_row(state)
+        return found | self._state_row(self._shown)
 
     def _state_row(self, state: PairingState) -> Row:
         match state:
@@ -216,19 +222,22 @@ class _Window:
         """Let go of it; who was agreed with is kept first."""
         await self.host.close()
         if self._keeping is not None:
-            await asyncio.wait({self._keeping})
+            await self._keeping
 
     def _on_change(self, state: PairingState) -> None:
         if isinstance(state, Agreed):
             self._keeping = asyncio.ensure_future(self._keep(state))
             self._keeping.add_done_callback(lambda _: self._tell())
-        self._tell()
+        else:
+            self._shown = state
+            self._tell()
 
     async def _keep(self, agreed: Agreed) -> None:
         try:
             await self._keeper.pair(agreed.key, agreed.name)
+            self._shown = agreed
         except PeerRefused as refused:
-            self._unkept = refused.problems[0]
+            self._shown = Failed(refused.problems[0])
 
     def _tell(self) -> None:
         self._news.set()

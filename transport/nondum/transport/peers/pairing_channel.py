@@ -165,8 +165,11 @@ class PairingHost:
         """Close the window, if it is open still, and let go of everything."""
         if not self._is_over:
             self._end(Failed(_CLOSED), Ending.OVER)
-        # Shielded: whoever waits for this may be cancelled, the context must still go.
-        await asyncio.shield(asyncio.to_thread(self._context.term))
+        ending = asyncio.ensure_future(asyncio.to_thread(self._context.term))
+        try:
+            await asyncio.shield(ending)
+        finally:  # the context must go, also where whoever waits for it is cancelled
+            await asyncio.wait({ending})
 
     @property
     def _is_over(self) -> bool:
