@@ -79,6 +79,9 @@ class Remote(Protocol):
         to be opened anew.
         """
 
+    async def tap(self, stream: str, name: str, connection: Connection) -> None:
+        """Give an open stream one more consumer, as long as it is open. Raises `NondumError`."""
+
     def disconnect(self, stream: str, reader: str) -> None:
         """Feed a reader no more; unknown ones are ignored."""
 
@@ -176,8 +179,12 @@ class Streams:
         `connection` stays the caller's to close. Raises `WorkerFailed` (STREAM_UNKNOWN, or why the
         producer refused), `LinkClosed`.
         """
+        name = f"tap-{next(self._taps)}"
+        if self._remote is not None and self._remote.is_open(stream):
+            await self._remote.tap(stream, name, connection)
+            return
         source = self._source(stream)
-        body = {"stream": stream, "type": source.type, "consumer": f"tap-{next(self._taps)}"}
+        body = {"stream": stream, "type": source.type, "consumer": name}
         await self._members[source.component].link.request("produce", body, (connection.fileno(),))
 
     async def close(self) -> None:

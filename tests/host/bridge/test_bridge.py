@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.slow_link import slow_link
 from tests.host.bridge.hosts import HERE, Over, Pair, Reader, pair, sending
-from tests.host.bridge.slow_link import slow_link
 from tests.host.workers.house import until_gone
 
 from nondum.host.bridge.bridge import Bridge

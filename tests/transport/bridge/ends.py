@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import secrets
 from collections.abc import AsyncIterator, Callable
 from typing import TypeVar
 
@@ -32,7 +33,7 @@ class Granted:
         self.claimed: asyncio.Future[None] = loop.create_future()
         self.over: asyncio.Future[Problem] = loop.create_future()
         self.outgoing: Outgoing = exporter.grant(
-            reader.public, kind, self._on_room, self.over.set_result
+            secrets.token_hex(16), reader.public, kind, self._on_room, self.over.set_result
         )
 
     def _on_room(self) -> None:

@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import itertools
 import os
+import secrets
 import signal
 import socket
 import subprocess
@@ -43,6 +44,12 @@ class Grant:
 
 
 @dataclass(frozen=True, slots=True)
+class _Export:
+    reader: PeerKey
+    on_over: OnOver
+
+
+@dataclass(frozen=True, slots=True)
 class _Running:
     process: WorkerProcess
     link: WorkerLink
@@ -59,7 +66,7 @@ class Bridge:
         self._idle_s = idle_s
         self._running: _Running | None = None
         self._lock = asyncio.Lock()
-        self._exports: dict[str, OnOver] = {}
+        self._exports: dict[str, _Export] = {}
         self._imports: dict[int, OnOver] = {}
         self._numbers = itertools.count(1)
         self._users = 0
@@ -87,23 +94,26 @@ class Bridge:
         is called once when the stream or the reader is gone, not after `unexport` or `withdraw`.
         Raises `WorkerFailed`, `LinkClosed`.
         """
+        token = secrets.token_hex(16)
+        body = {"token": token, "type": kind, "reader": reader}
         async with self._use() as running:
-            body = {"type": kind, "reader": reader}
-            answer = await running.link.request("export", body, (connection.fileno(),))
-            grant = Grant(running.port, running.key, answer["token"])
-            self._exports[grant.token] = on_over
-            return grant
+            self._exports[token] = _Export(reader, on_over)
+            try:
+                await running.link.request("export", body, (connection.fileno(),))
+            except BaseException:
+                self._exports.pop(token, None)
+                raise
+            return Grant(running.port, running.key, token)
 
     async def unexport(self, token: str) -> None:
         """End one export; unknown ones are ignored."""
         if self._exports.pop(token, None) is not None:
             await self._ask("unexport", {"token": token})
 
-    async def withdraw(self, reader: PeerKey, tokens: Sequence[str] = ()) -> None:
+    async def withdraw(self, reader: PeerKey) -> None:
         """End all that a bridge reads, and let it in no more."""
-        for token in tokens:
-            self._exports.pop(token, None)
-        await self._ask("withdraw", {"reader": reader})
+        for token in [token for token, one in self._exports.items() if one.reader == reader]:
+            await self.unexport(token)
 
     async def import_(
         self, kind: str, addresses: Sequence[str], grant: Grant, on_over: OnOver
@@ -241,7 +251,8 @@ class Bridge:
     def _on_event(self, name: str, body: dict[str, Any], _call_id: int | None) -> None:
         match name, body:
             case "export_over", {"token": str(token), "problem": problem}:
-                self._over(self._exports.pop(token, None), read_problem(problem))
+                export = self._exports.pop(token, None)
+                self._over(export.on_over if export else None, read_problem(problem))
             case "import_over", {"import": int(number), "problem": problem}:
                 self._over(self._imports.pop(number, None), read_problem(problem))
             case _:
@@ -259,7 +270,7 @@ class Bridge:
             return
         self._running = None
         running.process.signal(signal.SIGKILL)
-        ended = [*self._exports.values(), *self._imports.values()]
+        ended = [*(one.on_over for one in self._exports.values()), *self._imports.values()]
         self._exports.clear()
         self._imports.clear()
         for on_over in ended:

@@ -25,13 +25,14 @@ class Outbound:
     def __init__(
         self,
         exporter: Exporter,
+        token: str,
         reader: PeerKey,
         kind: str,
         packets: Packets,
         on_over: Callable[[Problem], None],
     ) -> None:
         """Own `packets`. `on_over` is called once when either end is gone; not after `end`."""
-        self.reader = reader
+        self.token, self.reader = token, reader
         self._on_over = on_over
         self._loop = asyncio.get_running_loop()
         self._fidelity = Fidelity(self._loop.time())
@@ -40,13 +41,8 @@ class Outbound:
         """A message has arrived that was not taken yet."""
         self._is_claimed = False
         self._is_warned = False
-        self._outgoing = exporter.grant(reader, kind, self._on_room, self._on_reader_gone)
+        self._outgoing = exporter.grant(token, reader, kind, self._on_room, self._on_reader_gone)
         self._consumer = Consumer(kind, packets, self._on_message, self._on_producer_gone)
-
-    @property
-    def token(self) -> str:
-        """Of the grant."""
-        return self._outgoing.token
 
     def figures(self) -> dict[str, Any]:
         """What was sent so far, and how images travel now."""

@@ -91,6 +91,8 @@ class RemoteStreams:
         wanted = self._imports.get(stream)
         if wanted is None:
             wanted = self._imports[stream] = _Import(kind)
+        elif wanted.kind != kind:
+            raise WorkerFailed(_other_type(stream, wanted.kind, kind))
         added = _Reader(consume, asyncio.get_running_loop().create_future())
         wanted.readers[reader] = added
         if wanted.task is None:
@@ -103,6 +105,15 @@ class RemoteStreams:
             if wanted.readers.get(reader) is added:
                 self.disconnect(stream, reader)
             raise
+
+    async def tap(self, stream: str, name: str, connection: Connection) -> None:
+        """Give a stream that is read here one more consumer; `connection` stays the caller's.
+
+        It ends with the stream: nothing is opened for it, or again. Raises `WorkerFailed`
+        (STREAM_UNKNOWN), `LinkClosed`.
+        """
+        number = self._imports[stream].number if stream in self._imports else 0
+        await self._bridge.feed(number, name, connection)
 
     def disconnect(self, stream: str, reader: str) -> None:
         """Feed a reader no more; with the last one, the stream is closed. Unknown ones are ignored.
@@ -121,6 +132,8 @@ class RemoteStreams:
         del self._imports[stream]
         if wanted.task is not None:
             wanted.task.cancel()
+            self._closing.add(wanted.task)
+            wanted.task.add_done_callback(self._closing.discard)
 
     async def close(self) -> None:
         """Let go of everything."""
@@ -156,8 +169,7 @@ class RemoteStreams:
         number = 0
         try:
             if opened.get("type") != wanted.kind:
-                told = f"{stream} is of type {opened.get('type')}, not {wanted.kind}"
-                raise WorkerFailed(Problem("STREAM_TYPE", told))
+                raise WorkerFailed(_other_type(stream, opened.get("type"), wanted.kind))
             number = wanted.number = await self._bridge.import_(
                 wanted.kind, self._addresses(host), grant, _settling(over)
             )
@@ -173,23 +185,22 @@ class RemoteStreams:
             await self._call(host, "stream.close", {"token": token})
 
     async def _feed(self, wanted: _Import, name: str) -> None:
-        """Wire one reader; its failure is its own."""
+        """Wire one reader; its failure is its own. A bridge that failed will feed it again."""
         reader = wanted.readers.get(name)
         if reader is None:
             return
         ours, theirs = link_sockets()
         with ours, theirs:
-            answers = await asyncio.gather(
+            consumed, fed = await asyncio.gather(
                 reader.consume(theirs),
                 self._bridge.feed(wanted.number, name, ours),
                 return_exceptions=True,
             )
-        errors = [answer for answer in answers if isinstance(answer, BaseException)]
         if reader.fed.done():
             return
-        if errors:
-            reader.fed.set_exception(errors[0])
-        else:
+        if isinstance(consumed, BaseException):
+            reader.fed.set_exception(consumed)
+        elif fed is None:
             reader.fed.set_result(None)
 
     def _refuse(self, wanted: _Import, error: NondumError) -> None:
@@ -206,6 +217,10 @@ class RemoteStreams:
 async def _quietly(work: Awaitable[Any]) -> None:
     with contextlib.suppress(WorkerFailed, LinkClosed):
         await work
+
+
+def _other_type(stream: str, found: object, expected: str) -> Problem:
+    return Problem("STREAM_TYPE", f"{stream} is of type {found}, not {expected}")
 
 
 def _settling(over: asyncio.Future[Problem]) -> Callable[[Problem], None]:

@@ -39,7 +39,6 @@ class Service:
         self._imports: dict[int, Inbound] = {}
         self._verbs: Mapping[str, Callable[[Answer], Answer]] = {
             "unexport": self._unexport,
-            "withdraw": self._withdraw,
             "unfeed": self._unfeed,
             "unimport": self._unimport,
             "figures": self._figures,
@@ -82,27 +81,22 @@ class Service:
         raise WorkerFailed(Problem("VERB_UNKNOWN", f"a bridge has no verb {verb!r}"))
 
     def _export(self, body: Answer, handle: Handle) -> Answer:
+        token = body["token"]
+
         def on_over(problem: Problem) -> None:
-            if self._exports.pop(outbound.token, None) is not None:
-                fields = {"token": outbound.token, "problem": problem.to_dict()}
+            if self._exports.pop(token, None) is not None:
+                fields = {"token": token, "problem": problem.to_dict()}
                 self._link.send_event("export_over", fields)
 
-        packets = adopt(handle, MAX_PACKET)
-        reader = PeerKey(body["reader"])
-        outbound = Outbound(self._exporter, reader, body["type"], packets, on_over)
-        self._exports[outbound.token] = outbound
-        return {"token": outbound.token}
+        packets, reader = adopt(handle, MAX_PACKET), PeerKey(body["reader"])
+        self._exports[token] = Outbound(
+            self._exporter, token, reader, body["type"], packets, on_over
+        )
+        return {}
 
     def _unexport(self, body: Answer) -> Answer:
         if outbound := self._exports.pop(body["token"], None):
             outbound.end(_CLOSED)
-        return {}
-
-    def _withdraw(self, body: Answer) -> Answer:
-        for token, outbound in list(self._exports.items()):
-            if outbound.reader == body["reader"]:
-                del self._exports[token]
-                outbound.end(_CLOSED)
         return {}
 
     async def _import(self, body: Answer) -> Answer:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import defaultdict
+from dataclasses import dataclass
 
 from nondum.host.bridge.bridge import Bridge
 from nondum.host.streams import Streams
@@ -18,21 +19,27 @@ MOST = 64
 log = logging.getLogger(__name__)
 
 
+@dataclass(eq=False, slots=True)
+class _Opened:
+    stream: str
+    token: str = ""
+    """Of the grant, once there is one."""
+
+
 class SharedStreams:
     """Answers peers that want to read, or want to no more."""
 
     def __init__(self, bridge: Bridge, streams: Streams) -> None:
         self._bridge, self._streams = bridge, streams
-        self._open: dict[PeerKey, dict[str, str]] = defaultdict(dict)
-        """By peer and token: the stream."""
+        self._opened: dict[PeerKey, set[_Opened]] = defaultdict(set)
 
     @property
     def readers(self) -> dict[str, list[PeerKey]]:
         """Peers that read, by stream."""
         found: dict[str, list[PeerKey]] = defaultdict(list)
-        for peer, opened in self._open.items():
-            for stream in opened.values():
-                found[stream].append(peer)
+        for peer, all_opened in self._opened.items():
+            for opened in all_opened:
+                found[opened.stream].append(peer)
         return dict(found)
 
     async def serve_open(self, caller: PeerKey, args: Body) -> Body:
@@ -43,43 +50,44 @@ class SharedStreams:
         """
         match args:
             case {"stream": str(stream), "bridge": str(key)}:
-                reader = parse_key(key)
+                reader, kind = parse_key(key), self._streams.kind(stream)
             case _:
                 told = "stream.open names a stream and a bridge"
                 raise WorkerFailed(Problem("STREAM_ARGUMENTS", told))
-        kind = self._streams.kind(stream)
-        if len(self._open[caller]) >= MOST:
+        if len(self._opened[caller]) >= MOST:
             raise WorkerFailed(Problem("STREAM_TOO_MANY", f"it reads {MOST} streams already"))
-        token = ""
+        opened = _Opened(stream)
+        self._opened[caller].add(opened)
 
         def on_over(problem: Problem) -> None:
             log.info("%s is not read by a peer any more: %s", stream, problem)
-            self._open[caller].pop(token, None)
+            self._opened[caller].discard(opened)
 
         ours, theirs = link_sockets()
         with ours, theirs:
-            grant = await self._bridge.export(kind, theirs, reader, on_over)
-            token = grant.token
-            self._open[caller][token] = stream
             try:
+                grant = await self._bridge.export(kind, theirs, reader, on_over)
+                opened.token = grant.token
                 await self._streams.tap(stream, ours)
             except BaseException:
-                await self._end(caller, token)
+                await self._end(caller, opened)
                 raise
-        return {"type": kind, "port": grant.port, "key": grant.key, "token": token}
+        if opened not in self._opened[caller]:  # the caller was lost meanwhile
+            await self._bridge.unexport(opened.token)
+        return {"type": kind, "port": grant.port, "key": grant.key, "token": grant.token}
 
     async def serve_close(self, caller: PeerKey, args: Body) -> Body:
         """`stream.close`: the caller reads a stream no more; unknown ones are ignored."""
-        match args:
-            case {"token": str(token)} if token in self._open.get(caller, {}):
-                await self._end(caller, token)
+        for opened in list(self._opened.get(caller, ())):
+            if opened.token and opened.token == args.get("token"):
+                await self._end(caller, opened)
         return {}
 
     async def caller_lost(self, caller: PeerKey) -> None:
         """A peer is gone, or is trusted no more: it reads nothing from now on."""
-        for token in list(self._open.pop(caller, {})):
-            await self._bridge.unexport(token)
+        for opened in self._opened.pop(caller, set()):
+            await self._bridge.unexport(opened.token)
 
-    async def _end(self, caller: PeerKey, token: str) -> None:
-        self._open[caller].pop(token, None)
-        await self._bridge.unexport(token)
+    async def _end(self, caller: PeerKey, opened: _Opened) -> None:
+        self._opened[caller].discard(opened)
+        await self._bridge.unexport(opened.token)

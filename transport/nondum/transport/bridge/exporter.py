@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import secrets
 from collections.abc import Callable
 
 import zmq
@@ -71,13 +70,16 @@ class Exporter:
 
     def grant(
         self,
+        token: str,
         reader: PeerKey,
         kind: str,
         on_room: Callable[[], None],
         on_over: Callable[[Problem], None],
     ) -> Outgoing:
-        """Let a reader have one stream of type `kind`, once (see `Outgoing`)."""
-        token = secrets.token_hex(16)
+        """Let a reader have one stream of type `kind`, once (see `Outgoing`).
+
+        The token must be new; it names the grant, and is no secret: the reader's key is proved.
+        """
         made = Outgoing(token, reader, kind, on_room, on_over)
         self._grants[token] = made
         return made

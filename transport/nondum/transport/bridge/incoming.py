@@ -53,7 +53,7 @@ class Incoming:
         on_frame: Callable[[Frame], None],
         on_over: Callable[[Problem], None],
     ) -> None:
-        """`on_opened` is told the stream's type. Each `on_frame` is answered by `handled`, in order.
+        """`on_opened` is told the stream's type. Answer each `on_frame` by `handled`, in order.
 
         `on_over` is called once, at the end or instead of the beginning; not after `close`.
         """

@@ -1,10 +1,15 @@
-"""A link between two bridges that carries only so much, or nothing for a while."""
+"""A link between two hosts that carries only so much, or nothing for a while.
+
+`python benchmarks/slow_link.py PORT BYTES_S` is one in a process of its own: it prints the port at
+which it takes connections to `PORT`, and lasts until it is killed.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 import socket
+import sys
 from collections.abc import AsyncIterator
 
 CHUNK = 16 * 1024
@@ -35,7 +40,7 @@ class SlowLink:
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with socket.socket() as sock:  # small buffers: what waits must wait at the owner's
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
-            sock.setblocking(False)
+            sock.settimeout(0)
             await asyncio.get_running_loop().sock_connect(sock, ("127.0.0.1", self._target))
             there, to_owner = await asyncio.open_connection(sock=sock.dup(), limit=BUFFER)
         self._writers += [writer, to_owner]
@@ -81,3 +86,13 @@ async def slow_link(port: int, bytes_s: float = float("inf")) -> AsyncIterator[S
     finally:
         server.close()
         link.close()
+
+
+async def _forever(port: int, bytes_s: float) -> None:
+    async with slow_link(port, bytes_s) as link:
+        print(link.port, flush=True)
+        await asyncio.Event().wait()
+
+
+if __name__ == "__main__":
+    asyncio.run(_forever(int(sys.argv[1]), float(sys.argv[2])))
