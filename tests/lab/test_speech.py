@@ -25,13 +25,14 @@ def drive(tmp_path: Path) -> Path:
     with (plugin / "payload.toml").open("a", encoding="utf-8") as manifest:
         folders = f'inbox = "{tmp_path / "in"}"\nsaid = "{tmp_path / "out"}"\n'
         manifest.write(f'\n[component.settings]\nmicrophone = ""\n{folders}')
-    return build([plugin], libraries=[PLUGINS / "sdk"], cache=tmp_path / "cache")["speech"]
+    return build([plugin], libraries=[PLUGINS / "sdk", PLUGINS / "espeak"], cache=tmp_path / "cache")["speech"]
 
 
 def test_spoken_goal_is_reached_and_told_aloud(
     host: RunningHost, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.syspath_prepend(PLUGINS / "speech")
+    for folder in ("espeak", "speech"):
+        monkeypatch.syspath_prepend(PLUGINS / folder)
     from nondum_speech.espeak import Espeak
     from nondum_speech.grammar import Vocabulary
     from nondum_speech.lexicon import lexicon

@@ -30,7 +30,7 @@ def entry_point(folder: Path) -> str:
 
 @pytest.fixture(scope="module")
 def shipped() -> dict[str, PluginDescription]:
-    sys.path += [str(folder) for folder in (*FOLDERS, PLUGINS / "panorama")]
+    sys.path += [str(folder) for folder in (*FOLDERS, PLUGINS / "espeak", PLUGINS / "panorama")]
     return {folder.name: describe(load(entry_point(folder), folder.name)) for folder in FOLDERS}
 
 
@@ -74,8 +74,13 @@ def test_manifest_says_what_the_plugin_says(
             "report people",
             ["stream", "detect", "watch", "report"],
         ),
+        (
+            ("thermal-camera", "people-detector", "visual-tracker", "speaker"),
+            "search for people and tell me",
+            ["stream", "detect", "watch", "report"],
+        ),
     ],
-    ids=["follow", "follow by warmth", "report"],
+    ids=["follow", "follow by warmth", "report", "search"],
 )
 def test_words_become_the_plan_that_is_meant(
     names: tuple[str, ...], words: str, schemas: list[str], shipped: dict[str, PluginDescription]

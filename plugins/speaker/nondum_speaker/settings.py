@@ -12,8 +12,10 @@ class Settings:
 
     report: str = "I have found: {thing}."
     """What `report` says; `{thing}` is the class, with blanks for hyphens."""
-    language: str = "en"
-    """A voice of espeak-ng."""
+    said: str = ""
+    """Folder for a WAV file of each sentence said; empty: the default sound device."""
+    voice: str = "en-us"
+    """A voice of eSpeak NG; `en-us+f2` is a variant of one."""
     words_per_minute: int = 160
 
     def __post_init__(self) -> None:

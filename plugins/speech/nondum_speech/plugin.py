@@ -10,14 +10,14 @@ from typing import Any
 
 from nondum.sdk import ConfigRefused, Context, Problem, hookimpl
 from nondum.sdk.settings import parse_settings
+from nondum_espeak import Outlet, VoiceUnknown, find_outlet
 from nondum_speech.ears import Ears
-from nondum_speech.espeak import Espeak, VoiceUnknown
+from nondum_speech.espeak import Espeak
 from nondum_speech.grammar import Vocabulary
 from nondum_speech.inbox import Inbox
 from nondum_speech.microphone import MicrophoneSilent, find_recorder, recorded
 from nondum_speech.settings import Settings
 from nondum_speech.sound import Sound
-from nondum_speech.voice import Folder, Outlet, find_player
 
 AGAIN_S = 5.0
 """A microphone that was pulled is looked for so often."""
@@ -45,7 +45,7 @@ class Speech:
         self._settings = settings
         self._espeak = Espeak(ctx.scratch)
         await self._try_voice(ctx.component)
-        self._outlet = Folder(Path(settings.said)) if settings.said else find_player(os.environ)
+        self._outlet = find_outlet(settings.said, os.environ)
         if self._outlet is None:
             ctx.log.info("no sound player is here: what is said will be printed only")
         self._ears = Ears(self._espeak, ctx.log, confidence=settings.confidence)
@@ -79,7 +79,7 @@ class Speech:
             sound = await self._sound(text)
             with self._ears.deafened():
                 try:
-                    await self._outlet.play(sound)
+                    await self._outlet.play(sound.to_wav())
                 except (OSError, TimeoutError) as error:
                     ctx.log.warning("that was not heard: %s", error)
 

@@ -21,7 +21,7 @@ from nondum.sdk.description import PluginDescription
 from nondum.sdk.planner import GroundTask, Plan
 
 PLUGINS = Path(__file__).parents[3] / "plugins"
-LIBRARIES = ("panorama",)
+LIBRARIES = ("espeak", "panorama")
 PAYLOADS = (
     "recorded-camera",
     "thermal-camera",

@@ -10,16 +10,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Protocol
 
-from nondum_speech.sound import Sound
-
 TIMEOUT_S = 30.0
 
 
 class Outlet(Protocol):
-    """Takes what is said."""
+    """Takes what is said, as WAV files."""
 
-    async def play(self, sound: Sound) -> None:
-        """Let it be heard; return when it has been. Raises `OSError`."""
+    async def play(self, wav: bytes) -> None:
+        """Let it be heard; return when it has been. Raises `OSError`, `TimeoutError`."""
         ...
 
 
@@ -30,7 +28,7 @@ class Player:
         """`command` plays a WAV file from its standard input."""
         self._command = command
 
-    async def play(self, sound: Sound) -> None:
+    async def play(self, wav: bytes) -> None:
         """Play, and leave nothing running when cancelled."""
         pipe, null = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
         process = await asyncio.create_subprocess_exec(
@@ -38,7 +36,7 @@ class Player:
         )
         try:
             async with asyncio.timeout(TIMEOUT_S):
-                await process.communicate(sound.to_wav())
+                await process.communicate(wav)
         finally:
             if process.returncode is None:
                 with contextlib.suppress(ProcessLookupError):
@@ -57,12 +55,17 @@ class Folder:
         numbers = (path.stem.removeprefix("said-") for path in folder.glob("said-*.wav"))
         self._number = max((int(n) for n in numbers if n.isdigit()), default=0)
 
-    async def play(self, sound: Sound) -> None:
+    async def play(self, wav: bytes) -> None:
         """Write a file, whole or not at all."""
         self._number += 1
         unfinished = self._folder / f"said-{self._number:06}.part"
-        unfinished.write_bytes(sound.to_wav())
+        unfinished.write_bytes(wav)
         unfinished.rename(unfinished.with_suffix(".wav"))
+
+
+def find_outlet(said: str, environment: Mapping[str, str]) -> Outlet | None:
+    """The folder `said`, if it is named; else a player; None where nothing can be heard."""
+    return Folder(Path(said)) if said else find_player(environment)
 
 
 def find_player(

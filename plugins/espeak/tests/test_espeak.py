@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import subprocess
 import sys
+import wave
 from pathlib import Path
 
 import espeakng_loader
 import pytest
 
-from nondum_speech.espeak import Espeak, VoiceUnknown
+from nondum_espeak import Espeak, VoiceUnknown
 
 SPEAK = """
 import sys
 from pathlib import Path
 import espeakng_loader
 espeakng_loader.get_data_path = lambda: sys.argv[1]
-from nondum_speech.espeak import Espeak
+from nondum_espeak import Espeak
 print(Espeak(Path(sys.argv[2])).phonemes("hello", voice="en-us"))
 """
+
+
+@pytest.fixture(scope="module")
+def espeak(tmp_path_factory: pytest.TempPathFactory) -> Espeak:
+    """The one library of this process."""
+    return Espeak(tmp_path_factory.mktemp("espeak"))
 
 
 def test_speed_is_kept(espeak: Espeak) -> None:
@@ -33,6 +41,14 @@ def test_speed_is_kept(espeak: Espeak) -> None:
 def test_unknown_voice_is_refused(espeak: Espeak) -> None:
     with pytest.raises(VoiceUnknown, match="'klingonese'"):
         espeak.say("hello", voice="klingonese", words_per_minute=160)
+
+
+def test_sentence_is_a_wav_file(espeak: Espeak) -> None:
+    said = espeak.say("search for people", voice="en-us", words_per_minute=160)
+    with wave.open(io.BytesIO(said.to_wav())) as wav:
+        assert (wav.getnchannels(), wav.getsampwidth()) == (1, 2)
+        assert wav.getnframes() / wav.getframerate() == pytest.approx(said.seconds)
+        assert wav.readframes(wav.getnframes()) == said.samples  # x86 and ARM are little-endian
 
 
 @pytest.mark.parametrize("length", [100, 150, 160, 170, 250])
