@@ -79,18 +79,18 @@ async def track(ctx: Context, u: str, d: str, o: str, h: str, c: str) -> None:
     `give_up_s`, and with FRAME_UNKNOWN when the camera's mount is not known.
     """
     settings = parse_settings(Settings, ctx.settings, where=ctx.component)
-    eye, follower = _Eye(ctx, d, c, settings), Follower(settings.gains)
+    eye, follower = _Eye(ctx, d, c, settings, body=h), Follower(settings.gains)
     odometry, output = ctx.optional_input("odometry"), ctx.output(o)
     began_s, mode = time.monotonic(), Mode.ACQUIRING
     while True:
         now_s = time.monotonic()
         pose = odometry.latest
-        if pose is not None and pose.child_frame_id in ("", ctx.host):
+        if pose is not None and pose.child_frame_id in ("", h):
             follower.heading.measured(pose.header.stamp_s, pose.yaw_rad)
         if (news := eye.look()) is not None:
             follower.saw(*news)
         command = follower.command(now_s)
-        output.send(_twist(ctx, command))
+        output.send(_twist(h, command))
         if command.mode is not mode:
             if mode is Mode.ACQUIRING:
                 await ctx.established()
@@ -108,7 +108,7 @@ async def watch(ctx: Context, u: str, d: str, h: str, c: str) -> None:
     Fails with TARGET_LOST when nobody was within `give_up_s`, and with FRAME_UNKNOWN.
     """
     settings = parse_settings(Settings, ctx.settings, where=ctx.component)
-    eye, crowd = _Eye(ctx, d, c, settings), Crowd(memory_s=settings.coast_s)
+    eye, crowd = _Eye(ctx, d, c, settings, body=h), Crowd(memory_s=settings.coast_s)
     began_s = time.monotonic()
     while not any(person.hits >= WATCH_HITS for person in crowd.tracks):
         if (news := eye.look()) is not None:
@@ -118,10 +118,14 @@ async def watch(ctx: Context, u: str, d: str, h: str, c: str) -> None:
 
 
 class _Eye:
-    """Reads detections as sightings, each message once."""
+    """Reads detections as sightings, each message once. The body may be another host's than the
+    one that this runs on."""
 
-    def __init__(self, ctx: Context, stream: str, class_id: str, settings: Settings) -> None:
+    def __init__(
+        self, ctx: Context, stream: str, class_id: str, settings: Settings, *, body: str
+    ) -> None:
         self._ctx = ctx
+        self._body = body
         self._input: InputStream[Detections] = ctx.input(stream)
         self._depth = ctx.optional_input("depth")
         self._class_id = class_id
@@ -137,16 +141,16 @@ class _Eye:
         seen = sightings(
             newest,
             self._class_id,
-            to_body=lambda bearing: self._ctx.transform(bearing, to=self._ctx.host),
+            to_body=lambda bearing: self._ctx.transform(bearing, to=self._body),
             field_of_view_deg=self._settings.field_of_view_deg,
             depth=self._depth.latest,
         )
         return seen, self._seen_s
 
 
-def _twist(ctx: Context, command: Command) -> Twist:
+def _twist(body: str, command: Command) -> Twist:
     return Twist(
-        Header(frame_id=ctx.host),
+        Header(frame_id=body),
         linear=(command.speed_m_s, 0.0, 0.0),
         angular=(0.0, 0.0, command.turn_rad_s),
     )
