@@ -208,6 +208,13 @@ async def by_bridges(run: Run) -> AsyncIterator[Send]:
 
 
 @contextlib.asynccontextmanager
+async def by_bridges_raw(run: Run) -> AsyncIterator[Send]:
+    """The same bytes, called an image of 16 bits: such are never compressed."""
+    async with by_bridges(run) as send:
+        yield lambda image: send(replace(image, encoding="mono16", width=image.step // 2))
+
+
+@contextlib.asynccontextmanager
 async def by_zmq(run: Run, *, curve: bool) -> AsyncIterator[Send]:
     ours, theirs = HostKeys.generate(), HostKeys.generate()
     publisher: zmq.Socket[bytes] = zmq.Context.instance().socket(zmq.XPUB)
@@ -276,6 +283,7 @@ async def measure(design: Design, bytes_s: float, seconds: float) -> Figures:
 
 DESIGNS: dict[str, Design] = {
     "nondum bridges": by_bridges,
+    "the same, raw only": by_bridges_raw,
     "ZeroMQ PUB/SUB, CURVE": lambda run: by_zmq(run, curve=True),
     "ZeroMQ PUB/SUB": lambda run: by_zmq(run, curve=False),
 }
