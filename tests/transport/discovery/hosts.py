@@ -134,6 +134,10 @@ class Host:
         self._say("status")
         return self.next("status")
 
+    def announced_s(self) -> float:
+        """When it was last announced, on its own clock."""
+        return max(row["announced_s"] or 0.0 for row in self.status()["interfaces"])
+
     def rename(self, name: str) -> None:
         """Have it announce another name."""
         self._say(f"announce {name}")

@@ -8,37 +8,29 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import ipaddress
 import logging
 import random
-import re
-import socket
 from collections import Counter
-from collections.abc import Awaitable, Callable, Iterable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
+from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
 
 from zeroconf import (  # type: ignore[attr-defined] # zeroconf keeps the DNS… for its callers
     DNSOutgoing,
-    DNSPointer,
     DNSQuestion,
-    DNSText,
     Error,
     IPVersion,
-    RecordUpdate,
-    RecordUpdateListener,
-    Zeroconf,
 )
 from zeroconf.asyncio import AsyncServiceInfo, AsyncZeroconf
 
-from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.errors import Problem
 from nondum.transport.discovery.announcement import Announcement
+from nondum.transport.discovery.ears import Ears
 from nondum.transport.discovery.hint import (
     MAX_ADDRESSES,
     SERVICE,
     Hint,
-    Source,
-    from_txt,
     instance,
     to_txt,
 )
@@ -46,14 +38,11 @@ from nondum.transport.discovery.interfaces import Flags, Interface, has_ipv6
 from nondum.transport.peers.identity import Security
 from nondum.transport.peers.keys import PeerKey, fingerprint
 
-APPEAR_S = (0.0, 1.25, 2.5)
-"""When a host is announced after a change: those who heard it take a second to forget an address
-that is named no more (RFC 6762, section 10.2), and the first packets over a new link get lost."""
+APPEAR_S = (0.0, 1.0, 2.5)
+"""When a host is announced after a change: the first packets over a new link may get lost."""
 GREET_S = 0.25
 """Time between two greetings at least, whoever comes: a hundred hosts may boot at once."""
 GREET_JITTER_S = 0.02
-MAX_NAMES = 1024
-"""Instance names whose owners are remembered, so that their goodbyes can be told."""
 MEMBERSHIPS = Path("/proc/sys/net/ipv4/igmp_max_memberships")
 _QUERY, _POINTER, _INTERNET = 0, 12, 1  # RFC 1035: flags, type PTR, class IN
 
@@ -70,7 +59,7 @@ class Multicast:
         on_refused: Callable[[Problem], None],
     ) -> None:
         """Only hosts that are secured alike are told of."""
-        self._ears = _Ears(security, on_hint, on_gone, on_refused)
+        self._ears = Ears(security, on_hint, on_gone, on_refused)
         self._loop = asyncio.get_running_loop()
         self._zeroconf: AsyncZeroconf | None = None
         self._info: AsyncServiceInfo | None = None
@@ -189,83 +178,6 @@ class Multicast:
         return unused
 
 
-class _Ears(RecordUpdateListener):
-    """Makes hints of records. It hears every announcement, not only those with something new."""
-
-    def __init__(
-        self,
-        security: Security,
-        on_hint: Callable[[Hint], None],
-        on_gone: Callable[[PeerKey], None],
-        on_refused: Callable[[Problem], None],
-    ) -> None:
-        self._security = security
-        self._on_hint, self._on_gone, self._on_refused = on_hint, on_gone, on_refused
-        self._zeroconf: Zeroconf | None = None
-        self._named: set[str] = set()
-        self._texts: dict[str, bytes] = {}
-        self._owners: dict[str, PeerKey] = {}
-
-    def async_update_records(self, zc: Zeroconf, now: float, records: list[RecordUpdate]) -> None:
-        """See which instances a packet is about; what it says is not in the cache yet."""
-        self._zeroconf = zc
-        for update in records:
-            record = update.new
-            if isinstance(record, DNSPointer) and record.key == SERVICE:
-                if not record.is_expired(now):
-                    self._named.add(record.alias)
-                elif owner := self._owners.pop(record.alias, None):
-                    self._on_gone(owner)
-            elif record.key.endswith(SERVICE) and not record.is_expired(now):
-                self._named.add(record.name)
-                if isinstance(record, DNSText):
-                    self._texts[record.name] = record.text
-
-    def async_update_records_complete(self) -> None:
-        """Read what the packet was about."""
-        for name in self._named:
-            self._read(name)
-        self._named.clear()
-        self._texts.clear()
-
-    def _read(self, name: str) -> None:
-        if not _INSTANCE.fullmatch(name):
-            return self._on_refused(_ODD_NAME)
-        assert self._zeroconf is not None
-        info = AsyncServiceInfo(SERVICE, name)
-        if not info.load_from_cache(self._zeroconf):
-            return None  # the rest of it is to come
-        try:
-            txt = {k.decode("ascii"): (v or b"").decode() for k, v in self._properties(info)}
-            hosts = [_named_scope(host) for host in info.parsed_scoped_addresses()]
-            hint = from_txt(txt, info.port, hosts, source=Source.MULTICAST, security=self._security)
-        except UnicodeDecodeError:
-            return self._on_refused(_ODD_TEXT)
-        except ProtocolViolation as error:
-            return self._on_refused(error.problems[0])
-        if instance(hint.key) != name:
-            return self._on_refused(_ODD_NAME)
-        self._remember(name, hint.key)
-        return self._on_hint(hint)
-
-    def _properties(self, info: AsyncServiceInfo) -> Iterable[tuple[bytes, bytes | None]]:
-        """The TXT record of the packet itself: of two in the cache, nobody knows which is newer."""
-        if (text := self._texts.get(info.name)) is not None:
-            info = AsyncServiceInfo(SERVICE, info.name, properties=text)
-        return info.properties.items()
-
-    def _remember(self, name: str, owner: PeerKey) -> None:
-        self._owners.pop(name, None)
-        self._owners[name] = owner
-        if len(self._owners) > MAX_NAMES:
-            del self._owners[next(iter(self._owners))]
-
-
-_INSTANCE = re.compile(r"[A-Z2-7]{4}(-[A-Z2-7]{4}){4}\." + re.escape(SERVICE))
-_ODD_NAME = Problem("HINT_NAME", "the name that is announced is not made of the key")
-_ODD_TEXT = Problem("HINT_MALFORMED", "the TXT record is no text")
-
-
 def _choice(interfaces: Sequence[Interface]) -> list[str | int]:
     """What zeroconf is to use: of each interface one IPv4 address, and IPv6 by an address of the
     link if there is one: hosts that hear another cannot tell which link the sender's are of."""
@@ -298,22 +210,11 @@ def _records(info: AsyncServiceInfo) -> tuple[Any, ...]:
 
 
 def _is_of_link(host: str) -> bool:
-    return ipaddress.ip_address(host).is_link_local and ":" in host
+    return ip_address(host).is_link_local and ":" in host
 
 
 def _unscoped(host: str) -> str:
     return host.partition("%")[0]
-
-
-def _named_scope(host: str) -> str:
-    """A scope by the interface's name, which lasts, instead of its number."""
-    address, percent, scope = host.partition("%")
-    if not percent:
-        return host
-    try:
-        return f"{address}%{socket.if_indextoname(int(scope))}"
-    except (OSError, ValueError):  # it has gone since
-        return address
 
 
 def _not_joined(interface: Interface, joined: int) -> Problem:
