@@ -222,7 +222,7 @@ class _Window:
         """Let go of it; who was agreed with is kept first."""
         await self.host.close()
         if self._keeping is not None:
-            await self._keeping
+            await asyncio.shield(self._keeping)
 
     def _on_change(self, state: PairingState) -> None:
         if isinstance(state, Agreed):
