@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import signal
 from collections.abc import AsyncIterator
@@ -10,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.host.bridge.hosts import HERE
+from tests.host.bridge.hosts import HERE, PATIENCE_S
 from tests.host.workers.house import House, is_alive, until_gone
 from tests.host.workers.test_streams import CAMERA, STREAM, WATCH, WATCHER, sees
 
@@ -22,7 +23,11 @@ from nondum.host.workers import Workers
 from nondum.planning.running import RunState
 from nondum.sdk.description import Output, Unit
 from nondum.sdk.errors import HostUnreachable, NondumError, Problem, WorkerFailed
-from nondum.sdk.wire import Body
+from nondum.sdk.messages import Image
+from nondum.sdk.packets import SocketPackets
+from nondum.sdk.streams import Consumer
+from nondum.sdk.wire import MAX_PACKET, Body
+from nondum.transport import link_sockets
 from nondum.transport.peers import PeerKey
 
 pytestmark = pytest.mark.anyio
@@ -192,6 +197,21 @@ async def test_restarted_camera_is_read_again(fleet: Fleet) -> None:
     await fleet.rover.until(WorkerReady, lambda _: len(fleet.rover.told(WorkerReady)) == 2)
     fleet.rover.behave("cam", "stream", u="rover__cam__camera", o=FRAMES)
     await sees(fleet.base, "one", 60)
+
+
+async def test_what_is_read_may_be_listened_in_on(fleet: Fleet) -> None:
+    await fleet.camera()
+    await fleet.watcher("one")
+    await sees(fleet.base, "one", 0)
+    ours, theirs = link_sockets()
+    with theirs:
+        await fleet.base.workers.streams.tap(FRAMES, theirs)
+    heard = asyncio.Event()
+    consumer = Consumer("image", SocketPackets(ours, MAX_PACKET), heard.set, lambda _: None)
+    await asyncio.wait_for(heard.wait(), PATIENCE_S)
+    assert isinstance(consumer.take(), Image)
+    consumer.close()
+    assert fleet.calls("stream.open") == 1
 
 
 @pytest.mark.parametrize(

@@ -169,13 +169,14 @@ class Bridge:
         if self._ending is not None:
             self._ending.cancel()
         async with self._lock:
-            await self._end()
+            self._end()
         await asyncio.gather(*self._endings)
 
     @contextlib.asynccontextmanager
     async def _use(self) -> AsyncIterator[_Running]:
         """The child, started if there is none, and not ended meanwhile."""
         self._users += 1
+        self._rest()
         try:
             async with self._lock:
                 if self._running is None:
@@ -231,22 +232,15 @@ class Bridge:
             self._ending = None
         is_idle = not self._users and not self._exports and not self._imports
         if is_idle and self._running is not None and not self._is_closed:
-            loop = asyncio.get_running_loop()
-            self._ending = loop.call_later(self._idle_s, self._end_idle)
+            self._ending = asyncio.get_running_loop().call_later(self._idle_s, self._end)
 
-    def _end_idle(self) -> None:
-        self._ending = None
-        if not self._users:
-            task = asyncio.get_running_loop().create_task(self._end())
-            self._endings.add(task)
-            task.add_done_callback(self._endings.discard)
-
-    async def _end(self) -> None:
+    def _end(self) -> None:
+        """End the child; whoever needs one from now on starts another."""
         running, self._running = self._running, None
         if running is not None:
-            running.link.close()
-            if not await running.process.wait(GRACE_S):
-                await running.process.end(0)
+            task = asyncio.get_running_loop().create_task(_ended(running))
+            self._endings.add(task)
+            task.add_done_callback(self._endings.discard)
 
     def _on_event(self, name: str, body: dict[str, Any], _call_id: int | None) -> None:
         match name, body:
@@ -275,6 +269,12 @@ class Bridge:
         self._imports.clear()
         for on_over in ended:
             on_over(Problem("BRIDGE_DIED", "the bridge to other hosts has ended"))
+
+
+async def _ended(running: _Running) -> None:
+    running.link.close()
+    if not await running.process.wait(GRACE_S):
+        await running.process.end(0)
 
 
 def interface(address: str) -> str:

@@ -37,6 +37,8 @@ class Outbound:
         self._loop = asyncio.get_running_loop()
         self._fidelity = Fidelity(self._loop.time())
         self._compressing: asyncio.Task[None] | None = None
+        self._coding = Coding.RAW
+        """Of the last message that was sent."""
         self._waits = False
         """A message has arrived that was not taken yet."""
         self._is_claimed = False
@@ -45,12 +47,12 @@ class Outbound:
         self._consumer = Consumer(kind, packets, self._on_message, self._on_producer_gone)
 
     def figures(self) -> dict[str, Any]:
-        """What was sent so far, and how images travel now."""
+        """What was sent so far, and how the last of it travelled."""
         outgoing = self._outgoing
         return {
             "frames": outgoing.frames_sent,
             "bytes": outgoing.bytes_sent,
-            "coding": self._fidelity.coding.name.lower(),
+            "coding": self._coding.name.lower(),
         }
 
     def end(self, problem: Problem) -> None:
@@ -108,6 +110,7 @@ class Outbound:
             if length > MAX_BULK:
                 raise ProtocolViolation(Problem("MESSAGE_TOO_LONG", f"{length} bytes"))
             self._outgoing.send(coding, header, bulk)
+            self._coding = coding
         except ProtocolViolation as violation:
             if not self._is_warned:  # once is enough
                 self._is_warned = True
