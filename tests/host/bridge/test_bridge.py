@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import os
 import signal
+import socket
 from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 from typing import Any
@@ -367,6 +368,23 @@ async def test_nobody_at_the_address_is_told() -> None:
             await hosts.reader.import_("image", HERE, replace(grant, port=1), Over())
         with pytest.raises(WorkerFailed, match="STREAM_UNREACHABLE"):
             await hosts.reader.import_("image", (), grant, Over())
+
+
+async def test_port_may_be_given_and_is_taken_once() -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    one, other = Bridge(HERE, port=port), Bridge(HERE, port=port)
+    try:
+        ours, theirs = link_sockets()
+        with ours, theirs:
+            assert (await one.export("image", theirs, await one.key(), Over())).port == port
+        with pytest.raises(WorkerFailed, match="ADDRESS_UNUSABLE"):
+            await other.key()
+        assert other.pid is None
+    finally:
+        await one.close()
+        await other.close()
 
 
 async def test_nothing_runs_without_streams() -> None:

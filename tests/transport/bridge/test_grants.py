@@ -144,6 +144,17 @@ async def test_reader_that_breaks_the_rules_loses_its_stream(parts: tuple[bytes,
         await works(host)
 
 
+async def test_flood_of_signs_of_life_is_cut() -> None:
+    async with owner() as host:
+        granted = host.grant(READER)
+        raw = host.raw(READER, granted)
+        raw.say(packets.asked(Claim(1, granted.outgoing.token)))
+        for _ in range(100):
+            raw.say(packets.asked(packets.Ping(1.0)))
+        assert (await within(granted.over)).code == "BRIDGE_PACKET"
+        await works(host)
+
+
 @pytest.mark.parametrize(
     "parts",
     [(b"garbage",), (packets.asked(Handled(1)),), (packets.asked(Claim(2, "x")),), (b"a", b"b")],

@@ -60,8 +60,14 @@ class _Running:
 class Bridge:
     """Starts the child when it is needed. Use it on the loop; `await close()` it."""
 
-    def __init__(self, listen: Sequence[str] = ("tcp://*:0",), *, idle_s: float = IDLE_S) -> None:
-        """Listen on the interfaces of some addresses, `tcp://INTERFACE:PORT`, at another port."""
+    def __init__(
+        self, listen: Sequence[str] = ("tcp://*:0",), *, port: int = 0, idle_s: float = IDLE_S
+    ) -> None:
+        """Listen on the interfaces of some addresses, `tcp://INTERFACE:PORT`, but at `port`.
+
+        Port 0 has the system pick one.
+        """
+        self._port = port
         self._interfaces = tuple(dict.fromkeys(interface(address) for address in listen))
         self._idle_s = idle_s
         self._running: _Running | None = None
@@ -201,6 +207,7 @@ class Bridge:
     async def _start(self) -> _Running:
         if self._is_closed:
             raise LinkClosed(Problem("LINK_CLOSED", "the bridge is closed"))
+        body = {"interfaces": list(self._interfaces), "port": self._port}
         ours, theirs = link_sockets()
         with theirs:
             process = WorkerProcess(_started(theirs.fileno()))
@@ -213,7 +220,7 @@ class Bridge:
         try:
             async with asyncio.timeout(START_S):
                 await link.meet({})
-                answer = await link.request("listen", {"interfaces": list(self._interfaces)})
+                answer = await link.request("listen", body)
         except (NondumError, TimeoutError) as error:
             link.close()
             await process.end(0)

@@ -67,7 +67,7 @@ class Service:
     ) -> Answer:
         match verb, handles:
             case "listen", ():
-                port = await self._exporter.start(tuple(body["interfaces"]))
+                port = await self._exporter.start(body["interfaces"], body["port"])
                 return {"port": port, "key": self._keys.public}
             case "import", ():
                 return await self._import(body)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import zmq
 
@@ -48,17 +48,17 @@ class Exporter:
         self._ears: Watch | None = None
         self._beating: asyncio.TimerHandle | None = None
 
-    async def start(self, interfaces: tuple[str, ...]) -> int:
-        """Listen at a port that the system picks; the port.
+    async def start(self, interfaces: Sequence[str], port: int = 0) -> int:
+        """Listen at a port, 0 for one that the system picks; the port.
 
-        Raises `PeerRefused` (ZAP_INEFFECTIVE), `zmq.ZMQError` where it cannot listen.
+        Raises `PeerRefused` (ZAP_INEFFECTIVE, ADDRESS_UNUSABLE).
         """
         self._zap = ZapHandler(self._context, self._judge)
         socket = sockets.listening(self._context, self._keys)
         try:
             await prove_enforced(socket, self._keys, self._zap.expect_probe)
             self._ears = Watch(socket, self._arrivals.on_event)
-            port = sockets.bind(socket, interfaces)
+            port = sockets.bind(socket, interfaces, port)
         except BaseException:
             if self._ears is not None:
                 self._ears.close()

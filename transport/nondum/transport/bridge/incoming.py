@@ -16,6 +16,7 @@ from nondum.transport.bridge.window import Window
 from nondum.transport.peers.drained import Drained
 from nondum.transport.peers.keys import HostKeys, PeerKey
 from nondum.transport.peers.monitor import SocketEvent, Watch
+from nondum.transport.token_bucket import TokenBucket
 
 BEAT_S = 0.3
 SILENT_S = 1.2
@@ -63,6 +64,7 @@ class Incoming:
         self._on_opened, self._on_frame, self._on_over = on_opened, on_frame, on_over
         self._loop = asyncio.get_running_loop()
         self._began_s = self._loop.time()
+        self._pongs = TokenBucket(packets.PINGS_HZ, packets.PINGS_HZ, self._began_s)
         self._window = Window()
         """As the owner must keep it: what breaks it would fill the memory here."""
         self._is_opened = False
@@ -135,7 +137,7 @@ class Incoming:
             case Frame(seq) if self._is_opened and self._window.has_room:
                 self._window.sent(seq, length, now_s)
                 self._on_frame(message)
-            case Pong(at_s, clock_s):
+            case Pong(at_s, clock_s) if self._pongs.take(1, now_s):
                 if at_s:
                     self.clocks.heard(at_s, clock_s, now_s)
             case Over(problem):

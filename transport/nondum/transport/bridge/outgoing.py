@@ -15,6 +15,7 @@ from nondum.transport.bridge.packets import Asked, Claim, Coding, Handled, Over,
 from nondum.transport.bridge.window import Window
 from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.keys import PeerKey
+from nondum.transport.token_bucket import TokenBucket
 
 CLAIM_S = 10.0
 """How long a grant waits for its reader."""
@@ -60,6 +61,7 @@ class Outgoing:
         self._heard_s = self._loop.time()
         self._heard_bytes = 0
         self._window = Window()
+        self._pings = TokenBucket(packets.PINGS_HZ, packets.PINGS_HZ, self._heard_s)
         self._way: Way | None = None
         self.is_over = False
 
@@ -115,6 +117,8 @@ class Outgoing:
                     return Problem("BRIDGE_PACKET", f"frame {seq} is not the next to be handled")
                 if self._window.has_room:
                     self._on_room()
+            case Ping() if not self._pings.take(1, now_s):
+                return Problem("BRIDGE_PACKET", "more signs of life than anybody needs")
             case Ping(at_s):
                 if self._way.send([packets.told(Pong(at_s, self._loop.time()))]) is Sent.GONE:
                     self._lose(_gone())

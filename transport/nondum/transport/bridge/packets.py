@@ -28,6 +28,8 @@ from nondum.sdk.wire_fields import read_body, read_number, read_problem, read_te
 VERSION = 1
 MAX_ASKED = 1024
 """Bytes of a reader's message."""
+PINGS_HZ = 20.0
+"""Signs of life that each end bears for long; more end the connection."""
 MAX_BULK = 64 * 1024 * 1024
 """Bulk bytes of one frame; longer ones stay on their host."""
 

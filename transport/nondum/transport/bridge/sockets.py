@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import zmq
 
+from nondum.sdk.errors import Problem
 from nondum.transport.bridge.packets import MAX_ASKED, MAX_BULK
 from nondum.transport.bridge.window import SMALL_MESSAGES
+from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import HostKeys, PeerKey
 
 Context = zmq.Context[zmq.Socket[bytes]]
@@ -44,15 +48,22 @@ def dialling(context: Context, keys: HostKeys, owner: PeerKey) -> zmq.Socket[byt
     return socket
 
 
-def bind(socket: zmq.Socket[bytes], interfaces: tuple[str, ...]) -> int:
-    """Listen on some interfaces, at one port that the system picks. Raises `zmq.ZMQError`."""
-    port = "*"
+def bind(socket: zmq.Socket[bytes], interfaces: Sequence[str], port: int) -> int:
+    """Listen on some interfaces, at one port; 0 has the system pick it.
+
+    Raises `PeerRefused` (ADDRESS_UNUSABLE).
+    """
     for interface in interfaces:
-        socket.bind(f"tcp://{interface}:{port}")
+        address = f"tcp://{interface}:{port or '*'}"
+        try:
+            socket.bind(address)
+        except zmq.ZMQError as error:
+            told = f"bridges cannot be listened for there: {error}"
+            raise PeerRefused(Problem("ADDRESS_UNUSABLE", told, where=address)) from error
         bound = socket.getsockopt(zmq.LAST_ENDPOINT)
         assert isinstance(bound, bytes)
-        port = bound.rstrip(b"\0").decode("ascii").rpartition(":")[2]
-    return int(port)
+        port = int(bound.rstrip(b"\0").decode("ascii").rpartition(":")[2])
+    return port
 
 
 def _bound(socket: zmq.Socket[bytes], longest: int) -> None:
