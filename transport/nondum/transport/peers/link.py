@@ -12,9 +12,8 @@ from nondum.sdk.errors import Problem
 from nondum.transport.peers import accepted
 from nondum.transport.peers.drained import Drained, Sent
 from nondum.transport.peers.keys import PeerKey
-from nondum.transport.peers.messages import Message, Ping, encode
+from nondum.transport.peers.messages import Message, encode
 from nondum.transport.peers.monitor import SocketEvent, Watch
-from nondum.transport.peers.pulse import State
 
 if TYPE_CHECKING:
     from nondum.transport.peers.session import Session
@@ -48,7 +47,7 @@ class Link:
         self.on_refused: Callable[[Problem], None] | None = None
         """Told why, when a link that this host began is turned away."""
         self.round_trip_s: float | None = None
-        self._pings = 0
+        self._pinged = 0
         self._pinged_s = now_s
 
     def send(self, data: bytes) -> Sent:
@@ -59,15 +58,14 @@ class Link:
         """Send what may be lost."""
         return self.send(encode(message))
 
-    def ping(self, now_s: float, state: State | None) -> Sent:
-        """Ask for a sign of life, and give one."""
-        self._pings += 1
-        self._pinged_s = now_s
-        return self.tell(Ping(self._pings, state))
+    def ping(self, number: int, data: bytes, now_s: float) -> Sent:
+        """Give a sign of life: the message of a ping, and its number."""
+        self._pinged, self._pinged_s = number, now_s
+        return self.send(data)
 
     def heard_pong(self, number: int, now_s: float) -> None:
         """A ping was answered."""
-        if number == self._pings:
+        if number == self._pinged:
             self.round_trip_s = now_s - self._pinged_s
 
     def cut(self, linger_ms: int = 0) -> None:

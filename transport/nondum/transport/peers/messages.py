@@ -123,7 +123,7 @@ class Ping:
 
 @dataclass(frozen=True, slots=True)
 class Pong:
-    """So is this one's."""
+    """A ping came; not every one is answered."""
 
     number: int
 

@@ -19,10 +19,12 @@ from nondum.transport.peers.messages import (
     Bye,
     Hello,
     Message,
+    Ping,
     Refused,
     Welcome,
     agreed_version,
     decode,
+    encode,
 )
 from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.refusals import Reason, Refusal, Refusals
@@ -64,6 +66,9 @@ class Roster:
         self._known: dict[PeerKey, Acquaintance] = {}
         self._orphans: set[Errand] = set()
         self._loop = asyncio.get_running_loop()
+        self._beats = 1
+        self._ping = encode(Ping(self._beats))
+        """The same for every link, so made once a beat."""
 
     @property
     def sessions(self) -> Mapping[PeerKey, Session]:
@@ -167,6 +172,8 @@ class Roster:
 
     def beat(self) -> None:
         """Ping every link, and find those that are dead."""
+        self._beats += 1
+        self._ping = encode(Ping(self._beats, self._pulse.state()))
         self.tend()
         for session in list(self._sessions.values()):
             for link in list(session.links):
@@ -186,7 +193,7 @@ class Roster:
 
     def try_link(self, link: Link) -> None:
         """Ping a link; one whose connection is gone is broken."""
-        if not link.is_over and link.ping(self._loop.time(), self._pulse.state()) is Sent.GONE:
+        if not link.is_over and link.ping(self._beats, self._ping, self._loop.time()) is Sent.GONE:
             self.break_link(link, Loss.DISCONNECTED)
 
     def close(self) -> None:
