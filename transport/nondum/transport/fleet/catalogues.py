@@ -33,7 +33,7 @@ READ = "fleet.read"
 CHANGED = "fleet.changed"
 """Notice: one chunk."""
 STATE = "fleet.state"
-"""Notice: revision and digest, where no pings carry them."""
+"""Notice: revision and digest, where no pings carry them or they would come too late."""
 CONFLATED_S = 0.02
 """Changes within so long are told as one."""
 AT_ONCE = 4
@@ -110,7 +110,7 @@ class Catalogues:
         return self._told
 
     def tell_state(self) -> None:
-        """Tell it to all, where no pings do."""
+        """Tell it to all, where no pings do, or not soon enough."""
         told = {"revision": self._told.revision, "digest": self._told.digest}
         self._links().notify_all(STATE, told)
 
@@ -199,8 +199,10 @@ class Catalogues:
         self._telling, self._told_s = None, self._loop.time()
         chunks = self._ledger.delta(self._told.revision) or ()
         self._told = self._ledger.state
-        if len(chunks) == 1:  # who is sent more than fits a message reads it when it can
+        if len(chunks) == 1:
             self._links().notify_all(CHANGED, chunks[0].to_body())
+        else:  # more than fits a message is read by each when it can
+            self.tell_state()
 
     def _answer(self, errand: Errand) -> Body | Awaitable[Body]:
         epoch, since = errand.args.get("epoch"), errand.args.get("revision")

@@ -125,6 +125,12 @@ class Meeting:
         for key in [key for key in self._wishes if not self._is_welcome(key)]:
             self._drop(key)
 
+    def again(self) -> None:
+        """Dial all that there is no link to: who turned this host away might not any more."""
+        for key, wish in self._wishes.items():
+            if not wish.is_linked:
+                self._dial_in(key, 0.0)
+
     def close(self) -> None:
         """Dial nobody any more."""
         for wish in self._wishes.values():

@@ -117,6 +117,11 @@ class Mesh:
         self._node.set_trust(trust)
         self._meeting.trust_changed()
 
+    def show_certificate(self, certificate: bytes) -> None:
+        """Show another certificate from now on, also to those who have turned this host away."""
+        self._node.show_certificate(certificate)
+        self._meeting.again()
+
     def publish(self, changes: Mapping[str, Body | None]) -> None:
         """Change this host's catalogue."""
         self._catalogues.publish(changes)

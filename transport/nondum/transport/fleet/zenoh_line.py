@@ -223,9 +223,9 @@ class Line:
                 with self._has_work:
                     self._has_work.wait(CONNECT_S)
                 continue
-            self._declare(session)
             with self._has_work:
-                self._is_open = True
+                self._is_open = True  # before anybody hears of this host, and wants an answer
+            self._declare(session)
             self._hop(self.opened.set)
             return session
         return None

@@ -39,6 +39,8 @@ ANSWER_S = 3.0
 """How long a greeting may take to be answered."""
 START_S = 3.0
 """How long the start waits for a router; it is looked for ever after."""
+OVERTAKEN_S = 0.1
+"""News that a host is gone may overtake its goodbye."""
 DOORS = 1024
 """Lives of peers that are remembered."""
 
@@ -180,8 +182,11 @@ class ZenohNode:
             self._greet_in(place, 0)
             return
         self._present.discard(place)
+        self._loop.call_later(OVERTAKEN_S, self._on_gone, place)
+
+    def _on_gone(self, place: Place) -> None:
         door = self._doors.get(place)
-        if door is not None and door.link is not None:
+        if place not in self._present and door is not None and door.link is not None:
             self._roster.break_link(door.link, Loss.DISCONNECTED)
 
     def _on_message(self, place: Place, number: int, data: bytes) -> None:
