@@ -237,14 +237,16 @@ def zenoh_member(
     return fleet, found
 
 
-def mesh_member(name: str, keys: HostKeys | None, trust: Trust) -> tuple[Mesh, Member]:
+def mesh_member(
+    name: str, keys: HostKeys | None, trust: Trust, *, listen: str = "tcp://127.0.0.1:0"
+) -> tuple[Mesh, Member]:
     servant = Servant()
     mesh = Mesh(
         Identity(name, keys),
         trust,
         servant,
         on_event=lambda event: found.hear(event),
-        listen=["tcp://127.0.0.1:0"],
+        listen=[listen],
     )
     found = Member(name, mesh, servant)
     return mesh, found
