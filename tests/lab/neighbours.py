@@ -21,7 +21,18 @@ def free_port() -> int:
 
 @contextmanager
 def neighbours(work: Path, *names: str, more: str = "") -> Iterator[list[RunningHost]]:
-    """Hosts in development mode that look for each other; `more` are further lines of [peers]."""
+    """Hosts that need no keys and are each other's peers; `more` are further lines of [peers]."""
+    with looking(work, *names, more=f"development = true\n{more}") as hosts:
+        for host in hosts:
+            for other in names:
+                if other != host.name:
+                    until_peer(host, other)
+        yield hosts
+
+
+@contextmanager
+def looking(work: Path, *names: str, more: str = "") -> Iterator[list[RunningHost]]:
+    """Hosts that look for each other; `more` are further lines of [peers]."""
     ports = {name: free_port() for name in names}
     with ExitStack() as stack:
         hosts = []
@@ -33,10 +44,6 @@ def neighbours(work: Path, *names: str, more: str = "") -> Iterator[list[Running
             stack.callback(host.stop)
             host.start()
             hosts.append(host)
-        for host in hosts:
-            for other in names:
-                if other != host.name:
-                    until_peer(host, other)
         yield hosts
 
 
@@ -58,7 +65,6 @@ def _section(port: int, others: list[str]) -> str:
     return f"""
 [peers]
 enabled = true
-development = true
 discover = false
 listen = ["tcp://127.0.0.1:{port}"]
 static = {others}

@@ -10,10 +10,15 @@ from nondum.host.events import (
     DriveUnreadable,
     Event,
     PayloadFailed,
+    PayloadPlaced,
     PayloadRefused,
+    PayloadSentAway,
+    PayloadTaken,
     PayloadWithdrawn,
     PeerJoined,
     PeerLeft,
+    PlaceLost,
+    PlaceMissing,
 )
 from nondum.sdk.errors import Problem
 
@@ -27,13 +32,27 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return f"{_name(event.payload, snapshot)} does not work: {_joined(event.problems)}"
         case PayloadWithdrawn():
             return f"{_name(event.payload, snapshot)} is withdrawn: {event.reason}"
+        case PayloadSentAway():
+            return f"{_name(event.payload, snapshot)} is to run on {event.host}, not here"
+        case PayloadPlaced():
+            name = _name(event.payload, snapshot)
+            return f"{name} runs on {event.host}, not here: {event.why}"
+        case PlaceLost():
+            name = _name(event.payload, snapshot)
+            return f"{name} does not run on {event.host} any more: {event.reason}"
+        case PlaceMissing():
+            name = _name(event.payload, snapshot)
+            return f"no host takes {name}: {_joined(event.problems)}"
+        case PayloadTaken():
+            name = _name(event.payload, snapshot)
+            return f"{name} runs here for {event.host}, not there: {event.why}"
         case DriveUnreadable():
             return f"drive {event.drive} cannot be used: {_joined(event.problems)}"
         case PeerJoined():
             return f"the host {event.host} is here"
         case PeerLeft():
             return f"the host {event.host} is gone: {event.reason}"
-        case DriveRead() if not event.payloads:
+        case DriveRead(payloads=(), certificates=0):
             return f"drive {event.drive} carries no payload"
     return None
 

@@ -73,7 +73,7 @@ class DriveInserted(Event):
     root: Path
     """Where its files are, or will be once `node` is mounted there."""
     kind: str
-    """`slot`, `block` or `installed`."""
+    """`slot`, `block`, `installed` or `placed`."""
     node: Path | None = None
     """The block device to mount at `root`; None: `root` is readable as it is."""
     filesystem: str = ""
@@ -93,6 +93,8 @@ class DriveRead(Event):
 
     drive: str
     payloads: tuple[str, ...]
+    certificates: int = 0
+    """How many certificates of hosts it carries."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,6 +213,56 @@ class PayloadWithdrawn(Event):
 
     payload: str
     reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadSentAway(Event):
+    """A person wants the payload on another host: it leaves this one, and its drive stays in."""
+
+    payload: str
+    host: str
+    """The other one."""
+    problems: tuple[Problem, ...]
+    """What is told of it here from now on."""
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadPlaced(Event):
+    """A payload that does not run here runs on a peer now."""
+
+    payload: str
+    host: str
+    """The peer."""
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceLost(Event):
+    """A payload does not run any more on the peer that it was placed on."""
+
+    payload: str
+    host: str
+    """The peer."""
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceMissing(Event):
+    """No peer that is there takes a payload that does not run here."""
+
+    payload: str
+    problems: tuple[Problem, ...]
+    """What each of them has said, `where` its name."""
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadTaken(Event):
+    """A peer's payload runs here, since it does not run there."""
+
+    payload: str
+    host: str
+    """The peer."""
+    why: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -450,6 +502,19 @@ class DeviceReleased(Event):
 
 
 # Peers
+
+
+@dataclass(frozen=True, slots=True)
+class CertificatesBrought(Event):
+    """A drive carries certificates of hosts, this one's perhaps."""
+
+    drive: str
+    certificates: tuple[str, ...] = field(repr=False)
+    """As they were read: nobody has checked them."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Only how many: anybody can write a drive."""
+        return {"drive": self.drive, "certificates": len(self.certificates)}
 
 
 @dataclass(frozen=True, slots=True)

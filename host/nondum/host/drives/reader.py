@@ -29,12 +29,14 @@ Report = Callable[[str, int, int], None]
 """Phase, done, total."""
 Arguments = Mapping[str, Any]
 
+CERTIFICATES = "nondum-peers"
+"""Folder of a drive with hosts' certificates."""
 KEY_DIGITS = 16
 """Hex digits of a contents list's digest that name a payload on a host."""
 
 
-def look(arguments: Arguments, report: Report) -> list[dict[str, Any]]:
-    """Mount the drive if it is a device, and tell the payloads on it.
+def look(arguments: Arguments, report: Report) -> dict[str, list[Any]]:
+    """Mount the drive if it is a device, and tell the `payloads` and host `certificates` on it.
 
     Raises `DriveGone`, `PayloadRefused` (FS_UNSUPPORTED, FS_ERROR).
     """
@@ -46,7 +48,19 @@ def look(arguments: Arguments, report: Report) -> list[dict[str, Any]]:
     is_payload = arguments["kind"] == "installed"
     folders = (root,) if is_payload else drive.find_payloads(root)
     verifier = UnsignedAllowed() if arguments["allow_unsigned"] else SignatureDemanded()
-    return [_found(folder, verifier) for folder in folders]
+    return {
+        "payloads": [_found(folder, verifier) for folder in folders],
+        "certificates": [] if is_payload else list(_certificates(root)),
+    }
+
+
+def _certificates(root: Path) -> Iterator[str]:
+    if (root / CERTIFICATES).is_dir():  # few drives have any: what reads them is big
+        from nondum.host.peers.drive_certificates import certificates_on
+
+        for data in certificates_on(root):
+            if data.isascii():
+                yield data.decode("ascii")
 
 
 def copy(arguments: Arguments, report: Report) -> dict[str, int]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from nondum.host.drives import mounting
 from nondum.host.effects import ReadDrive, ReleaseDrive
-from nondum.host.events import DriveRead, Event, PayloadFound
+from nondum.host.events import CertificatesBrought, DriveRead, Event, PayloadFound
 from nondum.host.lifecycle.children import Children
 from nondum.host.lifecycle.lanes import in_thread
 from nondum.sdk.errors import DriveGone, InstallFailed, Problem
@@ -25,7 +25,10 @@ class DriveReading:
         """Drive → where it is, or may be, mounted."""
 
     async def read(self, effect: ReadDrive) -> tuple[Event, ...]:
-        """Tell the payloads of a drive. Raises `DriveGone`, `PayloadRefused`, `InstallFailed`."""
+        """Tell the payloads and certificates of a drive.
+
+        Raises `DriveGone`, `PayloadRefused`, `InstallFailed`.
+        """
         if effect.node is not None:
             self._mounted[effect.drive] = effect.root
         arguments = {
@@ -56,9 +59,12 @@ class DriveReading:
                 fleet=said["fleet"],
                 problems=tuple(Problem(**problem) for problem in said["problems"]),
             )
-            for said in found
+            for said in found["payloads"]
         ]
-        return *payloads, DriveRead(effect.drive, tuple(found.payload for found in payloads))
+        certificates = tuple(found["certificates"])
+        brought = (CertificatesBrought(effect.drive, certificates),) if certificates else ()
+        keys = tuple(found.payload for found in payloads)
+        return *brought, *payloads, DriveRead(effect.drive, keys, len(certificates))
 
     async def release(self, effect: ReleaseDrive) -> tuple[Event, ...]:
         """Unmount a drive that was mounted for reading."""

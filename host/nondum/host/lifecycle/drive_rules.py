@@ -17,6 +17,9 @@ from nondum.host.events import (
 from nondum.host.lifecycle.turn import Turn
 from nondum.sdk.errors import Problem
 
+_GONE = {"placed": "the host that handed it over ended that, or is gone"}
+"""What is told of payloads whose last drive is gone, for kinds that nobody pulls."""
+
 
 def on_drive_inserted(turn: Turn, event: DriveInserted) -> None:
     """Read it. A drive that was there before the daemon's restart is read again."""
@@ -34,13 +37,14 @@ def on_drive_inserted(turn: Turn, event: DriveInserted) -> None:
 
 def on_drive_removed(turn: Turn, event: DriveRemoved) -> None:
     """Withdraw what was on it and nowhere else."""
-    if event.drive not in turn.state.drives:
+    drive = turn.state.drives.get(event.drive)
+    if drive is None:
         return
     turn.events.append(event)
     turn.drop_drive(event.drive)
     turn.effects.append(ReleaseDrive(event.drive))
     for payload in _on(turn, event.drive):
-        lose_source(turn, payload, event.drive, "its drive was pulled")
+        lose_source(turn, payload, event.drive, _GONE.get(drive.kind, "its drive was pulled"))
 
 
 def on_drive_read(turn: Turn, event: DriveRead) -> None:
@@ -57,7 +61,7 @@ def on_drive_read(turn: Turn, event: DriveRead) -> None:
         have="none",
         fix="make one with `nondum payload build`",
     )
-    problems = () if event.payloads else (nothing,)
+    problems = () if event.payloads or event.certificates else (nothing,)
     turn.put_drive(replace(drive, state=DriveState.COPYING, problems=problems))
     for payload in _on(turn, event.drive):
         if payload.key not in event.payloads:

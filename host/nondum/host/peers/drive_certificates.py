@@ -15,15 +15,15 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
+from nondum.host.drives.reader import CERTIFICATES
 from nondum.transport.peers.certificate import MAX_BYTES
 
-FOLDER = "nondum-peers"
 MOST_FILES = 1000
 
 
 def certificates_on(drive: Path) -> Iterator[bytes]:
     """What may be certificates, unread as yet. Blocks while the drive does: never on the loop."""
-    folder = drive / FOLDER
+    folder = drive / CERTIFICATES
     try:
         if folder.is_symlink():
             return

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import dataclasses
 
 from nondum.host.config import PeersSection
 from nondum.transport.discovery import Announcement, Discovery, DiscoveryStatus, Hint
 from nondum.transport.fleet import Mesh
 from nondum.transport.peers import PeerRefused
+
+PAIRING_LOOK_S = 1.0
+"""Between two looks at static hosts while one is to be paired with."""
 
 
 class PeerFinder:
@@ -16,6 +20,7 @@ class PeerFinder:
     def __init__(self, mesh: Mesh, config: PeersSection) -> None:
         """Made once the mesh listens."""
         self._mesh = mesh
+        self._looking: asyncio.TimerHandle | None = None
         self._announcement = Announcement(mesh.key, mesh.name, mesh.epoch, mesh.addresses)
         self._discovery = Discovery(
             self._announcement,
@@ -31,6 +36,7 @@ class PeerFinder:
 
     async def close(self) -> None:
         """Look no more."""
+        self._stop_looking()
         await self._discovery.close()
 
     @property
@@ -47,6 +53,25 @@ class PeerFinder:
         """Tell where this host can be asked to pair, or that it cannot any more."""
         self._announcement = dataclasses.replace(self._announcement, pairing_port=port)
         self._discovery.announce(self._announcement)
+        self._stop_looking()
+        if port is not None:
+            self._look_again()
+
+    def tell_again(self) -> None:
+        """Tell the mesh of all hints again: it may let in others now."""
+        for hint in self.hints:
+            self._on_hint(hint)
+
+    def _look_again(self) -> None:
+        """Whoever is to be paired with opens its window at about the same time."""
+        self._discovery.look_again()
+        loop = asyncio.get_running_loop()
+        self._looking = loop.call_later(PAIRING_LOOK_S, self._look_again)
+
+    def _stop_looking(self) -> None:
+        if self._looking is not None:
+            self._looking.cancel()
+            self._looking = None
 
     def _on_hint(self, hint: Hint) -> None:
         try:

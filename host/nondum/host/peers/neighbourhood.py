@@ -12,7 +12,8 @@ from nondum.host.bridge.shared_streams import SharedStreams
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.config import HostConfig, PeersSection
 from nondum.host.control.arguments import Arguments
-from nondum.host.events import Emit, Event, UnitsTaken
+from nondum.host.events import CertificatesBrought, Emit, Event, UnitsTaken
+from nondum.host.lifecycle.children import Children
 from nondum.host.lifecycle.folders import Folders
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.mind import Mind
@@ -24,6 +25,8 @@ from nondum.host.peers.goals import Goals
 from nondum.host.peers.offered import Policy
 from nondum.host.peers.pairing_desk import PairingDesk
 from nondum.host.peers.peering import Peering
+from nondum.host.peers.placement.pins import Pins
+from nondum.host.peers.placement.placement import Placement
 from nondum.host.peers.remote_calls import AllCalls, RemoteCalls, is_peers
 from nondum.host.peers.serving import Serving
 from nondum.host.peers.trust_keeper import TrustKeeper
@@ -38,7 +41,7 @@ from nondum.sdk.errors import Problem
 from nondum.sdk.wire import Body
 from nondum.transport.discovery import Hint
 from nondum.transport.fleet import FleetEvent, Mesh
-from nondum.transport.peers import CallFailed, Errand, PeerLost, Security
+from nondum.transport.peers import CallFailed, Errand, PeerLost, PeerRefused, Security, Trust
 
 ON_LOOPBACK = ("tcp://127.0.0.1:0",)
 OPEN_S = 10.0
@@ -57,6 +60,7 @@ class Neighbourhood:
         emit: Emit,
         compute: Compute,
         mind: Callable[[], Mind],
+        placement: Placement,
     ) -> None:
         """Use `open`. `mind` is asked for once the host runs."""
         host = config.host.name
@@ -129,6 +133,8 @@ class Neighbourhood:
         self.desk.add("goal.ask", self.goals.serve_ask)
         self.desk.add("goal.give", self.goals.serve_give)
         self.desk.hear("goal.news", self.goals.hear_news)
+        self.placement = placement
+        placement.serve(self.desk)
         self._remote = RemoteCalls(self.peering, emit, self.peering.claims)
         self.calls = AllCalls(workers, self._remote)
 
@@ -141,15 +147,32 @@ class Neighbourhood:
         catalogue: Catalogue,
         emit: Emit,
         mind: Callable[[], Mind],
+        children: Children,
     ) -> Neighbourhood:
         """Read keys and trust, and look at this machine. Raises `PeerRefused`."""
         keeper = await TrustKeeper.open(
-            folders.peers, config.host.name, on_change=lambda trust: made.mesh.set_trust(trust)
+            folders.peers,
+            config.host.name,
+            on_change=lambda trust: made._on_trust(trust),
+            on_certificate=lambda certificate: made.mesh.show_certificate(certificate),
         )
         compute = await asyncio.to_thread(
             probed, config.host.state, reserve_mb=config.install.reserve_mb
         )
-        made = cls(config, keeper, workers, catalogue, emit, compute, mind)
+        compute["place"] = config.peers.place
+        placement = Placement(
+            config,
+            folders,
+            children,
+            catalogue,
+            emit,
+            lambda: made.mesh,
+            pins=await Pins.open(folders.root / "places.json"),
+            compute=compute,
+            confinement=workers.launcher.level,
+            known=lambda: made.view.known().values(),
+        )
+        made = cls(config, keeper, workers, catalogue, emit, compute, mind, placement)
         return made
 
     @property
@@ -162,7 +185,7 @@ class Neighbourhood:
     def answering(self) -> dict[str, Callable[[Arguments], Awaitable[Any]]]:
         """Verbs that answer once."""
         own = {"peers": self.view.rows, "peers_why": self.view.why}
-        return {**own, **trust_orders.answering(self.trust)}
+        return {**own, **trust_orders.answering(self.trust), **self.placement.answering()}
 
     def following(self) -> dict[str, Callable[[Arguments], AsyncIterator[Row]]]:
         """Verbs that go on answering."""
@@ -174,22 +197,44 @@ class Neighbourhood:
 
     def on_event(self, event: Event) -> None:
         """Take in what happens on this host."""
+        if isinstance(event, CertificatesBrought):
+            self._aside(self._look_at(event))
         self.serving.on_event(event)
         self.peering.on_event(event)
         self.goals.on_event(event)
+        self.placement.on_event(event)
 
     async def close(self) -> None:
         """Say goodbye; what runs for peers, and at peers, is halted."""
+        await self.placement.close()
         await self._remote.close()
         await self._remote_streams.close()
         await self._bridge.close()
         await self.mesh.close()
+
+    def _on_trust(self, trust: Trust) -> None:
+        self.mesh.set_trust(trust)
+        if self.finder is not None:
+            self.finder.tell_again()
 
     def _on_fleet(self, event: FleetEvent) -> None:
         self.view.on_fleet(event)
         self.peering.on_fleet(event)
         if isinstance(event, PeerLost):
             self._aside(self._shared.caller_lost(event.key))
+
+    async def _look_at(self, event: CertificatesBrought) -> None:
+        """Take this host's certificate, if a drive brought it, and is of use."""
+        for data in event.certificates:
+            try:
+                taken = await self.keeper.offer(data.encode("ascii"))
+            except PeerRefused as refused:
+                self._mind().people.tell(f"drive {event.drive}: {refused.problems[0]}")
+                return
+            if taken is not None:
+                day = taken.not_after.date().isoformat()
+                told = f"drive {event.drive} has brought this host's certificate, good until {day}"
+                self._mind().people.tell(told)
 
     def _aside(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.get_running_loop().create_task(work)

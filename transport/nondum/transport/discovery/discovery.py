@@ -100,6 +100,10 @@ class Discovery:
         self._announcement = self._responder.announcement = announcement
         self._dirty.set()
 
+    def look_again(self) -> None:
+        """Ask static hosts anew now: something about them may have changed."""
+        self._asker.hurry()
+
     def status(self) -> DiscoveryStatus:
         """What was done and met."""
         responder, multicast = self._responder.problem, self._multicast

@@ -6,6 +6,7 @@ import asyncio
 import functools
 import secrets
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import zmq
@@ -179,6 +180,11 @@ class PeerNode:
         """Exchange the trust: peers that it does not let in any more are cut at once."""
         self._gate.trust = trust
         self._roster.check_trust()
+
+    def show_certificate(self, certificate: bytes) -> None:
+        """Show another certificate from now on; links that exist stay as they are."""
+        self.identity = replace(self.identity, certificate=certificate)
+        self._gate.identity = self.identity
 
     async def close(self) -> None:
         """Say goodbye and let go of everything; what runs for peers is cancelled."""
