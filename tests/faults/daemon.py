@@ -74,6 +74,9 @@ class DeadlyCatalogue(Catalogue):
             case "pull":
                 (Path(self.orders["root"]) / "slots" / SLOT).unlink()
                 self.bus.emit(events.DriveRemoved(SLOT))
+            case "send":
+                problem = Problem("PLACED_ELSEWHERE", "made up by a test")
+                self.bus.emit(events.PayloadSentAway(payload, "mule", (problem,)))
             case "retry":
                 self.bus.emit(events.RetryAsked(payload))
             case "lost":

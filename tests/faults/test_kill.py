@@ -90,6 +90,9 @@ ENDS: dict[Write, Step] = {
     broken: Step.QUARANTINED,
 }
 
+LASTING = {events.PayloadFailed: Step.QUARANTINED, events.PayloadSentAway: Step.REFUSED}
+"""Where these leave a payload, however it would have ended."""
+
 REFUSED_AT: dict[Step, Write] = {
     Step.RECEIVED: unfit,
     Step.COPIED: hooked,
@@ -103,6 +106,8 @@ def way(step: Step, event: type[Event]) -> tuple[Write, tuple[str, str] | None]:
     comes = {Step.REFUSED: unfit, Step.QUARANTINED: broken}.get(step, sound)
     if event is events.PayloadWithdrawn:
         return comes, (step.name, "pull")
+    if event is events.PayloadSentAway:
+        return comes, (step.name, "send")
     if event is events.RetryAsked:
         return comes, (step.name, "retry")
     if event is events.PayloadRefused:
@@ -182,8 +187,8 @@ async def test_kill_at_a_transition(
     if nudge is not None:
         orders["nudge"] = nudge
     await asyncio.to_thread(run_until_dead, tmp_path, **orders)
-    has_failed = event is events.PayloadFailed and when == "AFTER"
-    await check_recovery(tmp_path, Step.QUARANTINED if has_failed else ENDS[write])
+    lasts = LASTING.get(event) if when == "AFTER" else None
+    await check_recovery(tmp_path, lasts or ENDS[write])
 
 
 async def test_kill_at_any_moment(tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ from nondum.host.drives.slots import SlotSource
 from nondum.host.drives.source import DriveSource
 from nondum.host.events import Event, HostStarted, Recomposed
 from nondum.host.lifecycle.bus import Bus
+from nondum.host.lifecycle.children import Children
 from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
 from nondum.host.lifecycle.folders import Folders, claim
@@ -83,7 +84,9 @@ async def _run(
     manager = ComponentManager(catalogue, executor, bus)
     for source in (*drive_sources(config, folders), *more_drives):
         manager.add_source(source)
-    neighbours = await _neighbours(config, folders, workers, catalogue, bus, lambda: mind)
+    neighbours = await _neighbours(
+        config, folders, workers, catalogue, bus, lambda: mind, executor.children
+    )
     mind = Mind(
         config.host.name,
         neighbours.calls if neighbours else workers,
@@ -137,6 +140,7 @@ async def _neighbours(
     catalogue: Catalogue,
     bus: Bus,
     mind: Callable[[], Mind],
+    children: Children,
 ) -> Neighbourhood | None:
     """What this host has to do with others; None where it is to have nothing. Imported only where
     it is wanted: it needs some ten megabytes.
@@ -147,7 +151,7 @@ async def _neighbours(
         return None
     from nondum.host.peers.neighbourhood import Neighbourhood
 
-    return await Neighbourhood.open(config, folders, workers, catalogue, bus.emit, mind)
+    return await Neighbourhood.open(config, folders, workers, catalogue, bus.emit, mind, children)
 
 
 def _take(neighbours: Neighbourhood | None) -> Take | None:

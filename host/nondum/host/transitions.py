@@ -44,6 +44,11 @@ TRANSITIONS: _Rows = {
         (step, events.PayloadFailed): Transition(Step.QUARANTINED, effects.SuspendPayload)
         for step in (Step.STORED, Step.PROBED)
     },
+    **{
+        (step, events.PayloadSentAway): Transition(Step.REFUSED, effects.ClearPayload)
+        for step in _PRESENT
+        if step is not Step.REFUSED
+    },
     (Step.REFUSED, events.RetryAsked): Transition(Step.REMOVING, effects.ClearPayload),
     (Step.QUARANTINED, events.RetryAsked): Transition(Step.STORED, effects.ProbeComponents),
     **{

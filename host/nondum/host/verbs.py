@@ -26,6 +26,8 @@ PEER_VERBS = (
     "peers_trust",
     "peers_trust_fleet",
     "peers_why",
+    "place",
+    "places",
 )
 """What a host without peers refuses to answer, and why."""
 

@@ -113,6 +113,7 @@ EVENTS: dict[type[Event], Event] = {
         *way_to_active(),
         events.PayloadRefused("k1", (PROBLEM,)),
         events.PayloadFailed("k1", (PROBLEM,)),
+        events.PayloadSentAway("k1", "mule", (PROBLEM,)),
         events.PayloadWithdrawn("k1", "test"),
         events.PayloadCleared("k1"),
         events.RetryAsked("k1"),

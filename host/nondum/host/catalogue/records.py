@@ -193,7 +193,7 @@ class DriveRecord:
 
     id: str
     kind: str
-    """`slot`, `block` or `installed`."""
+    """`slot`, `block`, `installed` or `placed`."""
     root: Path
     node: Path | None = None
     """Block device to mount at `root`, where there is one."""

@@ -58,11 +58,11 @@ class Executor:
     ) -> None:
         options = options or InstallOptions()
         self._workers, self._emit = workers, emit
-        self._children = Children()
+        self.children = Children()
         self._lanes = Lanes()
         self._quiet = Quiet()
-        self._drives = DriveReading(self._children, allow_unsigned=options.allow_unsigned)
-        self.installation = Installation(host, folders, workers, self._children, emit, options)
+        self._drives = DriveReading(self.children, allow_unsigned=options.allow_unsigned)
+        self.installation = Installation(host, folders, workers, self.children, emit, options)
         self._hands: Mapping[type[Effect], _Hand] = {
             effects.ReadDrive: self._drives.read,
             effects.ReleaseDrive: self._drives.release,
@@ -95,7 +95,7 @@ class Executor:
         """Give up what is being done, unmount drives, end children. Workers are their owner's."""
         await self._lanes.close()
         await self._drives.close()
-        await self._children.close()
+        await self.children.close()
 
     async def _carry_out(self, effect: Effect) -> None:
         try:

@@ -50,6 +50,16 @@ class Folders:
         """Key, certificate and trust."""
         return self.root / "peers"
 
+    @property
+    def handover(self) -> Path:
+        """Payloads that other hosts are fetching, as far as they do."""
+        return self.root / "handover"
+
+    @property
+    def placed(self) -> Path:
+        """Payloads that other hosts have handed over: each a folder like a drive."""
+        return self.root / "placed"
+
     def staging(self, payload: str) -> Path:
         """A payload while it is copied and checked."""
         return self.root / "staging" / payload
@@ -122,6 +132,8 @@ def _orphans(folders: Folders, state: HostState) -> Iterator[Path]:
     steps = {key: payload.step for key, payload in state.payloads.items()}
     kept = {
         "staging": frozenset[str](),
+        "handover": frozenset(),
+        "placed": frozenset(),
         "payloads": {key for key, step in steps.items() if step in _KEEPS_FOLDER},
         "venvs": {key for key, step in steps.items() if step in _KEEPS_VENVS},
         "scratch": {

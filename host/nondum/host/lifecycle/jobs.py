@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from nondum.host.drives import reader
+from nondum.host.drives import parcel, reader
 from nondum.host.drives.reader import Arguments, Report
 from nondum.host.lifecycle import compiling, installing
 
@@ -15,6 +15,9 @@ JOBS: Mapping[str, Job] = {
     "look": reader.look,
     "copy": reader.copy,
     "verify": reader.verify,
+    "hand_over": parcel.hand_over,
+    "outline": parcel.outline,
+    "judge": parcel.judge,
     "install": installing.install,
     "compile": compiling.compile_wheels,
     "prune": installing.prune,

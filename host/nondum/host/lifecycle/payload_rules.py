@@ -22,6 +22,7 @@ from nondum.host.events import (
     PayloadFailed,
     PayloadFound,
     PayloadRefused,
+    PayloadSentAway,
     PayloadVerified,
     RetryAsked,
 )
@@ -120,7 +121,7 @@ def _told(payload: PayloadRecord, event: Event) -> PayloadRecord:
     match event:
         case PayloadVerified():
             return replace(payload, components=event.components)
-        case PayloadRefused() | PayloadFailed():
+        case PayloadRefused() | PayloadFailed() | PayloadSentAway():
             return replace(payload, problems=event.problems)
         case PayloadActivated():
             return replace(payload, attempts=0)

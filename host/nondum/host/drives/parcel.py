@@ -1,0 +1,122 @@
+"""A payload on its way to another host or from one, in a child process: files are copied for it to
+fetch, and what it offers is judged as what lies on a drive is."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from collections.abc import Collection
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from nondum.host.drives import mounting, reader
+from nondum.host.drives.reader import Arguments, Report
+from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
+from nondum.wheelhouse import contents, drive, payload, preflight
+from nondum.wheelhouse.contents import Contents, Entry
+
+MAX_METADATA = 16 * 1024 * 1024
+"""Bytes of all files together that a payload is judged by."""
+_MB = 1024 * 1024
+
+
+def hand_over(arguments: Arguments, report: Report) -> dict[str, Any]:
+    """Copy from a drive to `target` what another host is to fetch: the files whose hashes are
+    `wanted`, or, where that is None, all metadata, with the contents list and its signature.
+
+    Raises `PayloadRefused`, `DriveGone`, `InstallFailed` (DISK_FULL, …).
+    """
+    root, target = Path(arguments["root"]), Path(arguments["target"])
+    if arguments["node"] is not None:
+        mounting.mount(Path(arguments["node"]), root, arguments["filesystem"])
+    folder = root / arguments["folder"]
+    data = drive.read_contents(folder)
+    if hashlib.sha256(data).hexdigest() != arguments["digest"]:
+        text = "the contents list is not the one that was read before"
+        raise PayloadRefused(Problem("HASH_MISMATCH", text, where=folder.name))
+    listed = contents.parse(data, f"{folder.name}/{contents.NAME}")
+    wanted = _wanted(listed, arguments["wanted"])
+    _check_room(target, wanted, arguments["reserve_mb"])
+    for entry in wanted:  # what a former attempt left
+        (target / entry.path).unlink(missing_ok=True)
+    drive.copy(folder, listed, target, report, wanted=lambda entry: entry in wanted)
+    if arguments["wanted"] is None:
+        (target / contents.NAME).write_bytes(data)
+        signature = drive.read_signature(folder)
+        if signature is not None:
+            (target / contents.SIGNATURE_NAME).write_bytes(signature)
+    return {"files": [[entry.sha256, entry.path] for entry in wanted], "contents": len(data)}
+
+
+def outline(arguments: Arguments, report: Report) -> list[list[Any]]:
+    """The files that a payload is judged by: path, hash and size of each, from its contents list.
+
+    Raises `PayloadRefused`.
+    """
+    listed = _listed(Path(arguments["folder"]))
+    found = [entry for entry in listed.entries if payload.is_metadata(entry.path)]
+    total = sum(entry.size for entry in found)
+    if total > MAX_METADATA:
+        need, have = f"at most {MAX_METADATA} bytes", f"{total} bytes"
+        text = "there is more to read before it can be judged than another host is sent"
+        raise PayloadRefused(Problem("TOO_LARGE", text, listed.payload_id, need, have))
+    return [_row(entry) for entry in found]
+
+
+def judge(arguments: Arguments, report: Report) -> dict[str, Any]:
+    """Whether a payload, of which the metadata is in `folder`, would run here: its components, and
+    the files that are still `needed`: path, hash and size of each wheel that the store has not.
+
+    Raises `PayloadRefused` with all that keeps it from running here.
+    """
+    folder = Path(arguments["folder"])
+    listed = _listed(folder)
+    staged = payload.load(folder, listed)
+    facts = reader.facts_of(arguments)
+    problems = preflight.preflight(
+        staged.manifest, staged.locks, facts, minimum_nondum=listed.minimum_nondum
+    )
+    if problems:
+        raise PayloadRefused(*problems)
+    known = reader.known_wheels(arguments, staged, facts)
+    missing = {w.path for w in reader.chosen(staged, facts) if w.sha256 not in known}
+    needed = [entry for entry in listed.entries if entry.path in missing]
+    fetched_mb = sum(entry.size for entry in needed) // _MB
+    beside = replace(facts, free_disk_mb=max(0, facts.free_disk_mb - fetched_mb))
+    problems = preflight.preflight(staged.manifest, staged.locks, beside)
+    if problems:
+        raise PayloadRefused(*problems)
+    components = [component.id for component in staged.manifest.components]
+    return {"components": components, "needed": [_row(entry) for entry in needed]}
+
+
+def _listed(folder: Path) -> Contents:
+    return contents.parse(drive.read_contents(folder), f"{folder.name}/{contents.NAME}")
+
+
+def _wanted(listed: Contents, hashes: Collection[str] | None) -> tuple[Entry, ...]:
+    if hashes is None:
+        return tuple(entry for entry in listed.entries if payload.is_metadata(entry.path))
+    return tuple(entry for entry in listed.entries if entry.sha256 in hashes)
+
+
+def _check_room(target: Path, wanted: Collection[Entry], reserve_mb: int) -> None:
+    target.mkdir(parents=True, exist_ok=True)
+    need = sum(entry.size for entry in wanted)
+    have = shutil.disk_usage(target).free - reserve_mb * _MB
+    if need > have:
+        raise InstallFailed(
+            Problem(
+                "DISK_FULL",
+                "there is too little disk to copy it for another host",
+                where=str(target),
+                need=f"{need // _MB + 1} MB",
+                have=f"{max(0, have) // _MB} MB",
+                fix="free some disk, or plug the drive into the other host",
+            )
+        )
+
+
+def _row(entry: Entry) -> list[Any]:
+    return [entry.path, entry.sha256, entry.size]

@@ -1,0 +1,295 @@
+"""Payloads of this host that are to run elsewhere: each is handed to the first peer that takes it,
+and to the next one when that is lost.
+
+One call, `place.take`, is open for as long as the payload runs at the peer.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from nondum.host.catalogue.records import Step
+from nondum.host.catalogue.state import HostState
+from nondum.host.events import (
+    Emit,
+    Event,
+    HostStarted,
+    PayloadPlaced,
+    PayloadSentAway,
+    PlaceLost,
+    PlaceMissing,
+)
+from nondum.host.lifecycle.children import Children
+from nondum.host.lifecycle.folders import Folders
+from nondum.host.peers.placement.decide import (
+    INSTALLING,
+    Candidate,
+    Compute,
+    Parcel,
+    parcels,
+    ranked,
+    sent_away,
+)
+from nondum.host.peers.placement.handover import Described, Handover
+from nondum.host.peers.placement.pins import Pins
+from nondum.host.printable import printable
+from nondum.sdk.errors import NondumError, Problem
+from nondum.sdk.wire import Body
+from nondum.transport.fleet.seam import Fleet
+from nondum.transport.peers import CallFailed, Errand, PeerKey
+
+TAKE_S = 30 * 86400.0
+"""Deadline of the call that lasts as long as the payload is there; then it is made anew."""
+AGAIN_S = 30.0
+"""After so long, a peer that did not take a payload is asked again: memory and disk get free."""
+STEPS = ("waiting", "checking", "fetching", "installing", "active")
+
+
+@dataclass(frozen=True, slots=True)
+class Declined:
+    """Why a peer did not take a payload."""
+
+    epoch: int
+    """Of the peer: another life may think otherwise."""
+    problems: tuple[Problem, ...]
+    at_s: float
+    is_final: bool
+    """Whether it has tried: it would not work the next time either."""
+
+
+@dataclass(slots=True, eq=False)
+class Case:
+    """What has become of one parcel."""
+
+    parcel: Parcel
+    handover: Handover
+    candidate: Candidate | None = None
+    """The peer that is asked, or has it."""
+    step: str = ""
+    """One of `STEPS`, as the peer tells; empty: no peer has it."""
+    done: int = 0
+    total: int = 0
+    declined: dict[str, Declined] = field(default_factory=dict)
+    """By host."""
+    told: tuple[Problem, ...] = ()
+    """What people were told last of nobody's taking it."""
+    task: asyncio.Task[None] | None = None
+
+    @property
+    def host(self) -> str:
+        """The peer that is asked, or has it."""
+        return self.candidate.host if self.candidate else ""
+
+
+class Placing:
+    """Finds places. `await close()` it."""
+
+    def __init__(
+        self,
+        fleet: Callable[[], Fleet],
+        state: Callable[[], HostState],
+        folders: Folders,
+        children: Children,
+        emit: Emit,
+        pins: Pins,
+        *,
+        here: Compute,
+        reserve_mb: int,
+        is_open: bool,
+    ) -> None:
+        """`here` is what this host has to compute with. `is_open`: whether anything is placed."""
+        self._fleet, self._state, self._folders = fleet, state, folders
+        self._children, self._emit, self._pins = children, emit, pins
+        self._here, self._reserve_mb, self._is_open = here, reserve_mb, is_open
+        self._cases: dict[str, Case] = {}
+        self._news = asyncio.Event()
+        self._is_started = False
+
+    def __iter__(self) -> Iterator[Case]:
+        """All that is to run elsewhere."""
+        return iter(tuple(self._cases.values()))
+
+    def on_event(self, event: Event) -> None:
+        """Take in what happens here, peers included."""
+        self._is_started |= isinstance(event, HostStarted)
+        if event.JOURNALLED and self._is_started:
+            self.look()
+
+    def look(self) -> None:
+        """Compare what is to run elsewhere with what is being done about it."""
+        wanted = parcels(self._state(), self._pins.hosts) if self._is_open else {}
+        for key, case in tuple(self._cases.items()):
+            parcel = wanted.get(key)
+            if parcel is None or parcel.pinned_to != case.parcel.pinned_to:
+                self._drop(case)
+            else:
+                case.parcel = parcel
+        for key, parcel in wanted.items():
+            if key not in self._cases:
+                self._begin(parcel)
+            if parcel.pinned_to and parcel.step in INSTALLING:
+                self._send_away(parcel, parcel.pinned_to)
+        self._tell()
+
+    # What peers ask of it
+
+    async def want(self, errand: Errand) -> Body:
+        """Have files ready for the peer that takes a payload. Raises `CallFailed` (NOT_OFFERED)
+        and what reading the drive does."""
+        match errand.args:
+            case {"digest": str(digest), "wanted": list(wanted)} if all(
+                isinstance(sha256, str) for sha256 in wanted
+            ):
+                await self._case_of(errand, digest).handover.want(wanted)
+                return {}
+        raise CallFailed(_malformed("digest and wanted"))
+
+    async def read(self, errand: Errand) -> Body:
+        """A piece of a file: `data`. Raises `CallFailed` (NOT_OFFERED)."""
+        match errand.args:
+            case {"digest": str(digest), "sha256": str(sha256), "offset": int(offset)} if (
+                0 <= offset < 2**53
+            ):
+                case = self._case_of(errand, digest)
+                return {"data": await case.handover.read(sha256, offset)}
+        raise CallFailed(_malformed("digest, sha256 and offset"))
+
+    async def close(self) -> None:
+        """Give up everything."""
+        tasks = [case.task for case in self if case.task is not None]
+        self._cases.clear()
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    def _case_of(self, errand: Errand, digest: str) -> Case:
+        for case in self:
+            candidate = case.candidate
+            if (
+                case.parcel.digest == digest
+                and candidate is not None
+                and candidate.key == errand.caller.key
+            ):
+                return case
+        told = "no such payload is handed over to this host"
+        raise CallFailed(Problem("NOT_OFFERED", told))
+
+    # One payload
+
+    def _begin(self, parcel: Parcel) -> None:
+        handover = Handover(parcel, self._folders, self._children, reserve_mb=self._reserve_mb)
+        case = self._cases[parcel.key] = Case(parcel, handover)
+        case.task = asyncio.create_task(self._see_to(case))
+
+    def _drop(self, case: Case) -> None:
+        del self._cases[case.parcel.key]
+        if case.task is not None:
+            case.task.cancel()
+
+    async def _see_to(self, case: Case) -> None:
+        """Ask one peer after the other, for as long as the payload is to run elsewhere."""
+        try:
+            while True:
+                candidate = self._next(case)
+                if candidate is None:
+                    self._tell_missing(case)
+                    await self._changed()
+                else:
+                    await self._place(case, candidate)
+        finally:
+            await case.handover.close()
+
+    def _next(self, case: Case) -> Candidate | None:
+        """The best peer that has not said no."""
+        now_s = asyncio.get_running_loop().time()
+        for candidate in ranked(self._candidates(), case.parcel, self._here):
+            declined = case.declined.get(candidate.host)
+            if (
+                declined is None
+                or declined.epoch != candidate.epoch
+                or not (declined.is_final or now_s - declined.at_s < AGAIN_S)
+            ):
+                return candidate
+        return None
+
+    def _candidates(self) -> Iterator[Candidate]:
+        for key, peer in self._fleet().peers.items():
+            yield Candidate(PeerKey(key), peer.name, peer.epoch, peer.entries.get("compute", {}))
+
+    async def _place(self, case: Case, candidate: Candidate) -> None:
+        """Have a peer run it, until that ends; then the peer has declined."""
+        case.candidate, case.step, case.done, case.total = candidate, STEPS[0], 0, 0
+        problems: tuple[Problem, ...] = (Problem("PLACE_ENDED", "it ended without a word"),)
+        try:
+            described = await case.handover.open()
+            await self._run(case, candidate, described)
+        except NondumError as error:
+            problems = error.problems
+        finally:
+            step, case.step, case.candidate = case.step, "", None
+            if step == "active":
+                reason = "; ".join(printable(str(problem)) for problem in problems)
+                self._emit(PlaceLost(case.parcel.key, candidate.host, reason))
+        now_s = asyncio.get_running_loop().time()
+        is_final = step in ("installing", "active")
+        case.declined[candidate.host] = Declined(candidate.epoch, problems, now_s, is_final)
+
+    async def _run(self, case: Case, candidate: Candidate, described: Described) -> None:
+        args = {
+            "digest": case.parcel.digest,
+            "payload": case.parcel.payload_id,
+            "contents": described.contents,
+            "signature": described.signature,
+            "why": case.parcel.why,
+        }
+        call = self._fleet().call(candidate.key, "place.take", args, deadline_s=TAKE_S)
+        try:
+            async for news in call:
+                await self._on_news(case, news)
+            await call
+        finally:
+            call.cancel()
+
+    async def _on_news(self, case: Case, news: Mapping[str, Any]) -> None:
+        before = case.step
+        match news:
+            case {"step": str(step), "done": int(done), "total": int(total)} if step in STEPS:
+                case.step, case.done, case.total = step, done, total
+        if case.step == "active" != before:
+            await case.handover.drop_wheels()
+            parcel = case.parcel
+            if parcel.step is not Step.REFUSED:
+                self._send_away(parcel, case.host)
+            self._emit(PayloadPlaced(parcel.key, case.host, parcel.why))
+
+    def _send_away(self, parcel: Parcel, host: str) -> None:
+        self._emit(PayloadSentAway(parcel.key, host, (sent_away(parcel, host),)))
+
+    def _tell_missing(self, case: Case) -> None:
+        """Say once that nobody takes it, and why."""
+        problems = tuple(
+            replace(problem, where=host)
+            for host, declined in sorted(case.declined.items())
+            for problem in declined.problems
+        )
+        if problems and problems != case.told:
+            case.told = problems
+            self._emit(PlaceMissing(case.parcel.key, problems))
+
+    async def _changed(self) -> None:
+        """Wait until somebody may take it who did not before."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(AGAIN_S):
+                await self._news.wait()
+
+    def _tell(self) -> None:
+        self._news.set()
+        self._news = asyncio.Event()
+
+
+def _malformed(need: str) -> Problem:
+    return Problem("CALL_MALFORMED", "a call's arguments are not what it takes", need=need)

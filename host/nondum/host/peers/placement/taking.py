@@ -1,0 +1,303 @@
+"""Payloads that peers hand over to this host: judged here, fetched, and inserted like a drive.
+
+A call lasts as long as its payload is here: whatever ends it, its caller's loss included, pulls the
+drive that stands for it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import re
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NoReturn
+
+from nondum.host.catalogue.catalogue import now
+from nondum.host.catalogue.records import Step
+from nondum.host.catalogue.state import HostState
+from nondum.host.events import (
+    DriveInserted,
+    DriveRemoved,
+    Emit,
+    Event,
+    HostStarted,
+    PayloadFound,
+    PayloadTaken,
+)
+from nondum.host.lifecycle import admission
+from nondum.host.lifecycle.children import Children
+from nondum.host.lifecycle.folders import Folders, remove
+from nondum.host.lifecycle.lanes import in_thread
+from nondum.host.peers.placement.decide import PLACED
+from nondum.host.peers.placement.fetching import Fetching, Listed
+from nondum.host.printable import printable
+from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
+from nondum.sdk.wire import Body
+from nondum.transport.fleet.seam import Fleet
+from nondum.transport.peers import Call, CallFailed, Errand
+from nondum.wheelhouse import contents, names
+from nondum.wheelhouse.signatures import MAX_SIGNATURE_BYTES
+
+AT_ONCE = 2
+"""Payloads that are fetched at the same time; others wait."""
+MOST = 64
+"""Payloads of others that are taken."""
+READ_S = 20.0
+"""What a peer has to answer with a piece of a file."""
+COPY_S = 3600.0
+"""What a peer has to copy files from a drive."""
+SIGN_S = 1.0
+"""Time between two reports: one may be lost on the way."""
+PROGRESS_S = 0.2
+"""Time between two reports of what was fetched."""
+
+_DIGEST = re.compile(r"[0-9a-f]{64}")
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """A payload that a peer wants to run here."""
+
+    digest: str
+    payload_id: str
+    contents: int
+    signature: bytes | None
+    why: str
+
+    @classmethod
+    def parse(cls, args: Mapping[str, Any]) -> Offer:
+        """Read the arguments of `place.take`. Raises `CallFailed` (CALL_MALFORMED)."""
+        match args:
+            case {
+                "digest": str(digest),
+                "payload": str(payload_id),
+                "contents": int(size),
+                "signature": bytes() | None as signature,
+                "why": str(why),
+            } if (
+                _DIGEST.fullmatch(digest)
+                and names.PAYLOAD_ID.fullmatch(payload_id)
+                and 0 < size <= contents.MAX_BYTES
+                and len(signature or b"") <= MAX_SIGNATURE_BYTES
+            ):
+                return cls(digest, payload_id, size, signature, printable(why[:500]))
+        told = "a call's arguments are not what it takes"
+        need = "digest, payload, contents, signature and why"
+        raise CallFailed(Problem("CALL_MALFORMED", told, need=need))
+
+
+@dataclass(slots=True, eq=False)
+class Guest:
+    """A payload of a peer."""
+
+    offer: Offer
+    errand: Errand
+    drive: str
+    """Name of the drive that stands for it."""
+    root: Path
+    step: str = "waiting"
+    """`waiting`, `checking`, `fetching`, `installing` or `active`."""
+    done: int = 0
+    total: int = 0
+    version: str = ""
+    news: asyncio.Event = field(default_factory=asyncio.Event)
+    _told_s: float = 0.0
+
+    @property
+    def key(self) -> str:
+        """Of the payload on this host."""
+        return self.offer.digest[:16]
+
+    @property
+    def folder(self) -> Path:
+        """Where the payload lies."""
+        return self.root / "nondum" / self.offer.payload_id
+
+    def tell(self, step: str) -> None:
+        """Report how far it is."""
+        self.step = step
+        self._told_s = time.monotonic()
+        self.errand.progress({"step": step, "done": self.done, "total": self.total})
+
+    def add(self, count: int) -> None:
+        """More bytes are here."""
+        self.done += count
+        if self.done >= self.total or time.monotonic() - self._told_s >= PROGRESS_S:
+            self.tell("fetching")
+
+
+class Taking:
+    """Takes what fits this host and its rules."""
+
+    def __init__(
+        self,
+        fleet: Callable[[], Fleet],
+        state: Callable[[], HostState],
+        folders: Folders,
+        children: Children,
+        emit: Emit,
+        *,
+        rules: Mapping[str, Any],
+        is_open: bool,
+    ) -> None:
+        """`rules` are what the children go by: where the store is, whether payloads may be
+        unsigned, what is left free. `is_open`: whether any payload of others is taken."""
+        self._fleet, self._state, self._folders = fleet, state, folders
+        self._children, self._emit = children, emit
+        self._rules, self._is_open = rules, is_open
+        self._turns = asyncio.Semaphore(AT_ONCE)
+        self._numbers = itertools.count(1)
+        self._guests: dict[str, Guest] = {}
+        self._started = asyncio.Event()
+
+    def __iter__(self) -> Iterator[Guest]:
+        """All that is here, or on its way here, from peers."""
+        return iter(tuple(self._guests.values()))
+
+    def on_event(self, event: Event) -> None:
+        """Take in what happens here."""
+        if isinstance(event, HostStarted):
+            self._started.set()
+        if event.JOURNALLED:
+            for guest in self:
+                guest.news.set()
+
+    async def take(self, errand: Errand) -> Body:
+        """Run a peer's payload here until the peer ends the call. Progress has `step`, `done` and
+        `total`. Raises `CallFailed` and `PayloadRefused` with what keeps it from running here."""
+        offer = Offer.parse(errand.args)
+        self._check_open()
+        guest = self._guest(offer, errand)
+        self._guests[guest.drive] = guest
+        is_inserted = False
+        try:
+            await self._started.wait()
+            async with self._turns:
+                await self._fetch(guest)
+            is_inserted = True
+            self._emit(DriveInserted(guest.drive, guest.root, PLACED))
+            await self._follow(guest)
+        finally:
+            del self._guests[guest.drive]
+            if is_inserted:
+                self._emit(DriveRemoved(guest.drive))
+            await in_thread(remove, guest.root)
+
+    def _check_open(self) -> None:
+        if not self._is_open:
+            told, fix = "this host takes no payloads of others", "set `place = true` under [peers]"
+            raise CallFailed(Problem("PLACE_CLOSED", told, fix=fix))
+        if len(self._guests) >= MOST:
+            told = f"this host has {MOST} payloads of others already"
+            raise CallFailed(Problem("PLACE_FULL", told))
+
+    def _guest(self, offer: Offer, errand: Errand) -> Guest:
+        number = next(self._numbers)
+        drive = f"{PLACED}/{errand.caller.name}/{number}"
+        return Guest(offer, errand, drive, self._folders.placed / str(number))
+
+    # Fetching
+
+    async def _fetch(self, guest: Guest) -> None:
+        """Have here what this host needs of a payload. Raises all that it is refused for."""
+        fetching = Fetching(guest.folder, lambda sha256, at: self._read(guest, sha256, at))
+        guest.tell("checking")
+        try:
+            await self._fetch_contents(guest, fetching)
+            for row in await self._children.run("outline", {"folder": str(guest.folder)}):
+                await fetching.fetch(Listed(*row))
+            arguments = {**self._rules, "folder": str(guest.folder)}
+            judged = await self._children.run("judge", arguments)
+            self._check_components(guest, tuple(judged["components"]))
+            await self._fetch_wheels(guest, fetching, [Listed(*row) for row in judged["needed"]])
+        except OSError as error:
+            told = f"what is fetched cannot be written: {error.strerror}"
+            raise InstallFailed(Problem("IO_ERROR", told, where=guest.offer.payload_id)) from error
+
+    async def _fetch_contents(self, guest: Guest, fetching: Fetching) -> None:
+        """The contents list, and whether this host's own rules let it in."""
+        offer = guest.offer
+        await fetching.fetch(Listed(contents.NAME, offer.digest, offer.contents))
+        if offer.signature is not None:
+            signature = guest.folder / contents.SIGNATURE_NAME
+            await in_thread(signature.write_bytes, offer.signature)
+        arguments = {"kind": PLACED, "root": str(guest.root), "node": None, **self._rules}
+        (said,) = (await self._children.run("look", arguments))["payloads"]
+        found = PayloadFound(
+            said["payload"],
+            guest.drive,
+            guest.folder,
+            said["digest"],
+            said["payload_id"],
+            said["version"],
+            said["release"],
+            said["fleet"],
+        )
+        problems = [Problem(**problem) for problem in said["problems"]]
+        problems += admission.release_problems(self._state(), found, now())
+        if found.payload_id != offer.payload_id:
+            told = f"the contents list is {found.payload_id}'s"
+            problems.append(Problem("CALL_MALFORMED", told, need=offer.payload_id))
+        if problems:
+            raise PayloadRefused(*problems)
+        guest.version = found.version
+
+    def _check_components(self, guest: Guest, components: tuple[str, ...]) -> None:
+        rivals = admission.rivals(self._state(), guest.key, components)
+        problems = [admission.taken(rival, components) for rival in rivals]
+        if problems:
+            raise PayloadRefused(*problems)
+
+    async def _fetch_wheels(self, guest: Guest, fetching: Fetching, needed: list[Listed]) -> None:
+        if not needed:
+            return
+        guest.total = sum(listed.size for listed in needed)
+        guest.tell("fetching")
+        wanted = {"digest": guest.offer.digest, "wanted": [listed.sha256 for listed in needed]}
+        await self._call(guest, "place.want", wanted, COPY_S)
+        fetching.on_bytes = guest.add
+        for listed in needed:
+            await fetching.fetch(listed)
+
+    def _read(self, guest: Guest, sha256: str, offset: int) -> Call:
+        args = {"digest": guest.offer.digest, "sha256": sha256, "offset": offset}
+        return self._call(guest, "place.read", args, READ_S)
+
+    def _call(self, guest: Guest, method: str, args: Body, deadline_s: float) -> Call:
+        return self._fleet().call(guest.errand.caller.key, method, args, deadline_s=deadline_s)
+
+    # Once it is here
+
+    async def _follow(self, guest: Guest) -> NoReturn:
+        """Report how it is, until it is no more. Raises `PayloadRefused` with why it is not."""
+        was_here = False
+        while True:
+            guest.news.clear()
+            state = self._state()
+            drive, payload = state.drives.get(guest.drive), state.payloads.get(guest.key)
+            if drive is not None and drive.problems:
+                raise PayloadRefused(*drive.problems)
+            if payload is not None and guest.drive in payload.sources:
+                was_here = True
+                if payload.step in (Step.REFUSED, Step.QUARANTINED):
+                    raise PayloadRefused(*payload.problems)
+                if payload.step is Step.ACTIVE and guest.step != "active":
+                    await in_thread(remove, guest.folder / "wheels")  # the store has them now
+                    self._emit(PayloadTaken(guest.key, guest.errand.caller.name, guest.offer.why))
+                guest.tell("active" if payload.step is Step.ACTIVE else "installing")
+            elif was_here:
+                told = "it was withdrawn there"
+                raise PayloadRefused(Problem("PLACE_ENDED", told, where=guest.offer.payload_id))
+            await _either(guest.news, SIGN_S)
+
+
+async def _either(news: asyncio.Event, most_s: float) -> None:
+    """Wait for news, but not for ever."""
+    try:
+        async with asyncio.timeout(most_s):
+            await news.wait()
+    except TimeoutError:
+        return
