@@ -5,38 +5,18 @@ from __future__ import annotations
 import json
 import subprocess
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from tests.host.cli.daemon import command, nondum
-from tests.lab.neighbours import free_port, until_peer
+from tests.lab.neighbours import looking, until_peer
 from tests.lab.running_host import RunningHost
 
 from nondum.transport.peers import fingerprint
 from nondum.transport.peers.keys import load_or_create
 
 pytestmark = pytest.mark.lab
-
-
-@contextmanager
-def strangers(work: Path) -> Iterator[tuple[RunningHost, RunningHost]]:
-    """Hosts with keys, that know where the other one is and nothing else of it."""
-    first, second = free_port(), free_port()
-    with ExitStack() as stack:
-        hosts = []
-        for name, own, other in (("rover", first, second), ("base", second, first)):
-            (work / name).mkdir()
-            peers = (
-                f'[peers]\nenabled = true\ndiscover = false\nlisten = ["tcp://127.0.0.1:{own}"]\n'
-                f'static = ["127.0.0.1:{other}"]\n'
-            )
-            host = RunningHost(work / name, name=name, more=peers)
-            stack.callback(host.stop)
-            host.start()
-            hosts.append(host)
-        rover, base = hosts
-        yield rover, base
 
 
 @contextmanager
@@ -64,7 +44,7 @@ def key_of(host: RunningHost) -> str:
 
 
 def test_hosts_are_paired_used_and_revoked(tmp_path: Path) -> None:
-    with strangers(tmp_path) as (rover, base):
+    with looking(tmp_path, "rover", "base") as (rover, base):
         with window(rover) as here, window(base) as there:
             code = code_in(here)
             assert code_in(there) == code
@@ -86,7 +66,7 @@ def test_hosts_are_paired_used_and_revoked(tmp_path: Path) -> None:
 def test_fleet_lets_its_hosts_in(tmp_path: Path) -> None:
     fleet = tmp_path / "survey"
     nondum("keys", "fleet", "new", fleet).ok()
-    with strangers(tmp_path) as hosts:
+    with looking(tmp_path, "rover", "base") as hosts:
         for host in hosts:
             public, certificate = host.work / "key.pub", host.work / "certificate"
             nondum("--control", host.control, "peers", "key", "-o", public).ok()
@@ -94,9 +74,6 @@ def test_fleet_lets_its_hosts_in(tmp_path: Path) -> None:
             peers = ("--control", host.control, "peers")
             nondum(*peers, "trust-fleet", fleet / "fleet.pub").ok()
             nondum(*peers, "certify", certificate).ok()
-        for host in hosts:
-            host.stop()
-            host.start()
         rover, base = hosts
         until_peer(rover, "base")
         until_peer(base, "rover")
