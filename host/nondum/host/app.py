@@ -105,7 +105,8 @@ async def _run(
     bus.subscribe(news.on_event)
     listing = executor.installation.listing
     warnings = (*_warnings(config, catalogue), *(neighbours.warnings if neighbours else ()))
-    questions = Questions(catalogue, mind, workers, news, listing, warnings)
+    places = neighbours.placement.places if neighbours else dict
+    questions = Questions(catalogue, mind, workers, news, listing, warnings, places)
     orders = Orders(catalogue, mind, workers, news, bus, config.planning.translate_s)
     control = ControlServer(
         config.host.control,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from typing import cast
 
@@ -48,16 +48,21 @@ class Questions:
     """Lists the store: `wheel`, `bytes`, `used_by` (payload keys), `sha256`."""
     warnings: tuple[str, ...]
     """What every status says of this host."""
+    places: Callable[[], Mapping[str, str]] = dict
+    """Payload key → the peer that runs it, for those that run elsewhere."""
 
     async def status(self, arguments: Arguments) -> Row:
         """The host, its payloads and its goals at a glance."""
-        snapshot = self.catalogue.snapshot()
+        snapshot, places = self.catalogue.snapshot(), self.places()
         return {
             "host": snapshot.host,
             "revision": snapshot.revision,
-            "state": host_state(snapshot),
+            "state": host_state(snapshot, places),
             "warnings": [*self.warnings, *map(_kept_out, self.mind.views.kept_out())],
-            "payloads": [payload_row(p, self.news.progress(p.key)) for p in snapshot.payloads],
+            "payloads": [
+                payload_row(p, self.news.progress(p.key), places.get(p.key, ""))
+                for p in snapshot.payloads
+            ],
             "drives": [drive_row(drive) for drive in snapshot.drives],
             "goals": self.mind.views.given(),
             "told": self.mind.views.told(self.mind.people.last_number - TOLD),
@@ -116,7 +121,7 @@ class Questions:
     async def why(self, arguments: Arguments) -> Row:
         """Why the robot does what it does, or cannot; refused payloads and drives included."""
         view = self.mind.views.why()
-        told = [str(problem) for problem in problems_of(self.catalogue.snapshot())]
+        told = [str(problem) for problem in problems_of(self.catalogue.snapshot(), self.places())]
         return {**view, "problems": list(dict.fromkeys([*view["problems"], *told]))}
 
     async def composition(self, arguments: Arguments) -> Row:

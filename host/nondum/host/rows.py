@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any, TypeAlias
 
 from nondum.host.catalogue.records import (
@@ -26,25 +26,31 @@ Row: TypeAlias = dict[str, Any]
 _AT_REST = frozenset({Step.GONE, Step.ACTIVE, Step.REFUSED, Step.QUARANTINED})
 
 
-def host_state(snapshot: Snapshot) -> str:
-    """The host in a word or three: `working`, `ready`, or `ready, with problems`."""
+def host_state(snapshot: Snapshot, places: Mapping[str, str]) -> str:
+    """The host in a word or three: `working`, `ready`, or `ready, with problems`.
+
+    Payloads that have a place on a peer are none.
+    """
     if any(payload.step not in _AT_REST for payload in snapshot.payloads):
         return "working"
-    return "ready, with problems" if any(problems_of(snapshot)) else "ready"
+    return "ready, with problems" if any(problems_of(snapshot, places)) else "ready"
 
 
-def problems_of(snapshot: Snapshot) -> Iterator[Problem]:
-    """All that is wrong with payloads, components and drives."""
+def problems_of(snapshot: Snapshot, places: Collection[str] = ()) -> Iterator[Problem]:
+    """All that is wrong with payloads, components and drives; not what keeps those from this host
+    that have `places` on others."""
     for payload in snapshot.payloads:
-        yield from payload.problems
+        if payload.key not in places:
+            yield from payload.problems
     for component in snapshot.components:
         yield from component.problems
     for drive in snapshot.drives:
         yield from drive.problems
 
 
-def payload_row(payload: PayloadRecord, progress: Progress | None) -> Row:
-    """A payload: how far it has come, where it is, and what is wrong with it."""
+def payload_row(payload: PayloadRecord, progress: Progress | None, place: str = "") -> Row:
+    """A payload: how far it has come, where it is, what is wrong with it, and the peer that it runs
+    on, if it does."""
     return {
         "payload": payload.payload_id,
         "key": payload.key,
@@ -52,6 +58,7 @@ def payload_row(payload: PayloadRecord, progress: Progress | None) -> Row:
         "release": payload.release,
         "state": payload.step.value,
         "progress": progress.to_dict() if progress else None,
+        "place": place,
         "drive": ", ".join(payload.drives),
         "components": list(payload.components),
         "problems": [str(problem) for problem in payload.problems],

@@ -36,6 +36,7 @@ Commands:
   completion  Print the script that completes commands in a shell.
   components  What the robot is made of at this moment.
   devices     What is plugged in, and who has it.
+  doctor      Look for what is wrong around this host, without a daemon.
   facts       What the robot believes, and why.
   goal        Give the robot a goal, in words or in PDDL.
   goals       What can be asked for now, and what was.
@@ -48,6 +49,7 @@ Commands:
   payload     Make, judge and install payloads.
   pddl        Check, merge and plan PDDL files, without a host.
   peers       Other hosts: who is here, and whom this host trusts.
+  place       Payloads that run on another host, and where one is to run.
   plan        The plan that is being carried out.
   retry       Try again what was refused or quarantined.
   status      The host, its payloads and its goals at a glance.

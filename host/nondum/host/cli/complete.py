@@ -30,6 +30,7 @@ def names(verb: str, key: str, about: str = "") -> Completer:
 
 components = names("components", "component", "state")
 units = names("units", "unit", "type")
+peers = names("peers", "peer", "state")
 streams = names("streams", "stream", "type")
 
 
@@ -66,6 +67,13 @@ def troubled(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[Co
     """Completes payloads that may be tried again."""
     payloads = _rows((_asked(ctx, "status") or {}).get("payloads"))
     pairs = [(row["payload"], row["state"]) for row in payloads if row["problems"]]
+    return list(_items(pairs, incomplete))
+
+
+def movable(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Completes payloads that may run on other hosts."""
+    payloads = _rows((_asked(ctx, "status") or {}).get("payloads"))
+    pairs = [(p["payload"], p["state"]) for p in payloads if "installed/" not in p["drive"]]
     return list(_items(pairs, incomplete))
 
 

@@ -59,11 +59,22 @@ def show(view: dict[str, Any]) -> None:
 
 
 def _show_payloads(payloads: list[dict[str, Any]]) -> None:
-    rows = [{**row, "progress": render.progress(row["progress"])} for row in payloads]
+    rows = [
+        {
+            **row,
+            "state": "placed" if row["place"] else row["state"],
+            "on": row["place"],
+            "progress": render.progress(row["progress"]),
+        }
+        for row in payloads
+    ]
     columns = ["payload", "version", "state", "drive", "components"]
+    if any(row["on"] for row in rows):
+        columns.insert(3, "on")
     if any(row["progress"] for row in rows):
         columns.append("progress")
     table(rows, columns, empty="no payloads")
     for row in rows:
         for problem in row["problems"]:
-            render.sentence(problem, colour="red", mark=f"{row['payload']}: ")
+            colour = None if row["place"] else "red"
+            render.sentence(problem, colour=colour, mark=f"{row['payload']}: ")
