@@ -7,7 +7,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -69,29 +69,44 @@ class FollowMe:
     def lose(self, drive: Path, *, name: str) -> StageResult:
         """Pull a drive while the body turns: all that needed it ends at once, the body stands, and
         the host says what would help."""
-        steps = self.robot.view["plan"]["steps"]
         lost = _components(self.robot.view, drive)
+        return self.bereave(lambda: self.robot.pull(drive.name), lost, name=name, since="the pull")
+
+    def bereave(
+        self,
+        take: Callable[[], object],
+        lost: Collection[str],
+        *,
+        name: str,
+        since: str,
+        brake_s: float = BRAKE_S,
+    ) -> StageResult:
+        """Take components away while the body turns, and see that all goes down that needed them.
+
+        `since` says in words what `take` does; the body may take `brake_s` from then to stand.
+        """
+        steps = self.robot.view["plan"]["steps"]
         self._turning()
         stage = self._stage(name)
         stage.plan = tuple(step["action"] for step in steps)
-        self.robot.pull(drive.name)
+        take()
         goal = self.robot.until(f"{name}: the goal suspended", _suspended, timeout_s=PLAN_S)
         stage.phase("told")
-        begin_s = stage.begun_s + BRAKE_S
+        begin_s = stage.begun_s + brake_s
         self._until_heard(begin_s + STAND_S)
         fall = Fall.of(stage.journal())
         stage.phase("halted", fall.decided_s)
-        others = {step["component"] for step in steps} - lost
+        others = {step["component"] for step in steps} - {*lost}
         stage.faults += fall.faults(stage.plan, sorted(others))
         moved = motion(self.body.headings, self.body.places, begin_s, begin_s + STAND_S)
         if moved is None or not moved.is_standing:
             stage.faults.append("the body does not stand")
         said = [s for s in stage.told() if goal["reason"] in s and any(id in s for id in lost)]
         if not said:
-            stage.faults.append(f"nobody was told that {', '.join(lost)} is missing")
+            stage.faults.append(f"nobody was told that {', '.join(sorted(lost))} is missing")
         measure = (
             f"{len(stage.plan)} behaviours down in one tick, {_ms(stage.phases_s['halted'])} after "
-            f"the pull, and ended {_ms(fall.took_s)} later; then {moved} in {STAND_S:.0f} s; "
+            f"{since}, and ended {_ms(fall.took_s)} later; then {moved} in {STAND_S:.0f} s; "
             f"“{said[0] if said else ''}”"
         )
         return stage.result(reached=bool(fall.ticks), measure=measure)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -31,6 +31,8 @@ class Robot:
         self.slots = work / "slots"
         self.devices = work / "device-slots"
         self.control = work / "control.sock"
+        self.process: subprocess.Popen[bytes] | None = None
+        """The daemon, where `running` has started it."""
         self._view: View = {}
         self._changed = threading.Condition()
         self._watching = True
@@ -116,17 +118,27 @@ def nondum(*arguments: str | Path) -> str:
 
 
 @contextmanager
-def running(work: Path, *, name: str, initial: Mapping[str, Path]) -> Iterator[Robot]:
-    """A host with initial components, started and at last stopped."""
+def running(
+    work: Path,
+    *,
+    name: str,
+    initial: Mapping[str, Path],
+    more: str = "",
+    inside: Sequence[str] = (),
+) -> Iterator[Robot]:
+    """A host with initial components, started and at last stopped.
+
+    `more` are further lines of its configuration; `inside` is what runs commands on its machine,
+    if that is not this one.
+    """
     robot = Robot(work, name=name)
     for folder in (robot.slots, robot.devices):
         folder.mkdir(parents=True)
     config = work / "host.toml"
-    config.write_text(configuration(robot), encoding="utf-8")
+    config.write_text(configuration(robot) + more, encoding="utf-8")
+    command = [*inside, *NONDUM, "host", "run", "--user", "--config", str(config)]
     with (work / "daemon.log").open("wb") as log:
-        daemon = subprocess.Popen(
-            [*NONDUM, "host", "run", "--user", "--config", str(config)], stdout=log, stderr=log
-        )
+        daemon = robot.process = subprocess.Popen(command, stdout=log, stderr=log)
         try:
             _await_socket(robot, daemon)
             for drive in initial.values():

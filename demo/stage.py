@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from demo.robot import Robot, TooLate, View
@@ -11,6 +11,27 @@ from demo.table import StageResult
 
 INSTALL_S = 60.0
 PLAN_S = 20.0
+
+
+class Mark:
+    """A moment of a host: what it has told and done since."""
+
+    def __init__(self, robot: Robot) -> None:
+        """Now."""
+        self._robot = robot
+        self._told_before = robot.told_number()
+        self._journalled_before = max((row["id"] for row in self._newest(limit=1)), default=0)
+
+    def told(self) -> tuple[str, ...]:
+        """What the host has told, oldest first."""
+        return self._robot.told_since(self._told_before)
+
+    def journal(self) -> list[View]:
+        """What has happened, oldest first."""
+        return [row for row in self._newest(limit=1000) if row["id"] > self._journalled_before]
+
+    def _newest(self, *, limit: int) -> list[View]:
+        return list(self._robot.ask("journal", limit=limit))
 
 
 @dataclass
@@ -26,12 +47,10 @@ class Stage:
     plan: tuple[str, ...] = ()
     faults: list[str] = field(default_factory=list)
     """What was seen that must not be: the stage is not reached then, whatever is measured."""
-    _told_before: int = field(init=False)
-    _journalled_before: int = field(init=False)
+    _mark: Mark = field(init=False)
 
     def __post_init__(self) -> None:
-        self._told_before = self.robot.told_number()
-        self._journalled_before = max((row["id"] for row in self._newest(limit=1)), default=0)
+        self._mark = Mark(self.robot)
 
     def phase(self, name: str, at_s: float | None = None) -> None:
         """A phase is complete."""
@@ -39,18 +58,9 @@ class Stage:
 
     def installed(self, payloads: Sequence[str]) -> None:
         """Wait until all payloads are active, and take their phases over from the host."""
-
-        def active(view: View) -> Mapping[str, View] | None:
-            found = {p["payload"]: p for p in view["payloads"] if p["payload"] in payloads}
-            refused = [line for p in found.values() for line in p["problems"]]
-            if refused:
-                raise TooLate("\n".join(refused))
-            is_all = len(found) == len(payloads)
-            return found if is_all and all(p["state"] == "active" for p in found.values()) else None
-
-        found = self.robot.until(f"{self.name}: payloads active", active, timeout_s=INSTALL_S)
+        found = until_active(self.robot, payloads, what=self.name)
         for phase in ("seen", "verified", "installed", "ready"):
-            self.phase(phase, max(p["phases"][phase] for p in found.values()))
+            self.phase(phase, max(p["phases"][phase] for p in found))
 
     def planned(self) -> None:
         """Wait until there is a plan."""
@@ -63,11 +73,11 @@ class Stage:
 
     def told(self) -> tuple[str, ...]:
         """What the host has told since the stage began."""
-        return self.robot.told_since(self._told_before)
+        return self._mark.told()
 
     def journal(self) -> list[View]:
         """What has happened since the stage began, oldest first."""
-        return [row for row in self._newest(limit=1000) if row["id"] > self._journalled_before]
+        return self._mark.journal()
 
     def result(self, *, reached: bool, measure: str) -> StageResult:
         """What the table shows."""
@@ -82,8 +92,21 @@ class Stage:
             told=self.told(),
         )
 
-    def _newest(self, *, limit: int) -> list[View]:
-        return list(self.robot.ask("journal", limit=limit))
+
+def until_active(robot: Robot, payloads: Sequence[str], *, what: str) -> Sequence[View]:
+    """Wait until all payloads are active, and give their rows. Raises `TooLate`, also when one is
+    refused."""
+
+    def active(view: View) -> Sequence[View] | None:
+        found = {p["payload"]: p for p in view["payloads"] if p["payload"] in payloads}
+        refused = [line for p in found.values() for line in p["problems"]]
+        if refused:
+            raise TooLate("\n".join(refused))
+        is_all = len(found) == len(payloads)
+        is_active = all(p["state"] == "active" for p in found.values())
+        return tuple(found.values()) if is_all and is_active else None
+
+    return robot.until(f"{what}: payloads active", active, timeout_s=INSTALL_S)
 
 
 def only_stream(robot: Robot, kind: str) -> View:

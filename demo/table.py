@@ -7,13 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-PHASES = ("seen", "verified", "installed", "ready", "in plan", "goal")
 WIDTH = 98
-NOTE = (
-    "Seconds after the first drive of the stage went in, until the phase was complete for all of "
-    "its payloads. The published times are for a person with real instruments: they include hands "
-    "that fetch, plug and mount; ours do not, and drives here are folders on a disk."
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,13 +28,13 @@ class StageResult:
     """What the host said of its own accord during the stage."""
 
 
-def as_text(results: Sequence[StageResult]) -> str:
-    """The table that people read."""
-    head = ["stage", *PHASES, "published", "reached"]
+def as_text(results: Sequence[StageResult], *, phases: Sequence[str], note: str) -> str:
+    """The table that people read; `note` says what its seconds are."""
+    head = ["stage", *phases, "published", "reached"]
     rows = [
         [
             result.name,
-            *(_seconds(result.phases_s.get(phase)) for phase in PHASES),
+            *(_seconds(result.phases_s.get(phase)) for phase in phases),
             "-" if result.published_s is None else f"{result.published_s:.0f} s *",
             "yes" if result.reached else "NO",
         ]
@@ -53,15 +47,17 @@ def as_text(results: Sequence[StageResult]) -> str:
     ]
     lines.insert(1, "-" * len(lines[0]))
     measures = [_wrapped(f"{result.name}: {result.measure}") for result in results]
-    return "\n".join([*lines, "", *measures, "", _wrapped(f"* {NOTE}")])
+    return "\n".join([*lines, "", *measures, "", _wrapped(f"* {note}")])
 
 
-def as_data(results: Sequence[StageResult], *, seed: int) -> dict[str, Any]:
-    """The same as one JSON document; `seed` made stage III's source and mounts."""
+def as_data(
+    results: Sequence[StageResult], *, reached: bool, note: str, **more: Any
+) -> dict[str, Any]:
+    """The same as one JSON document, with `more` that belongs in it; `reached`: all of it was."""
     return {
-        "seed": seed,
-        "reached": all(result.reached for result in results),
-        "note": NOTE,
+        **more,
+        "reached": reached,
+        "note": note,
         "stages": [asdict(result) for result in results],
     }
 

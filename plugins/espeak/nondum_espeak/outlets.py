@@ -63,9 +63,10 @@ class Folder:
         unfinished.rename(unfinished.with_suffix(".wav"))
 
 
-def find_outlet(said: str, environment: Mapping[str, str]) -> Outlet | None:
-    """The folder `said`, if it is named; else a player; None where nothing can be heard."""
-    return Folder(Path(said)) if said else find_player(environment)
+def find_outlet(said: str, environment: Mapping[str, str], *, scratch: Path) -> Outlet | None:
+    """The folder `said`, if it is named (a relative one lies in `scratch`); else a player; None
+    where nothing can be heard."""
+    return Folder(scratch / said) if said else find_player(environment)
 
 
 def find_player(

@@ -77,5 +77,8 @@ def test_player_is_chosen_by_what_there_is(tmp_path: Path) -> None:
 def test_folder_that_is_named_goes_before_all_players(tmp_path: Path) -> None:
     program(tmp_path, "paplay", "exit 0")
     environment = {"PATH": str(tmp_path), "PULSE_SERVER": "unix:/x"}
-    assert isinstance(find_outlet(str(tmp_path / "out"), environment), Folder)
-    assert isinstance(find_outlet("", environment), Player)
+    outlet = find_outlet("out", environment, scratch=tmp_path)
+    assert isinstance(outlet, Folder)
+    asyncio.run(outlet.play(b"RIFF"))
+    assert (tmp_path / "out" / "said-000001.wav").exists()
+    assert isinstance(find_outlet("", environment, scratch=tmp_path), Player)

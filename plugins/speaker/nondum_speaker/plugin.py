@@ -55,8 +55,10 @@ class Speaker:
         except VoiceUnknown as unknown:
             problem = Problem("SETTING_INVALID", str(unknown), where=ctx.component)
             raise ConfigRefused(problem) from unknown
-        self._outlet = find_outlet(self._settings.said, os.environ)
-        if self._outlet is None:
+        self._outlet = find_outlet(self._settings.said, os.environ, scratch=ctx.scratch)
+        if self._settings.said:
+            ctx.log.info("what is said is written to %s", ctx.scratch / self._settings.said)
+        elif self._outlet is None:
             ctx.log.info("no sound player is here: what is said will be printed only")
 
     @behaviour("report", action="(report ?u - speaker ?c - class ?h - host)")

@@ -45,7 +45,7 @@ class Speech:
         self._settings = settings
         self._espeak = Espeak(ctx.scratch)
         await self._try_voice(ctx.component)
-        self._outlet = find_outlet(settings.said, os.environ)
+        self._outlet = find_outlet(settings.said, os.environ, scratch=ctx.scratch)
         if self._outlet is None:
             ctx.log.info("no sound player is here: what is said will be printed only")
         self._ears = Ears(self._espeak, ctx.log, confidence=settings.confidence)

@@ -1,0 +1,46 @@
+"""The drives of a demonstration, made from the plugins of this checkout."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from demo.drives import build, payload_id
+
+ROOT = Path(__file__).parent.parent
+PLUGINS = ROOT / "plugins"
+CACHE = ROOT / ".run/drives"
+
+
+@dataclass(frozen=True, slots=True)
+class Kit:
+    """The drives of a demonstration, by the names of the plugin folders they were built from."""
+
+    drives: Mapping[str, Path]
+    payloads: Mapping[str, str]
+    """Payload ids."""
+
+    @classmethod
+    def built(
+        cls,
+        names: Sequence[str],
+        *,
+        libraries: Sequence[str],
+        folders: Mapping[str, Path],
+        cache: Path = CACHE,
+    ) -> Kit:
+        """Build drives, or take them from the cache. `folders` are the sources of plugins and
+        libraries that are not where they are in the checkout."""
+        where = {name: folders.get(name, PLUGINS / name) for name in (*names, *libraries)}
+        drives = build(
+            [where[name] for name in names],
+            libraries=[where[name] for name in libraries],
+            cache=cache,
+        )
+        by_name = {name: drives[where[name].name] for name in names}
+        return cls(by_name, {name: payload_id(drive) for name, drive in by_name.items()})
+
+    def of(self, names: Sequence[str]) -> dict[str, Path]:
+        """Payload id → drive, in the order of `names`."""
+        return {self.payloads[name]: self.drives[name] for name in names}

@@ -1,0 +1,59 @@
+"""A person's voice and ears, of the same parts as the speech payload's: eSpeak NG and PocketSphinx.
+
+They are no payload's: sentences leave and enter as WAV files, as if through the air.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from demo.kit import PLUGINS
+
+if TYPE_CHECKING:
+    from nondum_speech.recogniser import Recogniser
+
+VOICE = "en-us"
+WORDS_PER_MINUTE = 150
+
+
+class Person:
+    """Says sentences, and understands those that they expect."""
+
+    def __init__(self, scratch: Path, *, expects: Sequence[str]) -> None:
+        """Takes half a second. `expects`: all that they tell apart, in small letters."""
+        sys.path += [str(PLUGINS / name) for name in ("espeak", "speech")]
+        from nondum_speech.espeak import Espeak
+
+        scratch.mkdir()
+        self._espeak = Espeak(scratch)
+        self._ears = self._made_ears(tuple(expects))
+
+    def say(self, words: str, into: Path) -> None:
+        """Write a WAV file of what they say, at once and whole."""
+        sound = self._espeak.say(words, voice=VOICE, words_per_minute=WORDS_PER_MINUTE)
+        unfinished = into.with_suffix(".part")
+        unfinished.write_bytes(sound.to_wav())
+        unfinished.rename(into)
+
+    def understood(self, wav: Path) -> tuple[str, ...]:
+        """The sentences in a WAV file that they expected; nothing for others."""
+        from nondum_speech.sentences import sentences_of
+        from nondum_speech.sound import read_wav
+
+        heard = (self._ears.hear(sentence).said for sentence in sentences_of(read_wav(wav)))
+        return tuple(filter(None, heard))
+
+    def _made_ears(self, expects: tuple[str, ...]) -> Recogniser:
+        from nondum_speech.grammar import Vocabulary
+        from nondum_speech.lexicon import lexicon
+        from nondum_speech.recogniser import FreeHearing, Recogniser
+        from nondum_speech.settings import Settings
+
+        vocabulary = Vocabulary(expects)
+        words = lexicon(
+            vocabulary.words, lambda word, voice: self._espeak.phonemes(word, voice=voice)
+        )
+        return Recogniser(vocabulary, words, FreeHearing(), confidence=Settings().confidence)

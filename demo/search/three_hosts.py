@@ -1,0 +1,143 @@
+"""The second demonstration: three hosts, of which two robots search with the parts of the third."""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import shutil
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from demo import live, stages
+from demo.following import Reference
+from demo.kit import PLUGINS, Kit
+from demo.live import Says
+from demo.performance import Programme, parser, perform
+from demo.robot import Robot, running
+from demo.search import losing
+from demo.search.person import Person
+from demo.search.searching import ALERT, WORDS, Search
+from demo.search.sites import Site, site
+from demo.table import StageResult
+
+REFERENCE = PLUGINS / "panorama/nondum_panorama/data/pedestrians.toml"
+
+ROBOT, NODE, SMALL = "panther", "node", "scout"
+BASE = "mobile-base"
+CAMERA = "thermal-camera"
+FOR_NODE = ("people-detector", "visual-tracker", "speech", "speaker")
+LIBRARIES = ("sdk", "espeak", "panorama")
+SETTINGS = {"speech": 'microphone = ""\nsaid = "said"\n', "speaker": 'said = "said"\n'}
+"""On a machine without sound, and with nobody who speaks but the demonstration."""
+PUBLISHED_S = {ROBOT: 442, SMALL: 339}
+
+PHASES = ("found", "payloads in", "understood", "in plan", "alert", "halted", "told")
+STAGES = (ROBOT, SMALL, losing.NAME)
+NOTE = (
+    "Seconds after the stage's robot (and, in the first, the node) was switched on, or after the "
+    "node vanished. The published times are for a person with real robots and other hardware: they "
+    "include hands that fetch and plug, and a person who walks up to be found; ours do not. Hosts "
+    "here are processes of one machine, drives are folders, and the thermal camera is simulated, "
+    "from a recording of real people."
+)
+OTHER_SENTENCES = ("i have found nobody", "i have lost person", "i cannot find people")
+EXAMPLES = """\
+examples:
+  ./run demo search                       as root: in network namespaces, with keys
+  ./run demo search --loopback            without: three processes that trust each other
+  ./run demo search --json | jq .stages
+  ./run demo search --without speaker     must fail: nobody says the alert
+"""
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run the demonstration; 0 only if every stage really happened."""
+    options = _options(arguments)
+    return perform(Programme(STAGES, PHASES, NOTE), functools.partial(_play, options), options)
+
+
+def _play(options: argparse.Namespace, work: Path, say: Says) -> Iterator[StageResult]:
+    say("building the payload drives (cached after the first time)")
+    kit = _kit(work)
+    person = Person(work / "person", expects=(ALERT, *OTHER_SENTENCES))
+    names = (ROBOT, NODE, SMALL)
+    with ExitStack() as stack:
+        where = stack.enter_context(site(work, names, is_loopback=options.loopback))
+        say(f"{', '.join(names)}: {where.told}")
+        switch_on = functools.partial(_switched_on, where, work, kit, stack, options)
+        say(f"{ROBOT}: it and the {NODE} are switched on; “{WORDS}”")
+        begun_s = time.monotonic()
+        node, robot = switch_on(NODE, ()), switch_on(ROBOT, (BASE,))
+        search = Search(node, person)
+        stage = search.begin(robot, published_s=PUBLISHED_S[ROBOT], begun_s=begun_s)
+        brought = [name for name in FOR_NODE if name not in options.without]
+        search.equip(stage, {node: kit.of(brought), robot: kit.of([CAMERA])})
+        yield search.run(stage)
+
+        say(f"{SMALL}: it is switched on; the camera moves there; “{WORDS}”")
+        begun_s = time.monotonic()
+        small = switch_on(SMALL, (BASE,))
+        stage = search.begin(small, published_s=PUBLISHED_S[SMALL], begun_s=begun_s)
+        stages.withdraw(robot, kit.drives[CAMERA])
+        search.equip(stage, {small: kit.of([CAMERA])})
+        yield search.run(stage)
+
+        say(f"{losing.NAME}: {SMALL} follows, steered by the {NODE}; then {where.how_lost}")
+        yield losing.lose_node(where, node, small, [robot], Reference.read(REFERENCE))
+
+
+def _switched_on(
+    where: Site,
+    work: Path,
+    kit: Kit,
+    stack: ExitStack,
+    options: argparse.Namespace,
+    name: str,
+    initial: Sequence[str],
+) -> Robot:
+    folder = work / name
+    folder.mkdir()
+    more = where.prepare(name, folder / "state")
+    robot = stack.enter_context(
+        running(folder, name=name, initial=kit.of(initial), more=more, inside=where.inside(name))
+    )
+    stack.enter_context(live.view(robot, is_shown=not (options.json or options.plain)))
+    return robot
+
+
+def _kit(work: Path) -> Kit:
+    folders = {name: _copy(name, work / "sources", text) for name, text in SETTINGS.items()}
+    return Kit.built((BASE, CAMERA, *FOR_NODE), libraries=LIBRARIES, folders=folders)
+
+
+def _copy(name: str, sources: Path, settings: str) -> Path:
+    """A plugin with other settings in its manifest."""
+    folder = Path(shutil.copytree(PLUGINS / name, sources / name))
+    with (folder / "payload.toml").open("a", encoding="utf-8") as manifest:
+        manifest.write(f"\n[component.settings]\n{settings}")
+    return folder
+
+
+def _options(arguments: Sequence[str]) -> argparse.Namespace:
+    made = parser(
+        "./run demo search",
+        __doc__ or "",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    made.add_argument(
+        "--loopback",
+        action="store_true",
+        help="no namespaces and no keys, even as root: processes on this machine's loopback",
+    )
+    made.add_argument(
+        "--without",
+        action="append",
+        default=[],
+        choices=FOR_NODE,
+        metavar="PAYLOAD",
+        help=f"leave this payload of the node out, which must fail: {', '.join(FOR_NODE)}",
+    )
+    return made.parse_args(arguments)
