@@ -13,6 +13,7 @@ import struct
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntFlag
+from pathlib import Path
 from typing import TypeAlias
 
 import ifaddr
@@ -21,6 +22,7 @@ IPInterface: TypeAlias = ipaddress.IPv4Interface | ipaddress.IPv6Interface
 """An address with its network."""
 
 _SIOCGIFFLAGS = 0x8913
+_MEMBERSHIPS = Path("/proc/sys/net/ipv4/igmp_max_memberships")
 _VIRTUAL = re.compile(r"(docker|br-|veth|virbr|vnet|podman|cni|flannel|cali|lxc|lxd|incus|zt).*")
 """Bridges and cables inside this machine: whoever is behind them is not another host, and joining
 them all floods a machine that runs containers."""
@@ -103,6 +105,14 @@ def has_ipv6() -> bool:
     except OSError:
         return False
     return True
+
+
+def memberships() -> int | None:
+    """On how many interfaces one socket may listen to multicast; None where that has no limit."""
+    try:
+        return int(_MEMBERSHIPS.read_text())
+    except (OSError, ValueError):
+        return None
 
 
 def of_host(host: str, interfaces: Sequence[Interface]) -> str:

@@ -7,13 +7,11 @@ again that this host is there, so that hosts whose networks meet later find each
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import random
 from collections import Counter
 from collections.abc import Awaitable, Callable, Sequence
 from ipaddress import ip_address
-from pathlib import Path
 from typing import Any
 
 from zeroconf import (  # type: ignore[attr-defined] # zeroconf keeps the DNS… for its callers
@@ -34,7 +32,7 @@ from nondum.transport.discovery.hint import (
     instance,
     to_txt,
 )
-from nondum.transport.discovery.interfaces import Flags, Interface, has_ipv6
+from nondum.transport.discovery.interfaces import Flags, Interface, has_ipv6, memberships
 from nondum.transport.peers.identity import Security
 from nondum.transport.peers.keys import PeerKey, fingerprint
 
@@ -43,7 +41,6 @@ APPEAR_S = (0.0, 1.0, 2.5)
 GREET_S = 0.25
 """Time between two greetings at least, whoever comes: a hundred hosts may boot at once."""
 GREET_JITTER_S = 0.02
-MEMBERSHIPS = Path("/proc/sys/net/ipv4/igmp_max_memberships")
 _QUERY, _POINTER, _INTERNET = 0, 12, 1  # RFC 1035: flags, type PTR, class IN
 
 
@@ -218,17 +215,16 @@ def _unscoped(host: str) -> str:
 
 
 def _not_joined(interface: Interface, joined: int) -> Problem:
-    with contextlib.suppress(OSError, ValueError):
-        limit = int(MEMBERSHIPS.read_text())
-        if joined > limit:
-            return Problem(
-                "MULTICAST_MEMBERSHIPS",
-                "the system does not let one program listen on so many interfaces",
-                where=interface.name,
-                need=str(joined),
-                have=str(limit),
-                fix=f"sysctl -w net.ipv4.igmp_max_memberships={2 * joined}",
-            )
+    limit = memberships()
+    if limit is not None and joined > limit:
+        return Problem(
+            "MULTICAST_MEMBERSHIPS",
+            "the system does not let one program listen on so many interfaces",
+            where=interface.name,
+            need=str(joined),
+            have=str(limit),
+            fix=f"sysctl -w net.ipv4.igmp_max_memberships={2 * joined}",
+        )
     return Problem(
         "MULTICAST_NOT_JOINED",
         "multicast cannot be used there for every kind of address, as yet",

@@ -1,0 +1,62 @@
+"""Commands that look for what is wrong around the host. None needs a daemon."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from nondum.host.cli import render
+from nondum.host.cli.connection import Session, json_option
+from nondum.host.cli.failure import EXIT_PROBLEMS
+from nondum.host.cli.table import table
+
+if TYPE_CHECKING:
+    from nondum.transport.discovery.doctor import Finding
+
+
+@click.group()
+def doctor() -> None:
+    """Look for what is wrong around this host, without a daemon.
+
+    Example: nondum doctor network
+    """
+
+
+@doctor.command()
+@click.option(
+    "--port",
+    type=click.IntRange(1, 65_535),
+    default=7410,
+    show_default=True,
+    help="Where this host listens to others (`peers.listen`).",
+)
+@json_option
+@click.pass_obj
+def network(session: Session, port: int) -> int:
+    """Tell whether this host can find others, and be found. Exits with 3 when it cannot.
+
+    Example: nondum doctor network
+    """
+    from nondum.transport.discovery.doctor import Result, examine
+
+    found = [_row(finding) for finding in examine(port)]
+    is_well = all(row["result"] != Result.BAD.value for row in found)
+    if session.as_json:
+        render.as_json({"ok": is_well, "findings": found})
+    else:
+        table(found, ["result", "check", "interface", "detail"], empty="Nothing was looked at.")
+        for row in found:
+            if row["fix"]:
+                render.sentence(f"{row['interface'] or row['check']}: {row['fix']}", mark="→ ")
+    return 0 if is_well else EXIT_PROBLEMS
+
+
+def _row(finding: Finding) -> dict[str, Any]:
+    return {
+        "check": finding.check,
+        "interface": finding.interface,
+        "result": finding.result.value,
+        "detail": finding.detail,
+        "fix": finding.fix,
+    }

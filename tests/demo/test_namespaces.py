@@ -1,0 +1,133 @@
+"""Machines and switches made of namespaces behave as real ones, and leave nothing behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from demo.namespaces import ROOT, Cable, Machine, Network
+
+pytestmark = pytest.mark.lab
+
+LISTEN = """
+import socket
+with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+    sock.bind(("", 9))
+    print("listening", flush=True)
+    while True:
+        data, sender = sock.recvfrom(100)
+        sock.sendto(data, sender)
+"""
+ASK = """
+import socket, sys
+with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+    sock.settimeout(0.3)
+    try:
+        for _ in range(5):
+            sock.sendto(b"hello", (sys.argv[1], 9))
+        sock.recv(100)
+    except OSError:
+        sys.exit(1)
+"""
+MADE = """
+import sys
+from demo.namespaces import Network
+network = Network().__enter__()
+network.lan("rover", "base")[0].start("sleep", "1000")
+print("made", flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def network() -> Iterator[Network]:
+    with Network() as network:
+        yield network
+
+
+def echoing(machine: Machine) -> Cable:
+    """Have a machine answer; its first cable."""
+    process = machine.start(sys.executable, "-c", LISTEN, stdout=subprocess.PIPE)
+    assert process.stdout is not None
+    process.stdout.readline()
+    return machine.cables[0]
+
+
+def reaches(machine: Machine, address: str) -> bool:
+    return machine.start(sys.executable, "-c", ASK, address).wait() == 0
+
+
+def left() -> list[str]:
+    listed = subprocess.run(["ip", "netns", "list"], capture_output=True, text=True, check=True)
+    return [line for line in listed.stdout.splitlines() if line.startswith("nondum-")]
+
+
+def test_machines_on_one_switch_reach_each_other_until_a_cable_is_pulled(network: Network) -> None:
+    rover, base = network.lan("rover", "base")
+    cable = echoing(base)
+    assert reaches(rover, cable.address)
+    cable.pull()
+    assert not reaches(rover, cable.address)
+    assert "NO-CARRIER" in base.ip("link", "show", cable.interface)
+    cable.put_back()
+    assert reaches(rover, cable.address)
+
+
+@pytest.mark.parametrize("lose", [Cable.lose_sent, Cable.lose_received])
+def test_one_way_loses_everything_until_it_is_healed(network: Network, lose: object) -> None:
+    rover, base = network.lan("rover", "base")
+    cable = echoing(base)
+    assert callable(lose)
+    lose(cable)
+    assert not reaches(rover, cable.address)
+    assert "state UP" in base.ip("link", "show", cable.interface)
+    cable.heal()
+    assert reaches(rover, cable.address)
+
+
+def test_halves_of_a_switch_are_apart_and_no_link_goes_down(network: Network) -> None:
+    rover, base, camp = network.lan("rover", "base", "camp")
+    cable = echoing(base)
+    network.switches[0].split([cable, camp.cables[0]])
+    assert not reaches(rover, cable.address)
+    assert reaches(camp, cable.address)
+    assert "state UP" in base.ip("link", "show", cable.interface)
+    network.switches[0].join()
+    assert reaches(rover, cable.address)
+
+
+def test_two_switches_are_two_networks(network: Network) -> None:
+    (rover,), (base,) = network.lan("rover"), network.lan("base")
+    cable = echoing(base)
+    assert cable.address == "10.77.1.1"
+    assert not reaches(rover, cable.address)
+    network.plug(rover, network.switches[1])
+    assert reaches(rover, cable.address)
+
+
+def test_nothing_is_left_behind_and_the_own_network_untouched() -> None:
+    before = Path("/proc/net/dev").read_text(encoding="ascii").count("\n")
+    with Network() as network:
+        (rover,) = network.lan("rover")
+        process = rover.start("sleep", "1000")
+        assert Path("/proc/net/dev").read_text(encoding="ascii").count("\n") == before
+    assert process.returncode == -signal.SIGKILL
+    assert not [name for name in left() if f"-{os.getpid()}-" in name]
+
+
+def test_what_a_killed_process_has_left_is_removed_by_the_next() -> None:
+    killed = subprocess.Popen(
+        [sys.executable, "-c", MADE], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert killed.stdout is not None
+    killed.stdout.readline()
+    killed.kill()
+    killed.communicate()
+    assert len([name for name in left() if f"-{killed.pid}-" in name]) == 3
+    with Network():
+        assert not [name for name in left() if f"-{killed.pid}-" in name]
