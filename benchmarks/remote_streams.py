@@ -191,7 +191,8 @@ async def by_bridges(run: Run) -> AsyncIterator[Send]:
     try:
         ours, theirs = link_sockets()
         with theirs:
-            grant = await owner.export("image", theirs, await reader.key(), lambda _: None)
+            async with reader.kept() as key:
+                grant = await owner.export("image", theirs, key, lambda _: None)
         producer.connect("bridge", SocketPackets(ours, MAX_PACKET))
         through = replace(grant, port=run.link_to(grant.port))
         number = await reader.import_("image", HERE, through, lambda _: None)
@@ -330,8 +331,8 @@ def page(found: Found, repeats: int, seconds: float) -> str:
 {RATE_HZ} Hz over TCP on loopback, whole or through a process that lets only so much pass. The age
 runs from the frame's stamp, set just before it is sent, to the moment the reader has an `Image` and
 has read all its pixels once. CPU is that of all processes that take part, the link's apart: four
-with bridges, of which two are on each host, two without. {repeats} repeats in turn of {seconds:g}
-s; medians of the repeats (lowest-highest).
+with bridges, of which two are on each host, two without. {repeats} repeats in turn of
+{seconds:g} s; medians of the repeats (lowest-highest).
 ZeroMQ: XPUB and SUB, two parts, high-water mark {HIGH_WATER_MARK}, copy=False, straight between the
 two processes that have and want the frames: what it lacks is one copy per host, grants, an end that
 is told, and JPEG.

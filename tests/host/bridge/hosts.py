@@ -92,9 +92,9 @@ class Pair:
         producer, over = Producer(kind), Over()
         self._producers.append(producer)
         ours, theirs = link_sockets()
-        key = await (reader or self.reader).key()
-        with theirs:
-            grant = await self.owner.export(kind, theirs, key, over)
+        async with self.owner.kept(), (reader or self.reader).kept() as key:
+            with theirs:
+                grant = await self.owner.export(kind, theirs, key, over)
         producer.connect("bridge", SocketPackets(ours, MAX_PACKET))
         return producer, grant, over
 

@@ -290,7 +290,8 @@ async def test_end_of_the_producer_ends_the_stream() -> None:
 async def test_withdrawn_reader_is_cut() -> None:
     async with pair() as hosts:
         _, _, _, reader_over = await read(hosts)
-        await hosts.owner.withdraw(await hosts.reader.key())
+        async with hosts.reader.kept() as key:
+            await hosts.owner.withdraw(key)
         assert await reader_over.code() == "STREAM_ENDED"
         assert (await hosts.owner.figures())["exports"] == {}
 
@@ -378,9 +379,11 @@ async def test_port_may_be_given_and_is_taken_once() -> None:
     try:
         ours, theirs = link_sockets()
         with ours, theirs:
-            assert (await one.export("image", theirs, await one.key(), Over())).port == port
+            async with one.kept() as key:
+                assert (await one.export("image", theirs, key, Over())).port == port
         with pytest.raises(WorkerFailed, match="ADDRESS_UNUSABLE"):
-            await other.key()
+            async with other.kept():
+                pass
         assert other.pid is None
     finally:
         await one.close()

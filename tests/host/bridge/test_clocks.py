@@ -27,7 +27,8 @@ async def test_stamps_are_told_by_the_readers_clock(
     async with pair() as hosts:
         with monkeypatch.context() as elsewhere:
             elsewhere.setattr(sys, "executable", str(python))
-            await hosts.owner.key()
+            async with hosts.owner.kept():
+                pass
         producer, grant, _ = await hosts.export("text")
         number = await hosts.reader.import_("text", HERE, grant, Over())
         reader = await hosts.reading(number, "text")

@@ -54,10 +54,10 @@ class Owner:
     async def opened(self, bridge: Bridge, kind: str = "image") -> tuple[Outgoing, int, Over]:
         """A stream that the bridge reads."""
         token, over = secrets.token_hex(8), Over()
-        key = await bridge.key()
-        outgoing = self._exporter.grant(token, key, kind, lambda: None, lambda _: None)
-        grant = Grant(self._port, self._keys.public, token)
-        return outgoing, await bridge.import_(kind, HERE, grant, over), over
+        async with bridge.kept() as key:
+            outgoing = self._exporter.grant(token, key, kind, lambda: None, lambda _: None)
+            grant = Grant(self._port, self._keys.public, token)
+            return outgoing, await bridge.import_(kind, HERE, grant, over), over
 
     async def close(self) -> None:
         self._exporter.close()
@@ -170,4 +170,17 @@ async def test_good_jpeg_is_restored_to_what_the_header_says() -> None:
         outgoing.send(Coding.JPEG, HEADER, jpeg())
         message = await reader.until()
         assert message.to_wire()[0] == HEADER
+        reader.close()
+
+
+async def test_what_must_be_restored_keeps_its_place() -> None:
+    async with both() as (owner, bridge):
+        outgoing, number, _ = await owner.opened(bridge)
+        reader = Reader("image")
+        await reader.attach(bridge, number, "eye")
+        for seq, coding, bulk in ((1, Coding.JPEG, jpeg()), (2, Coding.RAW, bytes(GOOD.data))):
+            numbered = {**HEADER, "header": {**HEADER["header"], "seq": seq}}
+            outgoing.send(coding, numbered, bulk)
+        await reader.until(lambda message: message.to_wire()[0]["header"]["seq"] == 2)
+        assert [message.to_wire()[0]["header"]["seq"] for message in reader.messages] == [1, 2]
         reader.close()

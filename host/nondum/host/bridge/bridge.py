@@ -86,10 +86,14 @@ class Bridge:
         """Process id of the child, while there is one."""
         return self._running.process.pid if self._running else None
 
-    async def key(self) -> PeerKey:
-        """The public key of the bridge, which is started for it. Raises `WorkerFailed`."""
+    @contextlib.asynccontextmanager
+    async def kept(self) -> AsyncIterator[PeerKey]:
+        """Have the bridge run, under one key, for as long as the context lasts; the key.
+
+        Raises `WorkerFailed` (BRIDGE_START).
+        """
         async with self._use() as running:
-            return running.key
+            yield running.key
 
     async def export(
         self, kind: str, connection: socket.socket, reader: PeerKey, on_over: OnOver

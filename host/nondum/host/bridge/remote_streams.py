@@ -162,27 +162,28 @@ class RemoteStreams:
         """Open a stream, feed its readers, and wait until it ends. Raises `NondumError`."""
         host = stream.partition("__")[0]
         over: asyncio.Future[Problem] = asyncio.get_running_loop().create_future()
-        opened = await self._call(
-            host, "stream.open", {"stream": stream, "bridge": await self._bridge.key()}
-        )
-        grant = _grant(opened)
-        number = 0
+        number, token = 0, ""
         try:
-            if opened.get("type") != wanted.kind:
-                raise WorkerFailed(_other_type(stream, opened.get("type"), wanted.kind))
-            number = wanted.number = await self._bridge.import_(
-                wanted.kind, self._addresses(host), grant, _settling(over)
-            )
+            async with self._bridge.kept() as key:
+                opened = await self._call(host, "stream.open", {"stream": stream, "bridge": key})
+                grant = _grant(opened)
+                token = grant.token
+                if opened.get("type") != wanted.kind:
+                    raise WorkerFailed(_other_type(stream, opened.get("type"), wanted.kind))
+                number = wanted.number = await self._bridge.import_(
+                    wanted.kind, self._addresses(host), grant, _settling(over)
+                )
             await asyncio.gather(*(self._feed(wanted, reader) for reader in list(wanted.readers)))
             log.info("%s has ended: %s", stream, await over)
         finally:
             wanted.number = 0
-            self._aside(self._part(number, host, grant.token))
+            self._aside(self._part(number, host, token))
 
     async def _part(self, number: int, host: str, token: str) -> None:
         await self._bridge.unimport(number)
-        with contextlib.suppress(NondumError):  # a host that is gone has closed it
-            await self._call(host, "stream.close", {"token": token})
+        if token:
+            with contextlib.suppress(NondumError):  # a host that is gone has closed it
+                await self._call(host, "stream.close", {"token": token})
 
     async def _feed(self, wanted: _Import, name: str) -> None:
         """Wire one reader; its failure is its own. A bridge that failed will feed it again."""

@@ -93,7 +93,7 @@ class Outgoing:
                 self.bytes_sent += length
                 self._window.sent(frame.seq, length, self._loop.time())
             case Sent.GONE:
-                self._lose(_gone())
+                self.break_off(_gone())
             case Sent.FULL:  # windows are smaller than what may wait: the frame is dropped
                 pass
 
@@ -121,7 +121,7 @@ class Outgoing:
                 return Problem("BRIDGE_PACKET", "more signs of life than anybody needs")
             case Ping(at_s):
                 if self._way.send([packets.told(Pong(at_s, self._loop.time()))]) is Sent.GONE:
-                    self._lose(_gone())
+                    self.break_off(_gone())
             case Claim():
                 return Problem("BRIDGE_PACKET", "the stream was claimed already")
         return None
@@ -133,24 +133,27 @@ class Outgoing:
         quiet_s = self._loop.time() - self._heard_s
         if self._way is None:
             if quiet_s > CLAIM_S:
-                self._lose(Problem("STREAM_UNCLAIMED", f"nobody came for it in {CLAIM_S:g} s"))
+                self.break_off(Problem("STREAM_UNCLAIMED", f"nobody came for it in {CLAIM_S:g} s"))
             return
         state = tcp.state(self._way.descriptor)
         received = 0 if state is None else state.bytes_received
         if quiet_s > SILENT_S:
-            self._lose(Problem("STREAM_SILENT", f"its reader said nothing for {SILENT_S:g} s"))
+            self.break_off(Problem("STREAM_SILENT", f"its reader said nothing for {SILENT_S:g} s"))
         elif received > 16 * self._heard_bytes + ASKED_BYTES:  # each message is sealed and framed
-            self._lose(Problem("BRIDGE_PACKET", "a message that does not end"))
+            self.break_off(Problem("BRIDGE_PACKET", "a message that does not end"))
 
     def try_way(self) -> None:
         """The connection may have ended: see whether it is there."""
-        is_claimed = self._way is not None and not self.is_over
-        if is_claimed and self._way.send([packets.told(Pong(0.0, 0.0))]) is Sent.GONE:  # type: ignore[union-attr]  # not None, as just seen
-            self._lose(_gone())
+        if self._way is None or self.is_over:
+            return
+        if self._way.send([packets.told(Pong(0.0, 0.0))]) is Sent.GONE:
+            self.break_off(_gone())
 
     def break_off(self, problem: Problem) -> None:
-        """The reader broke the rules."""
-        self._lose(problem)
+        """End it because of its reader, or for want of one."""
+        if not self.is_over:
+            self.end(problem)
+            self._on_over(problem)
 
     def end(self, problem: Problem) -> None:
         """End it, and tell the reader why; nothing more is called."""
@@ -160,11 +163,6 @@ class Outgoing:
         if self._way is not None:
             self._way.send([packets.told(Over(problem))])
             self._way.cut()
-
-    def _lose(self, problem: Problem) -> None:
-        if not self.is_over:
-            self.end(problem)
-            self._on_over(problem)
 
 
 def _gone() -> Problem:
