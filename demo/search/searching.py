@@ -18,7 +18,7 @@ from demo.table import StageResult
 WORDS = "search for people and tell me"
 SAID_SO = re.compile("search for .+ and tell me")
 """How a host offers it, whatever it calls people."""
-ALERT = "i have found person"
+ALERT = "i can see a person"
 FIND_S = 20.0
 UNDERSTAND_S = 15.0
 ALERT_S = 60.0

@@ -29,8 +29,11 @@ BASE = "mobile-base"
 CAMERA = "thermal-camera"
 FOR_NODE = ("people-detector", "visual-tracker", "speech", "speaker")
 LIBRARIES = ("sdk", "espeak", "panorama")
-SETTINGS = {"speech": 'microphone = ""\nsaid = "said"\n', "speaker": 'said = "said"\n'}
-"""On a machine without sound, and with nobody who speaks but the demonstration."""
+SETTINGS = {
+    "speech": 'microphone = ""\nsaid = "said"\n',
+    "speaker": 'said = "said"\nreport = "I can see a {thing}."\n',
+}
+"""For a machine without sound; and what is said is easier to understand than one word."""
 PUBLISHED_S = {ROBOT: 442, SMALL: 339}
 
 PHASES = ("found", "payloads in", "understood", "in plan", "alert", "halted", "told")
@@ -42,7 +45,7 @@ NOTE = (
     "here are processes of one machine, drives are folders, and the thermal camera is simulated, "
     "from a recording of real people."
 )
-OTHER_SENTENCES = ("i have found nobody", "i have lost person", "i cannot find people")
+OTHER_SENTENCES = ("i can see a robot", "i cannot see a person", "i have lost the person")
 EXAMPLES = """\
 examples:
   ./run demo search                       as root: in network namespaces, with keys
