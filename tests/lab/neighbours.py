@@ -31,11 +31,23 @@ def neighbours(work: Path, *names: str, more: str = "") -> Iterator[list[Running
 
 
 @contextmanager
+def open_host(work: Path, name: str) -> Iterator[tuple[RunningHost, str]]:
+    """One host that needs no keys, and where it listens."""
+    port = free_port()
+    host = RunningHost(work, name=name, more=_section(port, []) + "development = true\n")
+    try:
+        host.start()
+        yield host, f"tcp://127.0.0.1:{port}"
+    finally:
+        host.stop()
+
+
+@contextmanager
 def looking(work: Path, *names: str, more: str = "") -> Iterator[list[RunningHost]]:
     """Hosts that look for each other; `more` are further lines of [peers]."""
     ports = {name: free_port() for name in names}
     with ExitStack() as stack:
-        hosts = []
+        hosts: list[RunningHost] = []
         for name in names:
             others = [f"127.0.0.1:{port}" for other, port in ports.items() if other != name]
             section = _section(ports[name], others)

@@ -64,7 +64,7 @@ def paired(first: RunningHost, second: RunningHost) -> None:
             both_seen.wait()
             host.ask("peers_confirm", code=codes[other.name])
             ends = (row["step"] for row in steps if row["step"] in ("agreed", "failed"))
-            return next(ends)
+            return str(next(ends))
 
     with ThreadPoolExecutor(2) as people:
         ends = people.map(pair, (first, second), (second, first))

@@ -17,6 +17,7 @@ from nondum.host.events import (
     PayloadWithdrawn,
     PeerJoined,
     PeerLeft,
+    PeerTurnedAway,
     PlaceLost,
     PlaceMissing,
 )
@@ -50,6 +51,8 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return f"drive {event.drive} cannot be used: {_joined(event.problems)}"
         case PeerJoined():
             return f"the host {event.host} is here"
+        case PeerTurnedAway():
+            return _joined(event.problems)
         case PeerLeft():
             return f"the host {event.host} is gone: {event.reason}"
         case DriveRead(payloads=(), certificates=0):

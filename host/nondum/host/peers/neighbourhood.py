@@ -29,6 +29,7 @@ from nondum.host.peers.placement.pins import Pins
 from nondum.host.peers.placement.placement import Placement
 from nondum.host.peers.remote_calls import AllCalls, RemoteCalls, is_peers
 from nondum.host.peers.serving import Serving
+from nondum.host.peers.strangers import Strangers
 from nondum.host.peers.trust_keeper import TrustKeeper
 from nondum.host.peers.trust_orders import TrustOrders
 from nondum.host.peers.view import PeersView
@@ -41,7 +42,15 @@ from nondum.sdk.errors import Problem
 from nondum.sdk.wire import Body
 from nondum.transport.discovery import Hint
 from nondum.transport.fleet import FleetEvent, Mesh
-from nondum.transport.peers import CallFailed, Errand, PeerLost, PeerRefused, Security, Trust
+from nondum.transport.peers import (
+    CallFailed,
+    Errand,
+    PeerLost,
+    PeerRefused,
+    Refusal,
+    Security,
+    Trust,
+)
 
 ON_LOOPBACK = ("tcp://127.0.0.1:0",)
 OPEN_S = 10.0
@@ -76,6 +85,7 @@ class Neighbourhood:
             self._own_uses,
             self._on_taken,
         )
+        self._strangers = Strangers(emit, asyncio.get_running_loop().time)
         self.desk = Desk()
         self.desk.add("behave", self.serving.behave, self.serving.orphaned)
         self.desk.hear("values", self.serving.values)
@@ -219,6 +229,8 @@ class Neighbourhood:
 
     def _on_fleet(self, event: FleetEvent) -> None:
         self.view.on_fleet(event)
+        if isinstance(event, Refusal):
+            self._strangers.turned_away(event)
         self.peering.on_fleet(event)
         if isinstance(event, PeerLost):
             self._aside(self._shared.caller_lost(event.key))

@@ -83,6 +83,8 @@ class Served:
 
     errand: Errand
     asked: Asked
+    unit: str
+    """The actor."""
     call: Call
     taken: frozenset[str]
     progress: tuple[float, str] | None = None
@@ -141,12 +143,13 @@ class Serving:
         NOT_OFFERED, UNIT_TAKEN) and what the workers raise.
         """
         asked = Asked.parse(errand.args)
-        plugin = self._check_offered(asked)
+        plugin, unit = self._check_offered(asked)
         taken = self._uses(plugin, asked)
         await self._supersede(errand, taken)
         self._check_untaken(taken)
+        self._check_users(asked.component, unit)
         call = self._workers.behave(asked.component, asked.behaviour, asked.arguments, asked.values)
-        served = Served(errand, asked, call, taken)
+        served = Served(errand, asked, unit, call, taken)
         self._served[call.component, call.id] = served
         self._on_change()
         try:
@@ -229,8 +232,25 @@ class Serving:
             fix = "it is free when that ends"
             raise CallFailed(Problem("UNIT_TAKEN", told, fix=fix))
 
-    def _check_offered(self, asked: Asked) -> str:
-        """The plugin that is asked. Raises `CallFailed` (NOT_OFFERED, CALL_MALFORMED)."""
+    def _check_users(self, component: str, unit: str) -> None:
+        """Units say how many users they serve. Raises `CallFailed` (UNIT_TAKEN)."""
+        most = self._most_users(component, unit)
+        users = [served.caller for served in self if served.unit == unit]
+        if most and len(users) >= most:
+            told = f"{unit} serves {most} at once, and now {', '.join(sorted(users))}"
+            raise CallFailed(Problem("UNIT_TAKEN", told, fix="it is free when one of them ends"))
+
+    def _most_users(self, component: str, unit: str) -> int:
+        found = self._snapshot().component(component)
+        names = own_objects(self._snapshot().host, found) if found else {}
+        units = found.description.units if found else ()
+        return next((one.users for one in units if names[one.name] == unit), 0)
+
+    def _check_offered(self, asked: Asked) -> tuple[str, str]:
+        """The plugin and the unit that are asked.
+
+        Raises `CallFailed` (NOT_OFFERED, CALL_MALFORMED).
+        """
         snapshot = self._snapshot()
         component = snapshot.component(asked.component)
         offer = self._policy().offer(component) if component else None
@@ -242,9 +262,10 @@ class Serving:
             raise CallFailed(_malformed(f"arguments for {', '.join(parameters)}"))
         names = own_objects(snapshot.host, component)
         units = {names[unit.name] for unit in offer.description.units}
-        if asked.arguments[parameters[0]] not in units:
+        actor = asked.arguments[parameters[0]]
+        if actor not in units:
             raise CallFailed(_not_offered(asked, "the unit is not offered to peers"))
-        return component.description.name
+        return component.description.name, actor
 
     def _uses(self, plugin: str, asked: Asked) -> frozenset[str]:
         composition = self._composition()
