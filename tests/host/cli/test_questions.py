@@ -70,6 +70,7 @@ PAYLOAD_KEYS = {
     "problems",
     "codes",
     "phases",
+    "place",
 }
 
 STATUS = """\

@@ -39,18 +39,18 @@ class Handover:
     """One payload's files for one peer. `await open()` it, and `await close()` it."""
 
     def __init__(
-        self, parcel: Parcel, folders: Folders, children: Children, *, reserve_mb: int
+        self, name: str, parcel: Parcel, folders: Folders, children: Children, *, reserve_mb: int
     ) -> None:
+        """`name` tells it from all others of this daemon."""
         self._parcel, self._children, self._reserve_mb = parcel, children, reserve_mb
-        self._folder = folders.handover / parcel.key
-        self._mount = folders.mounts / f"handover-{parcel.key}"
+        self._folder = folders.handover / name
+        self._mount = folders.mounts / f"handover-{name}"
         self._files: dict[str, Path] = {}
         self._copying = asyncio.Lock()
 
     async def open(self) -> Described:
         """Copy what the payload is judged by. Raises `DriveGone`, `PayloadRefused`,
         `InstallFailed`."""
-        await in_thread(remove, self._folder)
         size = await self._copy(None)
         self._files[self._parcel.digest] = self._folder / contents.NAME
         signature = await in_thread(_signature, self._folder / contents.SIGNATURE_NAME)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -66,9 +67,10 @@ class Case:
     """What has become of one parcel."""
 
     parcel: Parcel
-    handover: Handover
     candidate: Candidate | None = None
     """The peer that is asked, or has it."""
+    handover: Handover | None = None
+    """What that peer may fetch."""
     step: str = ""
     """One of `STEPS`, as the peer tells; empty: no peer has it."""
     done: int = 0
@@ -108,6 +110,7 @@ class Placing:
         self._cases: dict[str, Case] = {}
         self._news = asyncio.Event()
         self._is_started = False
+        self._numbers = itertools.count(1)
 
     def __iter__(self) -> Iterator[Case]:
         """All that is to run elsewhere."""
@@ -144,7 +147,7 @@ class Placing:
             case {"digest": str(digest), "wanted": list(wanted)} if all(
                 isinstance(sha256, str) for sha256 in wanted
             ):
-                await self._case_of(errand, digest).handover.want(wanted)
+                await self._handover_to(errand, digest).want(wanted)
                 return {}
         raise CallFailed(_malformed("digest and wanted"))
 
@@ -154,8 +157,7 @@ class Placing:
             case {"digest": str(digest), "sha256": str(sha256), "offset": int(offset)} if (
                 0 <= offset < 2**53
             ):
-                case = self._case_of(errand, digest)
-                return {"data": await case.handover.read(sha256, offset)}
+                return {"data": await self._handover_to(errand, digest).read(sha256, offset)}
         raise CallFailed(_malformed("digest, sha256 and offset"))
 
     async def close(self) -> None:
@@ -166,23 +168,20 @@ class Placing:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    def _case_of(self, errand: Errand, digest: str) -> Case:
+    def _handover_to(self, errand: Errand, digest: str) -> Handover:
         for case in self:
-            candidate = case.candidate
-            if (
-                case.parcel.digest == digest
-                and candidate is not None
-                and candidate.key == errand.caller.key
-            ):
-                return case
+            candidate, handover = case.candidate, case.handover
+            is_it = case.parcel.digest == digest and handover is not None
+            if is_it and candidate is not None and candidate.key == errand.caller.key:
+                assert handover is not None
+                return handover
         told = "no such payload is handed over to this host"
         raise CallFailed(Problem("NOT_OFFERED", told))
 
     # One payload
 
     def _begin(self, parcel: Parcel) -> None:
-        handover = Handover(parcel, self._folders, self._children, reserve_mb=self._reserve_mb)
-        case = self._cases[parcel.key] = Case(parcel, handover)
+        case = self._cases[parcel.key] = Case(parcel)
         case.task = asyncio.create_task(self._see_to(case))
 
     def _drop(self, case: Case) -> None:
@@ -192,16 +191,13 @@ class Placing:
 
     async def _see_to(self, case: Case) -> None:
         """Ask one peer after the other, for as long as the payload is to run elsewhere."""
-        try:
-            while True:
-                candidate = self._next(case)
-                if candidate is None:
-                    self._tell_missing(case)
-                    await self._changed()
-                else:
-                    await self._place(case, candidate)
-        finally:
-            await case.handover.close()
+        while True:
+            candidate = self._next(case)
+            if candidate is None:
+                self._tell_missing(case)
+                await self._changed()
+            else:
+                await self._place(case, candidate)
 
     def _next(self, case: Case) -> Candidate | None:
         """The best peer that has not said no."""
@@ -223,20 +219,25 @@ class Placing:
     async def _place(self, case: Case, candidate: Candidate) -> None:
         """Have a peer run it, until that ends; then the peer has declined."""
         case.candidate, case.step, case.done, case.total = candidate, STEPS[0], 0, 0
+        handover = case.handover = self._handover(case.parcel)
         problems: tuple[Problem, ...] = (Problem("PLACE_ENDED", "it ended without a word"),)
         try:
-            described = await case.handover.open()
-            await self._run(case, candidate, described)
+            await self._run(case, candidate, await handover.open())
         except NondumError as error:
             problems = error.problems
         finally:
-            step, case.step, case.candidate = case.step, "", None
+            step, case.step, case.candidate, case.handover = case.step, "", None, None
+            await handover.close()
             if step == "active":
                 reason = "; ".join(printable(str(problem)) for problem in problems)
                 self._emit(PlaceLost(case.parcel.key, candidate.host, reason))
         now_s = asyncio.get_running_loop().time()
         is_final = step in ("installing", "active")
         case.declined[candidate.host] = Declined(candidate.epoch, problems, now_s, is_final)
+
+    def _handover(self, parcel: Parcel) -> Handover:
+        name = f"{parcel.key}-{next(self._numbers)}"
+        return Handover(name, parcel, self._folders, self._children, reserve_mb=self._reserve_mb)
 
     async def _run(self, case: Case, candidate: Candidate, described: Described) -> None:
         args = {
@@ -260,7 +261,8 @@ class Placing:
             case {"step": str(step), "done": int(done), "total": int(total)} if step in STEPS:
                 case.step, case.done, case.total = step, done, total
         if case.step == "active" != before:
-            await case.handover.drop_wheels()
+            if case.handover is not None:
+                await case.handover.drop_wheels()
             parcel = case.parcel
             if parcel.step is not Step.REFUSED:
                 self._send_away(parcel, case.host)
