@@ -31,9 +31,9 @@ def neighbours(work: Path, *names: str, more: str = "") -> Iterator[list[Running
 
 
 @contextmanager
-def open_host(work: Path, name: str) -> Iterator[tuple[RunningHost, str]]:
-    """One host that needs no keys, and where it listens."""
-    port = free_port()
+def open_host(work: Path, name: str, port: int = 0) -> Iterator[tuple[RunningHost, str]]:
+    """One host that needs no keys, and where it listens, unless that port is taken."""
+    port = port or free_port()
     host = RunningHost(work, name=name, more=_section(port, []) + "development = true\n")
     try:
         host.start()

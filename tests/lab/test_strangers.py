@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import subprocess
 import threading
 from collections.abc import Callable, Iterator
@@ -12,7 +13,7 @@ from typing import Any
 
 import pytest
 from demo.robot import NONDUM
-from tests.lab.neighbours import looking, until_peer
+from tests.lab.neighbours import looking, open_host, until_peer
 from tests.lab.running_host import RunningHost
 
 from nondum.host.control.client import ControlClient
@@ -77,6 +78,14 @@ def test_hosts_that_were_never_introduced_stay_apart(tmp_path: Path) -> None:
             (found,) = host.ask("peers_why")["hosts"]
             assert (found["peer"], found["state"], found["standing"]) == (other, "away", "unknown")
             assert not is_peer(host, other)
+
+
+def test_host_whose_port_is_taken_listens_at_another_and_says_so(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with open_host(tmp_path / "rover", "rover", port) as (rover, _):
+            (warning,) = [w for w in rover.ask("status")["warnings"] if "ADDRESS_UNUSABLE" in w]
+            assert str(port) in warning
 
 
 def test_paired_hosts_are_peers_until_one_is_revoked(tmp_path: Path) -> None:

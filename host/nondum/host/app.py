@@ -104,7 +104,11 @@ async def _run(
     news = News()
     bus.subscribe(news.on_event)
     listing = executor.installation.listing
-    warnings = (*_warnings(config, catalogue), *(neighbours.warnings if neighbours else ()))
+
+    def warnings() -> tuple[str, ...]:
+        of_peers = neighbours.warnings if neighbours else ()
+        return (*_warnings(config, catalogue), *of_peers)
+
     places = neighbours.placement.places if neighbours else dict
     questions = Questions(catalogue, mind, workers, news, listing, warnings, places)
     orders = Orders(catalogue, mind, workers, news, bus, config.planning.translate_s)

@@ -107,6 +107,8 @@ class PeersSection:
     """Listen for other hosts, and look for them."""
     listen: tuple[str, ...] = ("tcp://*:7410",)
     """Where this host listens; port 0 picks one."""
+    stream_port: int = 0
+    """Where streams are fetched from this host; 0 picks a port each time."""
     discover: bool = True
     """Announce this host by multicast, and listen for others."""
     static: tuple[str, ...] = ()

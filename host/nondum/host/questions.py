@@ -46,7 +46,7 @@ class Questions:
     news: News
     stored: Callable[[], Awaitable[list[Row]]]
     """Lists the store: `wheel`, `bytes`, `used_by` (payload keys), `sha256`."""
-    warnings: tuple[str, ...]
+    warnings: Callable[[], tuple[str, ...]]
     """What every status says of this host."""
     places: Callable[[], Mapping[str, str]] = dict
     """Payload key → the peer that runs it, for those that run elsewhere."""
@@ -58,12 +58,13 @@ class Questions:
             "host": snapshot.host,
             "revision": snapshot.revision,
             "state": host_state(snapshot, places),
-            "warnings": [*self.warnings, *map(_kept_out, self.mind.views.kept_out())],
+            "warnings": [*self.warnings(), *map(_kept_out, self.mind.views.kept_out())],
             "payloads": [
                 payload_row(p, self.news.progress(p.key), places.get(p.key, ""))
                 for p in snapshot.payloads
             ],
             "drives": [drive_row(drive) for drive in snapshot.drives],
+            "peers": [{"peer": p.name, "address": p.address} for p in snapshot.peers],
             "goals": self.mind.views.given(),
             "told": self.mind.views.told(self.mind.people.last_number - TOLD),
         }

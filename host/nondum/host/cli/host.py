@@ -30,13 +30,23 @@ def host() -> None:
     help=f"Configuration file [default: {host_config.SYSTEM_FILE}, none with --user].",
 )
 @click.option("--name", help="The host's name, over the configuration's.")
+@click.option(
+    "--peer",
+    "peers",
+    multiple=True,
+    metavar="HOST[:PORT]",
+    help="Look for this host, too, where multicast does not reach; may be repeated.",
+)
 @click.option("--verbose", "-v", is_flag=True, help="Log more.")
-def run(user: bool, config_file: Path | None, name: str | None, verbose: bool) -> None:
+def run(
+    user: bool, config_file: Path | None, name: str | None, peers: tuple[str, ...], verbose: bool
+) -> None:
     """Run a host until it is told to stop (SIGTERM, or Ctrl-C).
 
     \b
     Examples: nondum host run --user
               nondum host run --config /etc/nondum/host.toml
+              nondum host run --user --peer 10.0.0.7
     """
     logging.basicConfig(
         level=logging.DEBUG if verbose else logging.INFO,
@@ -46,6 +56,11 @@ def run(user: bool, config_file: Path | None, name: str | None, verbose: bool) -
     if name is not None:
         host_config.check_name(name, where="--name")
         chosen = dataclasses.replace(chosen, host=dataclasses.replace(chosen.host, name=name))
+    if peers:
+        section = dataclasses.replace(
+            chosen.peers, enabled=True, static=(*chosen.peers.static, *peers)
+        )
+        chosen = dataclasses.replace(chosen, peers=section)
     from nondum.host.app import run_host
 
     asyncio.run(run_host(chosen))

@@ -49,6 +49,9 @@ def show(view: dict[str, Any]) -> None:
     for drive in view["drives"]:
         for problem in drive["problems"]:
             render.sentence(problem, colour="red", mark=f"drive {drive['drive']}: ")
+    if view["peers"]:
+        names = ", ".join(row["peer"] for row in view["peers"])
+        render.sentence(names, mark="peers: ")
     if view["goals"]:
         click.echo()
         table(view["goals"], ["id", "text", "kind", "state", "reason"], empty="")

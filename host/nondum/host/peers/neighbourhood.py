@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
 from typing import Any
 
-from nondum.host.bridge.bridge import Bridge
+from nondum.host.bridge.bridge import Bridge, with_port
 from nondum.host.bridge.remote_streams import RemoteStreams
 from nondum.host.bridge.shared_streams import SharedStreams
 from nondum.host.catalogue.catalogue import Catalogue
@@ -75,6 +75,8 @@ class Neighbourhood:
         host = config.host.name
         self.keeper = keeper
         self._tasks: set[asyncio.Task[None]] = set()
+        self._troubles: list[str] = []
+        self._listens = _listen(config.peers)
         self._host, self._emit, self._mind = host, emit, mind
         self._movable = frozenset(config.peers.offer_actuators)
         self.serving = Serving(
@@ -95,7 +97,7 @@ class Neighbourhood:
             keeper.trust,
             self.desk,
             on_event=self._on_fleet,
-            listen=_listen(config.peers),
+            listen=self._listens,
             find=lambda mesh: self._find(mesh, config.peers),
         )
         self.peering = Peering(
@@ -117,7 +119,7 @@ class Neighbourhood:
             network=lambda: self.finder.status if self.finder else None,
             refusals=self.mesh.refusals,
         )
-        self._bridge = Bridge(_listen(config.peers))
+        self._bridge = Bridge(self._listens, port=config.peers.stream_port)
         self._shared = SharedStreams(self._bridge, workers.streams)
         self._remote_streams = RemoteStreams(self._bridge, self._ask, self._addresses)
         workers.streams.reach(self._remote_streams)
@@ -190,7 +192,7 @@ class Neighbourhood:
         """What every status says of it."""
         is_open = self.mesh.security is Security.DEVELOPMENT
         unsafe = ("peers need no keys: every host on this machine is one",) if is_open else ()
-        return (*unsafe, *map(str, self.keeper.warnings))
+        return (*unsafe, *map(str, self.keeper.warnings), *self._troubles)
 
     def answering(self) -> dict[str, Callable[[Arguments], Awaitable[Any]]]:
         """Verbs that answer once."""
@@ -202,8 +204,19 @@ class Neighbourhood:
         return trust_orders.following(self.trust)
 
     async def start(self) -> None:
-        """Be there for peers. Raises `PeerRefused`."""
-        await self.mesh.start()
+        """Be there for peers. Raises `PeerRefused`.
+
+        Where the port is taken, another one is used: multicast tells it, but hosts that look for
+        this one by name do not find it, so people are warned.
+        """
+        try:
+            await self.mesh.start()
+        except PeerRefused as refused:
+            if refused.code != "ADDRESS_UNUSABLE":
+                raise
+            self._troubles.append(str(refused.problems[0]))
+            self.mesh.listen_at([with_port(address, 0) for address in self._listens])
+            await self.mesh.start()
 
     def on_event(self, event: Event) -> None:
         """Take in what happens on this host."""

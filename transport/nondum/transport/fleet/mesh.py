@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from datetime import UTC, datetime
 from typing import Protocol, TypeAlias
 
 from nondum.sdk.wire import Body
@@ -11,7 +12,7 @@ from nondum.transport.fleet.meeting import Meeting
 from nondum.transport.fleet.seam import FleetEvent, Peer
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.errands import Handler
-from nondum.transport.peers.events import PeerEvent, PeerLost, PeerUp
+from nondum.transport.peers.events import DialFailed, PeerEvent, PeerLost, PeerUp
 from nondum.transport.peers.identity import Identity, Security
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.node import PeerNode, fresh_epoch
@@ -46,8 +47,12 @@ class Mesh:
         on_event: Callable[[FleetEvent], None],
         listen: Sequence[str] = ("tcp://*:0",),
         find: Find | None = None,
+        clock: Callable[[], datetime] = lambda: datetime.now(UTC),
     ) -> None:
-        """Made on the running loop. Without `find`, hosts meet by `meet` only."""
+        """Made on the running loop. Without `find`, hosts meet by `meet` only.
+
+        `clock` tells the time of day, which only certificates need.
+        """
         self.epoch = fresh_epoch()
         self.addresses: tuple[str, ...] = ()
         """Where it listens, once it has started."""
@@ -60,6 +65,7 @@ class Mesh:
             on_event=self._on_event,
             pulse=Pulse(self._catalogues.state, self._catalogues.heard),
             epoch=self.epoch,
+            clock=clock,
         )
         self._meeting = Meeting(identity.key, self._node, self._is_welcome)
         self._finder: Finder | None = None
@@ -90,11 +96,16 @@ class Mesh:
         return self._catalogues.peers
 
     async def start(self) -> None:
-        """Listen, then look for others. Raises `PeerRefused` as `PeerNode.start`."""
+        """Listen, then look for others. Raises `PeerRefused` as `PeerNode.start`; it may then be
+        tried again."""
         self.addresses = await self._node.start(self._listen)
         if self._find is not None:
             self._finder = self._find(self)
             await self._finder.start()
+
+    def listen_at(self, addresses: Sequence[str]) -> None:
+        """Have it listen elsewhere, once it is started."""
+        self._listen = tuple(addresses)
 
     def meet(self, key: PeerKey, addresses: Sequence[str], epoch: int = 0) -> None:
         """A host may be at these addresses, in this epoch if that is known; where it is let in, it
@@ -153,6 +164,8 @@ class Mesh:
                 self._meeting.up(event)
             case PeerLost():
                 self._meeting.lost(event.key)
+            case DialFailed():
+                self._meeting.turn_over(event.key)
             case _:
                 pass
         self._catalogues.on_event(event)

@@ -36,6 +36,8 @@ from nondum.transport.peers.zap import Entry, Knock, ZapHandler
 
 BEAT_S = 0.3
 """Time between two pings: sent by the loop that does the work, so that its hanging is noticed."""
+QUICK_LINKS = 32
+"""Peers that are pinged so often. With more of them, each is pinged less often, and told so."""
 SECOND_LOOK_S = 0.02
 """ZeroMQ tells of a broken connection a little before sending over it fails."""
 _NO_PULSE = Pulse()
@@ -102,7 +104,8 @@ class PeerNode:
         """Listen at addresses (`tcp://*:0` picks a port); the addresses as bound.
 
         Raises `PeerRefused` (ZAP_INEFFECTIVE, ZAP_TAKEN, DEVELOPMENT_LOOPBACK, ADDRESS_MALFORMED,
-        ADDRESS_UNUSABLE). Nothing is bound before the socket has turned away a stranger.
+        ADDRESS_UNUSABLE); it may then be tried again. Nothing is bound before the socket has turned
+        away a stranger.
         """
         for address in addresses:
             self.identity.check_address(address)
@@ -116,6 +119,8 @@ class PeerNode:
             if self._ears is not None:
                 self._ears.close()
             socket.close(0)
+            self._zap.close()
+            self._ears = self._zap = None
             raise
         self._listener = Drained(socket, self._on_frames)
         self._beating = self._loop.call_later(BEAT_S, self._beat)
@@ -263,8 +268,9 @@ class PeerNode:
                 self._loop.call_later(SECOND_LOOK_S, self._roster.try_link, link)
 
     def _beat(self) -> None:
-        self._beating = self._loop.call_later(BEAT_S, self._beat)
-        self._roster.beat()
+        next_s = BEAT_S * max(1.0, len(self._roster.sessions) / QUICK_LINKS)
+        self._beating = self._loop.call_later(next_s, self._beat)
+        self._roster.beat(next_s)
         self._arrivals.cut_overdue()
         # Links that are over keep their ids until their connections are gone: what was read of
         # them before they were cut must not make a new link.
