@@ -10,7 +10,7 @@ from tests.transport.fleet.fleets import Member, mesh_member, refusals
 
 from nondum.sdk.wire import Body
 from nondum.transport.fleet import Mesh, PeerChanged
-from nondum.transport.fleet.meeting import ADDRESSES, WISHES, Meeting
+from nondum.transport.fleet.meeting import ADDRESSES, AT_ONCE, WISHES, Meeting
 from nondum.transport.peers import (
     DialFailed,
     HostKeys,
@@ -202,6 +202,9 @@ async def test_strangers_hints_are_bounded() -> None:
     for number in range(3 * WISHES):
         many = [f"tcp://10.0.{number % 200}.{last}:1" for last in range(100)]
         meeting.hinted(PeerKey(f"b{number}"), many)
+    assert len(dialled.dials) == AT_ONCE
+    for number in range(3 * WISHES):
+        meeting.turn_over(PeerKey(f"b{number}"))
     assert len(dialled.dials) == WISHES
     assert all(len(addresses) == ADDRESSES for addresses in dialled.dials.values())
     meeting.close()
@@ -218,6 +221,7 @@ async def test_host_that_was_met_keeps_its_place_among_strangers() -> None:
     for number in range(2 * WISHES):
         meeting.hinted(PeerKey(f"b{number}"), ["tcp://10.0.0.2:1"])
     meeting.gone(met)
+    meeting.turn_over(next(iter(dialled.dials)))
     assert dialled.dials[met] == ("tcp://10.0.0.1:1",)
     meeting.close()
 

@@ -29,6 +29,7 @@ from nondum.transport.peers.messages import (
     decode,
     encode,
 )
+from nondum.transport.peers.pulse import DIGEST_BYTES, State
 
 numbers = st.integers(1, MAX_ID)
 names = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=64)
@@ -44,6 +45,7 @@ bodies = st.dictionaries(
     names, st.recursive(leaves, lambda inner: st.lists(inner, max_size=4), max_leaves=8), max_size=4
 )
 problems = st.builds(Problem, names, names, where=names)
+digests = st.binary(min_size=DIGEST_BYTES, max_size=DIGEST_BYTES)
 certificates = st.binary(max_size=1024)
 
 
@@ -62,7 +64,7 @@ messages: st.SearchStrategy[Message] = st.one_of(
     st.builds(Progress, numbers, bodies),
     st.builds(Cancel, numbers),
     st.builds(Notice, names, bodies),
-    st.builds(Ping, numbers),
+    st.builds(Ping, numbers, numbers, st.none() | st.builds(State, numbers, digests)),
     st.builds(Pong, numbers),
     st.builds(Bye, names),
 )

@@ -7,6 +7,8 @@ is no link a second later: perhaps only that direction works.
 from __future__ import annotations
 
 import asyncio
+import contextlib
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -15,7 +17,13 @@ from nondum.transport.peers.events import PeerUp
 from nondum.transport.peers.keys import PeerKey
 
 PATIENCE_S = 1.0
-"""How long the host with the bigger key waits to be dialled."""
+"""How long the host with the bigger key waits to be dialled …"""
+PATIENCE_FOR_EACH_S = 0.1
+"""… and so much more for every other peer that it looks for: when all start at once, it takes."""
+AT_ONCE = 8
+"""Peers that are dialled anew at the same time, or all handshakes would be late in the end."""
+TURN_S = 2.0
+"""How long one of them may keep others waiting; it is dialled on after that."""
 ADDRESSES = 16
 """Addresses of one peer that are tried."""
 WORKED = 4
@@ -68,6 +76,9 @@ class Meeting:
         """`is_welcome` tells whether a key might be let in."""
         self._mine, self._dialler, self._is_welcome = mine, dialler, is_welcome
         self._wishes: dict[PeerKey, _Wish] = {}
+        self._turns: dict[PeerKey, asyncio.TimerHandle] = {}
+        """Who is being dialled anew."""
+        self._queue: deque[PeerKey] = deque()
         self._loop = asyncio.get_running_loop()
 
     def hinted(self, key: PeerKey, addresses: Iterable[str], epoch: int = 0) -> None:
@@ -101,6 +112,7 @@ class Meeting:
             return
         wish.is_linked = True
         self._stop(wish)
+        self.turn_over(event.key)
         if event.address in wish.addresses:  # this host has dialled it there
             others = tuple(one for one in wish.worked if one != event.address)
             wish.worked = (event.address, *others)[:WORKED]
@@ -136,9 +148,16 @@ class Meeting:
         for wish in self._wishes.values():
             self._stop(wish)
         self._wishes.clear()
+        self._queue.clear()
+        for timer in self._turns.values():
+            timer.cancel()
+        self._turns.clear()
 
     def _courtesy_s(self, key: PeerKey) -> float:
-        return PATIENCE_S if self._mine > key else 0.0
+        if self._mine < key:
+            return 0.0
+        looked_for = sum(not wish.is_linked for wish in self._wishes.values())
+        return PATIENCE_S + PATIENCE_FOR_EACH_S * (looked_for - 1)
 
     def _wish(self, key: PeerKey) -> _Wish | None:
         """The wish for a peer, made where there is room for one more."""
@@ -161,24 +180,47 @@ class Meeting:
         else:
             wish.timer = self._loop.call_at(at_s, self._dial, key)
 
+    def turn_over(self, key: PeerKey) -> None:
+        """A peer was reached, or not at once: others have their turn."""
+        if timer := self._turns.pop(key, None):
+            timer.cancel()
+        while self._queue and len(self._turns) < AT_ONCE:
+            self._dial(self._queue.popleft())
+
     def _dial(self, key: PeerKey) -> None:
-        wish = self._wishes[key]
+        wish = self._wishes.get(key)
+        if wish is None:
+            return
         wish.timer = None
+        if wish.is_linked or not wish.addresses:
+            return
+        if len(self._turns) >= AT_ONCE and key not in self._turns:
+            self._leave_queue(key)
+            (self._queue.appendleft if wish.worked else self._queue.append)(key)
+            return
+        if timer := self._turns.pop(key, None):
+            timer.cancel()
+        self._turns[key] = self._loop.call_later(TURN_S, self.turn_over, key)
         wish.dialled_s = self._loop.time()
-        if not wish.is_linked and wish.addresses:
-            self._dialler.dial(key, wish.addresses)
+        self._dialler.dial(key, wish.addresses)
 
     def _look_where_it_was(self, key: PeerKey, wish: _Wish) -> None:
         if not wish.worked:
             self._drop(key)
             return
-        self._dialler.dial(key, wish.addresses)
+        self._dial(key)
         self._stop(wish)
         wish.timer = self._loop.call_later(REMEMBERED_S, self._drop, key)
 
     def _drop(self, key: PeerKey) -> None:
         self._stop(self._wishes.pop(key))
         self._dialler.hang_up(key)
+        self._leave_queue(key)
+        self.turn_over(key)
+
+    def _leave_queue(self, key: PeerKey) -> None:
+        with contextlib.suppress(ValueError):
+            self._queue.remove(key)
 
     def _stop(self, wish: _Wish) -> None:
         if wish.timer is not None:

@@ -35,7 +35,7 @@ from nondum.transport.peers.trust import Admission, Standing, Trust
 SILENCE_S = 10.0
 """A peer that has told nothing for so long hangs: three of its tellings were missed."""
 TEND_S = 0.5
-ANSWER_S = 3.0
+ANSWER_S = 8.0
 """How long a greeting may take to be answered."""
 START_S = 3.0
 """How long the start waits for a router; it is looked for ever after."""

@@ -41,6 +41,8 @@ class Link:
     ) -> None:
         self.route, self.proved, self.dialled = route, proved, dialled
         self.heard_s = now_s
+        self.beat_s = 0.0
+        """Between two of the other end's pings, as the last one said."""
         self.session: Session | None = None
         """The peer's, once greetings were exchanged."""
         self.is_over = False

@@ -117,6 +117,8 @@ class Ping:
     """The sender's loop is working."""
 
     number: int
+    beat_ms: int = 300
+    """Until the next one."""
     state: State | None = None
     """How far the sender's account of itself is; two more fields, or none."""
 
@@ -162,10 +164,10 @@ def encode(message: Message) -> bytes:
             fields: tuple[Any, ...] = (3, number, settled, remaining_ms, method, args)
         case Reply(number, body):
             fields = (4, number, body)
-        case Ping(number, None):
-            fields = (9, number)
-        case Ping(number, State(revision, digest)):
-            fields = (9, number, revision, digest)
+        case Ping(number, beat_ms, None):
+            fields = (9, number, beat_ms)
+        case Ping(number, beat_ms, State(revision, digest)):
+            fields = (9, number, beat_ms, revision, digest)
         case Pong(number):
             fields = (10, number)
         case Failure(number, problems):
@@ -292,12 +294,13 @@ def _read_notice(fields: list[Any]) -> Notice:
 
 
 def _read_ping(fields: list[Any]) -> Ping:
-    if len(fields) == 2:
-        return Ping(read_number(fields[1]))
-    digest = fields[3]
+    number, beat_ms = read_number(fields[1]), read_number(fields[2])
+    if len(fields) == 3:
+        return Ping(number, beat_ms)
+    digest = fields[4]
     if type(digest) is not bytes or len(digest) != DIGEST_BYTES:
         raise _violation("PACKET_FIELDS", f"a digest has {DIGEST_BYTES} bytes")
-    return Ping(read_number(fields[1]), State(read_number(fields[2]), digest))
+    return Ping(number, beat_ms, State(read_number(fields[3]), digest))
 
 
 def _read_pong(fields: list[Any]) -> Pong:
@@ -318,7 +321,7 @@ _READERS: tuple[tuple[tuple[int, ...], Callable[[list[Any]], Message]], ...] = (
     ((3,), _read_progress),
     ((2,), _read_cancel),
     ((3,), _read_notice),
-    ((2, 4), _read_ping),
+    ((3, 5), _read_ping),
     ((2,), _read_pong),
     ((2,), _read_bye),
 )

@@ -25,6 +25,7 @@ from nondum.transport.peers.messages import (
     agreed_version,
     decode,
     encode,
+    milliseconds,
 )
 from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.refusals import Reason, Refusal, Refusals
@@ -33,6 +34,9 @@ from nondum.transport.peers.trust import Admission
 
 SILENCE_S = 1.0
 """A link over which nothing came for so long is dead: three pings were missed."""
+PINGS_MISSED = 3.3
+LONGEST_SILENCE_S = 10.0
+"""The same, however seldom a peer says that it pings."""
 RESUME_S = 0.5
 """How long a peer may be without a link before it is lost."""
 ACQUAINTANCES = 1024
@@ -99,7 +103,7 @@ class Roster:
             self.turn_away(link, Reason.REVOKED, _REVOKED)
             return
         now_s, session = self._loop.time(), link.session
-        if session is not None and now_s - link.heard_s > self.silence_s:
+        if session is not None and self._is_silent(link):
             # This host may have hung itself: what waited meanwhile is of a link that is over.
             self.break_link(link, Loss.SILENT)
             return
@@ -170,10 +174,10 @@ class Roster:
             if not self.gate.still_admits(session.admission):
                 self._part(session, Refused(_REVOKED), Loss.REVOKED)
 
-    def beat(self) -> None:
-        """Ping every link, and find those that are dead."""
+    def beat(self, next_s: float) -> None:
+        """Ping every link, and find those that are dead; the next beat is in `next_s`."""
         self._beats += 1
-        self._ping = encode(Ping(self._beats, self._pulse.state()))
+        self._ping = encode(Ping(self._beats, milliseconds(next_s), self._pulse.state()))
         self.tend()
         for session in list(self._sessions.values()):
             for link in list(session.links):
@@ -181,15 +185,18 @@ class Roster:
 
     def tend(self) -> None:
         """What is due from time to time: end what is over, send what has waited."""
-        now_s = self._loop.time()
         for session in list(self._sessions.values()):
             if self.gate.has_expired(session.admission):
                 self._part(session, Refused(_EXPIRED), Loss.EXPIRED)
                 continue
             session.errands.pass_on_waiting()
             for link in list(session.links):
-                if now_s - link.heard_s > self.silence_s:
+                if self._is_silent(link):
                     self.break_link(link, Loss.SILENT)
+
+    def _is_silent(self, link: Link) -> bool:
+        missed_s = min(PINGS_MISSED * link.beat_s, LONGEST_SILENCE_S)
+        return self._loop.time() - link.heard_s > max(self.silence_s, missed_s)
 
     def try_link(self, link: Link) -> None:
         """Ping a link; one whose connection is gone is broken."""

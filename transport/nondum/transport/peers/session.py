@@ -116,7 +116,8 @@ class Session:
                 self.errands.take(message)
             case Reply(number, body):
                 self.calls.succeed(number, dict(body))
-            case Ping(number, state):
+            case Ping(number, beat_ms, state):
+                link.beat_s = beat_ms / 1000
                 if number % ANSWERED == 0:
                     link.tell(Pong(number))
                 if state is not None:
