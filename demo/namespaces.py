@@ -179,12 +179,11 @@ class Network:
     ) -> None:
         """Kill what runs there, and remove it all."""
         for machine in self.machines:
+            _remove(machine.namespace)  # first, or a grandchild may keep a pipe open
             for process in machine.processes:
-                process.kill()
                 process.communicate()
-        namespaces = [m.namespace for m in self.machines] + [s.namespace for s in self.switches]
-        for namespace in namespaces:
-            _remove(namespace)
+        for switch in self.switches:
+            _remove(switch.namespace)
 
     def switch(self) -> Switch:
         """A network more: the first is 10.77.0.0/24, the second 10.77.1.0/24, …"""
@@ -263,9 +262,10 @@ def _add(name: str) -> str:
 
 
 def _remove(namespace: str) -> None:
-    for pid in _run("ip", "netns", "pids", namespace).split():
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(int(pid), signal.SIGKILL)
+    while pids := _run("ip", "netns", "pids", namespace).split():
+        for pid in pids:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(int(pid), signal.SIGKILL)
     _run("ip", "netns", "delete", namespace)
 
 
