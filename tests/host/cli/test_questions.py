@@ -50,6 +50,7 @@ VIEWS: dict[str, set[str]] = {
         "revision",
         "state",
         "warnings",
+        "peers",
         "payloads",
         "drives",
         "goals",

@@ -109,7 +109,8 @@ class PeerNode:
         """
         for address in addresses:
             self.identity.check_address(address)
-        self._zap = ZapHandler(self._context, self._judge)
+        if self._zap is None:
+            self._zap = ZapHandler(self._context, self._judge)
         socket = listening(self._context, self.identity.keys)
         try:
             await prove_enforced(socket, self.identity.keys, self._zap.expect_probe)
@@ -119,8 +120,7 @@ class PeerNode:
             if self._ears is not None:
                 self._ears.close()
             socket.close(0)
-            self._zap.close()
-            self._ears = self._zap = None
+            self._ears = None
             raise
         self._listener = Drained(socket, self._on_frames)
         self._beating = self._loop.call_later(BEAT_S, self._beat)
