@@ -60,9 +60,9 @@ class Fall:
         if not self.ticks:
             yield "nothing was halted"
         else:
-            if len(self.ticks) > 1:
-                yield f"it took {len(self.ticks)} ticks to halt everything"
-            yield from (f"{action} was not halted" for action in {*actions} - self.ticks[0])
+            for action in {*actions} - self.ticks[0]:
+                is_late = any(action in tick for tick in self.ticks[1:])
+                yield f"{action} was {'halted in a later tick' if is_late else 'not halted'}"
         for component in components:
             yield from self._lateness(component)
             if component in self.exits:

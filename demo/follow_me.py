@@ -81,7 +81,8 @@ class FollowMe:
         since: str,
         brake_s: float = BRAKE_S,
     ) -> StageResult:
-        """Take components away while the body turns, and see that all goes down that needed them.
+        """Take components away while the body turns, and see that all goes down that needed them:
+        the steps of the plan from the first of theirs on.
 
         `since` says in words what `take` does; the body may take `brake_s` from then to stand.
         """
@@ -97,7 +98,8 @@ class FollowMe:
         fall = Fall.of(stage.journal())
         stage.phase("halted", fall.decided_s)
         others = {step["component"] for step in steps} - {*lost}
-        stage.faults += fall.faults(stage.plan, sorted(others))
+        first = next((n for n, step in enumerate(steps) if step["component"] in lost), 0)
+        stage.faults += fall.faults(stage.plan[first:], sorted(others))
         moved = motion(self.body.headings, self.body.places, begin_s, begin_s + STAND_S)
         if moved is None or not moved.is_standing:
             stage.faults.append("the body does not stand")
@@ -105,8 +107,9 @@ class FollowMe:
         if not said:
             stage.faults.append(f"nobody was told that {', '.join(sorted(lost))} is missing")
         measure = (
-            f"{len(stage.plan)} behaviours down in one tick, {_ms(stage.phases_s['halted'])} after "
-            f"{since}, and ended {_ms(fall.took_s)} later; then {moved} in {STAND_S:.0f} s; "
+            f"{len(stage.plan[first:])} behaviours down in one tick, "
+            f"{_ms(stage.phases_s['halted'])} after {since}, and all {len(stage.plan)} ended "
+            f"{_ms(fall.took_s)} later; then {moved} in {STAND_S:.0f} s; "
             f"“{said[0] if said else ''}”"
         )
         return stage.result(reached=bool(fall.ticks), measure=measure)

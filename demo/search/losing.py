@@ -2,36 +2,99 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+import json
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from demo.follow_me import follow_me
 from demo.following import Reference
-from demo.robot import Robot, View
+from demo.robot import Robot, View, nondum
+from demo.search.searching import WORDS, own_components
 from demo.search.sites import Site
-from demo.stage import PLAN_S
+from demo.stage import PLAN_S, Mark
 from demo.table import StageResult
+from nondum.sdk.errors import HostUnreachable
 
 FOLLOW = "follow me through the facility"
 NAME = "node lost"
 BRAKE_S = 3.0
 """A host counts as dead after some 1.5 s; the base brakes from full speed in less than that."""
+ENDED_S = 10.0
+PAUSE_S = 0.2
 
 
 def lose_node(
     site: Site, node: Robot, robot: Robot, others: Sequence[Robot], reference: Reference
 ) -> StageResult:
-    """Have a robot follow with what the node has, and let the node vanish: the robot must halt
-    and stand, all hosts must forget the node, and say what is missing."""
+    """Have a robot follow with what the node has, and let the node vanish: the robot must halt and
+    stand, the other hosts must forget the node and say what is missing, and the node must end what
+    it did for them."""
+    mark = Mark(node)
+    pids = [row["pid"] for row in node.view["components"] if row["pid"]]
     robot.ask("goal", words=FOLLOW)
     robot.until(f"{NAME}: {robot.name} follows", _all_established, timeout_s=PLAN_S)
-    lost = {row["component"] for row in robot.view["components"] if row["host"] == node.name}
+    lost = {f"{id}@{node.name}" for id in own_components(node)}
     with follow_me(robot, reference, words=FOLLOW) as following:
         result = following.bereave(
-            lambda: site.lose(node), lost, name=NAME, since="that", brake_s=BRAKE_S
+            lambda: site.lose(node), lost, name=NAME, since=site.lost, brake_s=BRAKE_S
         )
-    return result
+    left = [robot, *others]
+    for host in left:
+        host.until(f"{host.name} forgets {node.name}", _without(node.name), timeout_s=PLAN_S)
+    told = {host.name: _missing(host) for host in left}
+    faults = [
+        f"{name} does not say that {node.name} is missing"
+        for name, sentence in told.items()
+        if f"bring the host {node.name} back" not in sentence
+    ]
+    if not _within(lambda: _has_ended(node, mark, pids), ENDED_S):
+        faults.append(f"{node.name} still does something for hosts that it lost")
+    names = " and ".join(told)
+    measure = (
+        f"{result.measure}; {names} have nothing of {node.name} any more; asked why not “{WORDS}”, "
+        f"{others[0].name} says “{told[others[0].name]}”"
+    )
+    return dataclasses.replace(
+        result,
+        reached=result.reached and not faults,
+        measure="; BUT ".join([measure, *faults]),
+    )
+
+
+def _missing(host: Robot) -> str:
+    """What a host says when it is asked why it cannot search: one sentence a cause."""
+    found = json.loads(nondum("--control", host.control, "why", "--json", WORDS))
+    causes = (f"{cause['message']} → {cause['fix']}" for cause in found["causes"])
+    return "; ".join(causes)
+
+
+def _has_ended(node: Robot, mark: Mark, pids: Sequence[int]) -> bool:
+    """Whether nothing runs that was begun for a peer: by the node's own journal, or, where its
+    daemon is dead, by its workers being gone."""
+    try:
+        journal = mark.journal()
+    except HostUnreachable:
+        return not any(Path(f"/proc/{pid}").exists() for pid in pids)
+    begun = [row for row in journal if row["event"] == "BehaviourStarted"]
+    return bool(begun) and len(begun) == len(
+        [row for row in journal if row["event"] == "BehaviourEnded"]
+    )
+
+
+def _without(name: str) -> Callable[[View], bool]:
+    return lambda view: all(row["host"] != name for row in view["components"])
 
 
 def _all_established(view: View) -> bool:
     states = [step["state"] for step in view["plan"]["steps"]]
     return bool(states) and all(state == "established" for state in states)
+
+
+def _within(is_so: Callable[[], bool], seconds: float) -> bool:
+    """Wait until something is so, and say whether it was in time."""
+    deadline_s = time.monotonic() + seconds
+    while not (found := is_so()) and time.monotonic() < deadline_s:
+        time.sleep(PAUSE_S)
+    return found

@@ -33,6 +33,8 @@ class Search:
 
     node: Robot
     person: Person
+    where: str
+    """What they are on, for people."""
 
     def begin(self, robot: Robot, *, published_s: float, begun_s: float) -> Stage:
         """Wait until a robot that was switched on and the node know each other."""
@@ -73,6 +75,7 @@ class Search:
             lambda view: _given(view, ("reached",)),
             timeout_s=PLAN_S,
         )
+        stage.faults += self._unfed(marks[1], robot)
         ran = {robot.name: _started(marks[0]), self.node.name: _started(marks[1])}
         stage.faults += [
             f"{id} of {host} did nothing"
@@ -80,7 +83,7 @@ class Search:
             for id in sorted(ids - ran[host])
         ]
         measure = (
-            f"“{WORDS}”, said to {self.node.name}{_again(tries)}, became goal {goal['id']} of "
+            f"found on {self.where}; “{WORDS}”, said to {self.node.name}{_again(tries)}, became goal {goal['id']} of "
             f"{robot.name}; {_where(ran)} had a part in it; then “{ALERT}” was heard in "
             f"{file.name} of {self.node.name}'s speaker"
         )
@@ -125,6 +128,14 @@ class Search:
         }
         acting = {row["component"] for row in self.node.view["components"] if row["behaviours"]}
         return {robot.name: on_drives, self.node.name: acting & own_components(self.node)}
+
+    def _unfed(self, mark: Mark, robot: Robot) -> Sequence[str]:
+        """A fault if nothing that the node did was done with a stream of the robot."""
+        rows = (row for row in mark.journal() if row["event"] == "BehaviourStarted")
+        streams = (value for row in rows for value in row["detail"]["arguments"].values())
+        if any(stream.startswith(f"{robot.name}__") for stream in streams):
+            return ()
+        return (f"nothing of {robot.name} was looked at by {self.node.name}",)
 
     def _alert(self, since_wall_s: float, stage: Stage) -> tuple[float, Path]:
         """When the node's speaker said that somebody was found, and in which file; what a person

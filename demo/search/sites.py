@@ -24,8 +24,8 @@ class Site(Protocol):
         ...
 
     @property
-    def how_lost(self) -> str:
-        """What `lose` does, for people."""
+    def lost(self) -> str:
+        """What `lose` does, for people: a noun."""
         ...
 
     def prepare(self, name: str, state: Path) -> str:
@@ -45,7 +45,7 @@ class Lan:
     """Machines with one network each, joined by a switch; keys, and a fleet that certifies them."""
 
     told = "three network namespaces and a switch, CURVE keys, certificates of a fleet, multicast"
-    how_lost = "its network cable is pulled; its daemon and workers run on"
+    lost = "the pull of its network cable"
 
     def __init__(self, work: Path, network: Network, names: Sequence[str]) -> None:
         self._fleet = Fleet(work / "fleet")
@@ -73,7 +73,7 @@ class Loopback:
     """Processes of one machine, which know each other's ports and ask for no keys."""
 
     told = "one machine's loopback, static hosts, development mode (no keys)"
-    how_lost = "its daemon gets SIGKILL, and its workers end with it"
+    lost = "SIGKILL to its daemon"
 
     def __init__(self, names: Sequence[str]) -> None:
         self._ports = {name: _free_port() for name in names}

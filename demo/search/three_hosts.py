@@ -73,7 +73,7 @@ def _play(options: argparse.Namespace, work: Path, say: Says) -> Iterator[StageR
         say(f"{ROBOT}: it and the {NODE} are switched on; “{WORDS}”")
         begun_s = time.monotonic()
         node, robot = switch_on(NODE, ()), switch_on(ROBOT, (BASE,))
-        search = Search(node, person)
+        search = Search(node, person, where.told)
         stage = search.begin(robot, published_s=PUBLISHED_S[ROBOT], begun_s=begun_s)
         brought = [name for name in FOR_NODE if name not in options.without]
         search.equip(stage, {node: kit.of(brought), robot: kit.of([CAMERA])})
@@ -87,7 +87,7 @@ def _play(options: argparse.Namespace, work: Path, say: Says) -> Iterator[StageR
         search.equip(stage, {small: kit.of([CAMERA])})
         yield search.run(stage)
 
-        say(f"{losing.NAME}: {SMALL} follows, steered by the {NODE}; then {where.how_lost}")
+        say(f"{losing.NAME}: {SMALL} follows, steered by the {NODE}; then {where.lost}")
         yield losing.lose_node(where, node, small, [robot], Reference.read(REFERENCE))
 
 
