@@ -10,7 +10,17 @@ from typing import Any, TypeVar
 
 from nondum.sdk.wire import Body
 from nondum.transport.fleet import FleetEvent, Mesh
-from nondum.transport.peers import Call, Errand, Identity, Lease, Loss, PeerKey, PeerUp, Trust
+from nondum.transport.peers import (
+    Call,
+    Errand,
+    Handler,
+    Identity,
+    Lease,
+    Loss,
+    PeerKey,
+    PeerUp,
+    Trust,
+)
 
 PATIENCE_S = 20.0
 T = TypeVar("T")
@@ -31,8 +41,9 @@ class _Idle:
 class Guest:
     """A member of a mesh in development mode, on a loop in a thread of its own."""
 
-    def __init__(self, name: str) -> None:
-        self.name = name
+    def __init__(self, name: str, handler: Handler | None = None) -> None:
+        """`handler` does what hosts ask of it; by default, nothing."""
+        self.name, self._handler = name, handler or _Idle()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
@@ -62,6 +73,21 @@ class Guest:
             raise AssertionError(await call)
 
         return self._run(begin())
+
+    def reports(
+        self, host: str, method: str, until: Mapping[str, Any], **args: Any
+    ) -> list[dict[str, Any]]:
+        """Call a host, and wait for a report that says so; all reports up to that one."""
+
+        async def collect() -> list[dict[str, Any]]:
+            call, found = self._call(host, method, args), []
+            async for report in call:
+                found.append(report)
+                if until.items() <= report.items():
+                    return found
+            raise AssertionError(await call)
+
+        return self._run(collect())
 
     def tell(self, host: str, method: str, args: Mapping[str, Any]) -> None:
         """Tell a host something."""
@@ -97,7 +123,7 @@ class Guest:
         mesh = Mesh(
             Identity(self.name, None),
             Trust(),
-            _Idle(),
+            self._handler,
             on_event=on_event,
             listen=("tcp://127.0.0.1:0",),
         )
@@ -114,9 +140,9 @@ class Guest:
 
 
 @contextmanager
-def guest(name: str, *hosts: tuple[str, str]) -> Iterator[Guest]:
+def guest(name: str, *hosts: tuple[str, str], handler: Handler | None = None) -> Iterator[Guest]:
     """A guest that has met some hosts, by name and address."""
-    made = Guest(name)
+    made = Guest(name, handler)
     try:
         for host, address in hosts:
             made.meet(host, address)
