@@ -84,6 +84,7 @@ def test_host_whose_port_is_taken_listens_at_another_and_says_so(tmp_path: Path)
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with open_host(tmp_path / "rover", "rover", port) as (rover, _):
+            rover.until_told("this host listens elsewhere")
             (warning,) = [w for w in rover.ask("status")["warnings"] if "ADDRESS_UNUSABLE" in w]
             assert str(port) in warning
 

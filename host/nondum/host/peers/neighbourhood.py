@@ -215,6 +215,7 @@ class Neighbourhood:
             if refused.code != "ADDRESS_UNUSABLE":
                 raise
             self._troubles.append(str(refused.problems[0]))
+            self._mind().people.tell(f"{refused.problems[0]}; this host listens elsewhere")
             self.mesh.listen_at([with_port(address, 0) for address in self._listens])
             await self.mesh.start()
 
