@@ -81,6 +81,11 @@ class Meeting:
         self._queue: deque[PeerKey] = deque()
         self._loop = asyncio.get_running_loop()
 
+    @property
+    def looked_for(self) -> int:
+        """Peers that are to be linked to, and are or are not yet."""
+        return len(self._wishes)
+
     def hinted(self, key: PeerKey, addresses: Iterable[str], epoch: int = 0) -> None:
         """Somebody said where a peer is; perhaps again."""
         if key == self._mine or not self._is_welcome(key):
@@ -156,8 +161,8 @@ class Meeting:
     def _courtesy_s(self, key: PeerKey) -> float:
         if self._mine < key:
             return 0.0
-        looked_for = sum(not wish.is_linked for wish in self._wishes.values())
-        return PATIENCE_S + PATIENCE_FOR_EACH_S * (looked_for - 1)
+        unlinked = sum(not wish.is_linked for wish in self._wishes.values())
+        return PATIENCE_S + PATIENCE_FOR_EACH_S * (unlinked - 1)
 
     def _wish(self, key: PeerKey) -> _Wish | None:
         """The wish for a peer, made where there is room for one more."""

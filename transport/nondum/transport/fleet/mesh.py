@@ -113,6 +113,7 @@ class Mesh:
         for address in addresses:
             self._node.identity.check_address(address)
         self._meeting.hinted(key, addresses, epoch)
+        self._node.expected = self._meeting.looked_for
 
     def check_address(self, address: str) -> None:
         """Refuse addresses that this host does not dial. Raises `PeerRefused`."""

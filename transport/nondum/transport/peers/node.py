@@ -70,6 +70,8 @@ class PeerNode:
         self.identity = identity
         self.epoch = epoch or fresh_epoch()
         """Tells this life of the host from earlier ones."""
+        self.expected = 0
+        """How many peers it is to have, as far as anybody knows; for how often they are pinged."""
         self.refusals = Refusals(on_event)
         self._gate = Gate(identity, trust, clock)
         self._on_event = on_event
@@ -268,7 +270,8 @@ class PeerNode:
                 self._loop.call_later(SECOND_LOOK_S, self._roster.try_link, link)
 
     def _beat(self) -> None:
-        next_s = BEAT_S * max(1.0, len(self._roster.sessions) / QUICK_LINKS)
+        links = max(len(self._roster.sessions), self.expected)
+        next_s = BEAT_S * max(1.0, links / QUICK_LINKS)
         self._beating = self._loop.call_later(next_s, self._beat)
         self._roster.beat(next_s)
         self._arrivals.cut_overdue()

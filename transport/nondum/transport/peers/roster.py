@@ -70,7 +70,7 @@ class Roster:
         self._known: dict[PeerKey, Acquaintance] = {}
         self._orphans: set[Errand] = set()
         self._loop = asyncio.get_running_loop()
-        self._beats = 1
+        self._beats, self._beat_s = 1, 0.0
         self._ping = encode(Ping(self._beats))
         """The same for every link, so made once a beat."""
 
@@ -177,6 +177,7 @@ class Roster:
     def beat(self, next_s: float) -> None:
         """Ping every link, and find those that are dead; the next beat is in `next_s`."""
         self._beats += 1
+        self._beat_s = next_s
         self._ping = encode(Ping(self._beats, milliseconds(next_s), self._pulse.state()))
         self.tend()
         for session in list(self._sessions.values()):
@@ -255,6 +256,7 @@ class Roster:
         known_session = self._sessions.get(key)
         session = known_session or Session(admission, known, self._handler, self._pulse)
         self._sessions[key] = session
+        link.beat_s = self._beat_s  # until the peer has said its own
         for replaced in session.join(link):
             replaced.cut()
         if known_session is None:
