@@ -1,0 +1,101 @@
+"""Files come by hash and in pieces, whole and as listed, or not at all."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from nondum.host.peers.placement.fetching import WINDOW, Fetching, Listed
+from nondum.host.peers.placement.handover import CHUNK
+from nondum.sdk.errors import NondumError, Problem
+from nondum.transport.peers import Call, CallFailed
+from nondum.transport.peers.messages import Request
+
+pytestmark = pytest.mark.anyio
+
+
+class Owner:
+    """Answers each call after the loop has gone round a few times, as it likes."""
+
+    def __init__(self, data: bytes, answer: Callable[[int, bytes], Any] | None = None) -> None:
+        self._data, self._answer = data, answer or (lambda offset, piece: piece)
+        self.running: set[int] = set()
+        self.most = 0
+
+    def read(self, sha256: str, offset: int) -> Call:
+        request = Request(offset, offset, 1000, "place.read", {})
+        call = Call(request, 0.0, self.running.discard)
+        self.running.add(offset)
+        self.most = max(self.most, len(self.running))
+        asyncio.get_running_loop().call_soon(self._reply, call, offset)
+        return call
+
+    def _reply(self, call: Call, offset: int) -> None:
+        self.running.discard(offset)
+        answer = self._answer(offset, self._data[offset : offset + CHUNK])
+        if isinstance(answer, NondumError):
+            call.fail(answer)
+        else:
+            call.succeed({"data": answer})
+
+
+def listed(data: bytes, path: str = "wheels/a.whl") -> Listed:
+    return Listed(path, hashlib.sha256(data).hexdigest(), len(data))
+
+
+@pytest.mark.parametrize("size", [0, 1, CHUNK - 1, CHUNK, CHUNK + 1, 3 * WINDOW * CHUNK + 7])
+async def test_file_is_whole_afterwards(tmp_path: Path, size: int) -> None:
+    data = bytes(range(256)) * (size // 256) + bytes(size % 256)
+    owner, told = Owner(data), [0]
+    fetching = Fetching(tmp_path, owner.read, told.append)
+    await fetching.fetch(listed(data))
+    assert (tmp_path / "wheels/a.whl").read_bytes() == data
+    assert sum(told) == size
+    assert owner.most <= WINDOW
+
+
+pieces = st.sampled_from(["cut", "longer", "changed", "text", "failed"])
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(at=st.integers(0, 20), wrong=pieces)
+async def test_wrong_piece_is_refused_wherever_it_is(tmp_path: Path, at: int, wrong: str) -> None:
+    data = bytes(21 * CHUNK)
+
+    def answer(offset: int, piece: bytes) -> Any:
+        if offset != at * CHUNK:
+            return piece
+        failure = CallFailed(Problem("NOT_OFFERED", "not any more"))
+        return {
+            "cut": piece[:-1],
+            "longer": piece + b"\0",
+            "changed": b"\1" + piece[1:],
+            "text": "zeros",
+            "failed": failure,
+        }[wrong]
+
+    owner = Owner(data, answer)
+    folder = tmp_path / f"{at}-{wrong}"
+    with pytest.raises(NondumError) as refused:
+        await Fetching(folder, owner.read).fetch(listed(data))
+    assert refused.value.code == ("NOT_OFFERED" if wrong == "failed" else "HASH_MISMATCH")
+    (folder / "wheels/a.whl").unlink()
+
+
+async def test_pieces_that_are_not_wanted_any_more_are_cancelled(tmp_path: Path) -> None:
+    cancelled: list[int] = []
+
+    def read(sha256: str, offset: int) -> Call:
+        return Call(Request(offset, offset, 1000, "place.read", {}), 0.0, cancelled.append)
+
+    fetch = Fetching(tmp_path, read).fetch(listed(bytes(20 * CHUNK)))
+    with pytest.raises(TimeoutError):
+        await asyncio.wait_for(fetch, 0.05)
+    assert cancelled == [number * CHUNK for number in range(WINDOW)]
