@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -31,14 +31,15 @@ class Says:
 
 
 @contextmanager
-def view(robot: Robot, *, is_shown: bool) -> Iterator[None]:
-    """Draw the robot on a terminal until the context ends; in a pipe, print what it tells."""
+def view(robots: Sequence[Robot], *, is_shown: bool) -> Iterator[None]:
+    """Draw robots on a terminal until the context ends; in a pipe, print what they tell. More of
+    them may be added meanwhile."""
     if not is_shown:
         yield
         return
     stop = threading.Event()
     draw = _draw if sys.stderr.isatty() else _print
-    thread = threading.Thread(target=draw, args=(robot, stop), daemon=True)
+    thread = threading.Thread(target=draw, args=(robots, stop), daemon=True)
     thread.start()
     try:
         yield
@@ -47,25 +48,35 @@ def view(robot: Robot, *, is_shown: bool) -> Iterator[None]:
         thread.join(timeout=5.0)
 
 
-def _draw(robot: Robot, stop: threading.Event) -> None:
+def _draw(robots: Sequence[Robot], stop: threading.Event) -> None:
     console = Console(stderr=True)
     with Live(console=console, refresh_per_second=8, transient=True) as live:
         while not stop.wait(REDRAW_S):
-            live.update(_picture(robot.view))
+            live.update(_pictures(robots))
 
 
-def _print(robot: Robot, stop: threading.Event) -> None:
-    """The same news for a pipe: each sentence that the host tells, and each plan, once."""
-    told, plan = 0, ""
+def _print(robots: Sequence[Robot], stop: threading.Event) -> None:
+    """The same news for a pipe: each sentence that a host tells, and each plan, once."""
+    told, plans = dict[str, int](), dict[str, str]()
     while not stop.wait(REDRAW_S):
-        now = robot.view
-        for sentence in robot.told_since(told):
-            print(f"  host: {sentence}", file=sys.stderr)
-        told = robot.told_number()
-        steps = " → ".join(step["action"].split(" ")[0] for step in _steps(now))
-        if steps and steps != plan:
-            print(f"  plan: {steps}", file=sys.stderr)
-            plan = steps
+        for robot in tuple(robots):
+            name = robot.name
+            for sentence in robot.told_since(told.get(name, 0)):
+                print(f"  {name}: {sentence}", file=sys.stderr)
+            told[name] = robot.told_number()
+            steps = " → ".join(step["action"].split(" ")[0] for step in _steps(robot.view))
+            if steps and steps != plans.get(name):
+                print(f"  {name} plans: {steps}", file=sys.stderr)
+                plans[name] = steps
+
+
+def _pictures(robots: Sequence[Robot]) -> Table | Group:
+    """One beside the other."""
+    if len(robots) == 1:
+        return _picture(robots[0].view)
+    row = Table(*(robot.name for robot in robots), box=None, expand=True)
+    row.add_row(*(_picture(robot.view) for robot in robots))
+    return row
 
 
 def _picture(now: Mapping[str, Any]) -> Group:

@@ -45,14 +45,14 @@ def main(arguments: Sequence[str]) -> int:
     """Run the demonstration; 0 only if every goal was reached."""
     options = _options(arguments)
     play = functools.partial(_play, options)
-    return perform(Programme(STAGES, PHASES, NOTE), play, options, seed=options.seed)
+    return perform(Programme(STAGES, PHASES, NOTE), play, options, {"seed": options.seed})
 
 
 def _play(options: argparse.Namespace, work: Path, say: Says) -> Iterator[StageResult]:
     kit = _kit(options, work, say)
     with (
         running(work, name="panther", initial=kit.of([INITIAL])) as robot,
-        live.view(robot, is_shown=not (options.json or options.plain)),
+        live.view([robot], is_shown=not (options.json or options.plain)),
     ):
         yield from _played(robot, kit, options, say)
 

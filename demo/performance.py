@@ -7,7 +7,7 @@ import json
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,9 +32,10 @@ def perform(
     programme: Programme,
     play: Callable[[Path, Says], Iterator[StageResult]],
     options: argparse.Namespace,
-    **more: Any,
+    more: Mapping[str, Any],
 ) -> int:
-    """Play the stages and report; 0 only if every one was reached. `more` goes into the JSON."""
+    """Play the stages and report; 0 only if every one was reached. `more` goes into the JSON, as
+    it is in the end."""
     say = Says(is_shown=not options.json)
     work = Path(tempfile.mkdtemp(prefix="nondum-demo-"))
     results: list[StageResult] = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import time
 from collections.abc import Mapping, Sequence
@@ -33,8 +34,6 @@ class Search:
 
     node: Robot
     person: Person
-    where: str
-    """What they are on, for people."""
 
     def begin(self, robot: Robot, *, published_s: float, begun_s: float) -> Stage:
         """Wait until a robot that was switched on and the node know each other."""
@@ -70,11 +69,9 @@ class Search:
         stage.planned()
         said_s, file = self._alert(begun_wall_s, stage)
         stage.phase("alert", time.monotonic() - (time.time() - said_s))
-        goal = robot.until(
-            f"{stage.name}: the goal reached",
-            lambda view: _given(view, ("reached",)),
-            timeout_s=PLAN_S,
-        )
+        goal = robot.until(f"{stage.name}: the goal reached", _reached, timeout_s=PLAN_S)
+        stage.phase("understood", _when(marks[0], "GoalGiven"))
+        stage.phase("in plan", _when(marks[0], "PlanMade"))
         stage.faults += self._unfed(marks[1], robot)
         ran = {robot.name: _started(marks[0]), self.node.name: _started(marks[1])}
         stage.faults += [
@@ -83,7 +80,7 @@ class Search:
             for id in sorted(ids - ran[host])
         ]
         measure = (
-            f"found on {self.where}; “{WORDS}”, said to {self.node.name}{_again(tries)}, became goal {goal['id']} of "
+            f"“{WORDS}”, said to {self.node.name}{_again(tries)}, became goal {goal['id']} of "
             f"{robot.name}; {_where(ran)} had a part in it; then “{ALERT}” was heard in "
             f"{file.name} of {self.node.name}'s speaker"
         )
@@ -106,12 +103,9 @@ class Search:
         inbox = Talking(self.node).inbox()
         for number in range(1, TRIES + 1):
             self.person.say(WORDS, inbox / f"{stage.name}-{number}.wav")
-            deadline_s = time.monotonic() + UNDERSTAND_S
-            while time.monotonic() < deadline_s:
-                if _given(stage.robot.view, ("queued", "active", "reached")):
-                    stage.phase("understood")
-                    return number
-                time.sleep(PAUSE_S)
+            with contextlib.suppress(TooLate):
+                stage.robot.until("the goal", _given, timeout_s=UNDERSTAND_S)
+                return number
         told = "\n".join(row["text"] for row in self.node.view["told"])
         raise TooLate(f"{stage.robot.name} was given no goal; {self.node.name} told:\n{told}")
 
@@ -168,9 +162,18 @@ def _is_here(other: Robot) -> Any:
     return lambda view: any(row["text"] == sentence for row in view["told"])
 
 
-def _given(view: View, states: Sequence[str]) -> View | None:
-    goals = view.get("goals", ())
-    return next((g for g in goals if g["text"] == WORDS and g["state"] in states), None)
+def _given(view: View) -> View | None:
+    return next((goal for goal in view["goals"] if goal["text"] == WORDS), None)
+
+
+def _reached(view: View) -> View | None:
+    goal = _given(view)
+    return goal if goal and goal["state"] == "reached" else None
+
+
+def _when(mark: Mark, event: str) -> float:
+    """When something happened first, by a host's journal; all hosts here share one clock."""
+    return float(next(row["monotonic"] for row in mark.journal() if row["event"] == event))
 
 
 def _started(mark: Mark) -> set[str]:

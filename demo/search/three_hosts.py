@@ -6,7 +6,7 @@ import argparse
 import functools
 import shutil
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -58,10 +58,14 @@ examples:
 def main(arguments: Sequence[str]) -> int:
     """Run the demonstration; 0 only if every stage really happened."""
     options = _options(arguments)
-    return perform(Programme(STAGES, PHASES, NOTE), functools.partial(_play, options), options)
+    facts: dict[str, str] = {}
+    play = functools.partial(_play, options, facts)
+    return perform(Programme(STAGES, PHASES, NOTE), play, options, facts)
 
 
-def _play(options: argparse.Namespace, work: Path, say: Says) -> Iterator[StageResult]:
+def _play(
+    options: argparse.Namespace, facts: dict[str, str], work: Path, say: Says
+) -> Iterator[StageResult]:
     say("building the payload drives (cached after the first time)")
     kit = _kit(work)
     person = Person(work / "person", expects=(ALERT, *OTHER_SENTENCES))
@@ -69,45 +73,54 @@ def _play(options: argparse.Namespace, work: Path, say: Says) -> Iterator[StageR
     with ExitStack() as stack:
         where = stack.enter_context(site(work, names, is_loopback=options.loopback))
         say(f"{', '.join(names)}: {where.told}")
-        switch_on = functools.partial(_switched_on, where, work, kit, stack, options)
-        say(f"{ROBOT}: it and the {NODE} are switched on; “{WORDS}”")
-        begun_s = time.monotonic()
-        node, robot = switch_on(NODE, ()), switch_on(ROBOT, (BASE,))
-        search = Search(node, person, where.told)
-        stage = search.begin(robot, published_s=PUBLISHED_S[ROBOT], begun_s=begun_s)
-        brought = [name for name in FOR_NODE if name not in options.without]
-        search.equip(stage, {node: kit.of(brought), robot: kit.of([CAMERA])})
-        yield search.run(stage)
+        facts["where"] = where.told
+        shown: list[Robot] = []
+        stack.enter_context(live.view(shown, is_shown=not (options.json or options.plain)))
 
-        say(f"{SMALL}: it is switched on; the camera moves there; “{WORDS}”")
-        begun_s = time.monotonic()
-        small = switch_on(SMALL, (BASE,))
-        stage = search.begin(small, published_s=PUBLISHED_S[SMALL], begun_s=begun_s)
-        stages.withdraw(robot, kit.drives[CAMERA])
-        search.equip(stage, {small: kit.of([CAMERA])})
-        yield search.run(stage)
+        def switch_on(name: str, *initial: str) -> Robot:
+            shown.append(_switched_on(where, work / name, kit.of(initial), stack))
+            return shown[-1]
 
-        say(f"{losing.NAME}: {SMALL} follows, steered by the {NODE}; then {where.lost}")
-        yield losing.lose_node(where, node, small, [robot], Reference.read(REFERENCE))
+        yield from _played(options, where, kit, person, switch_on, say)
 
 
-def _switched_on(
-    where: Site,
-    work: Path,
-    kit: Kit,
-    stack: ExitStack,
+def _played(
     options: argparse.Namespace,
-    name: str,
-    initial: Sequence[str],
-) -> Robot:
-    folder = work / name
+    where: Site,
+    kit: Kit,
+    person: Person,
+    switch_on: Callable[..., Robot],
+    say: Says,
+) -> Iterator[StageResult]:
+    say(f"{ROBOT}: it and the {NODE} are switched on; “{WORDS}”")
+    begun_s = time.monotonic()
+    node, robot = switch_on(NODE), switch_on(ROBOT, BASE)
+    search = Search(node, person)
+    stage = search.begin(robot, published_s=PUBLISHED_S[ROBOT], begun_s=begun_s)
+    brought = [name for name in FOR_NODE if name not in options.without]
+    search.equip(stage, {node: kit.of(brought), robot: kit.of([CAMERA])})
+    yield search.run(stage)
+
+    say(f"{SMALL}: it is switched on; the camera moves there; “{WORDS}”")
+    begun_s = time.monotonic()
+    small = switch_on(SMALL, BASE)
+    stage = search.begin(small, published_s=PUBLISHED_S[SMALL], begun_s=begun_s)
+    stages.withdraw(robot, kit.drives[CAMERA])
+    search.equip(stage, {small: kit.of([CAMERA])})
+    yield search.run(stage)
+
+    say(f"{losing.NAME}: {SMALL} follows, steered by the {NODE}; then {where.lost}")
+    yield losing.lose_node(where, node, small, [robot], Reference.read(REFERENCE))
+
+
+def _switched_on(where: Site, folder: Path, initial: Mapping[str, Path], stack: ExitStack) -> Robot:
+    """A host that runs until the stack is unwound; it is called as its folder."""
     folder.mkdir()
+    name = folder.name
     more = where.prepare(name, folder / "state")
-    robot = stack.enter_context(
-        running(folder, name=name, initial=kit.of(initial), more=more, inside=where.inside(name))
+    return stack.enter_context(
+        running(folder, name=name, initial=initial, more=more, inside=where.inside(name))
     )
-    stack.enter_context(live.view(robot, is_shown=not (options.json or options.plain)))
-    return robot
 
 
 def _kit(work: Path) -> Kit:
