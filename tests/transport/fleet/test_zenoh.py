@@ -1,0 +1,150 @@
+"""What is particular to a fleet by way of a router: the router comes and goes, and is believed."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from collections.abc import AsyncIterator, Iterator
+from pathlib import Path
+
+import pytest
+from tests.transport.fleet.fleets import (
+    Member,
+    ZenohWorld,
+    refusals,
+    router,
+    zenoh_member,
+)
+
+from nondum.transport.fleet import PeerChanged
+from nondum.transport.fleet.zenoh_line import RouterAccess
+from nondum.transport.peers import (
+    DialFailed,
+    HostKeys,
+    Loss,
+    PeerLost,
+    PeerRefused,
+    PeerUp,
+    Reason,
+    Security,
+    Trust,
+)
+
+pytestmark = pytest.mark.anyio
+
+
+@pytest.fixture
+def world() -> Iterator[ZenohWorld]:
+    made = ZenohWorld()
+    yield made
+    made.close()
+
+
+@contextlib.asynccontextmanager
+async def started(
+    world: ZenohWorld, name: str, keys: HostKeys | None, trust: Trust
+) -> AsyncIterator[Member]:
+    fleet, member = zenoh_member(name, keys, trust, world.access)
+    await fleet.start()
+    try:
+        yield member
+    finally:
+        await fleet.close()
+
+
+async def test_router_that_restarts_loses_nothing_for_good(world: ZenohWorld) -> None:
+    async with world.member("rover") as rover, world.member("base") as base:
+        rover.fleet.publish({"fact/a": {"holds": True}})
+        await base.sees(rover, {"fact/a": {"holds": True}})
+        world.close()
+        assert (await base.told(PeerLost)).reason is Loss.DISCONNECTED
+        rover.fleet.publish({"fact/a": None, "fact/b": {"holds": True}})
+        world.router = router(world.port)
+        await base.sees(rover, {"fact/b": {"holds": True}})
+        assert (await base.told(PeerChanged)).is_whole
+
+
+async def test_router_that_is_late_is_waited_for(world: ZenohWorld) -> None:
+    world.close()
+    async with world.member("rover") as rover, world.member("base") as base:
+        assert (await base.told(DialFailed)).problem.code == "ROUTER_UNREACHED"
+        world.router = router(world.port)
+        assert (await base.told(PeerUp)).key == rover.key
+
+
+async def test_routers_word_is_told_as_such(world: ZenohWorld) -> None:
+    async with world.member("rover") as rover, world.member("base") as base:
+        assert (await base.told(PeerUp)).admitted_by == "router"
+        assert rover.fleet.security is Security.ROUTER
+
+
+async def test_host_without_trust_is_turned_away(world: ZenohWorld) -> None:
+    rover, stranger = HostKeys.generate(), HostKeys.generate()
+    both = Trust(paired={rover.public: "rover", stranger.public: "stranger"})
+    for trusted, other in [(rover, stranger), (stranger, rover)]:
+        async with (
+            started(world, "one", trusted, Trust()) as one,
+            started(world, "two", other, both) as two,
+        ):
+            if trusted.public < other.public:
+                continue  # who trusts nobody greets nobody
+            await one.until(lambda: bool(refusals(one)))
+            assert refusals(one)[0].reason is Reason.UNKNOWN_KEY
+            assert (await two.told(DialFailed)).problem.code == "KEY_UNKNOWN"
+            assert not one.fleet.peers
+
+
+async def test_second_host_of_a_name_is_kept_out(world: ZenohWorld) -> None:
+    keys = sorted((HostKeys.generate() for _ in range(3)), key=lambda pair: pair.public)
+    trust = Trust(paired={pair.public: "base" for pair in keys[:2]} | {keys[2].public: "rover"})
+    async with (
+        started(world, "rover", keys[2], trust) as rover,
+        started(world, "base", keys[0], trust) as first,
+    ):
+        await rover.told(PeerUp)
+        async with started(world, "base", keys[1], trust) as second:
+            assert (await second.told(DialFailed)).problem.code == "PEER_NAME_TAKEN"
+            assert set(rover.fleet.peers) == {first.key}
+
+
+async def test_peer_whose_key_is_revoked_is_cut(world: ZenohWorld) -> None:
+    async with world.member("rover") as rover, world.member("base") as base:
+        await base.told(PeerUp)
+        fleet = world.members[1]
+        fleet.set_trust(Trust(paired=dict(world.names)).with_revoked(rover.key, "stolen"))
+        assert (await base.told(PeerLost)).reason is Loss.REVOKED
+        assert (await rover.told(PeerLost)).reason is Loss.TURNED_AWAY
+
+
+async def test_hosts_without_keys_use_a_router_on_this_machine_only(world: ZenohWorld) -> None:
+    async with (
+        started(world, "rover", None, Trust()) as rover,
+        started(world, "base", None, Trust()) as base,
+    ):
+        assert (await base.told(PeerUp)).admitted_by == "development"
+        assert rover.fleet.security is Security.DEVELOPMENT
+    away = RouterAccess("test", ("tcp/192.0.2.1:7447",))
+    with pytest.raises(PeerRefused, match="DEVELOPMENT_LOOPBACK"):
+        zenoh_member("rover", None, Trust(), away)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "code"),
+    [
+        ({"fleet": "a/*"}, "FLEET_NAME"),
+        ({"fleet": ""}, "FLEET_NAME"),
+        ({"endpoints": ()}, "ADDRESS_MALFORMED"),
+        ({"endpoints": ("tcp://10.0.0.1:7447",)}, "ADDRESS_MALFORMED"),
+    ],
+    ids=str,
+)
+async def test_access_that_cannot_work_is_refused(wrong: dict[str, object], code: str) -> None:
+    access = RouterAccess("test", ("tls/10.0.0.1:7447",), Path("ca.pem"))
+    zenoh_member("rover", HostKeys.generate(), Trust(), access)
+    with pytest.raises(PeerRefused, match=code):
+        zenoh_member(
+            "rover",
+            HostKeys.generate(),
+            Trust(),
+            dataclasses.replace(access, **wrong),  # type: ignore[arg-type]  # as written above
+        )
