@@ -39,10 +39,12 @@ def perform(
     say = Says(is_shown=not options.json)
     work = Path(tempfile.mkdtemp(prefix="nondum-demo-"))
     results: list[StageResult] = []
+    is_over = False
     try:
         for result in play(work, say):
             results.append(result)
             say(f"  {result.measure}")
+        is_over = True
     except TooLate as late:
         print(f"error: {late}", file=sys.stderr)
     finally:
@@ -50,7 +52,7 @@ def perform(
             print(f"kept: {work}", file=sys.stderr)
         else:
             shutil.rmtree(work, ignore_errors=True)
-    is_whole = tuple(result.name for result in results) == tuple(programme.stages)
+    is_whole = is_over and tuple(result.name for result in results) == tuple(programme.stages)
     is_reached = is_whole and all(result.reached for result in results)
     if options.json:
         data = table.as_data(results, reached=is_reached, note=programme.note, **more)
