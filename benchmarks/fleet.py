@@ -294,7 +294,7 @@ COLUMNS = {
     "quiet: % of a core per host": ("quiet_percent", ".2f"),
     "a change reaches all: ms": ("news_ms", ".0f"),
     "its bytes": ("news_bytes", ",.0f"),
-    "taken for dead": ("lost", ".0f"),
+    "wrongly taken for dead": ("lost", ".0f"),
 }
 
 
@@ -314,7 +314,8 @@ machine over loopback, so that {max(hosts for _, hosts in found)} hosts share wh
 would have alone. All have started when they are told of each other at one moment; converged means
 that every one has every other's catalogue (10 kB, ten entries). Bytes are those that TCP carried,
 the router's included; CPU is until then, the router's and ZeroMQ's threads included. In quiet, mesh
-links are pinged every 0.3 s from both ends; by way of the router, hosts tell their state every 3 s.
+links are pinged from both ends, every 0.3 s for up to 32 peers and more seldom for more; by way of
+the router, hosts tell their state every 3 s.
 Then one entry of 200 bytes changes: until the last host has it, and what the one that told it has
 sent. The mesh is encrypted and every host proves its key; the router's links here are not.
 Medians of {repeats} repeats in turn (lowest-highest).
