@@ -21,10 +21,8 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import NewType
 
-from cryptography.exceptions import InvalidSignature
-from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
-
 from nondum.sdk.errors import Problem
+from nondum.transport.peers.ed25519 import SigningKey, is_signed
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import PeerKey, parse_key
 
@@ -73,8 +71,8 @@ class Certificate:
 
 def new_fleet() -> tuple[FleetKey, bytes]:
     """Make a fleet's key pair: the public one, and the 32 bytes to be kept secret."""
-    secret = Ed25519PrivateKey.generate()
-    return _fleet_key(secret), secret.private_bytes_raw()
+    made = SigningKey.generate()
+    return _fleet_key(made), made.secret
 
 
 def issue(
@@ -84,7 +82,7 @@ def issue(
 
     Raises `PeerRefused` (HOST_NAME, KEY_MALFORMED, CERTIFICATE_VALIDITY).
     """
-    signer = Ed25519PrivateKey.from_private_bytes(secret)
+    signer = SigningKey.of(secret)
     unsigned = Certificate(
         _fleet_key(signer), host, parse_key(key), _second(not_before), _second(not_after)
     )
@@ -137,13 +135,14 @@ def verify(found: Certificate, fleets: Container[FleetKey], now: datetime) -> No
                 fix="have the host's certificate issued by this fleet, or pair the two hosts",
             )
         )
+    unsigned = Problem("CERTIFICATE_SIGNATURE", "the fleet did not sign this", where=found.host)
     try:
-        public = Ed25519PublicKey.from_public_bytes(base64.b64decode(found.fleet))
-        public.verify(found.signature, found.signed_bytes())
-    except (InvalidSignature, ValueError) as error:
-        raise PeerRefused(
-            Problem("CERTIFICATE_SIGNATURE", "the fleet did not sign this", where=found.host)
-        ) from error
+        public = base64.b64decode(found.fleet)
+        is_by_fleet = is_signed(found.signed_bytes(), found.signature, public)
+    except ValueError as error:
+        raise PeerRefused(unsigned) from error
+    if not is_by_fleet:
+        raise PeerRefused(unsigned)
     _check_time(found, now)
 
 
@@ -187,8 +186,8 @@ def _second(moment: datetime) -> datetime:
     return moment.astimezone(UTC).replace(microsecond=0)
 
 
-def _fleet_key(secret: Ed25519PrivateKey) -> FleetKey:
-    return FleetKey(base64.b64encode(secret.public_key().public_bytes_raw()).decode("ascii"))
+def _fleet_key(signer: SigningKey) -> FleetKey:
+    return FleetKey(base64.b64encode(signer.public).decode("ascii"))
 
 
 def _malformed(what: str) -> PeerRefused:
