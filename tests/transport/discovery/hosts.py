@@ -44,6 +44,12 @@ class Seeker:
                 if wanted(hint):
                     return hint
 
+    async def lost(self, key: PeerKey) -> None:
+        """Wait until nothing hints at a host any more."""
+        async with asyncio.timeout(PATIENCE_S):
+            while await self.gone.get() != key:
+                pass
+
     async def found(self, other: Seeker) -> Hint:
         """Wait for a hint about another host."""
         return await self.told(lambda hint: hint.key == other.announcement.key)

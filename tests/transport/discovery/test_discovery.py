@@ -1,4 +1,4 @@
-"""Hosts that look for each other by multicast, on this machine's loopback."""
+"""Hosts that look for each other by multicast, on this machine's loopback: there may be others."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 from tests.transport.discovery import spoofing
-from tests.transport.discovery.hosts import PATIENCE_S, Seeker, here, seeking, until
+from tests.transport.discovery.hosts import Seeker, here, seeking, until
 
 from nondum.transport.discovery import Announcement
 from nondum.transport.discovery.book import MAX_PEERS
@@ -18,6 +18,8 @@ from nondum.transport.peers.keys import PeerKey
 pytestmark = pytest.mark.anyio
 
 LOOPBACK = ("127.0.0.1",)
+LIAR, OTHER = here("liar"), here("other")
+LIARS = {LIAR.key, OTHER.key}
 
 
 async def until_refused(seeker: Seeker, code: str) -> None:
@@ -49,16 +51,30 @@ async def test_hosts_find_each_other_in_both_directions() -> None:
         assert hint.addresses == base.announcement.listening
         assert hint.name == "base"
         await base.found(rover)
-        assert rover.discovery.hints.keys() == {base.announcement.key}
+        assert rover.announcement.key not in rover.discovery.hints
 
 
 async def test_a_goodbye_ends_the_hint() -> None:
     async with seeking(here("rover")) as rover:
         async with seeking(here("base")) as base:
             await rover.found(base)
-        async with asyncio.timeout(PATIENCE_S):
-            assert await rover.gone.get() == base.announcement.key
-        assert rover.discovery.hints == {}
+        await rover.lost(base.announcement.key)
+        assert base.announcement.key not in rover.discovery.hints
+
+
+async def test_a_host_that_is_heard_no_more_is_gone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever is killed says no goodbye, and multicast DNS would believe in him for an hour."""
+    monkeypatch.setattr("nondum.transport.discovery.discovery.AGAIN_S", 0.1)
+    monkeypatch.setattr("nondum.transport.discovery.discovery.SILENT_S", 1.0)
+    killed = here("killed")
+    async with seeking(here("rover")) as rover, seeking(here("base")) as base:
+        await rover.found(base)
+        spoof(spoofed(killed))
+        await rover.told(lambda hint: hint.key == killed.key)
+        await rover.lost(killed.key)
+        assert killed.key not in rover.discovery.hints
+        spoof(spoofed(killed))
+        await rover.told(lambda hint: hint.key == killed.key)  # it is back, and unchanged
 
 
 async def test_what_changes_is_told() -> None:
@@ -80,8 +96,8 @@ async def test_hosts_without_keys_find_each_other_and_nobody_else() -> None:
         await rover.found(base)
         await until_refused(rover, "HINT_SECURITY")
         await until_refused(secured, "HINT_SECURITY")
-        assert rover.discovery.hints.keys() == {base.announcement.key}
-        assert secured.discovery.hints == {}
+        assert secured.announcement.key not in rover.discovery.hints
+        assert not {rover.announcement.key, base.announcement.key} & secured.discovery.hints.keys()
 
 
 async def test_without_multicast_nobody_is_heard_or_told() -> None:
@@ -91,7 +107,7 @@ async def test_without_multicast_nobody_is_heard_or_told() -> None:
         seeking(here("base")) as base,
     ):
         await rover.found(base)
-        assert rover.discovery.hints.keys() == {base.announcement.key}
+        assert quiet.announcement.key not in rover.discovery.hints
         assert quiet.discovery.hints == {}
 
 
@@ -101,7 +117,7 @@ async def test_a_copy_of_the_key_is_reported_by_both() -> None:
     async with seeking(rover) as one, seeking(copy) as other:
         assert copy.listening[0] in await until_duplicate(one)
         assert rover.listening[0] in await until_duplicate(other)
-        assert one.discovery.hints == other.discovery.hints == {}
+        assert rover.key not in {**one.discovery.hints, **other.discovery.hints}
 
 
 async def test_the_own_echo_is_no_copy() -> None:
@@ -114,27 +130,27 @@ async def test_the_status_tells_what_was_announced_and_heard_and_where() -> None
     async with seeking(here("rover")) as rover, seeking(here("base")) as base:
         await rover.found(base)
         (row,) = (one for one in rover.discovery.status().interfaces if one.is_looked_on)
-        assert (row.interface, row.heard, row.problem) == ("lo", 1, None)
+        assert (row.interface, row.heard >= 1, row.problem) == ("lo", True, None)
         assert row.announced_s is not None and row.heard_s is not None
-        assert rover.discovery.status().hints == 1
+        assert rover.discovery.status().hints >= 1
 
 
 class TestStrangers:
     @pytest.mark.parametrize(
         ("packet", "code"),
         [
-            (spoofed(here("liar"), pk="~" * 40), "HINT_MALFORMED"),
-            (spoofed(here("liar"), epoch="no number"), "HINT_MALFORMED"),
-            (spoofed(here("liar"), pk=here("other").key), "HINT_NAME"),
+            (spoofed(LIAR, pk="~" * 40), "HINT_MALFORMED"),
+            (spoofed(LIAR, epoch="no number"), "HINT_MALFORMED"),
+            (spoofed(LIAR, pk=OTHER.key), "HINT_NAME"),
             (
                 spoofing.announced("rover._nondum._tcp.local.", {"id": "x"}, ["127.0.0.1"]),
                 "HINT_NAME",
             ),
             (
-                spoofing.announced(instance(here("l").key), b"\x03pk\xff", ["127.0.0.1"]),
+                spoofing.announced(instance(LIAR.key), b"\x03pk\xff", ["127.0.0.1"]),
                 "HINT_MALFORMED",
             ),
-            (spoofed(here("liar"), "8.8.8.8", "224.0.0.1", "0.0.0.0"), "HINT_NOWHERE"),
+            (spoofed(LIAR, "8.8.8.8", "224.0.0.1", "0.0.0.0"), "HINT_NOWHERE"),
         ],
         ids=["key", "epoch", "name of another key", "name of no key", "no text", "far away"],
     )
@@ -143,10 +159,10 @@ class TestStrangers:
             spoof(packet)
             await until_refused(rover, code)
             await rover.found(base)
-            assert rover.discovery.hints.keys() == {base.announcement.key}
+            assert not LIARS & rover.discovery.hints.keys()
 
     async def test_garbage_harms_nothing(self) -> None:
-        good = spoofed(here("liar"))
+        good = spoofed(LIAR)
         garbage = [os.urandom(n) for n in (0, 1, 11, 12, 500, 8000)]
         cut = [good[:n] for n in range(0, len(good), 7)]
         async with seeking(here("rover")) as rover:
@@ -155,10 +171,9 @@ class TestStrangers:
                 await rover.found(base)
 
     async def test_of_too_many_addresses_some_are_kept(self) -> None:
-        liar = here("liar")
         async with seeking(here("rover")) as rover:
-            spoof(spoofed(liar, *(f"127.0.0.{number}" for number in range(1, 100))))
-            hint = await rover.told(lambda hint: hint.key == liar.key)
+            spoof(spoofed(LIAR, *(f"127.0.0.{number}" for number in range(1, 100))))
+            hint = await rover.told(lambda hint: hint.key == LIAR.key)
             assert len(hint.addresses) == MAX_ADDRESSES
 
     async def test_ten_thousand_invented_hosts_cost_a_bounded_number_of_hints(self) -> None:

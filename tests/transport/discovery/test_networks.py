@@ -93,18 +93,22 @@ class TestSeveralNetworks:
 
 
 class TestAddresses:
-    def test_ipv6_of_the_link_alone_is_enough(self, network: Network) -> None:
+    @pytest.mark.parametrize("checks", [0, 1], ids=["ready at once", "checked by the kernel first"])
+    def test_ipv6_of_the_link_alone_is_enough(self, network: Network, checks: int) -> None:
         switch = network.switch()
         here, there = network.machine("rover"), network.machine("base")
+        for machine in (here, there):
+            machine.set("net.ipv6.conf.default.accept_dad", checks)
         network.plug(here, switch, ipv4="")
         far = network.plug(there, switch, ipv4="")
         rover, base = Host(here), Host(there)
         rover.finds_addresses(base, {f"tcp://[{far.link_local()}%lan0]:7410"})
 
-    def test_ipv6_is_not_needed(self, network: Network) -> None:
+    def test_ipv6_may_be_switched_off(self, network: Network) -> None:
         switch = network.switch()
         here, there = network.machine("rover"), network.machine("base")
         for machine in (here, there):
+            machine.set("net.ipv6.conf.all.disable_ipv6", 1)
             network.plug(machine, switch, ipv6=False)
         rover, base = Host(here), Host(there)
         rover.finds_addresses(base, {"tcp://10.77.0.2:7410"})
