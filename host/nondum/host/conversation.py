@@ -10,6 +10,7 @@ import asyncio
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, Protocol, TypeAlias
 
+from nondum.host.mind.composition import Composition
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.sayings import sayings
 from nondum.host.workers.proxies import Answer
@@ -128,7 +129,7 @@ class Conversation:
         while plugin := self._plugins().get(component):
             composition = self._mind.composition
             if composition is not None and composition is not seen:
-                seen, vocabulary = composition, sayings(composition.book)
+                seen, vocabulary = composition, sayings(composition.book, _hosts(composition))
                 if vocabulary != taught:
                     await plugin.learn_words(vocabulary)
                     taught = vocabulary
@@ -142,6 +143,12 @@ class Conversation:
                 return
             await self.heard(component, words)
             await asyncio.sleep(PAUSE_S)
+
+
+def _hosts(composition: Composition) -> tuple[str, ...]:
+    """Those who can be spoken to; none where there is only one."""
+    peers = tuple(peer.name for peer in composition.snapshot.peers)
+    return (composition.host, *peers) if peers else ()
 
 
 async def _awaited(answer: Answer) -> None:

@@ -59,3 +59,11 @@ def test_phrases_are_left_out_when_names_do_not_suffice() -> None:
     told = sayings(book(*many, classes=("dog",)))
     assert told["names"] == {"class": ["dog"]}
     assert 0 < len(json.dumps(told)) <= SAYINGS_BYTES + 100
+
+
+def test_hosts_are_spoken_to_by_name_where_there_are_several() -> None:
+    told = sayings(book("find {c:class}", classes=("dog",)), ["big-mule", "rover"])
+    assert told == {
+        "phrases": ["[{addressee}] find {class}"],
+        "names": {"class": ["dog"], "addressee": ["big mule", "rover"]},
+    }

@@ -17,14 +17,18 @@ from nondum.planning.phrases import Phrasebook
 SAYINGS_BYTES = 40_000
 """What a packet to a worker has room for, and some to spare."""
 
+ADDRESSEE = "addressee"
+"""Slot for the name of the host that is spoken to."""
+
 Sayings: TypeAlias = dict[str, object]
 
 
-def sayings(book: Phrasebook) -> Sayings:
+def sayings(book: Phrasebook, hosts: Sequence[str] = ()) -> Sayings:
     """`phrases`: patterns that can be said now; `names`: slot → words that may be said there.
 
     Slots are called by the types of what they name. A phrase without a name for one of its slots
-    cannot be said. What a packet has no room for is left out, names first.
+    cannot be said. Where there are several hosts, each can be addressed first. What a packet has no
+    room for is left out, names first.
     """
     names: dict[str, list[str]] = {}
     phrases: dict[str, None] = {}
@@ -32,7 +36,9 @@ def sayings(book: Phrasebook) -> Sayings:
         slots = {slot: _names(book, slot) for slot in phrase.binding_slots()}
         if all(slots.values()):
             names.update({_called(slot): words for slot, words in slots.items()})
-            phrases[_pattern(phrase)] = None
+            phrases[f"[{{{ADDRESSEE}}}] {_pattern(phrase)}" if hosts else _pattern(phrase)] = None
+    if hosts and phrases:
+        names[ADDRESSEE] = sorted(host.replace("-", " ") for host in hosts)
     told = list(phrases)
     while told and _size(told, names) > SAYINGS_BYTES:
         if all(len(words) < 2 for words in names.values()):
