@@ -18,7 +18,6 @@ from nondum.transport.peers import CallFailed, Errand, Lease, Loss
 
 pytestmark = pytest.mark.lab
 
-CHUNK = 64 * 1024
 Twist = Callable[[str, int, bytes], Any]
 """Path of a file, offset and its bytes there → what is sent."""
 
@@ -46,7 +45,7 @@ class Hands:
         if errand.method == "place.want":
             return {}
         path, offset = self._files[errand.args["sha256"]], errand.args["offset"]
-        data = path.read_bytes()[offset : offset + CHUNK]
+        data = path.read_bytes()[offset : offset + errand.args["length"]]
         return {"data": self._twist(path.relative_to(self.folder).as_posix(), offset, data)}
 
     def notice(self, *_: Any) -> None: ...
@@ -225,7 +224,7 @@ def test_only_who_takes_a_payload_may_fetch_it(mule: tuple[RunningHost, str], fo
     digest = hands.offer()["digest"]
     with guest("thief", ("mule", address), handler=hands) as one:
         for method, args in (
-            ("place.read", {"sha256": digest, "offset": 0}),
+            ("place.read", {"sha256": digest, "offset": 0, "length": 9}),
             ("place.want", {"wanted": [digest]}),
         ):
             with pytest.raises(CallFailed) as caught:

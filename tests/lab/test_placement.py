@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -12,28 +15,34 @@ from typing import Any
 
 import pytest
 from demo.robot import nondum
+from tests.host.drives.test_blocks import attached, detach, image
 from tests.lab.neighbours import beacon, free_port, until_peer, until_shared, written
+from tests.lab.plugins import talker
 from tests.lab.running_host import DAEMON, READY_S, RunningHost
+from tests.lab.traces import until_unmounted
 from tests.payloads import Part
 
 from nondum.sdk.errors import NondumError
 
 pytestmark = pytest.mark.lab
 
-OTHER_MACHINE = ("setarch", "linux32", *DAEMON)
-"""A daemon that the kernel tells that it is on a 32-bit machine: wheels for this one do not fit."""
+OTHER_MACHINE = ("setarch", "linux32")
+"""What is run so is told by the kernel that it is on a 32-bit machine: wheels for this one do not
+fit it."""
+ROVER_IS_OTHER = {"rover": (*OTHER_MACHINE, *DAEMON)}
+NOTHING_ELSE: Mapping[str, Sequence[str]] = {}
 
 
 @contextmanager
 def hosts(
     work: Path,
     *names: str,
-    other_machines: Sequence[str] = (),
+    programs: Mapping[str, Sequence[str]] = NOTHING_ELSE,
     unsigned: Sequence[str] | None = None,
     more: str = "",
 ) -> Iterator[list[RunningHost]]:
-    """Peers in development mode. Some think that they are other machines; if `unsigned` names some,
-    only those take unsigned payloads."""
+    """Peers in development mode. `programs` are the daemons of some; if `unsigned` names some, only
+    those take unsigned payloads."""
     ports = {name: free_port() for name in names}
     with ExitStack() as stack:
         made = []
@@ -45,7 +54,7 @@ def hosts(
                 name=name,
                 more=f"[peers]\nenabled = true\ndevelopment = true\ndiscover = false\n{more}\n"
                 f'listen = ["tcp://127.0.0.1:{ports[name]}"]\nstatic = {others}\n',
-                program=OTHER_MACHINE if name in other_machines else DAEMON,
+                program=programs.get(name, DAEMON),
             )
             if unsigned is not None and name not in unsigned:
                 config = host.work / "host.toml"
@@ -63,7 +72,7 @@ def hosts(
 
 def test_what_does_not_fit_here_runs_on_a_peer(tmp_path: Path) -> None:
     log = tmp_path / "log"
-    with hosts(tmp_path, "rover", "mule", other_machines=["rover"]) as (rover, mule):
+    with hosts(tmp_path, "rover", "mule", programs=ROVER_IS_OTHER) as (rover, mule):
         slot = rover.plug(rover.drive("light", beacon(log)))
         mule.until_step("light", "active")
         until_shared(rover, "beacon@mule")
@@ -106,7 +115,7 @@ def until_place(host: RunningHost, name: str, **wanted: Any) -> dict[str, Any]:
 
 
 def test_death_of_its_host_withdraws_a_payload(tmp_path: Path) -> None:
-    with hosts(tmp_path, "rover", "mule", other_machines=["rover"]) as (rover, mule):
+    with hosts(tmp_path, "rover", "mule", programs=ROVER_IS_OTHER) as (rover, mule):
         rover.plug(rover.drive("light", beacon(tmp_path / "log")))
         mule.until_step("light", "active")
         rover.kill()
@@ -118,7 +127,7 @@ def test_death_of_its_host_withdraws_a_payload(tmp_path: Path) -> None:
 
 
 def test_next_host_takes_what_one_dies_of(tmp_path: Path) -> None:
-    with hosts(tmp_path, "rover", "mule", "tower", other_machines=["rover"]) as made:
+    with hosts(tmp_path, "rover", "mule", "tower", programs=ROVER_IS_OTHER) as made:
         rover, *others = made
         rover.plug(rover.drive("light", bulky(tmp_path / "log", 40)))
         row = until_place(rover, "light", state="fetching")
@@ -135,8 +144,21 @@ def test_next_host_takes_what_one_dies_of(tmp_path: Path) -> None:
         assert len(list((first.state / "placed").iterdir())) == 1, "what was half fetched is gone"
 
 
+def test_host_that_was_out_of_reach_is_asked_again(tmp_path: Path) -> None:
+    with hosts(tmp_path, "rover", "mule", programs=ROVER_IS_OTHER) as (rover, mule):
+        rover.plug(rover.drive("light", beacon(tmp_path / "log")))
+        until_place(rover, "light", state="active")
+        os.kill(mule.pid, signal.SIGSTOP)
+        rover.until_told("org.example.light does not run on mule any more")
+        os.kill(mule.pid, signal.SIGCONT)
+        mule.until_told("org.example.light is withdrawn")
+        until_place(rover, "light", state="active")
+        until_shared(rover, "beacon@mule")
+        assert len(list((mule.state / "placed").iterdir())) == 1
+
+
 def test_rules_of_the_other_host_hold_there(tmp_path: Path) -> None:
-    with hosts(tmp_path, "rover", "mule", other_machines=["rover"], unsigned=["rover"]) as made:
+    with hosts(tmp_path, "rover", "mule", programs=ROVER_IS_OTHER, unsigned=["rover"]) as made:
         rover, mule = made
         rover.plug(rover.drive("light", beacon(tmp_path / "log")))
         told = rover.until_told("no host takes org.example.light")
@@ -150,12 +172,15 @@ def test_rules_of_the_other_host_hold_there(tmp_path: Path) -> None:
 
 
 def test_host_that_takes_nothing_is_not_asked(tmp_path: Path) -> None:
-    with hosts(tmp_path, "rover", "mule", other_machines=["rover"], more="place = false") as made:
+    with hosts(tmp_path, "rover", "mule", programs=ROVER_IS_OTHER, more="place = false") as made:
         rover, mule = made
         rover.plug(rover.drive("light", beacon(tmp_path / "log")))
         rover.until_step("light", "refused")
         assert placed(rover, "light") == {}
         assert not mule.view["payloads"]
+        with pytest.raises(NondumError) as refused:
+            rover.ask("place", payload="org.example.light", host="mule")
+        assert refused.value.code == "PLACE_OFF"
 
 
 def test_person_says_where_a_payload_runs(tmp_path: Path) -> None:
@@ -205,3 +230,27 @@ def test_what_cannot_be_placed_is_said(tmp_path: Path) -> None:
                 rover.ask("place", **arguments)
             assert refused.value.code == code
         assert rover.ask("places") == []
+
+
+@pytest.mark.skipif(
+    os.geteuid() != 0 or not Path("/dev/loop-control").exists(), reason="loop devices need root"
+)
+def test_stick_that_was_let_go_is_mounted_again_to_hand_it_over(tmp_path: Path) -> None:
+    loops = (sys.executable, "-m", "tests.lab.loop_daemon", str(tmp_path))
+    programs = {"rover": (*OTHER_MACHINE, *loops)}
+    with hosts(tmp_path, "rover", "mule", programs=programs, more="place = true") as (rover, mule):
+        before = rover.traces()
+        mule.stop()
+        with attached(image(tmp_path, talker())) as node:
+            rover.until_step("lamp", "refused")
+            rover.until(
+                "let go", lambda v: {d["state"] for d in v["drives"]} == {"idle"}, timeout_s=9
+            )
+            assert not rover.traces().mounts
+            mule.start()
+            mule.until_step("lamp", "active")
+            until_unmounted(rover.state)
+            detach(node)
+            mule.until_gone("lamp")
+        rover.until_gone("lamp")
+        assert rover.traces() == before

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from nondum.host.drives import mounting, reader
+from nondum.host.drives import filesystems, mounting, reader
 from nondum.host.drives.reader import Arguments, Report
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
 from nondum.wheelhouse import contents, drive, payload, preflight
@@ -29,7 +29,8 @@ def hand_over(arguments: Arguments, report: Report) -> dict[str, Any]:
     """
     root, target = Path(arguments["root"]), Path(arguments["target"])
     if arguments["node"] is not None:
-        mounting.mount(Path(arguments["node"]), root, arguments["filesystem"])
+        node = Path(arguments["node"])
+        mounting.mount(node, root, arguments["filesystem"] or filesystems.probe(node))
     folder = root / arguments["folder"]
     data = drive.read_contents(folder)
     if hashlib.sha256(data).hexdigest() != arguments["digest"]:

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from nondum.host.peers.placement.fetching import WINDOW, Fetching, Listed
-from nondum.host.peers.placement.handover import CHUNK
+from nondum.host.peers.placement.fetching import Fetching, Listed
+from nondum.host.peers.placement.pace import LARGEST, LEAST, MOST, PIECES
 from nondum.sdk.errors import NondumError, Problem
 from nondum.transport.peers import Call, CallFailed
 from nondum.transport.peers.messages import Request
@@ -26,31 +26,35 @@ class Owner:
 
     def __init__(self, data: bytes, answer: Callable[[int, bytes], Any] | None = None) -> None:
         self._data, self._answer = data, answer or (lambda offset, piece: piece)
-        self.running: set[int] = set()
+        self.running: dict[int, int] = {}
+        """Offset → length of what is asked for and not answered."""
         self.most = 0
 
-    def read(self, sha256: str, offset: int) -> Call:
-        request = Request(offset, offset, 1000, "place.read", {})
-        call = Call(request, 0.0, self.running.discard)
-        self.running.add(offset)
-        self.most = max(self.most, len(self.running))
+    def read(self, sha256: str, offset: int, length: int) -> Call:
+        call = asked(offset)
+        self.running[offset] = length
+        self.most = max(self.most, sum(self.running.values()))
         asyncio.get_running_loop().call_soon(self._reply, call, offset)
         return call
 
     def _reply(self, call: Call, offset: int) -> None:
-        self.running.discard(offset)
-        answer = self._answer(offset, self._data[offset : offset + CHUNK])
+        length = self.running.pop(offset)
+        answer = self._answer(offset, self._data[offset : offset + length])
         if isinstance(answer, NondumError):
             call.fail(answer)
         else:
             call.succeed({"data": answer})
 
 
+def asked(offset: int, on_cancel: Callable[[int], None] = lambda _: None) -> Call:
+    return Call(Request(offset, offset, 1000, "place.read", {}), 0.0, on_cancel)
+
+
 def listed(data: bytes, path: str = "wheels/a.whl") -> Listed:
     return Listed(path, hashlib.sha256(data).hexdigest(), len(data))
 
 
-@pytest.mark.parametrize("size", [0, 1, CHUNK - 1, CHUNK, CHUNK + 1, 3 * WINDOW * CHUNK + 7])
+@pytest.mark.parametrize("size", [0, 1, 4095, 4096, 4097, LARGEST, 3 * MOST + 7])
 async def test_file_is_whole_afterwards(tmp_path: Path, size: int) -> None:
     data = bytes(range(256)) * (size // 256) + bytes(size % 256)
     owner, told = Owner(data), [0]
@@ -58,19 +62,19 @@ async def test_file_is_whole_afterwards(tmp_path: Path, size: int) -> None:
     await fetching.fetch(listed(data))
     assert (tmp_path / "wheels/a.whl").read_bytes() == data
     assert sum(told) == size
-    assert owner.most <= WINDOW
+    assert owner.most <= MOST + LARGEST
 
 
 pieces = st.sampled_from(["cut", "longer", "changed", "text", "failed"])
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
-@given(at=st.integers(0, 20), wrong=pieces)
+@given(at=st.integers(0, 300_000), wrong=pieces)
 async def test_wrong_piece_is_refused_wherever_it_is(tmp_path: Path, at: int, wrong: str) -> None:
-    data = bytes(21 * CHUNK)
+    data = bytes(300_001)
 
     def answer(offset: int, piece: bytes) -> Any:
-        if offset != at * CHUNK:
+        if not offset <= at < offset + len(piece):
             return piece
         failure = CallFailed(Problem("NOT_OFFERED", "not any more"))
         return {
@@ -92,10 +96,10 @@ async def test_wrong_piece_is_refused_wherever_it_is(tmp_path: Path, at: int, wr
 async def test_pieces_that_are_not_wanted_any_more_are_cancelled(tmp_path: Path) -> None:
     cancelled: list[int] = []
 
-    def read(sha256: str, offset: int) -> Call:
-        return Call(Request(offset, offset, 1000, "place.read", {}), 0.0, cancelled.append)
+    def read(sha256: str, offset: int, length: int) -> Call:
+        return asked(offset, cancelled.append)
 
-    fetch = Fetching(tmp_path, read).fetch(listed(bytes(20 * CHUNK)))
+    fetch = Fetching(tmp_path, read).fetch(listed(bytes(100_000)))
     with pytest.raises(TimeoutError):
         await asyncio.wait_for(fetch, 0.05)
-    assert cancelled == [number * CHUNK for number in range(WINDOW)]
+    assert cancelled == [number * LEAST // PIECES for number in range(PIECES)]

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from nondum.host.lifecycle.lanes import in_thread
-from nondum.host.peers.placement.handover import CHUNK
+from nondum.host.peers.placement.pace import Pace
 from nondum.sdk.errors import PayloadRefused, Problem
 from nondum.transport.peers import Call
-
-WINDOW = 8
-"""Pieces that are asked for at once: enough to fill a link of some milliseconds."""
 
 
 class Listed(NamedTuple):
@@ -31,10 +29,11 @@ class Fetching:
     """Fetches files of one payload into one folder."""
 
     folder: Path
-    read: Callable[[str, int], Call]
-    """Asks for a piece of a file, by hash and offset."""
+    read: Callable[[str, int, int], Call]
+    """Asks for a piece of a file, by hash, offset and length."""
     on_bytes: Callable[[int], None] = lambda count: None
     """Told how many more there are now."""
+    pace: Pace = field(default_factory=Pace)
 
     async def fetch(self, listed: Listed) -> None:
         """Have a file in the folder, whole and as listed.
@@ -43,26 +42,45 @@ class Fetching:
         """
         path = self.folder / listed.path
         out = await in_thread(_created, path)
-        pieces: deque[tuple[int, Call]] = deque()
-        digest, asked = hashlib.sha256(), 0
+        pieces: deque[_Piece] = deque()
+        digest, done = hashlib.sha256(), 0
         try:
-            while asked < listed.size or pieces:
-                while asked < listed.size and len(pieces) < WINDOW:
-                    length = min(CHUNK, listed.size - asked)
-                    pieces.append((length, self.read(listed.sha256, asked)))
-                    asked += length
-                length, call = pieces.popleft()
-                data = (await call).get("data")
-                if not isinstance(data, bytes) or len(data) != length:
+            while done < listed.size:
+                self._ask(listed, done, pieces)
+                piece = pieces.popleft()
+                data = (await piece.call).get("data")
+                if not isinstance(data, bytes) or len(data) != piece.length:
                     raise PayloadRefused(_mismatch(listed, "is not as long as listed"))
+                self.pace.answered(piece.length, _now_s() - piece.asked_s)
                 await in_thread(_add, out, digest, data)
-                self.on_bytes(length)
+                done += piece.length
+                self.on_bytes(piece.length)
         finally:
-            for _, call in pieces:
-                call.cancel()
+            for piece in pieces:
+                piece.call.cancel()
             await in_thread(out.close)
         if digest.hexdigest() != listed.sha256:
             raise PayloadRefused(_mismatch(listed, "its bytes are not those that were listed"))
+
+    def _ask(self, listed: Listed, done: int, pieces: deque[_Piece]) -> None:
+        """Ask for as much as may be on its way; for one piece in any case."""
+        asked = done + sum(piece.length for piece in pieces)
+        while asked < listed.size and (not pieces or asked - done < self.pace.window):
+            length = min(self.pace.piece, listed.size - asked)
+            pieces.append(_Piece(length, self.read(listed.sha256, asked, length), _now_s()))
+            asked += length
+
+
+class _Piece(NamedTuple):
+    """What was asked for."""
+
+    length: int
+    call: Call
+    asked_s: float
+
+
+def _now_s() -> float:
+    return asyncio.get_running_loop().time()
 
 
 def _created(path: Path) -> BinaryIO:

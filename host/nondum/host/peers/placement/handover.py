@@ -22,9 +22,6 @@ from nondum.transport.peers import CallFailed
 from nondum.wheelhouse import contents
 from nondum.wheelhouse.signatures import MAX_SIGNATURE_BYTES
 
-CHUNK = 64 * 1024
-"""Bytes that are read at once: half of what a message may have."""
-
 
 @dataclass(frozen=True, slots=True)
 class Described:
@@ -62,13 +59,13 @@ class Handover:
         if missing:
             await self._copy(missing, on_progress)
 
-    async def read(self, sha256: str, offset: int) -> bytes:
-        """A piece of a file, at most `CHUNK` long. Raises `CallFailed` (NOT_OFFERED)."""
+    async def read(self, sha256: str, offset: int, length: int) -> bytes:
+        """A piece of a file, shorter at its end. Raises `CallFailed` (NOT_OFFERED)."""
         path = self._files.get(sha256)
         if path is None:
             told = "no file of that hash is handed over to this host"
             raise CallFailed(Problem("NOT_OFFERED", told, where=self._parcel.payload_id))
-        return await asyncio.to_thread(_read, path, offset)
+        return await asyncio.to_thread(_read, path, offset, length)
 
     async def drop_wheels(self) -> None:
         """The peer has what it wanted: keep only what the payload is judged by."""
@@ -116,9 +113,9 @@ def _signature(path: Path) -> bytes | None:
     return path.read_bytes()[:MAX_SIGNATURE_BYTES] if path.exists() else None
 
 
-def _read(path: Path, offset: int) -> bytes:
+def _read(path: Path, offset: int, length: int) -> bytes:
     descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
     try:
-        return os.pread(descriptor, CHUNK, offset)
+        return os.pread(descriptor, length, offset)
     finally:
         os.close(descriptor)

@@ -44,7 +44,7 @@ class PlaceOrders:
         """Have a `payload` run on one `host` only, or, without one, wherever it fits, here first.
 
         Gives `payload` and `host`. Raises `NondumError` (PAYLOAD_UNKNOWN, PEER_UNKNOWN),
-        `PayloadRefused` (PLACE_FIXED), `InstallFailed` (IO_ERROR).
+        `PayloadRefused` (PLACE_FIXED, PLACE_OFF), `InstallFailed` (IO_ERROR).
         """
         payload_id, host = arguments.text("payload"), arguments.optional_text("host")
         here = [p for p in self.catalogue.state.payloads.values() if p.payload_id == payload_id]
@@ -61,6 +61,9 @@ class PlaceOrders:
             raise NondumError(unknown("payload", payload_id, ids))
         if host not in (names := set(self.known())):
             raise NondumError(unknown("peer", host, names))
+        if not self.placing.is_open:
+            told, fix = "this host places nothing on others", "set `place = true` under [peers]"
+            raise PayloadRefused(Problem("PLACE_OFF", told, where=payload_id, fix=fix))
         state = self.catalogue.state
         if all(movable_source(payload, state) is None for payload in here):
             told = "it was installed here for good, or another host has placed it here"

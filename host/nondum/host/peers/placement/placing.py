@@ -36,17 +36,20 @@ from nondum.host.peers.placement.decide import (
     sent_away,
 )
 from nondum.host.peers.placement.handover import Described, Handover
+from nondum.host.peers.placement.pace import LARGEST
 from nondum.host.peers.placement.pins import Pins
 from nondum.host.printable import printable
 from nondum.sdk.errors import NondumError, Problem
 from nondum.sdk.wire import Body
 from nondum.transport.fleet.seam import Fleet
-from nondum.transport.peers import CallFailed, Errand, PeerKey
+from nondum.transport.peers import CallFailed, Errand, PeerKey, PeerUnreachable
 
 TAKE_S = 30 * 86400.0
 """Deadline of the call that lasts as long as the payload is there; then it is made anew."""
 AGAIN_S = 30.0
 """After so long, a peer that did not take a payload is asked again: memory and disk get free."""
+_ENDED = frozenset({"DEADLINE", "HALTED"})
+"""How calls end that nothing is wrong with."""
 STEPS = ("waiting", "checking", "fetching", "installing", "active")
 
 
@@ -60,6 +63,10 @@ class Declined:
     at_s: float
     is_final: bool
     """Whether it has tried: it would not work the next time either."""
+
+    def holds(self, epoch: int, now_s: float) -> bool:
+        """Whether there is no point in asking again yet."""
+        return self.epoch == epoch and (self.is_final or now_s - self.at_s < AGAIN_S)
 
 
 @dataclass(slots=True, eq=False)
@@ -106,7 +113,7 @@ class Placing:
         """`here` is what this host has to compute with. `is_open`: whether anything is placed."""
         self._fleet, self._state, self._folders = fleet, state, folders
         self._children, self._emit, self._pins = children, emit, pins
-        self._here, self._reserve_mb, self._is_open = here, reserve_mb, is_open
+        self._here, self._reserve_mb, self.is_open = here, reserve_mb, is_open
         self._cases: dict[str, Case] = {}
         self._news = asyncio.Event()
         self._is_started = False
@@ -124,7 +131,7 @@ class Placing:
 
     def look(self) -> None:
         """Compare what is to run elsewhere with what is being done about it."""
-        wanted = parcels(self._state(), self._pins.hosts) if self._is_open else {}
+        wanted = parcels(self._state(), self._pins.hosts) if self.is_open else {}
         for key, case in tuple(self._cases.items()):
             parcel = wanted.get(key)
             if parcel is None or parcel.pinned_to != case.parcel.pinned_to:
@@ -154,11 +161,15 @@ class Placing:
     async def read(self, errand: Errand) -> Body:
         """A piece of a file: `data`. Raises `CallFailed` (NOT_OFFERED)."""
         match errand.args:
-            case {"digest": str(digest), "sha256": str(sha256), "offset": int(offset)} if (
-                0 <= offset < 2**53
-            ):
-                return {"data": await self._handover_to(errand, digest).read(sha256, offset)}
-        raise CallFailed(_malformed("digest, sha256 and offset"))
+            case {
+                "digest": str(digest),
+                "sha256": str(sha256),
+                "offset": int(offset),
+                "length": int(length),
+            } if 0 <= offset < 2**53 and 0 < length <= LARGEST:
+                handover = self._handover_to(errand, digest)
+                return {"data": await handover.read(sha256, offset, length)}
+        raise CallFailed(_malformed("digest, sha256, offset and length"))
 
     async def close(self) -> None:
         """Give up everything."""
@@ -200,40 +211,41 @@ class Placing:
                 await self._place(case, candidate)
 
     def _next(self, case: Case) -> Candidate | None:
-        """The best peer that has not said no."""
+        """The best peer that has not said no; None also while the drive cannot be read."""
         now_s = asyncio.get_running_loop().time()
-        for candidate in ranked(self._candidates(), case.parcel, self._here):
-            declined = case.declined.get(candidate.host)
-            if (
-                declined is None
-                or declined.epoch != candidate.epoch
-                or not (declined.is_final or now_s - declined.at_s < AGAIN_S)
-            ):
-                return candidate
-        return None
+
+        def has_declined(host: str, epoch: int) -> bool:
+            declined = case.declined.get(host)
+            return declined is not None and declined.holds(epoch, now_s)
+
+        if has_declined(self._state().host, self._fleet().epoch):
+            return None
+        candidates = ranked(self._candidates(), case.parcel, self._here)
+        return next((c for c in candidates if not has_declined(c.host, c.epoch)), None)
 
     def _candidates(self) -> Iterator[Candidate]:
         for key, peer in self._fleet().peers.items():
             yield Candidate(PeerKey(key), peer.name, peer.epoch, peer.entries.get("compute", {}))
 
     async def _place(self, case: Case, candidate: Candidate) -> None:
-        """Have a peer run it, until that ends; then the peer has declined."""
-        case.candidate, case.step, case.done, case.total = candidate, STEPS[0], 0, 0
+        """Have a peer run it, until that ends."""
         handover = case.handover = self._handover(case.parcel)
-        problems: tuple[Problem, ...] = (Problem("PLACE_ENDED", "it ended without a word"),)
+        case.candidate, case.step, case.done, case.total = candidate, STEPS[0], 0, 0
         try:
-            await self._run(case, candidate, await handover.open())
-        except NondumError as error:
-            problems = error.problems
+            described = await self._opened(case, handover)
+            if described is not None:
+                await self._run(case, candidate, described)
         finally:
-            step, case.step, case.candidate, case.handover = case.step, "", None, None
+            case.candidate, case.handover, case.step = None, None, ""
             await handover.close()
-            if step == "active":
-                reason = "; ".join(printable(str(problem)) for problem in problems)
-                self._emit(PlaceLost(case.parcel.key, candidate.host, reason))
-        now_s = asyncio.get_running_loop().time()
-        is_final = step in ("installing", "active")
-        case.declined[candidate.host] = Declined(candidate.epoch, problems, now_s, is_final)
+
+    async def _opened(self, case: Case, handover: Handover) -> Described | None:
+        """What is told of it first; None if the drive cannot be read."""
+        try:
+            return await handover.open()
+        except NondumError as error:
+            self._decline(case, self._state().host, self._fleet().epoch, error.problems)
+            return None
 
     def _handover(self, parcel: Parcel) -> Handover:
         name = f"{parcel.key}-{next(self._numbers)}"
@@ -247,6 +259,22 @@ class Placing:
             "signature": described.signature,
             "why": case.parcel.why,
         }
+        problems: tuple[Problem, ...] = ()
+        try:
+            await self._call(case, candidate, args)
+        except PeerUnreachable as error:
+            problems = error.problems
+            if candidate.key in self._fleet().peers:  # it takes no more calls now
+                self._decline(case, candidate.host, candidate.epoch, problems)
+        except NondumError as error:
+            problems = error.problems
+            is_final = case.step in ("installing", "active") and error.code not in _ENDED
+            self._decline(case, candidate.host, candidate.epoch, problems, is_final=is_final)
+        if case.step == "active":
+            reason = "; ".join(printable(str(problem)) for problem in problems)
+            self._emit(PlaceLost(case.parcel.key, candidate.host, reason))
+
+    async def _call(self, case: Case, candidate: Candidate, args: Body) -> None:
         call = self._fleet().call(candidate.key, "place.take", args, deadline_s=TAKE_S)
         try:
             async for news in call:
@@ -254,6 +282,20 @@ class Placing:
             await call
         finally:
             call.cancel()
+        told = "it ended there without a word"
+        raise CallFailed(Problem("PLACE_ENDED", told, where=candidate.host))
+
+    def _decline(
+        self,
+        case: Case,
+        host: str,
+        epoch: int,
+        problems: tuple[Problem, ...],
+        *,
+        is_final: bool = False,
+    ) -> None:
+        now_s = asyncio.get_running_loop().time()
+        case.declined[host] = Declined(epoch, problems, now_s, is_final)
 
     async def _on_news(self, case: Case, news: Mapping[str, Any]) -> None:
         before = case.step

@@ -12,11 +12,12 @@ import re
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
 from nondum.host.catalogue.catalogue import now
-from nondum.host.catalogue.records import Step
+from nondum.host.catalogue.records import DriveState, PayloadRecord, Step
 from nondum.host.catalogue.state import HostState
 from nondum.host.events import (
     DriveInserted,
@@ -203,7 +204,7 @@ class Taking:
 
     async def _fetch(self, guest: Guest) -> None:
         """Have here what this host needs of a payload. Raises all that it is refused for."""
-        fetching = Fetching(guest.folder, lambda sha256, at: self._read(guest, sha256, at))
+        fetching = Fetching(guest.folder, partial(self._read, guest))
         guest.tell("checking")
         try:
             await self._fetch_contents(guest, fetching)
@@ -262,8 +263,9 @@ class Taking:
         for listed in needed:
             await fetching.fetch(listed)
 
-    def _read(self, guest: Guest, sha256: str, offset: int) -> Call:
-        args = {"digest": guest.offer.digest, "sha256": sha256, "offset": offset}
+    def _read(self, guest: Guest, sha256: str, offset: int, length: int) -> Call:
+        place = {"sha256": sha256, "offset": offset, "length": length}
+        args = {"digest": guest.offer.digest, **place}
         return self._call(guest, "place.read", args, READ_S)
 
     def _call(self, guest: Guest, method: str, args: Body, deadline_s: float) -> Call:
@@ -273,7 +275,7 @@ class Taking:
 
     async def _follow(self, guest: Guest) -> NoReturn:
         """Report how it is, until it is no more. Raises `PayloadRefused` with why it is not."""
-        was_here = False
+        was_read = False
         while True:
             guest.news.clear()
             state = self._state()
@@ -281,17 +283,21 @@ class Taking:
             if drive is not None and drive.problems:
                 raise PayloadRefused(*drive.problems)
             if payload is not None and guest.drive in payload.sources:
-                was_here = True
-                if payload.step in (Step.REFUSED, Step.QUARANTINED):
-                    raise PayloadRefused(*payload.problems)
-                if payload.step is Step.ACTIVE and guest.step != "active":
-                    await in_thread(remove, guest.folder / "wheels")  # the store has them now
-                    self._emit(PayloadTaken(guest.key, guest.errand.caller.name, guest.offer.why))
-                guest.tell("active" if payload.step is Step.ACTIVE else "installing")
-            elif was_here:
+                await self._look_at(guest, payload)
+            elif was_read and (drive is None or drive.state is not DriveState.READING):
                 told = "it was withdrawn there"
                 raise PayloadRefused(Problem("PLACE_ENDED", told, where=guest.offer.payload_id))
+            was_read |= drive is not None and drive.state is not DriveState.READING
             await _either(guest.news, SIGN_S)
+
+    async def _look_at(self, guest: Guest, payload: PayloadRecord) -> None:
+        """Report how it is. Raises `PayloadRefused` with why it does not run."""
+        if payload.step in (Step.REFUSED, Step.QUARANTINED):
+            raise PayloadRefused(*payload.problems)
+        if payload.step is Step.ACTIVE and guest.step != "active":
+            await in_thread(remove, guest.folder / "wheels")  # the store has them now
+            self._emit(PayloadTaken(guest.key, guest.errand.caller.name, guest.offer.why))
+        guest.tell("active" if payload.step is Step.ACTIVE else "installing")
 
 
 async def _either(news: asyncio.Event, most_s: float) -> None:
