@@ -2,164 +2,60 @@
 
 from __future__ import annotations
 
-import itertools
-import json
-import os
-import queue
-import subprocess
 import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any
 
-from demo.namespaces import Cable, Machine, Network, Switch
+from demo.namespaces import Network, Switch
+from tests.lab.faults.remote import PATIENCE_S, PORT, Member, Told
 
 from nondum.sdk.wire import Body
-from nondum.transport.peers import HostKeys, PeerKey
+from nondum.transport.peers import HostKeys
+from nondum.transport.peers.certificate import issue, new_fleet
 
-PATIENCE_S = 30.0
-PORT = 7410
-FAILURES = {"PEER_LOST", "PEER_DOWN", "PEER_BUSY", "DEADLINE", "ANSWER_FORGOTTEN"}
-"""What calls may fail with while links break."""
-
-Told = dict[str, Any]
 Catalogues = Mapping[str, Mapping[str, Body]]
 
-
-class Member:
-    """One host: a process of `tests.lab.faults.member`, which may be killed and started again."""
-
-    def __init__(self, machine: Machine, keys: HostKeys, config: Told) -> None:
-        self.name = machine.name
-        self.machine, self.keys = machine, keys
-        self.config = config
-        self._ids = itertools.count(1)
-        self._process: subprocess.Popen[str] | None = None
-        self._told: queue.SimpleQueue[Told] = queue.SimpleQueue()
-        self._answers: dict[int, queue.SimpleQueue[Told]] = {}
-        self._reader: threading.Thread | None = None
-        self.broken: list[str] = []
-        """What went wrong in it that no fault of others may bring about."""
-
-    @property
-    def cable(self) -> Cable:
-        return self.machine.cables[0]
-
-    @property
-    def address(self) -> str:
-        return f"tcp://{self.cable.address}:{PORT}"
-
-    @property
-    def pid(self) -> int:
-        assert self._process is not None
-        return self._process.pid
-
-    def start(self, **changes: Any) -> int:
-        """Start it, and wait until it listens; its epoch."""
-        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-        config = json.dumps({**self.config, **changes})
-        self._process = self.machine.python("tests.lab.faults.member", config, **pipes)
-        self._told = queue.SimpleQueue()
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-        return int(self.next("started")["epoch"])
-
-    def kill(self) -> None:
-        """End it without a word."""
-        assert self._process is not None
-        self._process.kill()
-        self._see_end()
-
-    def leave(self) -> None:
-        """Have it say goodbye and end."""
-        assert self._process is not None
-        assert self._process.stdin is not None
-        self._process.stdin.close()
-        self._see_end()
-
-    def next(self, event: str, **wanted: Any) -> Told:
-        """Wait for an event with these values; others before it are dropped."""
-        while True:
-            told = self._told.get(timeout=PATIENCE_S)
-            assert told["event"] != "ended", f"{self.name} has ended"
-            if told["event"] == event and wanted.items() <= told.items():
-                return told
-
-    def meets(self, other: Member) -> Told:
-        """Wait until another host is there."""
-        return self.next("up", peer=other.name)
-
-    def loses(self, other: Member) -> Told:
-        """Wait until another host is not there any more."""
-        return self.next("lost", peer=other.name)
-
-    def order(self, do: str, **arguments: Any) -> queue.SimpleQueue[Told]:
-        """Have it do something; where the answer will be."""
-        number = next(self._ids)
-        answer = self._answers[number] = queue.SimpleQueue()
-        assert self._process is not None
-        assert self._process.stdin is not None
-        self._process.stdin.write(json.dumps({"id": number, "do": do, **arguments}) + "\n")
-        self._process.stdin.flush()
-        return answer
-
-    def ask(self, do: str, **arguments: Any) -> Told:
-        """Have it do something, and wait for the answer."""
-        told = self.order(do, **arguments).get(timeout=PATIENCE_S)
-        assert "error" not in told, told["error"]
-        return told
-
-    def call(self, other: Member, method: str, **args: Any) -> Told:
-        """Have it call another host: `answer` or `failure`."""
-        return self.ask("call", peer=other.name, method=method, args=args, deadline_s=10)
-
-    def weight_kb(self) -> int:
-        """Memory that it has filled: its share (PSS) of what is no file's."""
-        lines = Path(f"/proc/{self.pid}/smaps_rollup").read_text(encoding="utf-8").splitlines()
-        return next(int(line.split()[1]) for line in lines if line.startswith("Pss_Anon:"))
-
-    def descriptors(self) -> int:
-        """Files and sockets that it has open."""
-        return len(os.listdir(f"/proc/{self.pid}/fd"))  # noqa: PTH208  # links that may be gone
-
-    def _read(self) -> None:
-        assert self._process is not None
-        assert self._process.stdout is not None
-        for line in self._process.stdout:
-            told = json.loads(line)
-            if told["event"] == "done":
-                self._answers.pop(told["id"]).put(told)
-            elif told["event"] == "broken":
-                self.broken.append(told["what"])
-            else:
-                self._told.put(told)
-        self._told.put({"event": "ended"})
-
-    def _see_end(self) -> None:
-        assert self._process is not None
-        assert self._reader is not None
-        self._process.wait(PATIENCE_S)
-        self._reader.join()
+FAILURES = {"PEER_LOST", "PEER_DOWN", "PEER_BUSY", "DEADLINE", "ANSWER_FORGOTTEN"}
+"""What calls may fail with while links break."""
 
 
 class Crew:
     """Hosts that trust each other and look for each other."""
 
-    def __init__(self, network: Network, work: Path, names: Sequence[str], seed: int) -> None:
-        self.work, self.seed = work, seed
+    def __init__(self, network: Network, work: Path, trust: Trusting, seed: int) -> None:
+        self.network, self.seed = network, seed
         self.log = work / "calls"
-        self.network = network
+        self.log.mkdir()
         self.switch: Switch = network.switch()
-        keys = {name: HostKeys.generate() for name in names}
-        paired = {one.public: name for name, one in keys.items()}
-        self.members = [self._member(name, keys[name], paired) for name in names]
+        self._trust = trust
+        self.members = [self.add(name, keys) for name, keys in trust.keys.items()]
 
     def __iter__(self) -> Iterator[Member]:
         return iter(self.members)
+
+    def add(self, machine: str, keys: HostKeys, *, name: str = "") -> Member:
+        """A host on a machine more, not started yet; it is no member that `all` would mean."""
+        made = self.network.machine(machine)
+        self.network.plug(made, self.switch)
+        name = name or machine
+        config = {
+            "name": name,
+            "public": keys.public,
+            "secret": keys.secret,
+            "port": PORT,
+            "discover": True,
+            "static": [],
+            "skew_s": 0,
+            "seed": f"{self.seed} {machine}",
+            "log": str(self.log),
+            **self._trust.config(name, keys),
+        }
+        return Member(made, keys, config)
 
     def start(self) -> None:
         """Start all, and wait until all see each other."""
@@ -169,12 +65,10 @@ class Crew:
 
     def all_see(self, catalogues: Catalogues, *, by: Sequence[Member] = ()) -> None:
         """Wait until all hosts (or those given) see exactly the others of these catalogues."""
-        answers = [
-            member.order(
-                "see", catalogues={k: v for k, v in catalogues.items() if k != member.name}
-            )
-            for member in by or self.members
-        ]
+        answers = []
+        for member in by or self.members:
+            others = {name: entries for name, entries in catalogues.items() if name != member.name}
+            answers.append(member.order("see", catalogues=others))
         for answer in answers:
             told = answer.get(timeout=PATIENCE_S)
             assert "error" not in told, told["error"]
@@ -192,60 +86,72 @@ class Crew:
         note(f"alike after {time.monotonic() - began_s:.2f} s")
         told = self._all("rest")
         self._all("idle")
-        works = Counter(self.log.read_text(encoding="utf-8").splitlines())
-        check(works, [piece for one in told.values() for piece in one["answered"]])
+        self.check_work(piece for one in told.values() for piece in one["answered"])
         for name, one in told.items():
             note(f"{name}: {len(one['answered'])} answered, {one['failed']}")
             assert one["failed"].keys() <= FAILURES, one["failed"]
+
+    def check_work(self, answered: Iterable[str] = ()) -> None:
+        """What was written down: nothing was done twice, nothing runs on, and what was answered was
+        done."""
+        lives = {
+            log.name: log.read_text(encoding="utf-8").splitlines() for log in self.log.iterdir()
+        }
+        works = Counter(line for lines in lives.values() for line in lines)
+        assert [line for line, times in works.items() if times > 1] == []
+        killed = {f"{one.name}-{epoch}" for one in self for epoch in one.killed}
+        for life, lines in lives.items():
+            begun, ended = _pieces(lines, "begin"), _pieces(lines, "end")
+            assert ended <= begun
+            assert begun == ended or life in killed, f"{life} goes on with {begun - ended}"
+        assert set(answered) <= _pieces(works, "end")
 
     def _all(self, do: str) -> dict[str, Told]:
         answers = {member.name: member.order(do) for member in self}
         return {name: answer.get(timeout=PATIENCE_S) for name, answer in answers.items()}
 
-    def _member(self, name: str, keys: HostKeys, paired: Mapping[PeerKey, str]) -> Member:
-        machine = self.network.machine(name)
-        self.network.plug(machine, self.switch)
-        config = {
-            "name": name,
-            "public": keys.public,
-            "secret": keys.secret,
-            "certificate": "",
-            "paired": {key: other for key, other in paired.items() if key != keys.public},
-            "fleets": [],
-            "port": PORT,
-            "discover": True,
-            "static": [],
-            "skew_s": 0,
-            "seed": f"{self.seed} {name}",
-            "log": str(self.log),
+
+class Trusting:
+    """Who trusts whom: all hosts of these names each other, by pairing or by a fleet."""
+
+    def __init__(self, names: Sequence[str], *, by_fleet: bool = False) -> None:
+        self.keys = {name: HostKeys.generate() for name in names}
+        self.fleet, self._secret = new_fleet() if by_fleet else ("", b"")
+        self.paired = {} if by_fleet else {one.public: name for name, one in self.keys.items()}
+
+    def config(self, name: str, keys: HostKeys) -> Told:
+        """What a host is told of it; a certificate is good from yesterday, for thirty days."""
+        return {
+            "paired": {key: name for key, name in self.paired.items() if key != keys.public},
+            "fleets": [self.fleet] if self.fleet else [],
+            "certificate": self._certificate(name, keys).hex() if self.fleet else "",
         }
-        return Member(machine, keys, config)
+
+    def _certificate(self, name: str, keys: HostKeys) -> bytes:
+        yesterday = datetime.now(UTC) - timedelta(days=1)
+        until = yesterday + timedelta(days=31)
+        signed = issue(self._secret, name, keys.public, not_before=yesterday, not_after=until)
+        return signed.to_bytes()
+
+
+@contextmanager
+def crew(work: Path, *names: str, seed: int, trust: Trusting | None = None) -> Iterator[Crew]:
+    """Hosts on one switch that all see each other."""
+    with Network() as network:
+        made = Crew(network, work, trust or Trusting(names), seed)
+        made.start()
+        yield made
+        broken = [f"{member.name}: {what}" for member in made for what in member.broken]
+        assert not broken, "\n".join(broken)
+
+
+def _pieces(lines: Iterable[str], word: str) -> set[str]:
+    return {line.removeprefix(f"{word} ") for line in lines if line.startswith(f"{word} ")}
 
 
 def note(text: str) -> None:
     """Tell a figure: pytest shows it with -s, and when the test fails."""
     sys.stdout.write(f"{text}\n")
-
-
-def check(works: Counter[str], answered: Sequence[str]) -> None:
-    """Of what was written down: nothing was done twice, nothing runs on, and what was answered was
-    done."""
-    begun = {line.removeprefix("begin ") for line in works if line.startswith("begin ")}
-    ended = {line.removeprefix("end ") for line in works if line.startswith("end ")}
-    assert [line for line, times in works.items() if times > 1] == []
-    assert begun == ended, begun ^ ended
-    assert set(answered) <= begun
-
-
-@contextmanager
-def crew(work: Path, *names: str, seed: int) -> Iterator[Crew]:
-    """Hosts on one switch that all see each other."""
-    with Network() as network:
-        made = Crew(network, work, names, seed)
-        made.start()
-        yield made
-        broken = [f"{member.name}: {what}" for member in made for what in member.broken]
-        assert not broken, "\n".join(broken)
 
 
 def until(holds: Callable[[], bool]) -> None:

@@ -1,7 +1,7 @@
 """One host of a fleet, on a machine of its own: it changes its catalogue, calls others, serves them
 by writing down what it does, and tells what it sees.
 
-python -m tests.lab.faults.member CONFIG     # until its standard input ends
+python -m tests.lab.faults.member CONFIG     # until it is told to leave
 
 Orders come as JSON, one a line: {"id": 1, "do": "see", …}; answers and events leave likewise.
 """
@@ -19,6 +19,7 @@ import sys
 from collections import Counter
 from collections.abc import Awaitable, Callable, Mapping
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from typing import Any
 
 from nondum.host.config import PeersSection
@@ -56,12 +57,16 @@ Order = Callable[..., Awaitable[Mapping[str, Any]]]
 class Works:
     """Serves calls: writes down when a piece of work begins and ends."""
 
-    def __init__(self, log: str) -> None:
-        self._log = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+    def __init__(self) -> None:
+        self._log = -1
         self.running: set[str] = set()
         self.idle = asyncio.Event()
         self.idle.set()
         self.noticed = 0
+
+    def open(self, log: Path) -> None:
+        """Write to a file of this life."""
+        self._log = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL)
 
     def serve(self, errand: Errand) -> Body | Awaitable[Body]:
         if errand.method == "echo":
@@ -226,7 +231,7 @@ class Member:
     def __init__(self, config: Mapping[str, Any]) -> None:
         chance = random.Random(config["seed"])
         self._skew = timedelta()
-        self._works, self._sees = Works(config["log"]), Sees(_tell)
+        self._works, self._sees = Works(), Sees(_tell)
         section = PeersSection(discover=config["discover"], static=tuple(config["static"]))
         self.mesh = Mesh(
             _identity(config),
@@ -237,12 +242,13 @@ class Member:
             find=lambda mesh: PeerFinder(mesh, section),
             clock=lambda: datetime.now(UTC) + self._skew,
         )
+        self._works.open(Path(config["log"], f"{self.mesh.name}-{self.mesh.epoch}"))
         self._changes, self._asks = Changes(self.mesh, chance), Asks(self.mesh, chance)
         self._timed: asyncio.Task[list[float]] | None = None
         self._set_clock(config["skew_s"])
 
     async def run(self) -> None:
-        """Take orders until there are none."""
+        """Take orders until it is to leave."""
         await self.mesh.start()
         _tell("started", epoch=self.mesh.epoch)
         orders: dict[str, Order] = {
@@ -254,6 +260,8 @@ class Member:
         while line := await loop.run_in_executor(None, sys.stdin.readline):
             order = json.loads(line)
             number, do = order.pop("id"), order.pop("do")
+            if do == "leave":
+                break
             task = asyncio.create_task(_obey(number, orders[do](**order)))
             tasks.add(task)
             task.add_done_callback(tasks.discard)

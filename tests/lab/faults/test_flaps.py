@@ -9,7 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from tests.lab.faults.crew import Crew, Member, crew, note, until
+from tests.lab.faults.crew import Crew, crew, note, until
+from tests.lab.faults.remote import Member
 
 pytestmark = pytest.mark.lab
 
