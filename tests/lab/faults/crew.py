@@ -12,7 +12,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from demo.namespaces import Network, Switch
-from tests.lab.faults.remote import PATIENCE_S, PORT, Member, Told
+from tests.lab.faults.remote import PATIENCE_S, PORT, Member, Told, taken
 
 from nondum.sdk.wire import Body
 from nondum.transport.peers import HostKeys
@@ -70,8 +70,17 @@ class Crew:
             others = {name: entries for name, entries in catalogues.items() if name != member.name}
             answers.append(member.order("see", catalogues=others))
         for answer in answers:
-            told = answer.get(timeout=PATIENCE_S)
-            assert "error" not in told, told["error"]
+            taken(answer)
+
+    def all_meet(self, *parts: Sequence[Member]) -> None:
+        """Wait until all hosts of each part have each other for peers, and nobody else."""
+        answers = []
+        for part in parts or (self.members,):
+            for member in part:
+                peers = [other.name for other in part if other is not member]
+                answers.append(member.order("be_among", peers=peers))
+        for answer in answers:
+            taken(answer)
 
     def live(self, *, change_s: float, ask_s: float) -> None:
         """Have all change their catalogues and call each other."""
@@ -108,7 +117,7 @@ class Crew:
 
     def _all(self, do: str) -> dict[str, Told]:
         answers = {member.name: member.order(do) for member in self}
-        return {name: answer.get(timeout=PATIENCE_S) for name, answer in answers.items()}
+        return {name: taken(answer) for name, answer in answers.items()}
 
 
 class Trusting:

@@ -298,11 +298,14 @@ class Member:
 
     async def order_see(self, catalogues: Mapping[str, Mapping[str, Body]]) -> Mapping[str, Any]:
         """Wait until exactly these peers are there with these entries."""
-        while self._seen() != catalogues:
-            self._sees.news.clear()
-            await self._sees.news.wait()
+        await self._until(lambda: self._seen() == catalogues)
         told = {peer.name: peer.entries for peer in self.mesh.peers.values()}
         assert told == catalogues, "events and `peers` tell different things"
+        return {}
+
+    async def order_be_among(self, peers: list[str]) -> Mapping[str, Any]:
+        """Wait until exactly these peers are there."""
+        await self._until(lambda: sorted(self._sees.names.values()) == sorted(peers))
         return {}
 
     async def order_call(
@@ -355,6 +358,11 @@ class Member:
                 times.append(loop.time() - began_s)
                 await asyncio.sleep(every_s)
         return times
+
+    async def _until(self, holds: Callable[[], bool]) -> None:
+        while not holds():
+            self._sees.news.clear()
+            await self._sees.news.wait()
 
     def _seen(self) -> dict[str, Mapping[str, Body]]:
         return {name: self._sees.catalogues.get(key, {}) for key, name in self._sees.names.items()}

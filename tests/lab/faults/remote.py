@@ -108,9 +108,7 @@ class Member:
 
     def ask(self, do: str, **arguments: Any) -> Told:
         """Have it do something, and wait for the answer."""
-        told = self.order(do, **arguments).get(timeout=PATIENCE_S)
-        assert "error" not in told, told["error"]
-        return told
+        return taken(self.order(do, **arguments))
 
     def call(self, other: Member, method: str, **args: Any) -> Told:
         """Have it call another host: `answer` or `failure`."""
@@ -143,3 +141,10 @@ class Member:
         assert self._reader is not None
         self._process.wait(PATIENCE_S)
         self._reader.join()
+
+
+def taken(answer: queue.SimpleQueue[Told]) -> Told:
+    """Wait for the answer to an order."""
+    told = answer.get(timeout=PATIENCE_S)
+    assert "error" not in told, told["error"]
+    return told
