@@ -204,7 +204,7 @@ def test_person_says_where_a_payload_runs(tmp_path: Path) -> None:
         until_shared(rover, "beacon@mule")
         assert ("ComponentsProbed", "org.example.light") not in happened_last(rover)
         nondum("--control", rover.control, "place", "org.example.light", "--here")
-        rover.until_step("light", "active")
+        rover.until_component("beacon", "ready")
         mule.until_gone("light")
         assert rover.ask("places") == []
 

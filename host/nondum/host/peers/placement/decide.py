@@ -114,7 +114,7 @@ def movable_source(payload: PayloadRecord, state: HostState) -> tuple[DriveRecor
 def sent_away(parcel: Parcel, host: str) -> Problem:
     """What is told of a payload that a person has placed elsewhere."""
     return Problem(
-        ELSEWHERE,
+        "PLACED_ELSEWHERE",
         f"it is to run on {host} only",
         where=parcel.payload_id,
         fix=f"have it run here again with `nondum place {parcel.payload_id} --here`",
