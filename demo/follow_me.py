@@ -66,6 +66,13 @@ class FollowMe:
         share = self._asked(stage, is_given=is_given)
         return stage.result(reached=share >= WANTED_FRACTION, measure=_told(share))
 
+    def ask(self, *, name: str) -> StageResult:
+        """Ask to be followed, with what there is, and measure whether the robot does."""
+        self.start_rad = self._standing()
+        stage = self._stage(name)
+        share = self._asked(stage)
+        return stage.result(reached=share >= WANTED_FRACTION, measure=_told(share))
+
     def lose(self, drive: Path, *, name: str) -> StageResult:
         """Pull a drive while the body turns: all that needed it ends at once, the body stands, and
         the host says what would help."""

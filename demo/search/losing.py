@@ -5,11 +5,10 @@ from __future__ import annotations
 import dataclasses
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
-from demo.follow_me import follow_me
-from demo.following import Reference
+from demo.follow_me import FollowMe
 from demo.robot import Robot, View, nondum
 from demo.search.searching import WORDS, own_components
 from demo.search.sites import Site
@@ -17,7 +16,6 @@ from demo.stage import PLAN_S, Mark
 from demo.table import StageResult
 from nondum.sdk.errors import HostUnreachable
 
-FOLLOW = "follow me through the facility"
 NAME = "node lost"
 BRAKE_S = 3.0
 """A host counts as dead after some 1.5 s; the base brakes from full speed in less than that."""
@@ -25,21 +23,18 @@ ENDED_S = 10.0
 PAUSE_S = 0.2
 
 
-def lose_node(
-    site: Site, node: Robot, robot: Robot, others: Sequence[Robot], reference: Reference
-) -> StageResult:
-    """Have a robot follow with what the node has, and let the node vanish: the robot must halt and
-    stand, the other hosts must forget the node and say what is missing, and the node must end what
-    it did for them."""
-    mark = Mark(node)
+def lose_node(site: Site, node: Robot, following: FollowMe, others: Sequence[Robot]) -> StageResult:
+    """Let the node vanish while a robot follows with what it has: the robot must halt and stand,
+    the other hosts must forget the node and say what is missing, and the node must end what it did
+    for them."""
+    robot, mark = following.robot, Mark(node)
     pids = [row["pid"] for row in node.view["components"] if row["pid"]]
-    robot.ask("goal", words=FOLLOW)
-    robot.until(f"{NAME}: {robot.name} follows", _all_established, timeout_s=PLAN_S)
     lost = {f"{id}@{node.name}" for id in own_components(node)}
-    with follow_me(robot, reference, words=FOLLOW) as following:
-        result = following.bereave(
-            lambda: site.lose(node), lost, name=NAME, since=site.lost, brake_s=BRAKE_S
-        )
+    steps = {step["component"] for step in robot.view["plan"]["steps"]}
+    busy = {id.partition("@")[0] for id in steps & lost}
+    result = following.bereave(
+        lambda: site.lose(node), lost, name=NAME, since=site.lost, brake_s=BRAKE_S
+    )
     left = [robot, *others]
     for host in left:
         host.until(f"{host.name} forgets {node.name}", _without(node.name), timeout_s=PLAN_S)
@@ -49,7 +44,7 @@ def lose_node(
         for name, sentence in told.items()
         if f"bring the host {node.name} back" not in sentence
     ]
-    if not _within(lambda: _has_ended(node, mark, pids), ENDED_S):
+    if not _within(lambda: _have_ended(busy, node, mark, pids), ENDED_S):
         faults.append(f"{node.name} still does something for hosts that it lost")
     names = " and ".join(told)
     measure = (
@@ -70,26 +65,18 @@ def _missing(host: Robot) -> str:
     return "; ".join(causes)
 
 
-def _has_ended(node: Robot, mark: Mark, pids: Sequence[int]) -> bool:
-    """Whether nothing runs that was begun for a peer: by the node's own journal, or, where its
-    daemon is dead, by its workers being gone."""
+def _have_ended(components: Collection[str], node: Robot, mark: Mark, pids: Sequence[int]) -> bool:
+    """Whether components of the node have ended what they did, by its own journal; where its daemon
+    is dead, whether its workers are."""
     try:
         journal = mark.journal()
     except HostUnreachable:
         return not any(Path(f"/proc/{pid}").exists() for pid in pids)
-    begun = [row for row in journal if row["event"] == "BehaviourStarted"]
-    return bool(begun) and len(begun) == len(
-        [row for row in journal if row["event"] == "BehaviourEnded"]
-    )
+    return {*components} <= {row["subject"] for row in journal if row["event"] == "BehaviourEnded"}
 
 
 def _without(name: str) -> Callable[[View], bool]:
     return lambda view: all(row["host"] != name for row in view["components"])
-
-
-def _all_established(view: View) -> bool:
-    states = [step["state"] for step in view["plan"]["steps"]]
-    return bool(states) and all(state == "established" for state in states)
 
 
 def _within(is_so: Callable[[], bool], seconds: float) -> bool:

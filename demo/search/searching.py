@@ -67,11 +67,11 @@ class Search:
         self._until_possible(robot)
         tries = self._say(stage)
         stage.planned()
+        stage.phase("understood", _when(marks[0], "GoalGiven"))
+        stage.phase("in plan", _when(marks[0], "PlanMade"))
         said_s, file = self._alert(begun_wall_s, stage)
         stage.phase("alert", time.monotonic() - (time.time() - said_s))
         goal = robot.until(f"{stage.name}: the goal reached", _reached, timeout_s=PLAN_S)
-        stage.phase("understood", _when(marks[0], "GoalGiven"))
-        stage.phase("in plan", _when(marks[0], "PlanMade"))
         stage.faults += self._unfed(marks[1], robot)
         ran = {robot.name: _started(marks[0]), self.node.name: _started(marks[1])}
         stage.faults += [

@@ -11,6 +11,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from demo import live, stages
+from demo.follow_me import follow_me
 from demo.following import Reference
 from demo.kit import PLUGINS, Kit
 from demo.live import Says
@@ -22,6 +23,7 @@ from demo.search.searching import ALERT, WORDS, Search
 from demo.search.sites import Site, site
 from demo.table import StageResult
 
+FOLLOW = "follow me through the facility"
 REFERENCE = PLUGINS / "panorama/nondum_panorama/data/pedestrians.toml"
 
 ROBOT, NODE, SMALL = "panther", "node", "scout"
@@ -36,11 +38,13 @@ SETTINGS = {
 """For a machine without sound; and what is said is easier to understand than one word."""
 PUBLISHED_S = {ROBOT: 442, SMALL: 339}
 
-PHASES = ("found", "payloads in", "understood", "in plan", "alert", "halted", "told")
-STAGES = (ROBOT, SMALL, losing.NAME)
+PHASES = ("found", "payloads in", "understood", "in plan", "alert", "goal", "halted")
+STEERED = "steered"
+STAGES = (ROBOT, SMALL, STEERED, losing.NAME)
 NOTE = (
-    "Seconds after the stage's robot (and, in the first, the node) was switched on, or after the "
-    "node vanished. The published times are for a person with real robots and other hardware: they "
+    "Seconds after the stage's robot (and, in the first, the node) was switched on; for “steered”, "
+    "after it was asked for, with the ten seconds over which it is judged; then after the node "
+    "vanished. The published times are for a person with real robots and other hardware: they "
     "include hands that fetch and plug, and a person who walks up to be found; ours do not. Hosts "
     "here are processes of one machine, drives are folders, and the thermal camera is simulated, "
     "from a recording of real people."
@@ -109,8 +113,11 @@ def _played(
     search.equip(stage, {small: kit.of([CAMERA])})
     yield search.run(stage)
 
-    say(f"{losing.NAME}: {SMALL} follows, steered by the {NODE}; then {where.lost}")
-    yield losing.lose_node(where, node, small, [robot], Reference.read(REFERENCE))
+    with follow_me(small, Reference.read(REFERENCE), words=FOLLOW) as following:
+        say(f"{STEERED}: the {NODE}'s detector and tracker steer {SMALL}; “{FOLLOW}”")
+        yield following.ask(name=STEERED)
+        say(f"{losing.NAME}: {where.lost}")
+        yield losing.lose_node(where, node, following, [robot])
 
 
 def _switched_on(where: Site, folder: Path, initial: Mapping[str, Path], stack: ExitStack) -> Robot:

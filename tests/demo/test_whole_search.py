@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 LIMIT_S = 400
-STAGES = ["panther", "scout", "node lost"]
+STAGES = ["panther", "scout", "steered", "node lost"]
 IN_ORDER = ("found", "payloads in", "understood", "in plan", "alert")
 
 pytestmark = [pytest.mark.lab, pytest.mark.timeout(LIMIT_S)]
@@ -37,8 +37,8 @@ def test_two_robots_search_with_the_node_and_miss_it(options: tuple[str, ...]) -
     has_network = "namespaces" in document["where"]
     assert has_network == (os.geteuid() == 0 and not options)
     assert document["reached"] is True
-    panther, scout, lost = document["stages"]
-    assert [panther["name"], scout["name"], lost["name"]] == STAGES
+    assert [stage["name"] for stage in document["stages"]] == STAGES
+    panther, scout, steered, lost = document["stages"]
     for stage in (panther, scout):
         phases = [stage["phases_s"][phase] for phase in IN_ORDER]
         assert phases == sorted(phases)
@@ -47,6 +47,8 @@ def test_two_robots_search_with_the_node_and_miss_it(options: tuple[str, ...]) -
         assert f"thermal-camera@{stage['name']}" in stage["measure"]
         for component in ("people-detector", "visual-tracker", "speaker"):
             assert f"{component}@node" in stage["measure"]
+    assert "mobile-base.drive" in steered["plan"][-1]
+    assert "visual-tracker.track node__" in steered["plan"][-2]
     assert lost["phases_s"].keys() == {"halted", "told"}
     assert "bring the host node back" in lost["measure"]
     assert all("BUT" not in stage["measure"] for stage in document["stages"])
