@@ -76,6 +76,15 @@ def test_mount_of_the_camera_counts(worker: Any) -> None:
     assert bench.read("steering").angular[2] > 0.5
 
 
+def test_body_of_another_host_is_not_taken_for_the_own(worker: Any) -> None:
+    """On a compute node: the camera's place on the robot counts, wherever the tracker runs."""
+    bench = worker(PLUGIN, mounts=AHEAD)
+    call = bench.behave("track", u="tracker", d="people", o="steering", h="rover", c="person")
+    bench.drain("steering")
+    assert bench.read("steering").header.frame_id == "rover"
+    shown(bench, 0.3, call).assert_failed("FRAME_UNKNOWN")
+
+
 def test_unknown_mount_fails(worker: Any) -> None:
     bench = worker(PLUGIN)
     assert shown(bench, 0.0, track(bench)).wait().state == "failed"
