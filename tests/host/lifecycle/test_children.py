@@ -17,6 +17,9 @@ from nondum.sdk.errors import DriveGone, InstallFailed
 
 pytestmark = pytest.mark.anyio
 
+NOTHING = {"payloads": [], "certificates": []}
+"""What is found on an empty drive."""
+
 
 @contextlib.asynccontextmanager
 async def children(quiet_s: float = 60.0) -> AsyncIterator[Children]:
@@ -39,9 +42,9 @@ def drive(root: Path) -> dict[str, Any]:
 
 async def test_child_answers_and_is_used_again(tmp_path: Path) -> None:
     async with children() as pool:
-        assert await pool.run("look", drive(tmp_path)) == []
+        assert await pool.run("look", drive(tmp_path)) == NOTHING
         (first,) = pool.pids()
-        assert await pool.run("look", drive(tmp_path)) == []
+        assert await pool.run("look", drive(tmp_path)) == NOTHING
         assert pool.pids() == {first}
 
 
@@ -57,7 +60,7 @@ async def test_fault_of_ours_comes_back_as_a_problem(tmp_path: Path) -> None:
         with pytest.raises(InstallFailed) as failed:
             await pool.run("look", {})
         assert failed.value.code == "INTERNAL"
-        assert await pool.run("look", drive(tmp_path)) == []
+        assert await pool.run("look", drive(tmp_path)) == NOTHING
 
 
 async def test_child_that_dies_is_told(tmp_path: Path) -> None:
@@ -68,7 +71,7 @@ async def test_child_that_dies_is_told(tmp_path: Path) -> None:
         with pytest.raises(InstallFailed) as failed:
             await pool.run("look", drive(tmp_path))
         assert failed.value.code == "CHILD_DIED"
-        assert await pool.run("look", drive(tmp_path)) == []
+        assert await pool.run("look", drive(tmp_path)) == NOTHING
 
 
 async def test_child_that_hangs_is_given_up(tmp_path: Path) -> None:
@@ -111,7 +114,7 @@ async def test_work_aside_is_idle_and_ends_with_its_child(tmp_path: Path) -> Non
 
 async def test_work_aside_gives_its_answer(tmp_path: Path) -> None:
     async with children() as pool:
-        assert await pool.run_aside("look", drive(tmp_path)) == []
+        assert await pool.run_aside("look", drive(tmp_path)) == NOTHING
         assert not pool.pids()
         with pytest.raises(DriveGone):
             await pool.run_aside("look", drive(tmp_path / "nowhere"))

@@ -40,7 +40,8 @@ def place(session: Session, payload: str | None, host: str | None, here: bool) -
     if session.as_json:
         render.as_json(placed)
     elif placed["host"] is None:
-        click.echo(f"{placed['payload']} may run here again")
+        told = "may run here again" if placed["before"] else "runs here whenever it fits"
+        click.echo(f"{placed['payload']} {told}")
     else:
         click.echo(f"{placed['payload']} is to run on {placed['host']}: see `nondum place`")
 

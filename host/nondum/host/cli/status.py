@@ -78,6 +78,5 @@ def _show_payloads(payloads: list[dict[str, Any]]) -> None:
         columns.append("progress")
     table(rows, columns, empty="no payloads")
     for row in rows:
-        for problem in row["problems"]:
-            colour = None if row["place"] else "red"
-            render.sentence(problem, colour=colour, mark=f"{row['payload']}: ")
+        for problem in () if row["place"] else row["problems"]:
+            render.sentence(problem, colour="red", mark=f"{row['payload']}: ")

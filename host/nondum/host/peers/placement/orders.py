@@ -43,17 +43,19 @@ class PlaceOrders:
     async def place(self, arguments: Arguments) -> Row:
         """Have a `payload` run on one `host` only, or, without one, wherever it fits, here first.
 
-        Gives `payload` and `host`. Raises `NondumError` (PAYLOAD_UNKNOWN, PEER_UNKNOWN),
+        Gives `payload`, `host`, and the host `before`. Raises `NondumError` (PAYLOAD_UNKNOWN, PEER_UNKNOWN),
         `PayloadRefused` (PLACE_FIXED, PLACE_OFF), `InstallFailed` (IO_ERROR).
         """
         payload_id, host = arguments.text("payload"), arguments.optional_text("host")
+        before = self.pins.hosts.get(payload_id)
         here = [p for p in self.catalogue.state.payloads.values() if p.payload_id == payload_id]
         if host is None or host == self.catalogue.state.host:
             await self._unpin(payload_id, here)
         else:
             await self._pin(payload_id, here, host)
         self.placing.look()
-        return {"payload": payload_id, "host": self.pins.hosts.get(payload_id)}
+        host = self.pins.hosts.get(payload_id)
+        return {"payload": payload_id, "host": host, "before": before}
 
     async def _pin(self, payload_id: str, here: list[PayloadRecord], host: str) -> None:
         if not here:
