@@ -43,8 +43,8 @@ class PlaceOrders:
     async def place(self, arguments: Arguments) -> Row:
         """Have a `payload` run on one `host` only, or, without one, wherever it fits, here first.
 
-        Gives `payload`, `host`, and the host `before`. Raises `NondumError` (PAYLOAD_UNKNOWN, PEER_UNKNOWN),
-        `PayloadRefused` (PLACE_FIXED, PLACE_OFF), `InstallFailed` (IO_ERROR).
+        Gives `payload`, `host`, and the host `before`. Raises `NondumError` (PAYLOAD_UNKNOWN,
+        PEER_UNKNOWN), `PayloadRefused` (PLACE_FIXED, PLACE_OFF), `InstallFailed` (IO_ERROR).
         """
         payload_id, host = arguments.text("payload"), arguments.optional_text("host")
         before = self.pins.hosts.get(payload_id)
