@@ -28,6 +28,7 @@ class PeerFinder:
             on_gone=mesh.no_more_hints,
             static=config.static,
             multicast=config.discover,
+            prefers=mesh.is_welcome,
         )
 
     async def start(self) -> None:

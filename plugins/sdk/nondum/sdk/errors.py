@@ -14,7 +14,13 @@
     ├── BehaviourFailed       a behaviour ended in FAILURE
     ├── ConfigRefused         the host's configuration or command line
     ├── HostUnreachable       no daemon answers
+    │   └── PeerUnreachable   no link to another host, or it was lost while it was needed
+    ├── PeerRefused           a key, certificate, pairing or setting of peers that cannot be trusted
+    ├── CallFailed            another host answered a call with problems
+    ├── EntryRefused          what cannot be shared with peers
     └── FrameUnknown          no transform between two frames
+
+Those of hosts among each other are defined in `nondum.transport`.
 
 A mistake in calling code stays `TypeError` or `ValueError`; these say that the world failed.
 """

@@ -67,7 +67,7 @@ class Mesh:
             epoch=self.epoch,
             clock=clock,
         )
-        self._meeting = Meeting(identity.key, self._node, self._is_welcome)
+        self._meeting = Meeting(identity.key, self._node, self.is_welcome)
         self._finder: Finder | None = None
 
     @property
@@ -154,7 +154,8 @@ class Mesh:
         await self._node.close()
         self._catalogues.close()
 
-    def _is_welcome(self, key: PeerKey) -> bool:
+    def is_welcome(self, key: PeerKey) -> bool:
+        """Whether a host might be let in, by its key alone."""
         if self.security is Security.DEVELOPMENT:
             return True
         return self._trust.standing(key) in (Standing.ADMITTED, Standing.MUST_CERTIFY)
