@@ -38,12 +38,12 @@ from nondum.host.printable import printable
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
 from nondum.sdk.wire import Body
 from nondum.transport.fleet.seam import Fleet
-from nondum.transport.peers import Call, CallFailed, Errand
+from nondum.transport.peers import Call, CallFailed, Errand, PeerKey
 from nondum.wheelhouse import contents, names
 from nondum.wheelhouse.signatures import MAX_SIGNATURE_BYTES
 
 AT_ONCE = 2
-"""Payloads that are fetched at the same time; others wait."""
+"""Payloads that are fetched from one peer at the same time; others wait."""
 MOST = 64
 """Payloads of others that are taken."""
 READ_S = 20.0
@@ -149,7 +149,8 @@ class Taking:
         self._fleet, self._state, self._folders = fleet, state, folders
         self._children, self._emit = children, emit
         self._rules, self._is_open = rules, is_open
-        self._turns = asyncio.Semaphore(AT_ONCE)
+        self._turns: dict[PeerKey, asyncio.Semaphore] = {}
+        """By peer: one that stalls keeps nobody else waiting."""
         self._numbers = itertools.count(1)
         self._guests: dict[str, Guest] = {}
         self._started = asyncio.Event()
@@ -176,7 +177,7 @@ class Taking:
         is_inserted = False
         try:
             await self._started.wait()
-            async with self._turns:
+            async with self._turns.setdefault(errand.caller.key, asyncio.Semaphore(AT_ONCE)):
                 await self._fetch(guest)
             is_inserted = True
             self._emit(DriveInserted(guest.drive, guest.root, PLACED))

@@ -1,0 +1,135 @@
+"""What is copied for another host, and how what another host offers is judged."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.payloads import Part, make_payload, seal
+
+from nondum.host.drives import parcel
+from nondum.sdk.errors import NondumError
+
+LAMP = """
+from nondum.sdk import Unit, hookimpl
+
+@hookimpl
+def units():
+    return [Unit("lamp", "light")]
+"""
+PAYLOAD = "org.example.lamp"
+
+
+def lamp(drive: Path, *, requires: str = "") -> Path:
+    return make_payload(drive, Part("lamp", LAMP), payload_id=PAYLOAD, requires=requires)
+
+
+def told(*_: object) -> None: ...
+
+
+def hand_over(folder: Path, target: Path, **more: Any) -> dict[str, Any]:
+    contents = (folder / "CONTENTS").read_bytes()
+    arguments = {
+        "root": str(folder.parents[1]),
+        "node": None,
+        "folder": f"nondum/{PAYLOAD}",
+        "digest": hashlib.sha256(contents).hexdigest(),
+        "target": str(target),
+        "wanted": None,
+        "reserve_mb": 0,
+    }
+    return parcel.hand_over(arguments | more, told)
+
+
+def judge(folder: Path, state: Path, **more: Any) -> dict[str, Any]:
+    rules = {"store": str(state / "store"), "confinement": 0, "method": "store", "reserve_mb": 0}
+    return parcel.judge({"folder": str(folder), **rules} | more, told)
+
+
+def code(work: Any, *arguments: Any, **more: Any) -> str:
+    with pytest.raises(NondumError) as refused:
+        work(*arguments, **more)
+    return refused.value.code
+
+
+def files(folder: Path) -> set[str]:
+    return {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
+
+
+def test_what_it_is_judged_by_comes_first(tmp_path: Path) -> None:
+    folder = lamp(tmp_path / "drive")
+    (folder / "CONTENTS.sig").write_bytes(b"signed")
+    copied = hand_over(folder, tmp_path / "out")
+    metadata = {"payload.toml", "index.json", "pylock.lamp.toml"}
+    assert files(tmp_path / "out") == {"CONTENTS", "CONTENTS.sig", *metadata}
+    assert {path for _, path in copied["files"]} == metadata
+    assert copied["contents"] == (folder / "CONTENTS").stat().st_size
+
+
+def test_only_what_is_wanted_is_copied(tmp_path: Path) -> None:
+    folder = lamp(tmp_path / "drive")
+    wheel = next((folder / "wheels").glob("test_lamp*"))
+    sha256 = hashlib.sha256(wheel.read_bytes()).hexdigest()
+    for _ in range(2):  # what a former attempt left is no hindrance
+        copied = hand_over(folder, tmp_path / "out", wanted=[sha256, "0" * 64])
+    assert copied["files"] == [[sha256, f"wheels/{wheel.name}"]]
+    assert files(tmp_path / "out") == {f"wheels/{wheel.name}"}
+
+
+def test_disk_that_is_to_stay_free_stays_free(tmp_path: Path) -> None:
+    folder = lamp(tmp_path / "drive")
+    whole_mb = shutil.disk_usage(tmp_path).total // 2**20
+    assert code(hand_over, folder, tmp_path / "out", reserve_mb=whole_mb) == "DISK_FULL"
+    assert files(tmp_path / "out") == set()
+
+
+def test_drive_that_is_another_one_now_is_refused(tmp_path: Path) -> None:
+    folder = lamp(tmp_path / "drive")
+    assert code(hand_over, folder, tmp_path / "out", digest="0" * 64) == "HASH_MISMATCH"
+
+
+def test_file_that_changed_on_the_drive_is_refused(tmp_path: Path) -> None:
+    folder = lamp(tmp_path / "drive")
+    with (folder / "index.json").open("ab") as index:
+        index.write(b" ")
+    assert code(hand_over, folder, tmp_path / "out") == "HASH_MISMATCH"
+
+
+def test_drive_that_is_gone_is_told(tmp_path: Path) -> None:
+    folder = lamp(tmp_path / "drive")
+    root = str(tmp_path / "other")
+    assert code(hand_over, folder, tmp_path / "out", root=root) == "DRIVE_GONE"
+
+
+def test_metadata_is_enough_to_judge_by(tmp_path: Path) -> None:
+    folder, out = lamp(tmp_path / "drive"), tmp_path / "out" / PAYLOAD
+    hand_over(folder, out)
+    listed = parcel.outline({"folder": str(out)}, told)
+    assert {path for path, _, _ in listed} == files(out) - {"CONTENTS"}
+    judged = judge(out, tmp_path)
+    assert judged["components"] == ["lamp"]
+    assert {path for path, _, _ in judged["needed"]} == files(folder) - files(out)
+
+
+@pytest.mark.parametrize(
+    ("requires", "refusal"),
+    [
+        ('python = ">=3.99"', "PYTHON_VERSION"),
+        ("memory_mb = 900000000", "NO_MEMORY"),
+        ("disk_mb = 900000000", "DISK_FULL"),
+        ("confinement = 1", "CONFINEMENT"),
+    ],
+)
+def test_what_does_not_fit_is_refused(tmp_path: Path, requires: str, refusal: str) -> None:
+    assert code(judge, lamp(tmp_path / "drive", requires=requires), tmp_path) == refusal
+
+
+def test_more_than_is_read_to_judge_is_refused(tmp_path: Path) -> None:
+    folder = lamp(tmp_path / "drive")
+    with (folder / "leaflet.txt").open("wb") as leaflet:
+        leaflet.truncate(parcel.MAX_METADATA)
+    seal(folder, payload_id=PAYLOAD)
+    assert code(parcel.outline, {"folder": str(folder)}, told) == "TOO_LARGE"
