@@ -1,0 +1,1 @@
+"""Hosts that find, lose and call each other: how long it takes."""
