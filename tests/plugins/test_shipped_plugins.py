@@ -76,7 +76,7 @@ def test_manifest_says_what_the_plugin_says(
         ),
         (
             ("thermal-camera", "people-detector", "visual-tracker", "speaker"),
-            "search for people and tell me",
+            "search for people",
             ["stream", "detect", "watch", "report"],
         ),
     ],

@@ -41,7 +41,7 @@ class Speaker:
         patterns = (
             "[please] report {c:class}",
             "[please] tell me of {c:class}",
-            "[please] search for {c:class} and tell me",
+            "[please] search for {c:class} [and tell me]",
         )
         return tuple(Phrase(pattern, "(reported ?c self)") for pattern in patterns)
 

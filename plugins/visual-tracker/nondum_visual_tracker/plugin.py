@@ -57,8 +57,7 @@ def fragments() -> tuple[Fragment, ...]:
 
 @hookimpl
 def phrases() -> tuple[Phrase, ...]:
-    patterns = ("[please] search for {c:class}", "[please] look for {c:class}")
-    return tuple(Phrase(pattern, "(found ?c self)") for pattern in patterns)
+    return (Phrase("[please] look for {c:class}", "(found ?c self)"),)
 
 
 @hookimpl

@@ -29,7 +29,7 @@ def test_alert_is_understood(person: Person, tmp_path: Path) -> None:
     [
         "I cannot see a person.",
         "I can see a robot.",
-        "panther: search for people and tell me is reached",
+        "panther: search for people is reached",
         "the host panther is here",
         "speech is active",
         "",
