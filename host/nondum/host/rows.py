@@ -122,7 +122,7 @@ def offered_row(component: PeerComponent, host: str) -> Row:
         "version": component.version,
         "payload": component.payload_id,
         "units": [unit.name for unit in described.units],
-        "behaviours": [behaviour.name for behaviour in described.behaviours],
+        "behaviours": list(component.abilities),
         "devices": {},
         "pid": None,
         "problem": f"its host does not offer {withheld}" if withheld else "",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -91,17 +92,16 @@ def test_what_is_offered_is_understood() -> None:
 def test_actuators_are_withheld_and_with_them_what_only_they_do() -> None:
     (offered,) = record_of(ME, standing(snapshot(component()), Policy(), {})).components
     assert [unit.name for unit in offered.description.units] == ["eye"]
-    assert [behaviour.name for behaviour in offered.description.behaviours] == ["look"]
-    assert offered.withheld == ("head",)
+    assert (offered.abilities, offered.withheld) == (("look",), ("head",))
     record = record_of(ME, standing(snapshot(component()), Policy(), {}))
     assert [mount.unit for mount in record.mounts] == ["mule__watcher__eye"]
 
 
-def test_component_of_withheld_units_only_brings_nothing() -> None:
+def test_component_of_withheld_units_only_brings_words() -> None:
     alone = component("watcher", HEAD)
     (offered,) = record_of(ME, standing(snapshot(alone), Policy(), {})).components
-    assert offered.withheld == ("head",)
-    assert offered.description == PluginDescription("watcher", "1.0")
+    assert (offered.abilities, offered.withheld) == ((), ("head",))
+    assert offered.description == replace(alone.description, units=())
 
 
 def test_type_of_actuator_that_a_plugin_declares_is_withheld_too() -> None:

@@ -11,6 +11,7 @@ from typing import Any
 from nondum.planning.goal import GoalKind
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
+from nondum.sdk.signature import parse_signature
 
 Xyz = tuple[float, float, float]
 
@@ -135,6 +136,11 @@ class ComponentRecord:
     problems: tuple[Problem, ...] = ()
 
     @property
+    def abilities(self) -> tuple[str, ...]:
+        """The names of its behaviours."""
+        return tuple(behaviour.name for behaviour in self.description.behaviours)
+
+    @property
     def is_ready(self) -> bool:
         """Whether its worker answers and every required device is there."""
         return self.state is ComponentState.READY and all(
@@ -158,6 +164,16 @@ class PeerComponent:
     """Below all of this host's own."""
     withheld: tuple[str, ...] = ()
     """Its units that this host may not use."""
+
+    @property
+    def abilities(self) -> tuple[str, ...]:
+        """The names of the behaviours that this host may ask for."""
+        types = {unit.type for unit in self.description.units}
+        return tuple(
+            behaviour.name
+            for behaviour in self.description.behaviours
+            if not self.withheld or types & set(parse_signature(behaviour.action).actor.types)
+        )
 
     @property
     def payload(self) -> str:

@@ -107,7 +107,7 @@ def _offered(component: _Component) -> str:
 
 
 def _abilities(component: _Component) -> str:
-    return ", ".join(behaviour.name for behaviour in component.description.behaviours)
+    return ", ".join(component.abilities)
 
 
 def _health(component: _Component) -> str:

@@ -182,6 +182,7 @@ class Views:
             }
             for _, component in self._everyone()
             for behaviour in component.description.behaviours
+            if behaviour.name in component.abilities
         ]
 
     def units(self) -> list[Row]:

@@ -20,6 +20,7 @@ from nondum.planning.facts import parts
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import MessageInvalid, NondumError, Problem
 from nondum.sdk.messages import value_from_wire
+from nondum.sdk.signature import parse_signature
 
 Entries: TypeAlias = Mapping[str, Mapping[str, Any]]
 Claim: TypeAlias = FactKnown | StreamFlowing
@@ -130,12 +131,15 @@ def _component(peer: Introduced, name: str, body: Mapping[str, Any]) -> PeerComp
         raise _Wrong("readiness or rank is missing")
     if not isinstance(withheld, list) or not all(isinstance(unit, str) for unit in withheld):
         raise _Wrong("the list of what is withheld is missing")
+    description = PluginDescription.parse(body.get("description"), where=name)
+    for behaviour in description.behaviours:
+        parse_signature(behaviour.action)  # it raises what is wrong with it
     return PeerComponent(
         id=peers_id(name, peer.name),
         life=peer.life,
         payload_id=_text(body, "payload"),
         version=_text(body, "version"),
-        description=PluginDescription.parse(body.get("description"), where=name),
+        description=description,
         is_ready=ready,
         rank=BELOW_OWN + rank,
         withheld=tuple(withheld),

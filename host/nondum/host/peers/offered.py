@@ -8,7 +8,8 @@
     flow/STREAM     the component on whose stream messages arrive
     taken/FACT      the host that uses what the fact is about
 
-A component whose every unit is withheld is told of, but brings nothing.
+Of a component whose units are withheld the words are shared all the same: what it says in PDDL, its
+phrases and labels. So peers understand what they cannot do, and know who can.
 """
 
 from __future__ import annotations
@@ -22,8 +23,7 @@ from nondum.host.events import FactKnown, StreamFlowing
 from nondum.host.mind.composition import own_objects
 from nondum.planning.facts import fact
 from nondum.planning.scope import SELF
-from nondum.sdk.description import ACTUATORS, Behaviour, PluginDescription
-from nondum.sdk.signature import parse_signature
+from nondum.sdk.description import ACTUATORS, PluginDescription
 
 Entries: TypeAlias = dict[str, dict[str, Any]]
 Claim: TypeAlias = FactKnown | StreamFlowing
@@ -58,13 +58,7 @@ class Policy:
         if component.id in self.movable or not withheld:
             return Offer(described, ())
         units = tuple(unit for unit in described.units if unit.name not in withheld)
-        if not units:
-            bare = PluginDescription(described.name, described.version, described.summary)
-            return Offer(bare, tuple(sorted(withheld)))
-        types = {unit.type for unit in units}
-        behaviours = tuple(b for b in described.behaviours if _is_for(b, types))
-        offered = replace(described, units=units, behaviours=behaviours, devices=())
-        return Offer(offered, tuple(sorted(withheld)))
+        return Offer(replace(described, units=units, devices=()), tuple(sorted(withheld)))
 
 
 def standing(snapshot: Snapshot, policy: Policy, compute: Mapping[str, Any]) -> Entries:
@@ -139,9 +133,3 @@ def _claimed(
                 yield key, {"predicate": predicate, "arguments": objects, "value": value}
             case StreamFlowing(_, stream, True) if stream in shared:
                 yield f"flow/{stream}", {"component": component}
-
-
-def _is_for(behaviour: Behaviour, types: Collection[str]) -> bool:
-    """Whether a behaviour's actor may be of one of some types."""
-    actor = next(iter(parse_signature(behaviour.action).parameters), None)
-    return actor is not None and any(type_ in types for type_ in actor.types)

@@ -8,12 +8,8 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-import re
-import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 from typing import Any, NoReturn
 
 from nondum.host.catalogue.catalogue import now
@@ -34,13 +30,12 @@ from nondum.host.lifecycle.folders import Folders, remove
 from nondum.host.lifecycle.lanes import in_thread
 from nondum.host.peers.placement.decide import PLACED
 from nondum.host.peers.placement.fetching import Fetching, Listed
-from nondum.host.printable import printable
+from nondum.host.peers.placement.guest import Guest, Offer
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
 from nondum.sdk.wire import Body
 from nondum.transport.fleet.seam import Fleet
 from nondum.transport.peers import Call, CallFailed, Errand, PeerKey
-from nondum.wheelhouse import contents, names
-from nondum.wheelhouse.signatures import MAX_SIGNATURE_BYTES
+from nondum.wheelhouse import contents
 
 AT_ONCE = 2
 """Payloads that are fetched from one peer at the same time; others wait."""
@@ -52,82 +47,6 @@ COPY_S = 3600.0
 """What a peer has to copy files from a drive."""
 SIGN_S = 1.0
 """Time between two reports: one may be lost on the way."""
-PROGRESS_S = 0.2
-"""Time between two reports of what was fetched."""
-
-_DIGEST = re.compile(r"[0-9a-f]{64}")
-
-
-@dataclass(frozen=True, slots=True)
-class Offer:
-    """A payload that a peer wants to run here."""
-
-    digest: str
-    payload_id: str
-    contents: int
-    signature: bytes | None
-    why: str
-
-    @classmethod
-    def parse(cls, args: Mapping[str, Any]) -> Offer:
-        """Read the arguments of `place.take`. Raises `CallFailed` (CALL_MALFORMED)."""
-        match args:
-            case {
-                "digest": str(digest),
-                "payload": str(payload_id),
-                "contents": int(size),
-                "signature": bytes() | None as signature,
-                "why": str(why),
-            } if (
-                _DIGEST.fullmatch(digest)
-                and names.PAYLOAD_ID.fullmatch(payload_id)
-                and 0 < size <= contents.MAX_BYTES
-                and len(signature or b"") <= MAX_SIGNATURE_BYTES
-            ):
-                return cls(digest, payload_id, size, signature, printable(why[:500]))
-        told = "a call's arguments are not what it takes"
-        need = "digest, payload, contents, signature and why"
-        raise CallFailed(Problem("CALL_MALFORMED", told, need=need))
-
-
-@dataclass(slots=True, eq=False)
-class Guest:
-    """A payload of a peer."""
-
-    offer: Offer
-    errand: Errand
-    drive: str
-    """Name of the drive that stands for it."""
-    root: Path
-    step: str = "waiting"
-    """`waiting`, `checking`, `fetching`, `installing` or `active`."""
-    done: int = 0
-    total: int = 0
-    version: str = ""
-    news: asyncio.Event = field(default_factory=asyncio.Event)
-    _told_s: float = 0.0
-
-    @property
-    def key(self) -> str:
-        """Of the payload on this host."""
-        return self.offer.digest[:16]
-
-    @property
-    def folder(self) -> Path:
-        """Where the payload lies."""
-        return self.root / "nondum" / self.offer.payload_id
-
-    def tell(self, step: str) -> None:
-        """Report how far it is."""
-        self.step = step
-        self._told_s = time.monotonic()
-        self.errand.progress({"step": step, "done": self.done, "total": self.total})
-
-    def add(self, count: int) -> None:
-        """More bytes are here."""
-        self.done += count
-        if self.done >= self.total or time.monotonic() - self._told_s >= PROGRESS_S:
-            self.tell("fetching")
 
 
 class Taking:
