@@ -113,4 +113,9 @@ def cut(descriptor: int, end: str) -> None:
 
 
 def _duplicate(descriptor: int) -> socket.socket:
-    return socket.socket(fileno=os.dup(descriptor))
+    copy = os.dup(descriptor)
+    try:
+        return socket.socket(fileno=copy)
+    except OSError:  # it is no socket's any more
+        os.close(copy)
+        raise

@@ -1,0 +1,39 @@
+"""Connections are known by descriptors, which may have gone to something else meanwhile."""
+
+from __future__ import annotations
+
+import os
+import socket
+from pathlib import Path
+
+from nondum.transport.peers import accepted
+
+
+def test_descriptor_that_is_no_socket_any_more_leaves_nothing_open() -> None:
+    descriptor = os.eventfd(0)
+    before = open_files()
+    assert accepted.other_end(descriptor) == ""
+    assert accepted.bytes_received(descriptor) == 0
+    accepted.cut(descriptor, "127.0.0.1:1")
+    assert open_files() == before
+    os.close(descriptor)
+
+
+def test_connection_to_another_end_is_not_cut() -> None:
+    with (
+        socket.create_server(("127.0.0.1", 0)) as server,
+        socket.create_connection(server.getsockname()) as here,
+    ):
+        there, (host, port) = server.accept()
+        with there:
+            assert accepted.other_end(there.fileno()) == f"{host}:{port}"
+            accepted.cut(there.fileno(), f"{host}:{port + 1}")
+            here.sendall(b"still here")
+            assert there.recv(10) == b"still here"
+            assert accepted.bytes_received(there.fileno()) == 10
+            accepted.cut(there.fileno(), f"{host}:{port}")
+            assert here.recv(1) == b""
+
+
+def open_files() -> list[str]:
+    return sorted(path.name for path in Path("/proc/self/fd").iterdir())
