@@ -9,6 +9,7 @@ from pathlib import Path
 
 from tests.lab.running_host import READY_S, RunningHost
 from tests.payloads import Part
+from tests.transport.fleet.fleets import router
 
 
 def free_port() -> int:
@@ -40,6 +41,29 @@ def open_host(work: Path, name: str, port: int = 0) -> Iterator[tuple[RunningHos
         yield host, f"tcp://127.0.0.1:{port}"
     finally:
         host.stop()
+
+
+@contextmanager
+def routed(work: Path, *names: str) -> Iterator[list[RunningHost]]:
+    """Hosts that need no keys and are each other's peers by way of a router."""
+    port = free_port()
+    own = router(port)
+    with ExitStack() as stack:
+        stack.callback(own.close)
+        hosts: list[RunningHost] = []
+        for name in names:
+            (work / name).mkdir(parents=True)
+            more = _section(free_port(), []) + "development = true\n"
+            more += f'[router]\nendpoints = ["tcp/127.0.0.1:{port}"]\n'
+            host = RunningHost(work / name, name=name, more=more)
+            stack.callback(host.stop)
+            host.start()
+            hosts.append(host)
+        for host in hosts:
+            for other in names:
+                if other != host.name:
+                    until_peer(host, other)
+        yield hosts
 
 
 @contextmanager

@@ -8,7 +8,7 @@ import threading
 from pathlib import Path
 
 import pytest
-from tests.lab.neighbours import beacon, ear, neighbours, say, until_shared, written
+from tests.lab.neighbours import beacon, ear, neighbours, routed, say, until_shared, written
 from tests.lab.plugins import scribe, talker
 from tests.lab.running_host import READY_S, RunningHost
 
@@ -156,6 +156,18 @@ def test_stream_of_one_host_is_read_on_the_other(tmp_path: Path) -> None:
         assert (row["component"], row["consumers"]) == ("talker@rover", ["scribe"])
         rover.ask("halt", id=goal)
         mule.until("it is read no more", lambda view: not view["streams"], timeout_s=READY_S)
+
+
+def test_hosts_by_way_of_a_router_use_each_other_all_the_same(tmp_path: Path) -> None:
+    with routed(tmp_path, "rover", "mule") as (rover, mule):
+        assert {row["by"] for row in rover.ask("peers")} == {"development"}
+        rover.bring("talk", talker("talker"))
+        mule.bring("write", scribe())
+        until_shared(rover, "scribe@mule")
+        rover.until_goal(rover.want("(written rover)"), "holds")
+        mule.kill()
+        until_lost(rover, "scribe@mule")
+        rover.until_goal("1", "suspended")
 
 
 def test_camera_of_another_body_is_not_planned_with(tmp_path: Path) -> None:

@@ -125,6 +125,22 @@ class PeersSection:
 
 
 @dataclass(frozen=True, slots=True)
+class RouterSection:
+    """A Zenoh router by which hosts reach each other, instead of links from each to each."""
+
+    endpoints: tuple[str, ...] = ()
+    """Where routers are, any of which will do: `tls/router.example:7447`. None: no router."""
+    fleet: str = "nondum"
+    """What tells fleets apart that share a router."""
+    authorities: Path | None = None
+    """Certificates (PEM) that the router's must come from."""
+    certificate: Path | None = None
+    """This host's (PEM), for a router that asks for one."""
+    private_key: Path | None = None
+    """Its key (PEM)."""
+
+
+@dataclass(frozen=True, slots=True)
 class HostConfig:
     """All of it."""
 
@@ -135,6 +151,7 @@ class HostConfig:
     workers: WorkersSection = field(default_factory=WorkersSection)
     planning: PlanningSection = field(default_factory=PlanningSection)
     peers: PeersSection = field(default_factory=PeersSection)
+    router: RouterSection = field(default_factory=RouterSection)
 
 
 def default_name(hostname: str) -> str:
@@ -235,6 +252,7 @@ _KINDS: Mapping[Any, str] = {
     float: "a number above 0",
     bool: "true or false",
     Path: "a path as a string",
+    Path | None: "a path as a string",
     tuple[Path, ...]: "a list of paths",
     tuple[str, ...]: "a list of strings",
 }
@@ -246,7 +264,7 @@ def _typed(hint: Any, value: Any) -> Any:
         (item, _) = get_args(hint)
         typed = [_typed(item, v) for v in value] if isinstance(value, list) else [None]
         return None if None in typed else tuple(typed)
-    if hint is Path:
+    if hint in (Path, Path | None):
         return Path(value).expanduser() if isinstance(value, str) and value else None
     if hint is float:
         is_number = isinstance(value, int | float) and not isinstance(value, bool)

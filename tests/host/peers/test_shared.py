@@ -22,6 +22,7 @@ from nondum.host.peers.heard import (
     BELOW_OWN,
     Introduced,
     claims_of,
+    reach_of,
     record_of,
     taken_in,
     withdrawal,
@@ -76,7 +77,10 @@ def no_claims(_: str) -> tuple[FactKnown, ...]:
 
 
 def test_what_is_offered_is_understood() -> None:
-    entries = standing(snapshot(component()), Policy(frozenset({"watcher"})), {"processors": 4})
+    entries = {
+        **standing(snapshot(component()), Policy(frozenset({"watcher"}))),
+        "compute": {"processors": 4},
+    }
     record = record_of(ME, entries)
     (offered,) = record.components
     assert offered.id == "watcher@mule"
@@ -90,16 +94,16 @@ def test_what_is_offered_is_understood() -> None:
 
 
 def test_actuators_are_withheld_and_with_them_what_only_they_do() -> None:
-    (offered,) = record_of(ME, standing(snapshot(component()), Policy(), {})).components
+    (offered,) = record_of(ME, standing(snapshot(component()), Policy())).components
     assert [unit.name for unit in offered.description.units] == ["eye"]
     assert (offered.abilities, offered.withheld) == (("look",), ("head",))
-    record = record_of(ME, standing(snapshot(component()), Policy(), {}))
+    record = record_of(ME, standing(snapshot(component()), Policy()))
     assert [mount.unit for mount in record.mounts] == ["mule__watcher__eye"]
 
 
 def test_component_of_withheld_units_only_brings_words() -> None:
     alone = component("watcher", HEAD)
-    (offered,) = record_of(ME, standing(snapshot(alone), Policy(), {})).components
+    (offered,) = record_of(ME, standing(snapshot(alone), Policy())).components
     assert (offered.abilities, offered.withheld) == ((), ("head",))
     assert offered.description == replace(alone.description, units=())
 
@@ -107,15 +111,13 @@ def test_component_of_withheld_units_only_brings_words() -> None:
 def test_type_of_actuator_that_a_plugin_declares_is_withheld_too() -> None:
     crane = component("watcher", Unit("boom", "crane"))
     policy = Policy(actuators=frozenset({"arm", "crane"}))
-    (offered,) = record_of(ME, standing(snapshot(crane), policy, {})).components
+    (offered,) = record_of(ME, standing(snapshot(crane), policy)).components
     assert offered.withheld == ("boom",)
 
 
 def test_devices_that_serve_a_component_are_told() -> None:
     served = component(devices=(DeviceClaim("port", {}, optional=False, device="usb1"),))
-    assert record_of(ME, standing(snapshot(served), Policy(), {})).devices == {
-        "usb1": "watcher@mule"
-    }
+    assert record_of(ME, standing(snapshot(served), Policy())).devices == {"usb1": "watcher@mule"}
 
 
 def test_what_a_component_says_is_told_with_full_names_and_taken_back() -> None:
@@ -147,6 +149,12 @@ def test_peer_takes_nothing_but_its_own(text: str) -> None:
     assert taken_in("mule", {f"taken/{text}": {"by": "mule"}}, "rover") == {}
 
 
+def test_streams_are_fetched_at_addresses_only() -> None:
+    said = {"reach": {"hosts": ["10.0.0.7", "fd00::7", "router.example", 7, "10.0.0.7:80"]}}
+    assert reach_of(said) == ("10.0.0.7", "[fd00::7]")
+    assert reach_of({"reach": {"hosts": "10.0.0.7"}}) == reach_of({}) == ()
+
+
 def test_peer_speaks_of_its_own_streams_only() -> None:
     entries = {"flow/rover__base__twist": {"component": "base"}}
     assert list(claims_of("mule", entries)) == []
@@ -166,7 +174,7 @@ def test_peer_speaks_of_its_own_streams_only() -> None:
 def test_entry_that_is_wrong_costs_itself_and_is_told(
     key: str, body: dict[str, Any], told: str
 ) -> None:
-    sound = standing(snapshot(component()), Policy(), {})
+    sound = standing(snapshot(component()), Policy())
     record = record_of(ME, {**sound, key: body})
     assert [offered.id for offered in record.components] == ["watcher@mule"]
     (problem,) = record.problems

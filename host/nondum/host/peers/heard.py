@@ -5,6 +5,7 @@ What cannot be understood is left out and told; it costs that one entry, not the
 
 from __future__ import annotations
 
+import ipaddress
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -29,6 +30,7 @@ BELOW_OWN = 1_000_000
 """Added to the ranks of peers' components: whatever their own host thinks of them, this one's own
 come first."""
 MOST_COMPONENTS = 1000
+MOST_ADDRESSES = 16
 _ID = re.compile(r"[a-z0-9][a-z0-9_-]{0,99}")
 _FACT = re.compile(r"[^\s()]+ [^\s()]+")
 _WORD = re.compile(r"[^\s()]{1,256}")
@@ -109,6 +111,12 @@ def withdrawal(claim: Claim) -> FactForgotten | StreamFlowing:
     return StreamFlowing(claim.component, claim.stream, flowing=False)
 
 
+def reach_of(entries: Entries) -> tuple[str, ...]:
+    """The IP addresses at which a peer says that its streams can be fetched."""
+    hosts = entries.get("reach", {}).get("hosts")
+    return tuple(_addresses(hosts)) if isinstance(hosts, list) else ()
+
+
 def taken_in(host: str, entries: Entries, self_host: str) -> dict[str, str]:
     """Facts about a peer's units and streams that do not hold, since somebody other than this host
     uses them."""
@@ -121,6 +129,16 @@ def taken_in(host: str, entries: Entries, self_host: str) -> dict[str, str]:
             if predicate in TAKEN_PREDICATES and arguments[0].startswith(f"{host}__"):
                 found[text] = printable(user)
     return found
+
+
+def _addresses(hosts: list[object]) -> Iterator[str]:
+    for host in hosts[:MOST_ADDRESSES]:
+        try:
+            found = ipaddress.ip_address(host) if isinstance(host, str) else None
+        except ValueError:
+            continue
+        if found is not None:
+            yield f"[{found}]" if found.version == 6 else str(found)
 
 
 def _component(peer: Introduced, name: str, body: Mapping[str, Any]) -> PeerComponent:

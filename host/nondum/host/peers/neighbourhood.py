@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
-from typing import Any
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Iterator
+from typing import TYPE_CHECKING, Any
 
 from nondum.host.bridge.bridge import Bridge, with_port
 from nondum.host.bridge.remote_streams import RemoteStreams
@@ -22,6 +22,7 @@ from nondum.host.peers.compute import Compute, probed
 from nondum.host.peers.desk import Desk
 from nondum.host.peers.finder import PeerFinder
 from nondum.host.peers.goals import Goals
+from nondum.host.peers.heard import reach_of
 from nondum.host.peers.offered import Policy
 from nondum.host.peers.pairing_desk import PairingDesk
 from nondum.host.peers.peering import Peering
@@ -41,6 +42,7 @@ from nondum.sdk.description import ACTUATORS
 from nondum.sdk.errors import Problem
 from nondum.sdk.wire import Body
 from nondum.transport.discovery import Hint
+from nondum.transport.discovery import interfaces as network
 from nondum.transport.fleet import FleetEvent, Mesh
 from nondum.transport.peers import (
     CallFailed,
@@ -51,6 +53,9 @@ from nondum.transport.peers import (
     Security,
     Trust,
 )
+
+if TYPE_CHECKING:  # zenoh is an extra
+    from nondum.transport.fleet.zenoh import ZenohFleet
 
 ON_LOOPBACK = ("tcp://127.0.0.1:0",)
 OPEN_S = 10.0
@@ -92,32 +97,25 @@ class Neighbourhood:
         self.desk.add("behave", self.serving.behave, self.serving.orphaned)
         self.desk.hear("values", self.serving.values)
         self.finder: PeerFinder | None = None
-        self.mesh = Mesh(
-            keeper.identity(development=config.peers.development),
-            keeper.trust,
-            self.desk,
-            on_event=self._on_fleet,
-            listen=self._listens,
-            find=lambda mesh: self._find(mesh, config.peers),
-        )
+        self.fleet = self._fleet(config)
         self.peering = Peering(
             host,
-            self.mesh,
+            self.fleet,
             emit,
             snapshot=catalogue.snapshot,
             policy=self._policy,
             claims=workers.claims,
             taken=lambda: {**dict.fromkeys(self._own_uses(), host), **self.serving.taken},
-            compute=compute,
+            about={"compute": compute, "reach": {"hosts": list(_own_hosts(config))}},
         )
         self.view = PeersView(
-            security=self.mesh.security,
+            security=self.fleet.security,
             snapshot=catalogue.snapshot,
-            peers=lambda: self.mesh.peers,
+            peers=lambda: self.fleet.peers,
             trust=lambda: keeper.trust,
             hints=self._hints,
             network=lambda: self.finder.status if self.finder else None,
-            refusals=self.mesh.refusals,
+            refusals=self.fleet.refusals,
         )
         self._bridge = Bridge(self._listens, port=config.peers.stream_port)
         self._shared = SharedStreams(self._bridge, workers.streams)
@@ -166,7 +164,7 @@ class Neighbourhood:
             folders.peers,
             config.host.name,
             on_change=lambda trust: made._on_trust(trust),
-            on_certificate=lambda certificate: made.mesh.show_certificate(certificate),
+            on_certificate=lambda certificate: made._on_certificate(certificate),
         )
         compute = await asyncio.to_thread(
             probed, config.host.state, reserve_mb=config.install.reserve_mb
@@ -178,7 +176,7 @@ class Neighbourhood:
             children,
             catalogue,
             emit,
-            lambda: made.mesh,
+            lambda: made.fleet,
             pins=await Pins.open(folders.root / "places.json"),
             compute=compute,
             confinement=workers.launcher.level,
@@ -190,7 +188,7 @@ class Neighbourhood:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What every status says of it."""
-        is_open = self.mesh.security is Security.DEVELOPMENT
+        is_open = self.fleet.security is Security.DEVELOPMENT
         unsafe = ("peers need no keys: every host on this machine is one",) if is_open else ()
         return (*unsafe, *map(str, self.keeper.warnings), *self._troubles)
 
@@ -210,14 +208,14 @@ class Neighbourhood:
         this one by name do not find it, so people are warned.
         """
         try:
-            await self.mesh.start()
+            await self.fleet.start()
         except PeerRefused as refused:
-            if refused.code != "ADDRESS_UNUSABLE":
+            if refused.code != "ADDRESS_UNUSABLE" or not isinstance(self.fleet, Mesh):
                 raise
             self._troubles.append(str(refused.problems[0]))
             self._mind().people.tell(f"{refused.problems[0]}; this host listens elsewhere")
-            self.mesh.listen_at([with_port(address, 0) for address in self._listens])
-            await self.mesh.start()
+            self.fleet.listen_at([with_port(address, 0) for address in self._listens])
+            await self.fleet.start()
 
     def on_event(self, event: Event) -> None:
         """Take in what happens on this host."""
@@ -234,10 +232,39 @@ class Neighbourhood:
         await self._remote.close()
         await self._remote_streams.close()
         await self._bridge.close()
-        await self.mesh.close()
+        await self.fleet.close()
+
+    def _fleet(self, config: HostConfig) -> Mesh | ZenohFleet:
+        """By a router, where there is one; else a link to each. Raises `PeerRefused`."""
+        identity = self.keeper.identity(development=config.peers.development)
+        trust, router = self.keeper.trust, config.router
+        if router.endpoints:
+            from nondum.transport.fleet.zenoh import ZenohFleet
+            from nondum.transport.fleet.zenoh_line import RouterAccess
+
+            access = RouterAccess(
+                router.fleet,
+                router.endpoints,
+                router.authorities,
+                router.certificate,
+                router.private_key,
+            )
+            return ZenohFleet(identity, trust, self.desk, access, on_event=self._on_fleet)
+        return Mesh(
+            identity,
+            trust,
+            self.desk,
+            on_event=self._on_fleet,
+            listen=self._listens,
+            find=lambda mesh: self._find(mesh, config.peers),
+        )
+
+    def _on_certificate(self, certificate: bytes) -> None:
+        if isinstance(self.fleet, Mesh):  # by way of a router, nobody asks for it
+            self.fleet.show_certificate(certificate)
 
     def _on_trust(self, trust: Trust) -> None:
-        self.mesh.set_trust(trust)
+        self.fleet.set_trust(trust)
         if self.finder is not None:
             self.finder.tell_again()
 
@@ -285,13 +312,15 @@ class Neighbourhood:
     def _addresses(self, host: str) -> tuple[str, ...]:
         """Where a peer is reached now; none for a host that is no peer."""
         key = self.peering.key_of(host)
-        peer = self.mesh.peers.get(key) if key else None
+        peer = self.fleet.peers.get(key) if key else None
         if key is None or peer is None:
             return ()
         hinted = (
             address for hint in self._hints() if hint.key == key for address in hint.addresses
         )
-        return tuple(dict.fromkeys((_as_endpoint(peer.address), *hinted)))
+        told = (f"tcp://{one}:0" for one in reach_of(peer.entries))
+        own = (_as_endpoint(peer.address),) if _has_port(peer.address) else ()
+        return tuple(dict.fromkeys((*own, *hinted, *told)))
 
     def _hints(self) -> tuple[Hint, ...]:
         return self.finder.hints if self.finder else ()
@@ -327,6 +356,19 @@ class Neighbourhood:
 
     def _on_taken(self) -> None:
         self._emit(UnitsTaken(self._host, self.serving.taken))
+
+
+def _own_hosts(config: HostConfig) -> Iterator[str]:
+    """Where this host's streams can be fetched, as it is started; links tell that by themselves."""
+    if config.router.endpoints:
+        every = network.read()
+        local = config.peers.development
+        for one in network.loopback(every) if local else network.looked_on(every):
+            yield from one.hosts
+
+
+def _has_port(address: str) -> bool:
+    return address.rpartition(":")[2].isdigit()
 
 
 def _as_endpoint(address: str) -> str:

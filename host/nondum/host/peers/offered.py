@@ -4,6 +4,7 @@
     mount/UNIT      where a unit sits on this host's body
     device/ID       the component that has a device
     compute         what this host has to compute with
+    reach           the addresses at which its streams can be fetched, where no link tells them
     fact/ID/FACT    what a component says is so: predicate, arguments, value
     flow/STREAM     the component on whose stream messages arrive
     taken/FACT      the host that uses what the fact is about
@@ -61,9 +62,9 @@ class Policy:
         return Offer(replace(described, units=units, devices=()), tuple(sorted(withheld)))
 
 
-def standing(snapshot: Snapshot, policy: Policy, compute: Mapping[str, Any]) -> Entries:
+def standing(snapshot: Snapshot, policy: Policy) -> Entries:
     """The entries that change with the catalogue only."""
-    entries: Entries = {"compute": dict(compute)} if compute else {}
+    entries: Entries = {}
     shared: set[str] = set()
     for component in snapshot.components:
         offer = policy.offer(component)

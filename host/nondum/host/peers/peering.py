@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any
 
 from nondum.host.catalogue.records import Snapshot
 from nondum.host.events import (
@@ -58,13 +57,13 @@ class Peering:
         policy: Callable[[], Policy],
         claims: Callable[[str], Iterable[Claim]],
         taken: Callable[[], Mapping[str, str]],
-        compute: Mapping[str, Any],
+        about: Entries,
     ) -> None:
         """`claims` is what a component of this host says is so, `taken` the facts that do not hold
-        since somebody uses what they are about → who; `compute` what there is to compute with."""
+        since somebody uses what they are about → who; `about` entries that never change."""
         self._host, self._fleet, self._emit = host, fleet, emit
         self._snapshot, self._policy, self._claims_here = snapshot, policy, claims
-        self._taken, self._compute = taken, compute
+        self._taken, self._about = taken, about
         self._introduced: dict[PeerKey, Introduced] = {}
         self._claims: dict[PeerKey, dict[str, Claim]] = {}
         self._standing: Entries = {}
@@ -92,7 +91,7 @@ class Peering:
         snapshot, policy, before = self._snapshot(), self._policy(), self._standing | self._passing
         if self._is_recomposed:
             self._is_recomposed = False
-            self._standing = standing(snapshot, policy, self._compute)
+            self._standing = self._about | standing(snapshot, policy)
         self._passing = passing(snapshot, policy, self._claims_here, self._taken())
         if news := changes(before, self._standing | self._passing):
             self._tell(news)
