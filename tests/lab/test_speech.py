@@ -25,7 +25,9 @@ def drive(tmp_path: Path) -> Path:
     with (plugin / "payload.toml").open("a", encoding="utf-8") as manifest:
         folders = f'inbox = "{tmp_path / "in"}"\nsaid = "{tmp_path / "out"}"\n'
         manifest.write(f'\n[component.settings]\nmicrophone = ""\n{folders}')
-    return build([plugin], libraries=[PLUGINS / "sdk", PLUGINS / "espeak"], cache=tmp_path / "cache")["speech"]
+    return build(
+        [plugin], libraries=[PLUGINS / "sdk", PLUGINS / "espeak"], cache=tmp_path / "cache"
+    )["speech"]
 
 
 def test_spoken_goal_is_reached_and_told_aloud(
