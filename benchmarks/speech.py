@@ -1,4 +1,6 @@
-"""How well spoken goals are heard: `PYTHONPATH=plugins/espeak:plugins/speech python benchmarks/speech.py`.
+"""How well spoken goals are heard.
+
+    PYTHONPATH=plugins/espeak:plugins/speech python benchmarks/speech.py
 
 Phrases of the shipped plugins, and sentences that are none, said by many synthesised voices at
 several speeds, under noise. Where flite is installed, it says them too: a synthesiser that had no

@@ -17,7 +17,7 @@ from nondum.sdk.errors import DriveGone, InstallFailed
 
 pytestmark = pytest.mark.anyio
 
-NOTHING = {"payloads": [], "certificates": []}
+NOTHING: dict[str, list[str]] = {"payloads": [], "certificates": []}
 """What is found on an empty drive."""
 
 
