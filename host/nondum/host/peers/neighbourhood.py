@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
+from typing import Any
 
 from nondum.host.bridge.bridge import Bridge, with_port
-from nondum.host.bridge.remote_streams import RemoteStreams
-from nondum.host.bridge.shared_streams import SharedStreams
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.config import HostConfig, PeersSection
 from nondum.host.control.arguments import Arguments
@@ -22,44 +20,31 @@ from nondum.host.peers.compute import Compute, probed
 from nondum.host.peers.desk import Desk
 from nondum.host.peers.finder import PeerFinder
 from nondum.host.peers.goals import Goals
-from nondum.host.peers.heard import reach_of
-from nondum.host.peers.offered import Policy
+from nondum.host.peers.offered import Policy, policy_of
 from nondum.host.peers.pairing_desk import PairingDesk
 from nondum.host.peers.peering import Peering
 from nondum.host.peers.placement.pins import Pins
 from nondum.host.peers.placement.placement import Placement
-from nondum.host.peers.remote_calls import AllCalls, RemoteCalls, is_peers
+from nondum.host.peers.reaching import fleet_of, listens, own_hosts
+from nondum.host.peers.remote_calls import AllCalls, RemoteCalls
 from nondum.host.peers.serving import Serving
 from nondum.host.peers.strangers import Strangers
+from nondum.host.peers.stream_desk import StreamDesk
 from nondum.host.peers.trust_keeper import TrustKeeper
 from nondum.host.peers.trust_orders import TrustOrders
+from nondum.host.peers.uses import uses_of
 from nondum.host.peers.view import PeersView
 from nondum.host.rows import Row
 from nondum.host.workers.workers import Workers
-from nondum.planning.core import TAKEN_PREDICATES
-from nondum.planning.facts import predicate_of
-from nondum.sdk.description import ACTUATORS
-from nondum.sdk.errors import Problem
-from nondum.sdk.wire import Body
 from nondum.transport.discovery import Hint
-from nondum.transport.discovery import interfaces as network
 from nondum.transport.fleet import FleetEvent, Mesh
 from nondum.transport.peers import (
-    CallFailed,
-    Errand,
     PeerLost,
     PeerRefused,
     Refusal,
     Security,
     Trust,
 )
-
-if TYPE_CHECKING:  # zenoh is an extra
-    from nondum.transport.fleet.zenoh import ZenohFleet
-
-ON_LOOPBACK = ("tcp://127.0.0.1:0",)
-OPEN_S = 10.0
-"""What a peer has to open a stream."""
 
 
 class Neighbourhood:
@@ -81,7 +66,7 @@ class Neighbourhood:
         self.keeper = keeper
         self._tasks: set[asyncio.Task[None]] = set()
         self._troubles: list[str] = []
-        self._listens = _listen(config.peers)
+        self._listens = listens(config.peers)
         self._host, self._emit, self._mind = host, emit, mind
         self._movable = frozenset(config.peers.offer_actuators)
         self.serving = Serving(
@@ -97,7 +82,14 @@ class Neighbourhood:
         self.desk.add("behave", self.serving.behave, self.serving.orphaned)
         self.desk.hear("values", self.serving.values)
         self.finder: PeerFinder | None = None
-        self.fleet = self._fleet(config)
+        self.fleet = fleet_of(
+            config,
+            keeper.identity(development=config.peers.development),
+            keeper.trust,
+            self.desk,
+            on_event=self._on_fleet,
+            find=lambda mesh: self._find(mesh, config.peers),
+        )
         self.peering = Peering(
             host,
             self.fleet,
@@ -106,7 +98,7 @@ class Neighbourhood:
             policy=self._policy,
             claims=workers.claims,
             taken=lambda: {**dict.fromkeys(self._own_uses(), host), **self.serving.taken},
-            about={"compute": compute, "reach": {"hosts": list(_own_hosts(config))}},
+            about={"compute": compute, "reach": {"hosts": list(own_hosts(config))}},
         )
         self.view = PeersView(
             security=self.fleet.security,
@@ -117,12 +109,9 @@ class Neighbourhood:
             network=lambda: self.finder.status if self.finder else None,
             refusals=self.fleet.refusals,
         )
-        self._bridge = Bridge(self._listens, port=config.peers.stream_port)
-        self._shared = SharedStreams(self._bridge, workers.streams)
-        self._remote_streams = RemoteStreams(self._bridge, self._ask, self._addresses)
-        workers.streams.reach(self._remote_streams)
-        self.desk.add("stream.open", self._open_stream)
-        self.desk.add("stream.close", self._close_stream)
+        bridge = Bridge(self._listens, port=config.peers.stream_port)
+        self._streams = StreamDesk(bridge, workers.streams, self.peering, self.fleet, self._hints)
+        self._streams.serve(self.desk)
         self.trust = TrustOrders(
             keeper,
             PairingDesk(
@@ -230,34 +219,8 @@ class Neighbourhood:
         """Say goodbye; what runs for peers, and at peers, is halted."""
         await self.placement.close()
         await self._remote.close()
-        await self._remote_streams.close()
-        await self._bridge.close()
+        await self._streams.close()
         await self.fleet.close()
-
-    def _fleet(self, config: HostConfig) -> Mesh | ZenohFleet:
-        """By a router, where there is one; else a link to each. Raises `PeerRefused`."""
-        identity = self.keeper.identity(development=config.peers.development)
-        trust, router = self.keeper.trust, config.router
-        if router.endpoints:
-            from nondum.transport.fleet.zenoh import ZenohFleet
-            from nondum.transport.fleet.zenoh_line import RouterAccess
-
-            access = RouterAccess(
-                router.fleet,
-                router.endpoints,
-                router.authorities,
-                router.certificate,
-                router.private_key,
-            )
-            return ZenohFleet(identity, trust, self.desk, access, on_event=self._on_fleet)
-        return Mesh(
-            identity,
-            trust,
-            self.desk,
-            on_event=self._on_fleet,
-            listen=self._listens,
-            find=lambda mesh: self._find(mesh, config.peers),
-        )
 
     def _on_certificate(self, certificate: bytes) -> None:
         if isinstance(self.fleet, Mesh):  # by way of a router, nobody asks for it
@@ -274,7 +237,7 @@ class Neighbourhood:
             self._strangers.turned_away(event)
         self.peering.on_fleet(event)
         if isinstance(event, PeerLost):
-            self._aside(self._shared.caller_lost(event.key))
+            self._streams.lose(event.key)
 
     async def _look_at(self, event: CertificatesBrought) -> None:
         """Take this host's certificate, if a drive brought it, and is of use."""
@@ -294,34 +257,6 @@ class Neighbourhood:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    # Streams
-
-    async def _open_stream(self, errand: Errand) -> Body:
-        """Let a peer read a stream of an offered unit. Raises `CallFailed` (NOT_OFFERED)."""
-        if errand.args.get("stream") not in self.peering.offered_streams():
-            told = "no such stream is offered to peers"
-            raise CallFailed(Problem("NOT_OFFERED", told))
-        return await self._shared.serve_open(errand.caller.key, errand.args)
-
-    async def _close_stream(self, errand: Errand) -> Body:
-        return await self._shared.serve_close(errand.caller.key, errand.args)
-
-    async def _ask(self, host: str, method: str, args: Body) -> Body:
-        return await self.peering.call(host, method, args, deadline_s=OPEN_S)
-
-    def _addresses(self, host: str) -> tuple[str, ...]:
-        """Where a peer is reached now; none for a host that is no peer."""
-        key = self.peering.key_of(host)
-        peer = self.fleet.peers.get(key) if key else None
-        if key is None or peer is None:
-            return ()
-        hinted = (
-            address for hint in self._hints() if hint.key == key for address in hint.addresses
-        )
-        told = (f"tcp://{one}:0" for one in reach_of(peer.entries))
-        own = (_as_endpoint(peer.address),) if _has_port(peer.address) else ()
-        return tuple(dict.fromkeys((*own, *hinted, *told)))
-
     def _hints(self) -> tuple[Hint, ...]:
         return self.finder.hints if self.finder else ()
 
@@ -337,45 +272,10 @@ class Neighbourhood:
         return self._mind().composition
 
     def _policy(self) -> Policy:
-        composition = self._composition()
-        if composition is None:
-            return Policy(self._movable)
-        types = composition.merged.domain.types
-        moving = (name for name in types.parents if types.is_one_of((name,), ACTUATORS))
-        return Policy(self._movable, ACTUATORS | frozenset(moving))
+        return policy_of(self._composition(), self._movable)
 
     def _own_uses(self) -> frozenset[str]:
-        """The facts that this host's own behaviours take of its own components."""
-        return frozenset(
-            text
-            for run in self._mind().runner
-            if not is_peers(run.component)
-            for text in run.step.delete
-            if predicate_of(text) in TAKEN_PREDICATES
-        )
+        return uses_of(self._mind().runner)
 
     def _on_taken(self) -> None:
         self._emit(UnitsTaken(self._host, self.serving.taken))
-
-
-def _own_hosts(config: HostConfig) -> Iterator[str]:
-    """Where this host's streams can be fetched, as it is started; links tell that by themselves."""
-    if config.router.endpoints:
-        every = network.read()
-        local = config.peers.development
-        for one in network.loopback(every) if local else network.looked_on(every):
-            yield from one.hosts
-
-
-def _has_port(address: str) -> bool:
-    return address.rpartition(":")[2].isdigit()
-
-
-def _as_endpoint(address: str) -> str:
-    """Where a peer is, whether it was dialled (`tcp://HOST:PORT`) or has dialled (`HOST:PORT`)."""
-    return address if address.startswith("tcp://") else f"tcp://{address}"
-
-
-def _listen(config: PeersSection) -> tuple[str, ...]:
-    is_default = config.listen == PeersSection().listen
-    return ON_LOOPBACK if config.development and is_default else config.listen

@@ -21,7 +21,7 @@ from typing import Any, TypeAlias
 
 from nondum.host.catalogue.records import ComponentRecord, Snapshot
 from nondum.host.events import FactKnown, StreamFlowing
-from nondum.host.mind.composition import own_objects
+from nondum.host.mind.composition import Composition, own_objects
 from nondum.planning.facts import fact
 from nondum.planning.scope import SELF
 from nondum.sdk.description import ACTUATORS, PluginDescription
@@ -60,6 +60,15 @@ class Policy:
             return Offer(described, ())
         units = tuple(unit for unit in described.units if unit.name not in withheld)
         return Offer(replace(described, units=units, devices=()), tuple(sorted(withheld)))
+
+
+def policy_of(composition: Composition | None, movable: frozenset[str]) -> Policy:
+    """The policy with all types of actuators that are known now."""
+    if composition is None:
+        return Policy(movable)
+    types = composition.merged.domain.types
+    moving = (name for name in types.parents if types.is_one_of((name,), ACTUATORS))
+    return Policy(movable, ACTUATORS | frozenset(moving))
 
 
 def standing(snapshot: Snapshot, policy: Policy) -> Entries:

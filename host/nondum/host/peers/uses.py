@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
+from nondum.host.mind.runner import RunningBehaviour
+from nondum.host.peers.remote_calls import is_peers
 from nondum.planning.core import TAKEN_PREDICATES
 from nondum.planning.domain import Merged, bind
+from nondum.planning.facts import predicate_of
+
+
+def uses_of(running: Iterable[RunningBehaviour]) -> frozenset[str]:
+    """The facts that this host's own behaviours take of its own components."""
+    return frozenset(
+        text
+        for run in running
+        if not is_peers(run.component)
+        for text in run.step.delete
+        if predicate_of(text) in TAKEN_PREDICATES
+    )
 
 
 def taken_by(
