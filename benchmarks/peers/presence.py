@@ -8,7 +8,7 @@ import random
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 
@@ -40,6 +40,10 @@ class Kind:
     take: Callable[[Ground], Sample]
     needs_cables: bool = False
 
+    def late(self, samples: Sequence[Sample]) -> int:
+        """How many took longer than they should."""
+        return sum(one.took_s > self.aim_s for one in samples)
+
 
 def at_once(ground: Ground) -> Sample:
     """Two hosts that start at one moment."""
@@ -57,7 +61,7 @@ def third(ground: Ground) -> Sample:
         return found(new, linked)
 
 
-def found(new: Host, others: list[Host] | tuple[Host, ...]) -> Sample:
+def found(new: Host, others: Sequence[Host]) -> Sample:
     """From the moment that all are up to the last event by which one has another as a peer."""
     started = [one.find("started") for one in (new, *others)]
     pairs = [pair for other in others for pair in ((new, other), (other, new))]
@@ -119,9 +123,10 @@ def unplugged(ground: Ground, _struck: Host) -> Iterator[float]:
         yield at_s
 
 
+AT_ONCE = Kind("found: two that start at once", 0.1, at_once)
 DEPARTURE = Kind("departure: SIGTERM", 0.05, lost_by(signalled(signal.SIGTERM)))
 KINDS = (
-    Kind("found: two that start at once", 0.1, at_once),
+    AT_ONCE,
     Kind("found: a third that starts beside two", 0.1, third),
     DEPARTURE,
     Kind("death: kill -9", 1.5, lost_by(signalled(signal.SIGKILL))),

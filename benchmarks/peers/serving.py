@@ -30,6 +30,7 @@ from nondum.transport.peers import (
     PeerNode,
     Trust,
 )
+from nondum.transport.peers.allowance import Allowance
 from nondum.transport.peers.events import PeerEvent
 
 SERVING_NAME = "serving"
@@ -53,9 +54,10 @@ class Answering:
 
 
 def node(mine: Identity, theirs: PeerKey, on_event: Callable[[PeerEvent], None]) -> PeerNode:
-    """One of two ends."""
+    """One of two ends, which may call as often as it can."""
     trust = Trust().with_paired(theirs, "other")
-    return PeerNode(mine, trust, Answering(), on_event=on_event)
+    unbounded = Allowance(per_s=1e9, burst=1e9)
+    return PeerNode(mine, trust, Answering(), on_event=on_event, allowance=unbounded)
 
 
 async def by_peers(keys: Keys) -> None:
