@@ -121,6 +121,10 @@ class Calls:
         call.timer = self._loop.call_at(ends_s, self._expire, call)
         return call
 
+    def awaits(self, number: int) -> bool:
+        """Whether a call is unanswered."""
+        return number in self._pending
+
     def cancel(self, number: int) -> None:
         """Ask the peer to halt a call; unknown and finished ones are ignored."""
         if number in self._pending:

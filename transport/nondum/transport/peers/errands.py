@@ -152,7 +152,7 @@ class Errands:
             return
         self._running[request.number] = errand
         errand.task = self._loop.create_task(self._work(errand, result))
-        errand.task.add_done_callback(lambda _: self._end(errand))
+        errand.task.add_done_callback(lambda _: self._end(errand, result))
         errand.timer = self._loop.call_at(errand.ends_s, self._expire, errand)
 
     async def _work(self, errand: Errand, result: Awaitable[Body]) -> None:
@@ -165,10 +165,12 @@ class Errands:
         self._running.pop(errand.number, None)
         self._conclude(answer)
 
-    def _end(self, errand: Errand) -> None:
+    def _end(self, errand: Errand, result: Awaitable[Body]) -> None:
         if errand.timer is not None:
             errand.timer.cancel()
         if self._running.pop(errand.number, None):  # cancelled before its first step
+            if inspect.iscoroutine(result):
+                result.close()
             self._conclude(_failure(errand, asyncio.CancelledError()))
 
     def _expire(self, errand: Errand) -> None:

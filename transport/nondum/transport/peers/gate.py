@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 
 from nondum.sdk.errors import NondumError, Problem
+from nondum.transport.peers.allowance import USUAL, greetings
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.identity import Identity, Security, is_loopback
 from nondum.transport.peers.keys import PeerKey, fingerprint
@@ -16,6 +17,7 @@ from nondum.transport.peers.once import Once
 from nondum.transport.peers.refusals import Reason
 from nondum.transport.peers.trust import Admission, Standing, Trust
 from nondum.transport.peers.zap import DOMAIN, Entry, Knock
+from nondum.transport.token_bucket import TokenBucket
 
 PAST_EPOCHS = 8
 """Lives of a peer that are remembered as over."""
@@ -41,6 +43,11 @@ class Acquaintance:
     past: deque[int] = field(default_factory=lambda: deque(maxlen=PAST_EPOCHS))
     once: Once = field(default_factory=Once)
     next_number: int = 1
+    allowance: TokenBucket = field(default_factory=USUAL.bucket)
+    """What it may still send of its own accord."""
+    barred_until_s: float = float("-inf")
+    """It has sent more: on the loop's clock."""
+    greetings: TokenBucket = field(default_factory=greetings)
 
     def meet(self, hello: Hello) -> bool:
         """Take a greeting in; whether it begins something new, so that what ran before is over.

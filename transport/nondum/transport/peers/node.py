@@ -14,6 +14,7 @@ import zmq
 from nondum.sdk.errors import Problem
 from nondum.sdk.wire import Body
 from nondum.sdk.wire_fields import MAX_ID
+from nondum.transport.peers.allowance import USUAL, Allowance
 from nondum.transport.peers.arrivals import Arrivals
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.dial import Attempt, Dial
@@ -61,11 +62,12 @@ class PeerNode:
         pulse: Pulse = _NO_PULSE,
         epoch: int | None = None,
         clock: Callable[[], datetime] = lambda: datetime.now(UTC),
+        allowance: Allowance = USUAL,
     ) -> None:
         """Made on the running loop. `trust` is not asked in development mode.
 
         `pulse` is what rides in pings; `epoch` is drawn when it is not given; `clock` tells the
-        time of day, which only certificates need.
+        time of day, which only certificates need; `allowance` is what each peer may send.
         """
         self.identity = identity
         self.epoch = epoch or fresh_epoch()
@@ -76,7 +78,14 @@ class PeerNode:
         self._gate = Gate(identity, trust, clock)
         self._on_event = on_event
         self._roster = Roster(
-            self._gate, self.epoch, handler, self.refusals, on_event, self._became_peer, pulse
+            self._gate,
+            self.epoch,
+            handler,
+            self.refusals,
+            on_event,
+            self._became_peer,
+            pulse,
+            allowance=allowance,
         )
         self._arrivals = Arrivals(self.refusals, self._on_closed)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()

@@ -31,6 +31,8 @@ class Reason(Enum):
     VERSION = "version"
     DUPLICATE = "duplicate"
     """A second host with the same key, or this host itself."""
+    FLOODING = "flooding"
+    """A peer that sends more than any host needs to."""
     WRONG_DOMAIN = "wrong domain"
     INTERNAL = "internal"
 

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Callable, Iterator, Mapping
 
 from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.transport.peers.allowance import BARRED_S, USUAL, Allowance, cost
 from nondum.transport.peers.dial import Dial
 from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.errands import Errand, Handler
@@ -58,12 +59,14 @@ class Roster:
         on_peer_link: Callable[[Link], None],
         pulse: Pulse,
         silence_s: float = SILENCE_S,
+        allowance: Allowance = USUAL,
     ) -> None:
         """`on_peer_link` is told of every accepted link that became a peer's; a link is dead after
-        `silence_s`."""
+        `silence_s`; `allowance` is every peer's."""
         self.gate, self.epoch = gate, epoch
         self.dials: dict[PeerKey, Dial] = {}
         self.silence_s = silence_s
+        self._allowance = allowance
         self._handler, self._refusals = handler, refusals
         self._on_event, self._on_peer_link, self._pulse = on_event, on_peer_link, pulse
         self._sessions: dict[PeerKey, Session] = {}
@@ -110,6 +113,21 @@ class Roster:
         link.heard_s = now_s
         try:
             message = decode(data)
+        except ProtocolViolation as violation:
+            self.turn_away(link, Reason.GARBAGE, violation.problems[0])
+            return
+        if session is None or session.is_free(message):
+            self._take_in((link, message))
+        elif not session.paced.take((link, message), cost(len(data))):
+            self._bar(session.known)
+            self.turn_away(link, Reason.FLOODING, _FLOODING)
+
+    def _take_in(self, come: tuple[Link, Message]) -> None:
+        link, message = come
+        session = link.session
+        if link.is_over:
+            return
+        try:
             if session is not None:
                 session.receive(link, message)
             else:
@@ -234,10 +252,18 @@ class Roster:
         admission = self.gate.admit(hello, link.proved)
         self._check_name(admission)
         known = self._acquaintance(admission.key)
+        now_s = self._loop.time()
+        if now_s >= known.barred_until_s and not known.greetings.take(1, now_s):
+            self._bar(known)
+        if now_s < known.barred_until_s:
+            raise TurnedAway(Reason.FLOODING, _FLOODING)
         former = known.epoch
         if known.meet(hello) and (session := self._sessions.get(admission.key)):
             self.lose(session, Loss.GAVE_UP if former == hello.epoch else Loss.RESTARTED)
         return admission, known
+
+    def _bar(self, known: Acquaintance) -> None:
+        known.barred_until_s = self._loop.time() + BARRED_S
 
     def _check_name(self, admission: Admission) -> None:
         """Names are what objects are called by: two hosts of one name cannot both be there.
@@ -254,7 +280,9 @@ class Roster:
     def _join(self, link: Link, admission: Admission, known: Acquaintance) -> None:
         key = admission.key
         known_session = self._sessions.get(key)
-        session = known_session or Session(admission, known, self._handler, self._pulse)
+        session = known_session or Session(
+            admission, known, self._handler, self._pulse, self._take_in
+        )
         self._sessions[key] = session
         link.beat_s = self._beat_s  # until the peer has said its own
         for replaced in session.join(link):
@@ -277,7 +305,9 @@ class Roster:
             for away in self._away():
                 del self._known[away]
                 break
-        return self._known.setdefault(key, Acquaintance())
+        if key not in self._known:
+            self._known[key] = Acquaintance(allowance=self._allowance.bucket())
+        return self._known[key]
 
     def _away(self) -> Iterator[PeerKey]:
         return (key for key in list(self._known) if key not in self._sessions)
@@ -298,6 +328,11 @@ _OURS = frozenset({Loss.SILENT, Loss.DISCONNECTED, Loss.VIOLATED, Loss.REVOKED, 
 """Losses that this host has found: the peer may not know that what was between them is over."""
 _REVOKED = Problem("KEY_REVOKED", "this key is not accepted any more")
 _EXPIRED = Problem("CERTIFICATE_TIME", "the certificate has ended")
+_FLOODING = Problem(
+    "PEER_FLOODS",
+    f"it has sent more than any host needs to, and is not let in for {BARRED_S:.0f} s",
+    fix="look for what it runs that calls or tells others without end",
+)
 
 
 def _name_taken(name: str, holder: PeerKey, newcomer: PeerKey) -> Problem:

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Callable
 from typing import Any, assert_never
 
 from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.transport.peers.allowance import Paced
 from nondum.transport.peers.calls import Calls
 from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.errands import Errand, Errands, Handler
@@ -58,8 +60,15 @@ class Session:
     """A live peer."""
 
     def __init__(
-        self, admission: Admission, known: Acquaintance, handler: Handler, pulse: Pulse
+        self,
+        admission: Admission,
+        known: Acquaintance,
+        handler: Handler,
+        pulse: Pulse,
+        take_in: Callable[[tuple[Link, Message]], None],
     ) -> None:
+        """`take_in` is called with what comes, when the peer may send as much."""
+        self.paced = Paced(known.allowance, take_in)
         self.admission, self.known = admission, known
         self.links: list[Link] = []
         """The last one is sent over."""
@@ -104,6 +113,15 @@ class Session:
         if self.links and was_used:
             self.calls.repeat()
         return bool(self.links)
+
+    def is_free(self, message: Message) -> bool:
+        """Whether the peer may say it however much it has said: an answer, or its last word."""
+        match message:
+            case Reply(number) | Failure(number):
+                return self.calls.awaits(number)
+            case Bye() | Refused():
+                return True
+        return False
 
     def receive(self, link: Link, message: Message) -> None:
         """Take a message in.
@@ -153,6 +171,7 @@ class Session:
         """The peer is lost: fail the calls to it; its errands that run on."""
         if self.missing is not None:
             self.missing.cancel()
+        self.paced.close()
         self.known.next_number = self.calls.next_number
         told = f"the peer was lost while a call ran: {reason.value}"
         self.calls.lose(Problem("PEER_LOST", told, where=self.admission.name))

@@ -1,0 +1,122 @@
+"""Peers that send more than any host needs to are cut, and stay out for a while."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+
+import pytest
+from tests.transport.peers.hosts import Host, Servant, host, identity, raises, trusting, up
+
+from nondum.transport.peers import (
+    Loss,
+    PeerLost,
+    PeerNode,
+    PeerUp,
+    Reason,
+    accepted,
+    allowance,
+    roster,
+)
+from nondum.transport.peers.allowance import Allowance
+
+pytestmark = pytest.mark.anyio
+
+FEW = Allowance(per_s=200.0, burst=50.0)
+
+
+@pytest.fixture(autouse=True)
+def _few_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(allowance, "WAITING", 100)
+
+
+@pytest.fixture
+async def narrow() -> AsyncIterator[tuple[Host, Host]]:
+    """A rover, linked to a base that takes little."""
+    rover, base = identity("rover"), identity("base")
+    servant = Servant()
+    node = PeerNode(
+        base, trusting(rover), servant, on_event=lambda event: there.hear(event), allowance=FEW
+    )
+    there = Host(node, servant)
+    (there.address,) = await node.start(["tcp://127.0.0.1:0"])
+    async with host(rover, trusting(base)) as here:
+        here.node.dial(there.key, [there.address])
+        await up(here, there)
+        yield here, there
+    await node.close()
+
+
+@pytest.mark.parametrize("what", ["calls", "notices"])
+async def test_peer_that_floods_is_cut_and_not_let_in_again(
+    what: str, narrow: tuple[Host, Host]
+) -> None:
+    rover, base = narrow
+    for _ in range(250):
+        if what == "calls":
+            rover.node.call(base.key, "echo", {}, deadline_s=60)
+        else:
+            rover.node.notify(base.key, "values", {})
+    assert (await base.told(PeerLost)).reason is Loss.VIOLATED
+    assert (await rover.told(PeerLost)).reason is Loss.TURNED_AWAY
+    await base.counted(Reason.FLOODING, 2)  # and when it came back
+    assert rover.key not in base.node.peers
+
+
+async def test_length_counts(narrow: tuple[Host, Host]) -> None:
+    rover, base = narrow
+    for _ in range(30):  # each as much as 7
+        rover.node.notify(base.key, "values", {"text": "x" * 100_000})
+    assert (await base.told(PeerLost)).reason is Loss.VIOLATED
+
+
+async def test_whoever_waits_for_answers_is_slowed_down_and_not_cut(
+    narrow: tuple[Host, Host],
+) -> None:
+    rover, base = narrow
+    began_s = asyncio.get_running_loop().time()
+    for number in range(4):
+        calls = [rover.node.call(base.key, "echo", {"n": n}, deadline_s=60) for n in range(50)]
+        assert [answer["n"] for answer in await asyncio.gather(*calls)] == list(range(50)), number
+    assert asyncio.get_running_loop().time() - began_s > 150 / FEW.per_s * 0.9
+    assert base.node.refusals.counts == {}
+
+
+async def test_halted_call_that_waits_to_be_taken_in_is_halted(
+    narrow: tuple[Host, Host],
+) -> None:
+    rover, base = narrow
+    for _ in range(100):
+        rover.node.notify(base.key, "values", {})
+    call = rover.node.call(base.key, "wait", {}, deadline_s=60)
+    call.cancel()
+    assert await raises(lambda: call) == ["HALTED"]
+
+
+async def test_answers_are_free(narrow: tuple[Host, Host]) -> None:
+    rover, base = narrow
+    for _ in range(300):
+        await base.node.call(rover.key, "echo", {"text": "x" * 1000}, deadline_s=5)
+    assert base.node.refusals.counts == {}
+
+
+async def test_flooding_peer_is_let_in_after_a_while(
+    narrow: tuple[Host, Host], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rover, base = narrow
+    monkeypatch.setattr(roster, "BARRED_S", 0.0)
+    for _ in range(250):
+        rover.node.notify(base.key, "values", {})
+    await base.told(PeerLost)
+    await base.told(PeerUp)
+
+
+async def test_peer_that_greets_again_and_again_is_not_let_in(
+    narrow: tuple[Host, Host],
+) -> None:
+    rover, base = narrow
+    while await raises(lambda: rover.node.call(base.key, "echo", {}, deadline_s=5)) == []:
+        for session in base.node._roster.sessions.values():
+            (route,) = (link.route for link in session.links)
+            accepted.cut(route.descriptor, route.address)  # type: ignore[attr-defined]  # accepted
+    await base.counted(Reason.FLOODING)

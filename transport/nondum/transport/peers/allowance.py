@@ -1,0 +1,95 @@
+"""How much a peer may send of its own accord: far more than any host needs, and too little to keep
+this one from its work."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from nondum.transport.token_bucket import TokenBucket
+
+LENGTH = 16 * 1024
+"""Bytes after which a message counts as one more."""
+WAITING = 4096
+"""Messages that may wait until they are allowed: more than all calls that a peer may have begun."""
+LOOK_S = 0.01
+"""Between two looks at what waits."""
+GREETINGS_PER_S, GREETINGS = 2.0, 30.0
+"""A link that breaks again and again is no flood; this is."""
+BARRED_S = 30.0
+"""How long a peer is not let in that has flooded this host."""
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Allowance:
+    """Messages that no call of this host has asked for. Answers to calls are free."""
+
+    per_s: float = 4000.0
+    burst: float = 20_000.0
+
+    def bucket(self) -> TokenBucket:
+        """A full one, for one peer."""
+        return TokenBucket(self.per_s, self.burst, 0.0)
+
+
+USUAL = Allowance()
+
+
+def greetings() -> TokenBucket:
+    """How often one peer may greet."""
+    return TokenBucket(GREETINGS_PER_S, GREETINGS, 0.0)
+
+
+def cost(length: int) -> int:
+    """What a message of so many bytes counts as.
+
+    >>> cost(100), cost(128 * 1024)
+    (1, 9)
+    """
+    return 1 + length // LENGTH
+
+
+class Paced(Generic[T]):
+    """Hands on what a peer sends, in order, and no faster than it is allowed to.
+
+    Whoever waits for answers is slowed down by that, and never has too much waiting.
+    """
+
+    def __init__(self, bucket: TokenBucket, hand_on: Callable[[T], None]) -> None:
+        self._bucket, self._hand_on = bucket, hand_on
+        self._loop = asyncio.get_running_loop()
+        self._waiting: deque[tuple[int, T]] = deque()
+        self._size = 0
+        self._timer: asyncio.TimerHandle | None = None
+
+    def take(self, one: T, cost: int) -> bool:
+        """Hand it on, now or later; False when too much waits already."""
+        if not self._waiting and self._bucket.take(cost, self._loop.time()):
+            self._hand_on(one)
+            return True
+        if self._size + cost > WAITING:
+            return False
+        self._waiting.append((cost, one))
+        self._size += cost
+        if self._timer is None:
+            self._timer = self._loop.call_later(LOOK_S, self._look)
+        return True
+
+    def close(self) -> None:
+        """Forget what waits."""
+        self._waiting.clear()
+        if self._timer is not None:
+            self._timer.cancel()
+
+    def _look(self) -> None:
+        while self._waiting and self._bucket.take(self._waiting[0][0], self._loop.time()):
+            cost, one = self._waiting.popleft()
+            self._size -= cost
+            self._hand_on(one)
+        again = bool(self._waiting)
+        self._timer = self._loop.call_later(LOOK_S, self._look) if again else None
