@@ -39,6 +39,8 @@ class Kind:
     aim_s: float
     take: Callable[[Ground], Sample]
     needs_cables: bool = False
+    times: int = 1
+    """How often in one repeat: more where what is rare matters."""
 
     def late(self, samples: Sequence[Sample]) -> int:
         """How many took longer than they should."""
@@ -123,7 +125,7 @@ def unplugged(ground: Ground, _struck: Host) -> Iterator[float]:
         yield at_s
 
 
-AT_ONCE = Kind("found: two that start at once", 0.1, at_once)
+AT_ONCE = Kind("found: two that start at once", 0.1, at_once, times=10)
 DEPARTURE = Kind("departure: SIGTERM", 0.05, lost_by(signalled(signal.SIGTERM)))
 KINDS = (
     AT_ONCE,
@@ -143,9 +145,15 @@ def measure(ground: Ground, repeats: int) -> Found:
     found: Found = {one: [] for one in KINDS if ground.machines or not one.needs_cables}
     for _ in range(repeats):
         for kind, samples in found.items():
-            try:
-                samples.append(kind.take(ground))
-            except NotSeen as missed:
-                samples.append(Sample(math.inf, f"not seen ({missed})"))
-            print(f"peers: {kind.name}: {samples[-1]}", file=sys.stderr)
+            for _ in range(kind.times):
+                samples.append(sample(kind, ground))
+                print(f"peers: {kind.name}: {samples[-1]}", file=sys.stderr)
     return found
+
+
+def sample(kind: Kind, ground: Ground) -> Sample:
+    """One repeat, whatever comes of it."""
+    try:
+        return kind.take(ground)
+    except NotSeen as missed:
+        return Sample(math.inf, f"not seen ({missed})")

@@ -93,7 +93,8 @@ def _presence(found: presence.Found, ground: Ground) -> Iterator[str]:
     )
     yield _list(
         "**Found** begins when discovery has started at the last of them, and ends when all have "
-        f"each other as peers that can be called. Before that, it took {starting:.0f} ms to start.",
+        f"each other as peers that can be called. Before that, it took {starting:.0f} ms to start. "
+        "Two that start at once are measured more often, since what may go wrong then is rare.",
         "**Departure** and **death** begin with the signal, the pulled cable (the milliseconds the "
         "command takes count, too) or the loop's last word, after the link has lasted for 0.5 to "
         "1.5 s, and end with the other host's `PeerLost`. Before its goodbye, a whole daemon "
