@@ -1,8 +1,8 @@
 """`python -m tests`: all tests in the order that CI runs them; with arguments, pytest with those.
 
-Whole hosts (marker `lab`) run by themselves, after the rest: they are judged in real time, and
-other tests beside them would be load that no robot has. Each plugin's own tests run as its author
-runs them, in its folder.
+Whole hosts (marker `lab`) run after the rest. Those that are judged in real time run by themselves:
+other tests beside them would be load that no robot has; two of the others (`beside`) run at once.
+Each plugin's own tests run as its author runs them, in its folder.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ ROOT = Path(__file__).parent.parent
 PYTEST = [sys.executable, "-m", "pytest"]
 # `.` on the path gives tests/ and demo/ only: nondum itself is what is installed.
 INSTALLED = ["-o", "pythonpath=."]
+TWO_AT_ONCE = ["-n", "2", "--dist", "loadfile"]
 
 
 def main(arguments: list[str]) -> int:
@@ -23,8 +24,9 @@ def main(arguments: list[str]) -> int:
     if arguments:
         return subprocess.run([*PYTEST, *INSTALLED, *arguments], cwd=ROOT, check=False).returncode
     runs = [
-        (ROOT, [*INSTALLED, "-n", "2", "--dist", "loadfile", "-m", "not lab"]),
-        (ROOT, [*INSTALLED, "-m", "lab"]),
+        (ROOT, [*INSTALLED, *TWO_AT_ONCE, "-m", "not lab"]),
+        (ROOT, [*INSTALLED, *TWO_AT_ONCE, "-m", "beside"]),
+        (ROOT, [*INSTALLED, "-m", "lab and not beside"]),
         *((folder.parent, []) for folder in sorted(ROOT.glob("plugins/*/tests"))),
     ]
     return max(

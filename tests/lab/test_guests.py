@@ -15,7 +15,7 @@ from tests.payloads import Part
 
 from nondum.transport.peers import CallFailed
 
-pytestmark = pytest.mark.lab
+pytestmark = [pytest.mark.lab, pytest.mark.beside]
 
 LAMP = "mule__beacon__lamp"
 
