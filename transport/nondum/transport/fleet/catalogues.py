@@ -25,6 +25,7 @@ from nondum.transport.peers.failures import CallFailed, PeerUnreachable
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.pulse import State
 from nondum.transport.peers.trust import Admission
+from nondum.transport.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
 
@@ -40,6 +41,10 @@ AT_ONCE = 4
 """Peers whose catalogues are read at the same time."""
 READ_S = 10.0
 """How long one reading may take."""
+TURN_S = 1.0
+"""How long it may keep others waiting for their turn."""
+CHANGES_PER_S, CHANGES = 100.0, 200.0
+"""More than a host tells; of those that tell more, changes are read when there is time."""
 FIRST_WAIT_S = 0.1
 LONGEST_WAIT_S = 3.0
 AWAY = 64
@@ -70,6 +75,7 @@ class _Known:
         self.is_told = False
         """Whether its catalogue was told of since it came up."""
         self.reading: asyncio.Task[None] | None = None
+        self.changes = TokenBucket(CHANGES_PER_S, CHANGES, 0.0)
 
 
 class Catalogues:
@@ -146,7 +152,7 @@ class Catalogues:
         """Take in what is the seam's own, and pass the rest on. Raises `ProtocolViolation`."""
         if method == CHANGED:
             if known := self._known.get(caller.key):
-                self._take(known, parse(args))
+                self._told_of(known, parse(args))
         elif method == STATE:
             self.heard(caller.key, read_state(args))
         elif not method.startswith(OWN_METHODS):
@@ -224,14 +230,25 @@ class Catalogues:
 
     async def _read(self, known: _Known) -> None:
         try:
+            if not known.changes.take(1, self._loop.time()):
+                await asyncio.sleep(FIRST_WAIT_S)
             for wait_s in _waits():
-                async with self._turns:
-                    await self._ask(known)
+                await self._ask_in_turn(known)
                 if not _is_wanting(known):
                     return
                 await asyncio.sleep(wait_s)
         finally:
             known.reading = None
+
+    async def _ask_in_turn(self, known: _Known) -> None:
+        async with self._turns:
+            asking = self._loop.create_task(self._ask(known))
+            try:
+                await asyncio.wait({asking}, timeout=TURN_S)
+            except asyncio.CancelledError:
+                asking.cancel()
+                raise
+        await asking
 
     async def _ask(self, known: _Known) -> None:
         key, replica = known.up.key, known.replica
@@ -248,6 +265,13 @@ class Catalogues:
         else:
             if not known.is_told and not replica.must_ask:
                 self._tell_whole(known)  # nothing has changed while it was away
+
+    def _told_of(self, known: _Known, chunk: Chunk) -> None:
+        if known.changes.take(1, self._loop.time()):
+            self._take(known, chunk)
+        else:
+            known.replica.hear(chunk.state)
+            self._see_to(known)
 
     def _take(self, known: _Known, chunk: Chunk) -> None:
         change = known.replica.take(chunk)

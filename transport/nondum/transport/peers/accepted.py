@@ -34,6 +34,8 @@ class Accepted:
     """The other end, `address:port`; empty when it was gone before anybody looked."""
     since_s: float
     is_peer: bool = False
+    has_spoken: bool = False
+    """Whether a message came of it; what becomes of it is told then."""
 
 
 class AcceptedConnections:
@@ -60,14 +62,19 @@ class AcceptedConnections:
             cut(oldest, gone.end)
             yield gone.end
 
+    def spoke(self, descriptor: int, now_s: float) -> None:
+        """The first message has come over the connection."""
+        known = self._known.setdefault(descriptor, Accepted(other_end(descriptor), now_s))
+        known.has_spoken = True
+
     def became_peer(self, descriptor: int, now_s: float) -> None:
         """The connection has shown who it is."""
         self._known[descriptor] = Accepted(other_end(descriptor), now_s, is_peer=True)
 
     def closed(self, descriptor: int) -> bool:
-        """The connection is gone; whether it was a stranger's that nobody had cut."""
+        """The connection is gone; whether it was a stranger's of which nobody has told anything."""
         known = self._known.pop(descriptor, None)
-        return known is not None and not known.is_peer
+        return known is not None and not known.is_peer and not known.has_spoken
 
     def cut_overdue(self, now_s: float) -> Iterator[str]:
         """Cut those that took too long or sent too much, and tell their ends."""

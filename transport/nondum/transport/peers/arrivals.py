@@ -46,6 +46,10 @@ class Arrivals:
         elif event.kind == zmq.EVENT_HANDSHAKE_FAILED_AUTH:
             self._explained += 1  # the gate has counted it
 
+    def spoke(self, descriptor: int) -> None:
+        """The first message has come over a connection."""
+        self._connections.spoke(descriptor, asyncio.get_running_loop().time())
+
     def became_peer(self, descriptor: int) -> None:
         """A connection has shown who it is."""
         self._connections.became_peer(descriptor, asyncio.get_running_loop().time())

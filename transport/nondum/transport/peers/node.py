@@ -236,6 +236,7 @@ class PeerNode:
             route = AcceptedRoute(self._listener, routing_id, int(data.get(zmq.SRCFD)))
             link = Link(route, proved, self._loop.time(), dialled=False)
             self._inbound[routing_id] = link
+            self._arrivals.spoke(route.descriptor)
         return link
 
     def _on_dialled(self, link: Link, frames: list[zmq.Frame]) -> None:
