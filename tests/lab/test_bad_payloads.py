@@ -12,7 +12,7 @@ from tests.lab.plugins import scribe, talker
 from tests.lab.running_host import Row, RunningHost, running
 from tests.payloads import make_payload
 
-pytestmark = pytest.mark.lab
+pytestmark = [pytest.mark.lab, pytest.mark.beside]
 
 IMPATIENT = "[workers]\nstartup_s = 2.0\n"
 HEALTHY = ("talker", "scribe")

@@ -9,7 +9,7 @@ from demo import slots
 from tests.lab.plugins import gauge
 from tests.lab.running_host import RunningHost
 
-pytestmark = pytest.mark.lab
+pytestmark = [pytest.mark.lab, pytest.mark.beside]
 
 WAITS = "waits for gauge"
 

@@ -6,7 +6,7 @@ import pytest
 from tests.lab.plugins import attic, lamps
 from tests.lab.running_host import RunningHost
 
-pytestmark = pytest.mark.lab
+pytestmark = [pytest.mark.lab, pytest.mark.beside]
 
 
 def test_goal_that_follows_from_a_rule_is_reached(host: RunningHost) -> None:

@@ -303,6 +303,16 @@ class Member:
         assert told == catalogues, "events and `peers` tell different things"
         return {}
 
+    async def order_know(self, peer: str, entries: Mapping[str, Body]) -> Mapping[str, Any]:
+        """Wait until one peer is there with exactly these entries."""
+        await self._until(lambda: self._seen().get(peer) == entries)
+        return {}
+
+    async def order_miss(self, peer: str) -> Mapping[str, Any]:
+        """Wait until one peer is not there."""
+        await self._until(lambda: peer not in self._sees.names.values())
+        return {}
+
     async def order_be_among(self, peers: list[str]) -> Mapping[str, Any]:
         """Wait until exactly these peers are there."""
         await self._until(lambda: sorted(self._sees.names.values()) == sorted(peers))
