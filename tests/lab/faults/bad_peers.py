@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
@@ -32,6 +33,7 @@ from nondum.transport.peers.messages import (
 from nondum.transport.peers.pulse import State
 
 BEAT_S = 0.2
+LATE_S = 0.6
 EPOCH = 7
 
 
@@ -168,6 +170,22 @@ def mute(bad: Bad) -> Iterator[None]:
         yield
 
 
+def late(bad: Bad) -> Iterator[None]:
+    """Answer when nobody waits any more, twice, and what nobody has asked."""
+    waiting: deque[tuple[float, Request]] = deque()
+    while True:
+        bad.live()
+        for message in bad.heard(BEAT_S):
+            if isinstance(message, Request) and message.method == "echo":
+                waiting.append((time.monotonic() + LATE_S, message))
+        while waiting and waiting[0][0] < time.monotonic():
+            number = waiting.popleft()[1].number
+            for _ in range(2):
+                bad.say(Reply(number, {"answer": "late"}))
+                bad.say(Reply(number + 1000, {}))
+        yield
+
+
 def deaf(bad: Bad) -> Iterator[None]:
     """Ask for long answers, and read none of them."""
     number = 0
@@ -210,6 +228,7 @@ KINDS: dict[str, Callable[[Bad], Iterator[None]]] = {
         changes,
         oversized,
         mute,
+        late,
         deaf,
         reads,
         greetings,

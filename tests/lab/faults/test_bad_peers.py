@@ -62,6 +62,16 @@ def test_bad_manners_are_bounded(kind: str, hosts: Crew) -> None:
         mule.ask("idle")  # all that it had begun is halted
 
 
+def test_late_answers_are_no_answers(hosts: Crew) -> None:
+    rover, mule, _ = hosts
+    with measured(rover, mule), bad_peer(hosts, "late", mule):
+        for _ in range(3):
+            call = {"peer": "bad", "method": "echo", "args": {}, "deadline_s": 0.5}
+            assert mule.ask("call", **call)["failure"] == "DEADLINE"
+        assert "bad" in mule.ask("status")["peers"]
+        others_go_on(hosts)
+
+
 def others_go_on(hosts: Crew) -> None:
     """Good hosts' catalogues are known, and one that was killed comes back."""
     rover, mule, base = hosts

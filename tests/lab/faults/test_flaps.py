@@ -37,7 +37,10 @@ def test_all_know_the_same_in_the_end_and_nothing_is_done_twice(seed: int, tmp_p
             after = member.weight_kb(), member.descriptors()
             note(f"{member.name}: {weight_kb} kB, {descriptors} descriptors; then {after}")
             assert after[0] <= weight_kb + GROWTH_KB
-            assert member.ask("status")["lost"], "no flap was noticed"
+            status = member.ask("status")
+            note(f"{member.name}: lost {status['lost']}, refused {status['refused']}")
+            assert status["lost"], "no flap was noticed"
+            assert "FLOODING" not in status["refused"]
 
 
 def storm(hosts: Crew, flaps: int) -> None:

@@ -17,7 +17,7 @@ WAITING = 4096
 """Messages that may wait until they are allowed: more than all calls that a peer may have begun."""
 LOOK_S = 0.01
 """Between two looks at what waits."""
-GREETINGS_PER_S, GREETINGS = 2.0, 30.0
+GREETINGS_PER_S, GREETINGS = 3.0, 60.0
 """A link that breaks again and again is no flood; this is."""
 BARRED_S = 30.0
 """How long a peer is not let in that has flooded this host."""
