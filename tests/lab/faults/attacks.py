@@ -150,7 +150,7 @@ def spoofed(ip: str, port: int, key: str) -> Iterator[None]:
         txt = {"id": name, "pk": liar, "epoch": epoch, "proto": "1"}
         nowhere = f"10.77.0.{random.randrange(100, 250)}"
         ttl = random.choice([0, 120, 120])
-        sock.sendto(announced(instance(liar), txt, [nowhere, ip], ttl=ttl), GROUP)
+        sock.sendto(announced(instance(liar), txt, [nowhere], ttl=ttl), GROUP)
         time.sleep(0.001)
         yield
 

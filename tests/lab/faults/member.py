@@ -188,6 +188,8 @@ class Sees:
         self.catalogues: dict[PeerKey, dict[str, Body]] = {}
         self.changed = 0
         self.lost: Counter[str] = Counter()
+        self.met: set[str] = set()
+        """Who was ever there."""
         self.news = asyncio.Event()
 
     def hear(self, event: FleetEvent) -> None:
@@ -195,6 +197,7 @@ class Sees:
             case PeerUp(key, name, epoch):
                 assert key not in self.names, "a peer came up twice"
                 self.names[key] = name
+                self.met.add(name)
                 self._tell("up", peer=name, key=key, epoch=epoch)
             case PeerLost(key, name, reason):
                 del self.names[key]
@@ -352,6 +355,7 @@ class Member:
         counts = {reason.name: count for reason, count in self.mesh.refusals.counts.items()}
         return {
             "peers": sorted(self._sees.names.values()),
+            "met": sorted(self._sees.met),
             "running": len(self._works.running),
             "noticed": self._works.noticed,
             "changed": self._sees.changed,
