@@ -138,12 +138,13 @@ class Multicast:
     async def _open(self, choice: list[str | int]) -> AsyncZeroconf:
         version = IPVersion.All if has_ipv6() else IPVersion.V4Only
         opened = AsyncZeroconf(interfaces=choice, ip_version=version)
+        # At once: of what is heard before, zeroconf would take the next telling for a duplicate.
+        opened.zeroconf.async_add_listener(self._ears, None)
         try:
             await opened.zeroconf.async_wait_for_start()
         except BaseException:
             await opened.async_close()
             raise
-        opened.zeroconf.async_add_listener(self._ears, None)
         return opened
 
     def _keep(self, task: Awaitable[Any]) -> None:

@@ -80,6 +80,7 @@ class Meeting:
         """Who is being dialled anew."""
         self._queue: deque[PeerKey] = deque()
         self._loop = asyncio.get_running_loop()
+        self._is_closed = False
 
     @property
     def looked_for(self) -> int:
@@ -88,7 +89,7 @@ class Meeting:
 
     def hinted(self, key: PeerKey, addresses: Iterable[str], epoch: int = 0) -> None:
         """Somebody said where a peer is; perhaps again."""
-        if key == self._mine or not self._is_welcome(key):
+        if self._is_closed or key == self._mine or not self._is_welcome(key):
             return
         wish = self._wish(key)
         if wish is None:
@@ -149,7 +150,8 @@ class Meeting:
                 self._dial_in(key, 0.0)
 
     def close(self) -> None:
-        """Dial nobody any more."""
+        """Dial nobody any more, whatever is hinted at."""
+        self._is_closed = True
         for wish in self._wishes.values():
             self._stop(wish)
         self._wishes.clear()

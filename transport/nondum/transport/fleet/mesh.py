@@ -148,10 +148,10 @@ class Mesh:
 
     async def close(self) -> None:
         """Say goodbye and let go of everything."""
+        self._meeting.close()
+        await self._node.close()  # peers first: multicast takes its time to say goodbye
         if self._finder is not None:
             await self._finder.close()
-        self._meeting.close()
-        await self._node.close()
         self._catalogues.close()
 
     def is_welcome(self, key: PeerKey) -> bool:
