@@ -15,6 +15,7 @@ import socket
 import subprocess
 import sys
 import threading
+from collections import deque
 from collections.abc import AsyncIterator, Callable
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
@@ -113,12 +114,16 @@ class Host:
         self._told: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         self._reader = threading.Thread(target=self._read)
         self._reader.start()
-        self.key = self.next("started")["key"]
+        self._early: deque[dict[str, Any]] = deque()
+        """What it was told of while it was starting still."""
+        while (told := self._told.get(timeout=PATIENCE_S))["event"] != "started":
+            self._early.append(told)
+        self.key = told["key"]
 
     def next(self, event: str, **wanted: Any) -> dict[str, Any]:
         """Wait for an event with these values; others before it are dropped."""
         while True:
-            told = self._told.get(timeout=PATIENCE_S)
+            told = self._early.popleft() if self._early else self._told.get(timeout=PATIENCE_S)
             if told["event"] == event and wanted.items() <= told.items():
                 return told
 
