@@ -104,10 +104,8 @@ def _presence(found: presence.Found, ground: Ground) -> Iterator[str]:
     )
     if AT_ONCE.late(found[AT_ONCE]):
         yield _text(
-            "Hosts that start within the same millisecond may miss each other's first words: those "
-            "that arrive after a host's sockets are open and before it listens are lost, and "
-            "zeroconf takes their like for duplicates for 0.8 s. Then they meet by the next "
-            "announcement, up to a second later."
+            "Of hosts that start at the same moment, few miss each other's first words. They meet by "
+            "the next announcement, up to a second later."
         )
     if DEPARTURE.late(found[DEPARTURE]):
         yield _text(
