@@ -104,8 +104,8 @@ def _presence(found: presence.Found, ground: Ground) -> Iterator[str]:
     )
     if AT_ONCE.late(found[AT_ONCE]):
         yield _text(
-            "Of hosts that start at the same moment, few miss each other's first words. They meet by "
-            "the next announcement, up to a second later."
+            "Of hosts that start at the same moment, few miss each other's first words. They meet "
+            "by the next announcement, up to a second later."
         )
     if DEPARTURE.late(found[DEPARTURE]):
         yield _text(
