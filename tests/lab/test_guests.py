@@ -95,6 +95,17 @@ def test_what_is_held_for_a_lost_peer_makes_way_when_it_comes_back(
         assert (tmp_path / "log").read_text().split() == ["on", "off", "on"]
 
 
+def test_host_that_asks_again_has_lost_what_it_asked_for_before(
+    mule: tuple[RunningHost, str], tmp_path: Path
+) -> None:
+    host, address = mule
+    host.bring("light", beacon(tmp_path / "log"))
+    with guest("guest", ("mule", address)) as one:
+        one.begin("mule", **shine())
+        one.begin("mule", **shine())
+        assert (tmp_path / "log").read_text().split() == ["on", "off", "on"]
+
+
 @pytest.mark.parametrize(
     ("asked", "code"),
     [

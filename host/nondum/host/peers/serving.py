@@ -211,17 +211,16 @@ class Serving:
         return {"outcome": call.state.name, "reason": call.reason}
 
     async def _supersede(self, errand: Errand, taken: frozenset[str]) -> None:
-        """End what is held for the same host's earlier life, or from before the link broke."""
-        held = [
+        """End what the same host had asked of the same units: it has lost that, or it would not ask
+        again. What is being halted already is waited for."""
+        earlier = [
             served
             for served in self
-            if served.caller == errand.caller.name
-            and served.errand.orphaned.is_set()
-            and served.taken & taken
+            if served.caller == errand.caller.name and served.taken & taken
         ]
-        for served in held:
+        for served in earlier:
             served.call.halt()
-        for served in held:
+        for served in earlier:
             await served.call.ended()
             self._served.pop((served.call.component, served.call.id), None)
 

@@ -1,5 +1,6 @@
 """The standing wish to be linked to one peer: all its addresses at once, the first one wins.
 
+Those of the link alone come a moment later.
 Every connection has a socket of its own. (ZeroMQ's own reconnecting sends what was queued for the
 connection before, retries a wrong key for ever, and a refused one never again.)
 """
@@ -20,6 +21,9 @@ from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.link import DialledRoute, Link
 from nondum.transport.peers.monitor import HANDSHAKE_FAILED, SocketEvent
 
+HEAD_START_S = 0.05
+"""What addresses of the link alone come behind the others: a link by one of them would break
+whenever the cable is out for a moment."""
 FIRST_WAIT_S = 0.05
 LONGEST_WAIT_S = 5.0
 ANSWER_S = 8.0
@@ -95,6 +99,7 @@ class Dial:
         self._wait_s = FIRST_WAIT_S
         self._retry: asyncio.TimerHandle | None = None
         self._limit: asyncio.TimerHandle | None = None
+        self._others: asyncio.TimerHandle | None = None
         self._is_closed = False
         self._try()
 
@@ -135,7 +140,7 @@ class Dial:
     def close(self) -> None:
         """Try no more. A connection that became a link lasts until it breaks."""
         self._is_closed = True
-        for timer in (self._retry, self._limit):
+        for timer in (self._retry, self._limit, self._others):
             if timer is not None:
                 timer.cancel()
         for attempt in self._attempts:
@@ -152,20 +157,41 @@ class Dial:
         self._retry = None
         if not self._is_wanted(self.key):
             return
-        for address in self.addresses:
-            try:
-                self._attempts.append(Attempt(self, self._connect(self.key), address))
-            except zmq.ZMQError as error:
-                self._tell(address, _unusable(error))
+        lasting = tuple(one for one in self.addresses if not is_of_link(one))
+        self._attempt(lasting or self.addresses)
+        if lasting and self._others is None:
+            others = tuple(one for one in self.addresses if one not in lasting)
+            self._others = self._loop.call_later(HEAD_START_S, self._try_others, others)
         if self._limit is not None:
             self._limit.cancel()
         self._limit = self._loop.call_later(ANSWER_S, self._give_up)
         self.again()
 
+    def _try_others(self, addresses: Sequence[str]) -> None:
+        self._others = None
+        if self._is_wanted(self.key) and not any(one.is_connected for one in self._attempts):
+            self._attempt(addresses)
+
+    def _attempt(self, addresses: Sequence[str]) -> None:
+        for address in addresses:
+            try:
+                self._attempts.append(Attempt(self, self._connect(self.key), address))
+            except zmq.ZMQError as error:
+                self._tell(address, _unusable(error))
+
     def _give_up(self) -> None:
         for attempt in list(self._attempts):
             if not attempt.is_settled:
                 self.over(attempt, Problem("PEER_SILENT", "nobody answers there"))
+
+
+def is_of_link(address: str) -> bool:
+    """Whether an address is gone whenever its link is down, if only for a moment (RFC 4862).
+
+    >>> is_of_link("tcp://[fe80::1%eth0]:7410"), is_of_link("tcp://10.0.0.7:7410")
+    (True, False)
+    """
+    return address.startswith("tcp://[fe80:")
 
 
 def _why(event: SocketEvent) -> Problem | None:
