@@ -13,6 +13,7 @@ import struct
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
+from typing import Any
 
 AWAITED_S = 4.5
 """How long a connection may take to become a peer's: a little less than ZeroMQ's own handshake."""
@@ -31,7 +32,7 @@ class Accepted:
     """One connection."""
 
     end: str
-    """The other end, `address:port`; empty when it was gone before anybody looked."""
+    """The other end as `written`; empty when it was gone before anybody looked."""
     since_s: float
     is_peer: bool = False
     has_spoken: bool = False
@@ -92,10 +93,22 @@ def other_end(descriptor: int) -> str:
     """The other end of a TCP connection; empty when there is none."""
     try:
         with closing(_duplicate(descriptor)) as connection:
-            host, port = connection.getpeername()[:2]
-            return f"{host}:{port}"
+            return written(connection.getpeername())
     except (OSError, ValueError):
         return ""
+
+
+def written(end: tuple[Any, ...]) -> str:
+    """An end of a TCP connection as ZeroMQ takes it, behind `tcp://`.
+
+    >>> written(("::ffff:10.0.0.7", 50001, 0, 0)), written(("fe80::1", 50001, 0, 3))
+    ('10.0.0.7:50001', '[fe80::1%3]:50001')
+    """
+    host, port, *more = end
+    if "." in host:  # an IPv4 address, or one that is mapped into IPv6 (RFC 4291, 2.5.5.2)
+        return f"{host.removeprefix('::ffff:')}:{port}"
+    scope = more[1] if len(more) > 1 else 0
+    return f"[{host}%{scope}]:{port}" if scope else f"[{host}]:{port}"
 
 
 def bytes_received(descriptor: int) -> int:
@@ -112,8 +125,7 @@ def cut(descriptor: int, end: str) -> None:
     """Shut a connection down, if the descriptor is still the one to that end."""
     try:
         with closing(_duplicate(descriptor)) as connection:
-            host, port = connection.getpeername()[:2]
-            if f"{host}:{port}" == end:
+            if written(connection.getpeername()) == end:
                 connection.shutdown(socket.SHUT_RDWR)
     except (OSError, ValueError):
         return  # it is gone by itself
