@@ -168,6 +168,20 @@ def test_what_a_peer_makes_up_is_told_and_changes_nothing_else(
         assert "PEER_ENTRY" in row["problems"][0]
 
 
+def test_devices_of_a_peer_are_shown_with_who_has_them(mule: tuple[RunningHost, str]) -> None:
+    host, address = mule
+    with guest("guest", ("mule", address)) as one:
+        one.publish({"device/usb1": {"component": "eye"}})
+        host.until(
+            "the device is shown",
+            lambda _: (
+                [(r["device"], r["component"]) for r in host.ask("devices")]
+                == [("usb1", "eye@guest")]
+            ),
+            timeout_s=READY_S,
+        )
+
+
 def test_host_halts_what_runs_for_a_peer(mule: tuple[RunningHost, str], tmp_path: Path) -> None:
     host, address = mule
     host.bring("light", beacon(tmp_path / "log"))

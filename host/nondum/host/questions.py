@@ -22,6 +22,7 @@ from nondum.host.rows import (
     journal_row,
     offered_row,
     payload_row,
+    peers_device_row,
     problems_of,
     stream_row,
     unknown,
@@ -92,7 +93,11 @@ class Questions:
         """What is plugged in, and who has it."""
         snapshot = self.catalogue.snapshot()
         claims = claims_by_device(snapshot)
-        return [device_row(device, claims) for device in snapshot.devices]
+        own = [device_row(device, claims) for device in snapshot.devices]
+        peers = (
+            (device, owner) for peer in snapshot.peers for device, owner in peer.devices.items()
+        )
+        return own + [peers_device_row(device, owner) for device, owner in peers]
 
     async def streams(self, arguments: Arguments) -> list[Row]:
         """Who sends what to whom."""

@@ -90,6 +90,12 @@ def device_row(device: DeviceRecord, claims: Mapping[str, tuple[str, DeviceClaim
     }
 
 
+def peers_device_row(device: str, component: str) -> Row:
+    """A device of a peer, in the same columns: of it, only who has it is told."""
+    row = {"device": device, "node": "", "component": component, "need": ""}
+    return {**row, "contested_by": [], "properties": {}}
+
+
 def component_row(component: ComponentRecord, host: str, pid: int | None) -> Row:
     """A component: how it is, and what it brings."""
     described = component.description
