@@ -15,10 +15,11 @@ TICK_S = 0.02
 
 def main() -> None:
     """Send what the instrument would, in real time, until the parent process is gone."""
-    camera = ComptonCamera(arguments(__doc__ or "").scenario)
+    given = arguments(__doc__ or "")
+    camera = ComptonCamera(given.scenario)
     port = Port()
     print(port.path, flush=True)
-    for wait_s in ticks(TICK_S):
+    for wait_s in ticks(TICK_S, given.parent):
         port.read(wait_s)  # the instrument takes no commands
         port.write(camera.advance(TICK_S))
 

@@ -32,7 +32,7 @@ def main() -> None:
     print(head.path, switch.path, sep="\n", flush=True)
     log = given.log.open("a", encoding="utf-8") if given.log else None
     logged_s, before = 0.0, time.monotonic()
-    for wait_s in ticks(TICK_S):
+    for wait_s in ticks(TICK_S, given.parent):
         said = unit.receive(head.read(wait_s))
         was_closed = relay.closed
         relay.receive(switch.read(0))
