@@ -1,0 +1,225 @@
+"""The cages of a daemon's workers: limits on all processes of one together, and their sure end.
+
+Version 2 is used where there is any, version 1 where that has the controllers; where there is
+neither, or the daemon may not use them, cages hold nobody and say so.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import itertools
+import os
+import time
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path
+
+from nondum.host.cgroups import mounts
+from nondum.host.cgroups.cage import CageLimits, Tree, Usage
+from nondum.host.cgroups.legacy import Legacy
+from nondum.host.cgroups.mounts import Mounted
+from nondum.host.cgroups.unified import Unified
+from nondum.sdk.errors import Problem
+
+EMPTY_S = 1.0
+"""How long killed processes are waited for: one in the kernel's hands may never end."""
+PAUSE_S = 0.005
+GENERATIONS = 2
+"""How often the children of a process that is put in are looked for: they may fork meanwhile."""
+
+
+class Cage:
+    """One worker's. Its methods block for microseconds, but for `end`."""
+
+    def __init__(self, tree: Tree, name: str) -> None:
+        self._tree = tree
+        self.name = name
+
+    def limit(self, limits: CageLimits) -> None:
+        """Change its limits: a spare interpreter is put in before it is known whose it will be.
+
+        Raises `OSError`.
+        """
+        self._tree.limit(self.name, limits)
+
+    def add(self, pid: int) -> None:
+        """Put a process in, with all that it has started. Raises `OSError`.
+
+        The kernel may take some 20 ms for it, five times less where no other was put in just now.
+        """
+        self._tree.add(self.name, pid)
+        for _ in range(GENERATIONS):  # what these start from now on is in it by itself
+            for child in tuple(_descendants(pid)):
+                with contextlib.suppress(ProcessLookupError):
+                    self._tree.add(self.name, child)
+
+    def usage(self) -> Usage:
+        """What it uses; all zeros once it is removed."""
+        return self._tree.usage(self.name)
+
+    def kill(self) -> None:
+        """SIGKILL all that is in it, however much it forks."""
+        self._tree.kill(self.name)
+
+    def remove(self) -> bool:
+        """Remove it once it is empty; answer whether it is gone."""
+        return self._tree.remove(self.name)
+
+    def end(self) -> bool:
+        """Kill all that is in it and remove it; answer whether it is gone. Blocks up to a second:
+        not for the loop.
+        """
+        until_s = time.monotonic() + EMPTY_S
+        while True:
+            self.kill()
+            if self.remove():
+                return True
+            if time.monotonic() >= until_s:
+                return False
+            time.sleep(PAUSE_S)
+
+
+class Cages:
+    """Makes cages. `sweep` away those of an earlier life first."""
+
+    def __init__(self, tree: Tree) -> None:
+        self._tree = tree
+        taken = [int(name.rpartition(".")[2]) for name in tree.names() if "." in name]
+        self._numbers = itertools.count(max(taken, default=0) + 1)
+
+    @classmethod
+    def open(cls, state: Path) -> Cages:
+        """Look for what this machine has. One daemon's cages are apart from others', by the
+        `state` folder that it has claimed.
+        """
+        return cls(tree(mounts.here(), owner(state)))
+
+    @property
+    def kind(self) -> str:
+        """`v2`, `v1`, or empty: none."""
+        return self._tree.kind
+
+    @property
+    def holds(self) -> frozenset[str]:
+        """What is really limited: of `memory`, `pids`, `cpu`."""
+        return self._tree.controllers
+
+    def make(self, component: str, limits: CageLimits) -> Cage:
+        """Make a cage for a new worker of a component. Raises `OSError`."""
+        cage = Cage(self._tree, f"{component}.{next(self._numbers)}")
+        self._tree.make(cage.name)
+        cage.limit(limits)
+        return cage
+
+    def sweep(self, keep: Collection[str] = ()) -> int:
+        """End all cages but those named: what a daemon left that died. Returns how many there were.
+
+        Blocks up to a second for each: not for the loop.
+        """
+        left = [name for name in self._tree.names() if name not in keep]
+        for name in left:
+            Cage(self._tree, name).end()
+        return len(left)
+
+    def close(self) -> None:
+        """Let go of the place where cages are; call it once all have ended."""
+        self._tree.close()
+
+    def problems(self) -> tuple[Problem, ...]:
+        """What cannot be limited here, and what to do about it."""
+        return tuple(_problems(self._tree))
+
+
+class NoTree:
+    """Where there are no cgroups that this daemon may use: cages that hold nobody."""
+
+    kind = ""
+    controllers: frozenset[str] = frozenset()
+
+    def make(self, name: str) -> None:
+        """Do nothing."""
+
+    def limit(self, name: str, limits: CageLimits) -> None:
+        """Do nothing."""
+
+    def add(self, name: str, pid: int) -> None:
+        """Do nothing."""
+
+    def kill(self, name: str) -> None:
+        """Do nothing."""
+
+    def remove(self, name: str) -> bool:
+        """Nothing is left of it."""
+        return True
+
+    def usage(self, name: str) -> Usage:
+        """Nothing is known."""
+        return Usage()
+
+    def names(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+def owner(state: Path) -> str:
+    """The name of a daemon's part of a hierarchy.
+
+    >>> owner(Path("/var/lib/nondum"))
+    'nondum-a56b8fb1'
+    """
+    return f"nondum-{hashlib.sha256(os.fsencode(state.absolute())).hexdigest()[:8]}"
+
+
+def tree(hierarchies: Sequence[Mounted], owner: str) -> Tree:
+    """The best that can be had: version 2 if it limits anything, else version 1, else none."""
+    found: Tree | None = None
+    for hierarchy in hierarchies:
+        if not hierarchy.controllers:
+            found = Unified.open(hierarchy.own, hierarchy.top, owner)
+    if found is None or not found.controllers:
+        found = Legacy.open(hierarchies, owner) or found
+    return found or NoTree()
+
+
+def _descendants(pid: int) -> Iterator[int]:
+    with contextlib.suppress(OSError):  # it has just ended
+        for task in Path(f"/proc/{pid}/task").iterdir():
+            for child in (task / "children").read_text(encoding="ascii").split():
+                yield int(child)
+                yield from _descendants(int(child))
+
+
+def _problems(tree: Tree) -> Iterator[Problem]:
+    if not tree.kind:
+        yield Problem(
+            "CGROUPS_MISSING",
+            "workers' memory, tasks and processor time are not limited together",
+            fix="run nondum as the service that its package installs, or as root",
+        )
+        return
+    for controller, (code, what, fix) in _MISSING.items():
+        if controller not in tree.controllers:
+            yield Problem(code, f"this machine has no {controller} cgroup: {what}", fix=fix)
+
+
+_MISSING = {
+    "memory": (
+        "CGROUP_MEMORY_MISSING",
+        "a worker's memory is bounded process by process only",
+        "add `cgroup_enable=memory cgroup_memory=1` to the one line of "
+        "/boot/firmware/cmdline.txt (Raspberry Pi OS), or boot without cgroup_disable=memory",
+    ),
+    "pids": (
+        "CGROUP_PIDS_MISSING",
+        "a worker may start any number of processes",
+        "use a kernel with CONFIG_CGROUP_PIDS, and lend the service its cgroup (Delegate=yes)",
+    ),
+    "cpu": (
+        "CGROUP_CPU_MISSING",
+        "a worker may take processor time from others",
+        "use a kernel with CONFIG_FAIR_GROUP_SCHED, and lend the service its cgroup (Delegate=yes)",
+    ),
+}
