@@ -28,7 +28,8 @@ OFFERED = ("pedestrian-detector",)
 SECOND = ("thermal-camera",)
 THIRD = ("compton-camera", "pan-tilt-unit")
 LIBRARIES = ("sdk", "panorama")
-STAGES = ("I", "pulled", "put back", "offered", "killed", "II", "III")
+LAST = "III"
+STAGES = ("I", "pulled", "put back", "offered", "killed", "II", LAST)
 
 PHASES = ("seen", "verified", "installed", "ready", "in plan", "goal")
 NOTE = (
@@ -45,7 +46,8 @@ def main(arguments: Sequence[str]) -> int:
     """Run the demonstration; 0 only if every goal was reached."""
     options = _options(arguments)
     play = functools.partial(_play, options)
-    return perform(Programme(STAGES, PHASES, NOTE), play, options, {"seed": options.seed})
+    wanted = (LAST,) if options.only == LAST else STAGES
+    return perform(Programme(wanted, PHASES, NOTE), play, options, {"seed": options.seed})
 
 
 def _play(options: argparse.Namespace, work: Path, say: Says) -> Iterator[StageResult]:
@@ -65,16 +67,17 @@ def _played(
     if options.shuffle is not None:
         for names in (first, second, third):
             dice.shuffle(names)
-    yield from _followed(robot, kit, first, second, say)
-    robot.ask("halt", now=True)
-    leaving = {*first, *OFFERED, *second} - {CAMERA}
-    stages.withdraw(robot, *(kit.drives[name] for name in leaving))
-    say(f"III: those come out; {', '.join(third)} go in; “{POINT}” (--seed {options.seed})")
+    if options.only != LAST:
+        yield from _followed(robot, kit, first, second, say)
+        robot.ask("halt", now=True)
+        leaving = {*first, *OFFERED, *second} - {CAMERA}
+        stages.withdraw(robot, *(kit.drives[name] for name in leaving))
+    say(f"{LAST}: no other is in; {', '.join(third)} go in; “{POINT}” (--seed {options.seed})")
     yield stages.point(
         robot,
         kit.of(third),
         random_scenario(options.seed),
-        name="III",
+        name=LAST,
         words=POINT,
         published_s=199,
         mistold_rad=math.radians(options.wrong_mount),
@@ -124,6 +127,7 @@ def _options(arguments: Sequence[str]) -> argparse.Namespace:
         default=random.SystemRandom().randrange(1_000_000),
         help="of source and mounts in stage III [default: another one each time]",
     )
+    made.add_argument("--only", choices=(LAST,), help="this stage alone")
     made.add_argument(
         "--shuffle",
         type=int,
