@@ -13,6 +13,7 @@ import socket
 from dataclasses import asdict
 from typing import Any, Protocol
 
+from nondum.host.cgroups import Cages
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spare import ROOM, ROOM_BYTES, Spare
 from nondum.host.workers.spec import WorkerSpec, base_interpreter
@@ -56,7 +57,8 @@ class RlimitLauncher:
     level = 0
     name = "resource limits"
 
-    def __init__(self) -> None:
+    def __init__(self, cages: Cages | None = None) -> None:
+        self._cages = cages
         self._spare: Spare | None = None
 
     def launch(self, spec: WorkerSpec, sock: socket.socket) -> WorkerProcess:
@@ -66,13 +68,15 @@ class RlimitLauncher:
             spec.scratch.mkdir(parents=True, exist_ok=True, mode=0o700)
             parameters = _parameters(spec)
             if spare is not None and spare.python == spec.python:
+                spare.limit(spec.limits)
                 if spare.become(parameters, sock):
-                    return WorkerProcess(spare.popen)
+                    return WorkerProcess(spare.popen, spare.cage)
             elif spare is not None:
                 spare.close()
-            started = Spare(spec.python)
+            started = Spare(spec.python, self._cages)
+            started.limit(spec.limits)
             if started.become(parameters, sock):
-                return WorkerProcess(started.popen)
+                return WorkerProcess(started.popen, started.cage)
         except OSError as error:
             problem = Problem("LAUNCH_FAILED", str(error), where=spec.component)
             raise WorkerFailed(problem) from error
@@ -83,7 +87,7 @@ class RlimitLauncher:
         """Have a spare interpreter."""
         if self._spare is None:
             try:
-                self._spare = Spare(base_interpreter())
+                self._spare = Spare(base_interpreter(), self._cages)
             except OSError as error:  # launching will tell, should it be lasting
                 log.warning("no spare interpreter: %s", error)
 

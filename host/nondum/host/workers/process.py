@@ -9,6 +9,8 @@ import signal
 import subprocess
 from typing import IO
 
+from nondum.host.cgroups import Cage
+
 DETACH_S = 1.0
 """How long a process that was killed is waited for; one in the kernel's hands may never end."""
 
@@ -16,8 +18,10 @@ DETACH_S = 1.0
 class WorkerProcess:
     """A started process that leads a session of its own. Make it on the loop; it reaps itself."""
 
-    def __init__(self, popen: subprocess.Popen[bytes]) -> None:
+    def __init__(self, popen: subprocess.Popen[bytes], cage: Cage | None = None) -> None:
         self._popen = popen
+        self.cage = cage
+        """What holds it and all that it starts; whoever ends the process ends the cage."""
         self.pid = popen.pid
         self.exited: asyncio.Future[int] = asyncio.get_running_loop().create_future()
         """Its exit status, negative for the signal that ended it."""

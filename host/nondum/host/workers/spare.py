@@ -14,6 +14,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from nondum.host.cgroups import Cage, CageLimits, Cages
+from nondum.host.workers.spec import Limits
+
 BOOTSTRAP = Path(__file__).with_name("bootstrap.py")
 ROOM = "NONDUM_ROOM"
 """Environment variable that keeps room for the mark of the worker (see `launcher.py`)."""
@@ -23,9 +26,10 @@ ROOM_BYTES = 2048
 class Spare:
     """A started interpreter. It ends when it is closed, or with the thread that started it."""
 
-    def __init__(self, python: Path) -> None:
-        """Start it. Raises `OSError`."""
+    def __init__(self, python: Path, cages: Cages | None = None) -> None:
+        """Start it, in a cage of its own. Raises `OSError`."""
         self.python = python
+        self.cage: Cage | None = None
         self._orders, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         try:
             with theirs:
@@ -33,6 +37,13 @@ class Spare:
         except OSError:
             self._orders.close()
             raise
+        if cages is not None:
+            self._be_caged(cages)
+
+    def limit(self, limits: Limits) -> None:
+        """Set what it may use, before it becomes a worker. Raises `OSError`."""
+        if self.cage is not None:
+            self.cage.limit(limits.of_cage())
 
     def become(self, parameters: Mapping[str, Any], link: socket.socket) -> bool:
         """Have it become a worker on its end of a link; answer whether it could be told.
@@ -52,9 +63,19 @@ class Spare:
         self._orders.close()
         self.popen.kill()
         self.popen.wait()
+        if self.cage is not None:
+            self.cage.end()
         for pipe in (self.popen.stdout, self.popen.stderr):
             if pipe is not None:
                 pipe.close()
+
+    def _be_caged(self, cages: Cages) -> None:
+        try:
+            self.cage = cages.make("worker", CageLimits())
+            self.cage.add(self.popen.pid)
+        except OSError:
+            self.close()
+            raise
 
 
 def _started(python: Path, orders: int) -> subprocess.Popen[bytes]:

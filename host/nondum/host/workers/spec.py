@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from nondum.host.cgroups import CageLimits
 from nondum.planning.contribution import object_name
 from nondum.sdk.description import PluginDescription
 
@@ -27,6 +28,14 @@ class Limits:
     """Processor seconds in all; None: no limit, since workers live long."""
     numeric_threads: int = 1
     """Threads that each numeric library may start for itself."""
+    processors: float = 0.0
+    """Processor seconds in a second, of all its processes; 0: no limit."""
+    scratch_mb: int = 256
+    """Size of its scratch folder."""
+
+    def of_cage(self) -> CageLimits:
+        """What all its processes may use together."""
+        return CageLimits(self.memory_mb, self.tasks, processors=self.processors)
 
 
 @dataclass(frozen=True, slots=True)
