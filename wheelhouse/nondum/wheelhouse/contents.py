@@ -36,10 +36,13 @@ MAX_FILE_BYTES = 8 * 1024**3
 MAX_RELEASE = 2**53
 FORMAT = "nondum-payload 1"
 HEADER_KEYS = ("id", "version", "release", "fleet", "minimum-nondum", "built")
+OPTIONAL_KEYS = ("hosts",)
+MAX_HOSTS = 64
 
 _ENTRY = re.compile(r"([0-9a-f]{64})  (0|[1-9][0-9]{0,15})  (\S+)")
 _BUILT = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ")
 _FLEET = re.compile(r"[a-z0-9.-]{0,64}")
+_HOST = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +69,8 @@ class Contents:
     built: str
     """UTC, ISO 8601 to the second."""
     entries: tuple[Entry, ...]
+    hosts: tuple[str, ...] = ()
+    """Names of the only hosts that it is meant for; empty: any."""
 
     def to_bytes(self) -> bytes:
         """The list as it stands on a drive."""
@@ -74,6 +79,7 @@ class Contents:
             ("version", self.version),
             ("release", str(self.release)),
             ("fleet", self.fleet),
+            *((("hosts", " ".join(self.hosts)),) if self.hosts else ()),
             ("minimum-nondum", self.minimum_nondum),
             ("built", self.built),
         )
@@ -122,6 +128,7 @@ def parse(data: bytes, where: str) -> Contents:
         minimum_nondum=header["minimum-nondum"],
         built=header["built"],
         entries=entries,
+        hosts=tuple(header.get("hosts", "").split()),
     )
 
 
@@ -132,7 +139,7 @@ def _header(lines: list[str], where: str, problems: list[Problem]) -> tuple[dict
         if not line:
             break
         key, colon, value = line.partition(":")
-        if not colon or key not in HEADER_KEYS or key in header:
+        if not colon or key not in (*HEADER_KEYS, *OPTIONAL_KEYS) or key in header:
             problems.append(
                 _flaw("CONTENTS_HEADER", f"unexpected header {line[:60]!r}", f"{where}:{number}")
             )
@@ -159,6 +166,10 @@ def _header_flaw(key: str, value: str) -> str | None:
             return f"{value[:60]!r} is not a whole number of at most {MAX_RELEASE}"
         case "fleet" if not _FLEET.fullmatch(value):
             return f"{value[:60]!r} is not a fleet's name"
+        case "hosts" if not 0 < len(value.split()) <= MAX_HOSTS or not all(
+            _HOST.fullmatch(host) for host in value.split()
+        ):
+            return f"{value[:60]!r} is not one to {MAX_HOSTS} names of hosts"
         case "built" if not _BUILT.fullmatch(value):
             return f"{value[:60]!r} is not a time like 2026-01-01T00:00:00Z"
     return None

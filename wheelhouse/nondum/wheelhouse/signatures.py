@@ -10,25 +10,63 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from nondum.sdk.errors import Problem
+from nondum.wheelhouse.manifest import PERMISSIONS, Manifest
 
 MAX_SIGNATURE_BYTES = 8 * 1024
 
 
 @dataclass(frozen=True, slots=True)
+class Grant:
+    """What a payload that is believed may have."""
+
+    permissions: tuple[str, ...] = ()
+    """What its components may ask for."""
+    role: str = ""
+    """The role in the trust file by which it is believed; empty: it is not by one."""
+    owners: tuple[str, ...] = ()
+    """The roles that may bring a payload of its id: whose was first, brings the next ones."""
+    most_release: int | None = None
+    """Newer releases are void, whatever came in before."""
+
+    def problems(self, manifest: Manifest) -> tuple[Problem, ...]:
+        """What a payload asks for and is not granted (PERMISSION_DENIED)."""
+        by = f"the role {self.role}" if self.role else "whoever signed it"
+        return tuple(
+            Problem(
+                "PERMISSION_DENIED",
+                f"the payload asks for {permission!r}, which {by} may not give",
+                where=component.id,
+                need=permission,
+                have=", ".join(self.permissions) or "no permissions",
+                fix=f"leave it out, or add {permission!r} to that role in the trust file",
+            )
+            for component in manifest.components
+            for permission in component.permissions
+            if permission not in self.permissions
+        )
+
+
+EVERYTHING = Grant(PERMISSIONS)
+"""What is granted where nobody asks for signatures."""
+
+
+@dataclass(frozen=True, slots=True)
 class Verdict:
-    """Whether a contents list may be believed, and in whose name."""
+    """Whether a contents list may be believed, in whose name, and what for."""
 
     signers: tuple[str, ...]
-    """Fingerprints or names of keys whose signatures hold; empty: nobody vouches for it."""
+    """Names (fingerprints of those without) of keys whose signatures hold; empty: nobody vouches
+    for it."""
     problems: tuple[Problem, ...] = ()
     """Why it is refused; empty: it is not."""
+    warnings: tuple[Problem, ...] = ()
+    """What is doubtful, and does not keep it out."""
+    grant: Grant = Grant()
+    """What it may have, if it is not refused."""
 
 
 class Verifier(Protocol):
     """Judges contents lists."""
-
-    warning: str
-    """What every status must say while this verifier is in force; empty: nothing."""
 
     def verify(self, contents: bytes, signature: bytes | None) -> Verdict:
         """Judge the bytes of a contents list; `signature` is None when there is no file."""
@@ -39,22 +77,8 @@ class UnsignedAllowed:
     """Believes everything: for development, where `allow_unsigned` is set."""
 
     warning = "payloads without a signature are accepted (allow_unsigned)"
+    """What every status must say while this is in force."""
 
     def verify(self, contents: bytes, signature: bytes | None) -> Verdict:
         """Accept."""
-        return Verdict(signers=())
-
-
-class SignatureDemanded:
-    """Refuses everything: this nondum cannot verify signatures yet, and none may be left out."""
-
-    warning = ""
-
-    def verify(self, contents: bytes, signature: bytes | None) -> Verdict:
-        """Refuse."""
-        if signature is None:
-            message, fix = "the payload is not signed", "sign it, or set allow_unsigned to develop"
-            return Verdict((), (Problem("SIG_MISSING", message, fix=fix),))
-        message = "signatures cannot be verified by this version of nondum"
-        fix = "set allow_unsigned in [drives] to accept payloads for development"
-        return Verdict((), (Problem("SIG_UNTRUSTED", message, fix=fix),))
+        return Verdict(signers=(), grant=EVERYTHING)

@@ -15,13 +15,14 @@ from typing import Any
 from packaging.version import Version
 
 from nondum.host.drives import filesystems, mounting
+from nondum.host.trust.rules import Rules
 from nondum.sdk.errors import PayloadRefused, Problem
 from nondum.wheelhouse import contents, drive, lock, payload, preflight, wheel
 from nondum.wheelhouse.contents import Contents
 from nondum.wheelhouse.lock import LockedWheel
 from nondum.wheelhouse.payload import StagedPayload
 from nondum.wheelhouse.preflight import HostFacts
-from nondum.wheelhouse.signatures import SignatureDemanded, UnsignedAllowed, Verifier
+from nondum.wheelhouse.signatures import Verifier
 from nondum.wheelhouse.store import Store
 from nondum.wheelhouse.stored import StoredWheel
 
@@ -47,7 +48,7 @@ def look(arguments: Arguments, report: Report) -> dict[str, list[Any]]:
         mounting.mount(node, root, filesystem)
     is_payload = arguments["kind"] == "installed"
     folders = (root,) if is_payload else drive.find_payloads(root)
-    verifier = UnsignedAllowed() if arguments["allow_unsigned"] else SignatureDemanded()
+    verifier = Rules.of(arguments).verifier()
     return {
         "payloads": [_found(folder, verifier) for folder in folders],
         "certificates": [] if is_payload else list(_certificates(root)),

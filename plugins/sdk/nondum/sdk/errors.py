@@ -2,6 +2,7 @@
 
     NondumError
     ├── PayloadRefused        a drive's contents list, manifest, lock, wheel or preflight
+    ├── TrustRefused          a trust file, key or signature of one that cannot be believed
     ├── InstallFailed         staging, store or venv could not be carried through
     │   └── DriveGone         the drive went away while it was needed
     ├── WorkerFailed          did not start, lied, hung, crashed
@@ -83,6 +84,10 @@ class NondumError(Exception):
 
 class PayloadRefused(NondumError):
     """A payload is not what it claims, or does not fit this host."""
+
+
+class TrustRefused(NondumError):
+    """A trust file, a key, or the signature of one, that cannot be believed."""
 
 
 class InstallFailed(NondumError):

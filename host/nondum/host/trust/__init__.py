@@ -1,0 +1,1 @@
+"""Whose payloads this host runs."""

@@ -1,0 +1,46 @@
+"""By what a host judges payloads, as plain data that child processes are given."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import lru_cache
+from typing import Any
+
+from nondum.wheelhouse.signatures import Verifier
+from nondum.wheelhouse.trust import trust_file
+from nondum.wheelhouse.trust.judging import Circumstances, Developing, Judging
+from nondum.wheelhouse.trust.trust import Trust
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """What stands for a host when it is judged for it elsewhere."""
+
+    host: str
+    allow_unsigned: bool
+    trust: str | None = None
+    """Text of the trust file that is in force; None: nobody is trusted."""
+
+    def to_arguments(self) -> dict[str, Any]:
+        """The rules among a job's arguments."""
+        return {"host": self.host, "allow_unsigned": self.allow_unsigned, "trust": self.trust}
+
+    @classmethod
+    def of(cls, arguments: Mapping[str, Any]) -> Rules:
+        """The rules among a job's arguments."""
+        host, trust = arguments.get("host", ""), arguments.get("trust")
+        return cls(host, arguments["allow_unsigned"], trust)
+
+    def verifier(self) -> Verifier:
+        """Who judges by them, now."""
+        at = Circumstances(self.host, datetime.now(UTC))
+        trust = parsed(self.trust) if self.trust is not None else None
+        return Developing(trust, at) if self.allow_unsigned else Judging(trust, at)
+
+
+@lru_cache(maxsize=4)
+def parsed(text: str) -> Trust:
+    """A trust file that was accepted before. Raises `TrustRefused`."""
+    return trust_file.parse(text, trust_file.NAME)
