@@ -1,0 +1,409 @@
+"""Everything of nondum that reads bytes from somebody else, as targets.
+
+Each is read as the host reads it, text from its UTF-8 bytes; seeds are what the project's own
+writers write.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import tempfile
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from packaging.tags import sys_tags
+from tests.fuzz.target import Target
+from tests.payloads import lock_text, make_wheel
+from tests.wheelhouse.hostile_wheels import NAME, WheelBuilder
+
+from nondum.host import config
+from nondum.host.control import protocol as control
+from nondum.planning.claims import claims_of
+from nondum.planning.contribution import Contribution
+from nondum.planning.parse import parse_formula
+from nondum.sdk import wire
+from nondum.sdk.description import Behaviour, Fragment, PluginDescription
+from nondum.sdk.errors import Problem
+from nondum.transport.bridge import packets as bridge
+from nondum.transport.discovery import hint
+from nondum.transport.discovery import packets as discovery
+from nondum.transport.discovery.announcement import Announcement
+from nondum.transport.discovery.hint import Source
+from nondum.transport.peers import certificate, messages, pairing, pairing_messages
+from nondum.transport.peers.identity import Security
+from nondum.transport.peers.keys import PeerKey
+from nondum.wheelhouse import archive, contents, index, lock, manifest, wheel
+from nondum.wheelhouse.contents import Contents, Entry
+from nondum.wheelhouse.trust import sshsig, trust_file
+from nondum.wheelhouse.trust.public_key import PublicKey
+
+PLUGINS = Path(__file__).parents[2] / "plugins"
+SHA256 = "0123456789abcdef" * 4
+WHERE = "fuzzed"
+
+
+def of_text(read: Callable[[str], object]) -> Callable[[bytes], object]:
+    """A reader of text, which is not asked about bytes that are none."""
+
+    def read_bytes(data: bytes) -> object:
+        try:
+            text = data.decode()
+        except UnicodeDecodeError:
+            return None
+        return read(text)
+
+    return read_bytes
+
+
+def _contents() -> list[bytes]:
+    entries = tuple(Entry(SHA256, size, f"wheels/a-{size}.whl") for size in (1, 2, 3))
+    listed = Contents(
+        "org.example.lamp", "1.0", 7, "survey", "0.1.0", "2026-01-01T00:00:00Z", entries
+    )
+    return [listed.to_bytes()]
+
+
+def _public_key() -> PublicKey:
+    point = base64.b64decode("R0UdCfPvbzM/XVCmWYsjLAMTvOZ5YVsjSEzg1q3PxQE=")
+    return PublicKey("ssh-ed25519", point)
+
+
+def _signatures() -> list[bytes]:
+    one = sshsig.armoured(_public_key(), sshsig.PAYLOAD, "sha512", bytes(range(64)))
+    return [one, one + one]
+
+
+def _read_signature(data: bytes) -> object:
+    return [signature.holds(b"contents") for signature in sshsig.parse(data, WHERE)]
+
+
+def _trust_files() -> list[bytes]:
+    key = f"ssh-ed25519 {base64.b64encode(_public_key().blob).decode()}"
+    return [
+        f"""\
+format = "nondum-trust 1"
+owner = "survey"
+version = 3
+made = "2026-08-01T00:00:00Z"
+fleets = ["survey"]
+
+[roots]
+threshold = 1
+[[roots.key]]
+name = "alice"
+key = "{key}"
+
+[[key]]
+name = "acme-release"
+key = "{key}"
+until = "2028-01-01T00:00:00Z"
+
+[[role]]
+name = "acme"
+payloads = ["com.acme"]
+keys = ["acme-release"]
+permissions = ["network"]
+
+[[revoked]]
+fingerprint = "SHA256:{"a" * 43}"
+why = "lost"
+""".encode()
+    ]
+
+
+MANIFEST = b"""\
+id = "org.example.blinker"
+name = "Blinker"
+summary = "Blinks"
+authors = ["A. Author"]
+licence = "Apache-2.0"
+
+[requires]
+python = ">=3.11"
+memory_mb = 50
+
+[[component]]
+id = "blinker"
+distribution = "example-blinker"
+permissions = ["network"]
+settings = { rate_hz = 2, names = ["a", "b"] }
+
+[[component.device]]
+name = "lamp"
+match = { ID_VENDOR_ID = "1a86", SUBSYSTEM = "tty" }
+optional = true
+
+[[component.unit]]
+name = "lamp"
+xyz = [0.1, 0, 0.2]
+rpy = [0, 0, 1.57]
+"""
+TOML = (b"[[", b"]]", b'"""', b"'''", b"1e999", b"inf", b"2026-01-01", b"a.b.c", b"\\u0000", b"= {")
+
+
+def _locks() -> list[bytes]:
+    with tempfile.TemporaryDirectory() as folder:
+        made = [make_wheel(Path(folder), name, "1.0", {f"{name}.py": ""}) for name in ("a", "b")]
+        return [lock_text(made).encode()]
+
+
+def _read_lock(text: str) -> object:
+    return lock.select(lock.parse(text, WHERE), _environment(), tuple(sys_tags()))
+
+
+def _environment() -> Mapping[str, str]:
+    from packaging.markers import default_environment
+
+    return {key: str(value) for key, value in default_environment().items()}
+
+
+def _wheels() -> list[bytes]:
+    plain = WheelBuilder(files={"evil/__init__.py": b"X = 1\n", "evil/data.txt": b"0" * 500})
+    with tempfile.TemporaryDirectory() as folder:
+        scripts = {"evil": {"evil": "evil:main"}}
+        made = make_wheel(Path(folder), "evil", "1.0", {"evil.py": "X=1"}, entry_points=scripts)
+        return [plain.bytes(), made.read_bytes()]
+
+
+def _read_wheel(data: bytes) -> object:
+    """As `verify` and the store read it: laid out, what it needs told, every member unpacked."""
+    view = memoryview(data)
+    layout = wheel.lay_out(view, NAME)
+    if layout.problems:
+        return layout
+    for file in layout.files:
+        try:
+            for _ in archive.unpack(view, file.member):
+                pass
+        except ValueError:  # how a damaged member is told to `wheel`
+            return None
+    return layout.needs.requirements
+
+
+def _described() -> PluginDescription:
+    fragment = Fragment("domain.pddl", DOMAIN.decode())
+    behaviour = Behaviour("point", "(point ?u - pointer ?t - thing)", lasting=True)
+    return PluginDescription("lamp", "1.0", behaviours=(behaviour,), fragments=(fragment,))
+
+
+def _indexes() -> list[bytes]:
+    return [index.to_bytes({"lamp": _described()})]
+
+
+DOMAIN = b"""\
+(define (domain lamp)
+  (:requirements :strips :typing)
+  (:types lamp - pointer)
+  (:constants red - colour)
+  (:predicates (lit ?l - lamp ?c - colour))
+  (:derived (bright ?l - lamp) (exists (?c - colour) (lit ?l ?c)))
+  (:action light
+    :parameters (?l - lamp ?c - colour)
+    :precondition (and (not (lit ?l ?c)) (or (bright ?l) (= ?l ?l)))
+    :effect (and (lit ?l ?c) (forall (?d - colour) (when (lit ?l ?d) (not (lit ?l ?d))))
+                 (increase (total-cost) 3))))
+"""
+PROBLEM = b"""\
+(define (problem p) (:domain d) (:objects a b - lamp) (:init (lit a red)) (:goal (lit b red)))
+"""
+GOAL = b"(and (lit a red) (not (lit b red)))"
+PDDL = (b"(and", b"(or", b"(not", b"(forall (?x - t)", b"(exists (?x)", b"(when", b"(either a b)")
+
+
+def _read_fragment(text: str) -> object:
+    """Parsed, and then checked as one component's claim."""
+    said = Contribution("lamp", "spot", "lamp", "1.0", fragments=(Fragment(WHERE, text),))
+    return claims_of.__wrapped__(said)
+
+
+def _frames() -> list[bytes]:
+    body = {"a": 1, "b": [1.5, "x", None, True], "c": {"d": b"\0"}}
+    said = (
+        wire.Hello((1, 2), "0.1", 7),
+        wire.Welcome(1, body),
+        wire.Request(3, "behave", body),
+        wire.Reply(3, body),
+        wire.Failure(3, (Problem("CODE", "message", "where", "need", "have", "fix"),)),
+        wire.Event("progress", 3, body),
+        wire.Cancel(3),
+    )
+    return [wire.encode(each) for each in said]
+
+
+MSGPACK = (b"\xc1", b"\xdf\xff\xff\xff\xff", b"\xdd\xff\xff\xff\xff", b"\x81\xa1a", b"\x91" * 40)
+"""A byte that is none, lying lengths, a table, nesting."""
+
+
+def _peer_messages() -> list[bytes]:
+    hello = messages.Hello((1,), "rover", "k" * 40, 5, 1, b"")
+    body = {"a": [1, 2.5, "x"], "b": {"c": None}}
+    problem = Problem("CODE", "message")
+    said = (
+        hello,
+        messages.Welcome(hello),
+        messages.Refused(problem),
+        messages.Request(2, 1, 1000, "behave", body),
+        messages.Reply(1, body),
+        messages.Failure(1, (problem,)),
+        messages.Progress(1, body),
+        messages.Cancel(1),
+        messages.Notice("changed", body),
+        messages.Ping(3),
+        messages.Pong(3),
+        messages.Bye("stopped"),
+    )
+    return [messages.encode(each) for each in said]
+
+
+def _pairing_messages() -> list[bytes]:
+    commit = pairing.Commit(KEY, "rover", bytes(pairing_messages.HASH_BYTES))
+    said = (
+        pairing.Ask(KEY, "rover"),
+        commit,
+        pairing_messages.Beat(),
+        pairing_messages.Ended(pairing_messages.Ending.BUSY),
+    )
+    return [pairing_messages.encode(each) for each in said]
+
+
+KEY = PeerKey("rq:rM>}U?@Lns47E1%kR.o@n%FcmmsL/@{H8]yf7")
+
+
+def _certificates() -> list[bytes]:
+    _, secret = certificate.new_fleet()
+    begin, end = datetime(2026, 1, 1, tzinfo=UTC), datetime(2027, 1, 1, tzinfo=UTC)
+    made = certificate.issue(secret, "rover", KEY, not_before=begin, not_after=end)
+    return [made.to_bytes()]
+
+
+def _announcement() -> Announcement:
+    return Announcement(KEY, "rover", 7, ("tcp://0.0.0.0:7410",), pairing_port=7411)
+
+
+def _answers() -> list[bytes]:
+    return [discovery.answer(bytes(discovery.NONCE), _announcement())]
+
+
+def _read_datagram(data: bytes) -> object:
+    """Asked, answered, and what is answered judged as a hint."""
+    discovery.nonce_of(data)
+    told = discovery.read_answer(data)
+    return _hint(told.txt, told.port)
+
+
+def _txts() -> list[bytes]:
+    return [json.dumps(hint.to_txt(_announcement())).encode()]
+
+
+def _read_txt(text: str) -> object:
+    """The fields of a DNS-SD record; JSON stands for what zeroconf has taken apart."""
+    try:
+        txt: Any = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(txt, dict) or any(type(value) is not str for value in txt.values()):
+        return None
+    return _hint(txt, 7410)
+
+
+def _hint(txt: Mapping[str, str], port: int) -> object:
+    hosts = ("192.0.2.1", "fe80::1%eth0")
+    return hint.from_txt(txt, port, hosts, source=Source.MULTICAST, security=Security.CURVE)
+
+
+def _asked() -> list[bytes]:
+    claims = (bridge.Claim(1, "token"), bridge.Handled(3), bridge.Ping(1.5))
+    return [bridge.asked(claim) for claim in claims]
+
+
+def _told() -> list[bytes]:
+    over = bridge.Over(Problem("CODE", "message"))
+    frame = bridge.Frame(3, bridge.Coding.RAW, {"t": 1.0}, b"bulk")
+    return [
+        bridge.head(frame),
+        bridge.told(bridge.Opened("image")),
+        bridge.told(bridge.Pong(1.0, 2.0)),
+        bridge.told(over),
+    ]
+
+
+def _requests() -> list[bytes]:
+    return [control.encode_request(control.Request("goal", {"words": "follow me"}))]
+
+
+CONFIG = b"""\
+[host]
+name = "rover"
+state = "/var/lib/nondum"
+
+[drives]
+slots = ["/run/slots"]
+allow_unsigned = false
+
+[workers]
+memory_mb = 512
+
+[peers]
+listen = ["tcp://*:7410"]
+"""
+
+JSON = (b"null", b"[[", b"{}", b"1e999")
+
+
+def _read_config(text: str) -> object:
+    return config.parse(text, WHERE, config.user_config())
+
+
+TARGETS = (
+    Target(
+        "signature",
+        _read_signature,
+        _signatures,
+        (sshsig.BEGIN.encode(), sshsig.END.encode(), b"U1NIU0lH", b"\n"),
+        cases=1_000_000,
+    ),
+    Target("trust file", of_text(lambda t: trust_file.parse(t, WHERE)), _trust_files, TOML),
+    Target(
+        "contents list",
+        lambda data: contents.parse(data, WHERE),
+        _contents,
+        (b"release: ", b"../", b"\n\n", b"  ", SHA256.encode()),
+        cases=1_000_000,
+    ),
+    Target("manifest", of_text(lambda t: manifest.parse(t, WHERE)), lambda: [MANIFEST], TOML),
+    Target("lock", of_text(_read_lock), _locks, (*TOML, b"hashes", b"vcs", b"archive", b"url")),
+    Target(
+        "wheel",
+        _read_wheel,
+        _wheels,
+        (b"PK\x01\x02", b"PK\x03\x04", b"PK\x05\x06", b"PK\x06\x06", b"\xff\xff\xff\xff"),
+    ),
+    Target(
+        "index", lambda data: index.parse(data, WHERE), _indexes, (b"null", b"[[", b"{}", b"1e999")
+    ),
+    Target("fragment", of_text(_read_fragment), lambda: [DOMAIN, PROBLEM], PDDL),
+    Target(
+        "goal",
+        of_text(lambda t: parse_formula(t, WHERE)),
+        lambda: [GOAL],
+        PDDL,
+    ),
+    Target("worker frame", wire.decode, _frames, MSGPACK, cases=1_000_000),
+    Target("peer message", messages.decode, _peer_messages, MSGPACK),
+    Target("pairing message", pairing_messages.decode, _pairing_messages, MSGPACK),
+    Target("certificate", certificate.parse, _certificates, (b": ", b"\n", b"+0000")),
+    Target("datagram", _read_datagram, _answers, MSGPACK),
+    Target("TXT record", of_text(_read_txt), _txts, (b'"pk"', b'"proto"', b'"epoch"', b",")),
+    Target("stream, asked", bridge.read_asked, _asked, MSGPACK),
+    Target("stream, told", lambda data: bridge.read_told([data]), _told, MSGPACK),
+    Target("control request", control.decode_request, _requests, JSON),
+    Target(
+        "configuration",
+        of_text(_read_config),
+        lambda: [CONFIG],
+        TOML,
+    ),
+)
