@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from nondum.host.catalogue.records import Snapshot
 from nondum.host.events import (
+    DriveFlapping,
     DriveRead,
     DriveUnreadable,
     Event,
@@ -20,6 +21,7 @@ from nondum.host.events import (
     PeerTurnedAway,
     PlaceLost,
     PlaceMissing,
+    WorkerStrained,
 )
 from nondum.sdk.errors import Problem
 
@@ -47,6 +49,10 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
         case PayloadTaken():
             name = _name(event.payload, snapshot)
             return f"{name} runs here for {event.host}, not there: {event.why}"
+        case DriveFlapping():
+            return _joined(event.problems)
+        case WorkerStrained():
+            return _joined(event.problems)
         case DriveUnreadable():
             return f"drive {event.drive} cannot be used: {_joined(event.problems)}"
         case PeerJoined():

@@ -78,6 +78,28 @@ class DriveInserted(Event):
     """The block device to mount at `root`; None: `root` is readable as it is."""
     filesystem: str = ""
     """File system of `node`, as udev names it."""
+    problems: tuple[Problem, ...] = ()
+    """What keeps it from being read at all."""
+    port: str = ""
+    """Where it is plugged in, as far as that is known: whatever comes there next has the same."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveQueued(Event):
+    """A drive waits until others have been looked through."""
+
+    JOURNALLED: ClassVar[bool] = False
+    drive: str
+    ahead: int
+    """How many come before it; 0: its turn has come."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveFlapping(Event):
+    """Something comes and goes in a port, so that it is not read before it has stayed a while."""
+
+    drive: str
+    problems: tuple[Problem, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,6 +249,43 @@ class PayloadSentAway(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class BesideRefused(Event):
+    """A release cannot run beside the one in force, which has to stop first."""
+
+    payload: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadSuperseded(Event):
+    """Another release of the payload is in force, or on its way there; this one waits beside it."""
+
+    payload: str
+    by: str
+    """Key of the other one."""
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadResumed(Event):
+    """A release that waited beside another one is wanted: it is brought up (again)."""
+
+    payload: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class RollbackAsked(Event):
+    """A person asked that an earlier release of a payload be in force, this once: rollback
+    protection lets it pass until it is unplugged or a newer one comes."""
+
+    payload: str
+    """Key of the earlier release."""
+    release: int
+    from_release: int
+
+
+@dataclass(frozen=True, slots=True)
 class PayloadPlaced(Event):
     """A payload that does not run here runs on a peer now."""
 
@@ -305,8 +364,24 @@ class HostStarted(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class HostStopped(Event):
+    """The daemon was told to end, and did."""
+
+    host: str
+
+
+@dataclass(frozen=True, slots=True)
+class HostSteady(Event):
+    """The daemon has lived for a while beside what others may have died of."""
+
+    JOURNALLED: ClassVar[bool] = False
+
+    host: str
+
+
+@dataclass(frozen=True, slots=True)
 class CatalogueSetAside(Event):
-    """The catalogue's file was damaged: it was kept under another name and a new one begun."""
+    """The catalogue's file was damaged or gone: a backup, or a new one, took its place."""
 
     host: str
     problems: tuple[Problem, ...]
@@ -348,6 +423,8 @@ class WorkerReady(Event):
 
     component: str
     description: PluginDescription
+    payload: str = ""
+    """Key of the payload whose worker it is: two releases may run side by side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -356,11 +433,21 @@ class WorkerExited(Event):
 
     component: str
     reason: str
+    payload: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerFailed(Event):
     """A worker will not be started again: it is quarantined."""
+
+    component: str
+    problems: tuple[Problem, ...]
+    payload: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerStrained(Event):
+    """A worker uses nearly all that it may, or spins; it goes on. Told again only after a calm."""
 
     component: str
     problems: tuple[Problem, ...]

@@ -85,6 +85,10 @@ class Tree(Protocol):
         """Remove an empty cage; answer whether it is gone."""
         ...
 
+    def pids(self, name: str) -> tuple[int, ...]:
+        """The processes in it; none once it is gone."""
+        ...
+
     def usage(self, name: str) -> Usage:
         """What it uses; all zeros once it is gone."""
         ...

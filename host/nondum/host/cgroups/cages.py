@@ -53,6 +53,10 @@ class Cage:
                 with contextlib.suppress(ProcessLookupError):
                     self._tree.add(self.name, child)
 
+    def pids(self) -> tuple[int, ...]:
+        """The processes in it."""
+        return self._tree.pids(self.name)
+
     def usage(self) -> Usage:
         """What it uses; all zeros once it is removed."""
         return self._tree.usage(self.name)
@@ -151,6 +155,10 @@ class NoTree:
     def remove(self, name: str) -> bool:
         """Nothing is left of it."""
         return True
+
+    def pids(self, name: str) -> tuple[int, ...]:
+        """None are known."""
+        return ()
 
     def usage(self, name: str) -> Usage:
         """Nothing is known."""

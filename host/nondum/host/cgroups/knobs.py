@@ -38,6 +38,11 @@ def words(file: Path) -> frozenset[str]:
         return frozenset()
 
 
+def pids(folder: Path) -> tuple[int, ...]:
+    """The processes in a cgroup; none once it is gone."""
+    return tuple(sorted(int(pid) for pid in words(folder / "cgroup.procs")))
+
+
 def inside(folder: Path) -> tuple[str, ...]:
     """The names of the cgroups in one."""
     try:
@@ -59,14 +64,14 @@ def put(file: Path, value: str | int) -> None:
 def kill_all(folder: Path, state: Path, stop: str, go: str) -> None:
     """Stop a cgroup by its freezer, SIGKILL everybody in it, and let them go to their end."""
     for _ in range(ROUNDS):
-        pids = words(folder / "cgroup.procs")
-        if not pids:
+        held = pids(folder)
+        if not held:
             return
         with contextlib.suppress(OSError):  # without a freezer it is a race, and mostly won
             put(state, stop)
-        for pid in pids:
+        for pid in held:
             with contextlib.suppress(ProcessLookupError):
-                os.kill(int(pid), signal.SIGKILL)
+                os.kill(pid, signal.SIGKILL)
         with contextlib.suppress(OSError):
             put(state, go)
 

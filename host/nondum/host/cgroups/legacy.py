@@ -67,6 +67,10 @@ class Legacy:
         """Remove an empty cage."""
         return all([knobs.remove(folder) for folder in self._folders(name)])
 
+    def pids(self, name: str) -> tuple[int, ...]:
+        """The processes in it."""
+        return knobs.pids(self._folders(name)[0])
+
     def usage(self, name: str) -> Usage:
         """What it uses."""
         return Usage(

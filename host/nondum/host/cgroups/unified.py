@@ -84,6 +84,10 @@ class Unified:
         """Remove an empty cage."""
         return knobs.remove(self._base / name)
 
+    def pids(self, name: str) -> tuple[int, ...]:
+        """The processes in it."""
+        return knobs.pids(self._base / name)
+
     def usage(self, name: str) -> Usage:
         """What it uses."""
         folder = self._base / name

@@ -48,10 +48,14 @@ class Timing:
     """Between two signs of life."""
     missed: int = 3
     """Heartbeats in a row that may be missed before the worker counts as hung."""
+    settle_beats: int = 2
+    """Heartbeats that a release is watched for before it takes over from another one."""
     halt_s: float = 2.0
     """From asking a behaviour to halt until its worker is ended for not obeying."""
     term_s: float = 0.5
     """From SIGTERM to SIGKILL."""
+    look_s: float = 2.0
+    """Between two looks at what a worker uses."""
 
     @property
     def silence_s(self) -> float:

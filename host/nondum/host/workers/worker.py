@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from nondum.host.events import BehaviourProgressed, Event, WorkerLogged
+from nondum.host.cgroups import Usage
+from nondum.host.events import BehaviourProgressed, Event, StreamFlowing, WorkerLogged
 from nondum.host.printable import printable
-from nondum.host.workers import problems
+from nondum.host.workers import problems, scratch
 from nondum.host.workers.call import Call
+from nondum.host.workers.excess import Reading, Watch
+from nondum.host.workers.gauge import Gauge
 from nondum.host.workers.index import mismatches
 from nondum.host.workers.launcher import Launcher
 from nondum.host.workers.leftovers import end_leftovers
@@ -39,6 +43,8 @@ class Worker:
         self.claims = Claims()
         """What it says is so."""
         self._streams: frozenset[str] = frozenset()
+        self._beats = 0
+        self._beaten = asyncio.Event()
         self._loop = asyncio.get_running_loop()
         self._calls: dict[int, Call] = {}
         self._tail: deque[str] = deque(maxlen=TAIL_LINES)
@@ -46,6 +52,7 @@ class Worker:
         self._watchdog: asyncio.TimerHandle | None = None
         self.gone: asyncio.Future[Problem] = self._loop.create_future()
         """Why the worker ended, once nothing of it is left."""
+        self._watch = Watch(spec.component, spec.limits)
         ours, theirs = link_sockets()
         try:
             with theirs:
@@ -53,6 +60,7 @@ class Worker:
         except WorkerFailed:
             ours.close()
             raise
+        self._gauge = Gauge(self._process.pid, self._process.cage)
         self._outputs = [
             Output(source, pipe, self._on_line)
             for source, pipe in zip(("stdout", "stderr"), self._process.outputs, strict=True)
@@ -81,6 +89,16 @@ class Worker:
         await self.link.request("start", {})
         self._beat()
 
+    async def look(self) -> tuple[Problem, ...]:
+        """Look at what it uses: end it when that is too much, tell what is nearly."""
+        reading = await self._reading()
+        if self._ending is not None:
+            return ()
+        excess = self._watch.see(reading)
+        if excess.end is not None:
+            self.end(excess.end)
+        return excess.strains
+
     async def behave(self, call: Call, values: Sequence[Any]) -> None:
         """Run a behaviour to its end, which the call is told."""
         body = {"behaviour": call.behaviour, "arguments": call.arguments, "values": values}
@@ -95,6 +113,15 @@ class Worker:
             call.end(*await self._outcome(pending, call))
         finally:
             del self._calls[pending.id]
+
+    async def heard(self, beats: int) -> None:
+        """Wait for so many more signs of life; those who hang or end are ended, see `gone`."""
+        wanted = self._beats + beats
+        while self._beats < wanted and not self.gone.done():
+            self._beaten.clear()
+            beaten = asyncio.ensure_future(self._beaten.wait())
+            await asyncio.wait([beaten, self.gone], return_when=asyncio.FIRST_COMPLETED)
+            beaten.cancel()
 
     async def stop(self, grace_s: float, problem: Problem) -> None:
         """Have the plugin leave everything safe, then end the process, all within `grace_s`."""
@@ -121,19 +148,43 @@ class Worker:
         self.link.close()
         if is_exited:
             self._close_outputs()
-        await asyncio.to_thread(end_leftovers, self.spec.scratch)
+        await asyncio.to_thread(self._clear_away, problem)
         self._close_outputs()
         self.gone.set_result(problem)
+
+    def _clear_away(self, problem: Problem) -> None:
+        """End what the process has started. Blocks."""
+        if self._process.cage is not None:
+            self._process.cage.end()
+        end_leftovers(self.spec.scratch)
+        if problem.code == problems.SCRATCH_FULL:  # the next worker is to have room, and the host
+            scratch.empty(self.spec.scratch)
 
     async def _end_by_itself(self) -> None:
         """Its link or process has ended: the other one will, or is ended."""
         await self._process.wait(self._timing.term_s)
         if self._process.exited.done():
             self._close_outputs()
-            status = self._process.exited.result()
-            await self._end(problems.exited(self.spec.component, status, self._tail), 0.0)
+            await self._end(self._why_exited(self._process.exited.result()), 0.0)
         else:
             await self._end(problems.hung_up(self.spec.component), 0.0)
+
+    async def _reading(self) -> Reading:
+        pids, folder = self._gauge.pids(), self.spec.scratch
+        is_flowing = any(isinstance(claim, StreamFlowing) for claim in self.claims)
+        return Reading(
+            at_s=time.monotonic(),
+            usage=self._gauge.usage(),
+            descriptors=self._gauge.descriptors(),
+            scratch_bytes=await asyncio.to_thread(scratch.used_bytes, folder, pids),
+            is_asked=bool(self._calls) or is_flowing,
+        )
+
+    def _why_exited(self, status: int) -> Problem:
+        cage, said = self._process.cage, tuple(self._tail)
+        usage = cage.usage() if cage is not None else Usage()
+        exhausted = problems.exhausted(self.spec.component, self.spec.limits, usage, status, said)
+        return exhausted or problems.exited(self.spec.component, status, said)
 
     def _close_outputs(self) -> None:
         for output in self._outputs:
@@ -176,7 +227,8 @@ class Worker:
         call = self._calls.get(call_id) if call_id is not None else None
         match name:
             case "heartbeat" | "pong":
-                pass
+                self._beats += 1
+                self._beaten.set()
             case "established":
                 if call is not None:  # it may come from a thread whose call has just ended
                     call.establish()

@@ -1,0 +1,102 @@
+"""What of a worker's use is too much: told to people, or the end of the worker. Pure; readings and
+times are given.
+
+Limits that the kernel keeps (cgroups, setrlimit(2)) hold whatever is found here; this says which
+limit it was, and ends workers that beat against one instead of working.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from nondum.host.cgroups import Usage
+from nondum.host.workers import problems
+from nondum.host.workers.spec import Limits
+from nondum.sdk.errors import Problem
+
+REFUSALS = 1000
+"""Processes and threads refused between two readings: it forks for its life."""
+NEARLY = 0.9
+"""Part of a limit at which people are told."""
+SPIN_S = 10.0
+"""How long a worker that nobody asks anything may keep a processor busy."""
+SPARED = 3
+"""Descriptors below the limit at which there are none left to work with."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What a worker uses at one moment."""
+
+    at_s: float
+    usage: Usage
+    descriptors: int = 0
+    """Most of any one of its processes."""
+    scratch_bytes: int = 0
+    is_asked: bool = False
+    """Whether a behaviour of its runs or a stream of its flows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Excess:
+    """What is too much, by the code it is told with."""
+
+    strains: tuple[Problem, ...] = ()
+    """To be told; the worker goes on."""
+    end: Problem | None = None
+    """Why the worker is to be ended."""
+
+
+@dataclass(slots=True)
+class Watch:
+    """One worker's readings, and what was told of it already."""
+
+    component: str
+    limits: Limits
+    _last: Reading | None = None
+    _busy_since_s: float | None = None
+    _told: set[str] = field(default_factory=set)
+
+    def see(self, now: Reading) -> Excess:
+        """Judge one more reading. A strain is told once, and again after it has passed."""
+        last, self._last = self._last, now
+        if last is None:
+            return Excess()
+        if (end := self._end(last, now)) is not None:
+            return Excess(end=end)
+        strains = {problem.code: problem for problem in self._strains(last, now)}
+        fresh = tuple(p for code, p in strains.items() if code not in self._told)
+        self._told = set(strains)
+        return Excess(fresh)
+
+    def _end(self, last: Reading, now: Reading) -> Problem | None:
+        if now.usage.oom_kills > last.usage.oom_kills:
+            return problems.out_of_memory(self.component, self.limits.memory_mb)
+        if now.usage.refused_tasks - last.usage.refused_tasks >= REFUSALS:
+            return problems.too_many_tasks(self.component, self.limits.tasks)
+        full = self.limits.descriptors - SPARED
+        if now.descriptors >= full and last.descriptors >= full:
+            return problems.too_many_descriptors(self.component, self.limits.descriptors)
+        if now.scratch_bytes > self.limits.scratch_mb * problems.MEGABYTE:
+            return problems.scratch_full(self.component, self.limits.scratch_mb)
+        return None
+
+    def _strains(self, last: Reading, now: Reading) -> Iterator[Problem]:
+        if now.usage.refused_tasks > last.usage.refused_tasks:
+            yield problems.too_many_tasks(self.component, self.limits.tasks)
+        if now.descriptors >= self.limits.descriptors * NEARLY:
+            yield problems.too_many_descriptors(self.component, self.limits.descriptors)
+        if now.scratch_bytes >= self.limits.scratch_mb * problems.MEGABYTE * NEARLY:
+            yield problems.scratch_full(self.component, self.limits.scratch_mb)
+        if self._is_spinning(last, now):
+            yield problems.spinning(self.component, SPIN_S)
+
+    def _is_spinning(self, last: Reading, now: Reading) -> bool:
+        available = min(1.0, self.limits.processors or 1.0)
+        used = (now.usage.cpu_s - last.usage.cpu_s) / max(now.at_s - last.at_s, 1e-9)
+        if now.is_asked or used < available * NEARLY:
+            self._busy_since_s = None
+        elif self._busy_since_s is None:
+            self._busy_since_s = last.at_s
+        return self._busy_since_s is not None and now.at_s - self._busy_since_s >= SPIN_S

@@ -1,0 +1,48 @@
+"""What a worker uses now, as its cage and proc(5) tell."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from nondum.host.cgroups import Cage, Usage
+
+TICKS_HZ = os.sysconf("SC_CLK_TCK")
+
+
+class Gauge:
+    """One worker's: of all its processes, where a cage holds them."""
+
+    def __init__(self, pid: int, cage: Cage | None) -> None:
+        self._pid, self._cage = pid, cage
+
+    def pids(self) -> tuple[int, ...]:
+        """Its processes, as far as they are known."""
+        held = self._cage.pids() if self._cage is not None else ()
+        return held or (self._pid,)
+
+    def usage(self) -> Usage:
+        """What it uses; without a cage, the processor time of its first process only."""
+        if self._cage is not None and self._cage.pids():
+            return self._cage.usage()
+        return Usage(cpu_s=_cpu_s(self._pid))
+
+    def descriptors(self) -> int:
+        """Open files of that process of its which has most."""
+        return max((count for pid in self.pids() for count in _open_files(pid)), default=0)
+
+
+def _open_files(pid: int) -> Iterator[int]:
+    with contextlib.suppress(OSError):  # it has ended, or may not be looked at
+        yield sum(1 for _ in Path(f"/proc/{pid}/fd").iterdir())
+
+
+def _cpu_s(pid: int) -> float:
+    try:
+        line = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return 0.0
+    fields = line.rpartition(")")[2].split()  # the name may hold anything
+    return (int(fields[11]) + int(fields[12])) / TICKS_HZ
