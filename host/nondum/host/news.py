@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from nondum.host.events import Event, ProgressMade
+from nondum.host.events import DriveQueued, Event, ProgressMade
 
 PROGRESS_S = 0.1
 """Progress within one phase is told no more often: a view costs more than a step of copying."""
@@ -48,19 +48,28 @@ class News:
         self._next = asyncio.Event()
         self._progress: dict[str, Progress] = {}
         self._progress_told_s = float("-inf")
+        self._ahead: dict[str, int] = {}
 
     def on_event(self, event: Event) -> None:
         """Take in what has happened. A step that a payload comes to ends its progress."""
         if isinstance(event, ProgressMade):
             self._on_progress(event)
+        elif isinstance(event, DriveQueued):
+            self._ahead[event.drive] = event.ahead
+            self._tell()
         elif event.JOURNALLED:
             payload = getattr(event, "payload", None)  # of those events that are about one
             self._progress.pop(str(payload), None)
+            self._ahead.pop(str(getattr(event, "drive", None)), None)
             self._tell()
 
     def progress(self, payload: str) -> Progress | None:
         """How far the payload of that key is within its step, where that is known."""
         return self._progress.get(payload)
+
+    def ahead(self, drive: str) -> int:
+        """How many drives are looked through before that one."""
+        return self._ahead.get(drive, 0)
 
     async def changed(self, since: int) -> int:
         """Wait until `version` is not `since`, and give it."""

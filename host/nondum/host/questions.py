@@ -64,7 +64,7 @@ class Questions:
                 payload_row(p, self.news.progress(p.key), places.get(p.key, ""))
                 for p in snapshot.payloads
             ],
-            "drives": [drive_row(drive) for drive in snapshot.drives],
+            "drives": [drive_row(d, self.news.ahead(d.id)) for d in snapshot.drives],
             "peers": [{"peer": p.name, "address": p.address} for p in snapshot.peers],
             "goals": self.mind.views.given(),
             "told": self.mind.views.told(self.mind.people.last_number - TOLD),

@@ -67,12 +67,13 @@ def payload_row(payload: PayloadRecord, progress: Progress | None, place: str = 
     }
 
 
-def drive_row(drive: DriveRecord) -> Row:
-    """A drive that is in."""
+def drive_row(drive: DriveRecord, ahead: int = 0) -> Row:
+    """A drive that is in; `queued` as long as others are looked through `ahead` of it."""
     return {
         "drive": drive.id,
         "kind": drive.kind,
-        "state": drive.state.value,
+        "state": "queued" if ahead else drive.state.value,
+        "ahead": ahead,
         "problems": [str(problem) for problem in drive.problems],
     }
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import errno
+import hashlib
 import os
+import struct
 import subprocess
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -11,15 +14,17 @@ from pathlib import Path
 
 import pytest
 import pyudev
+from tests.host.drives.test_usb import stick
 from tests.host.lifecycle.living import LAMP, Living, left_over, living
 from tests.payloads import Part, make_payload, make_wheel
 
+from nondum.host import events
 from nondum.host.catalogue.records import DriveState, Step
-from nondum.host.drives import filesystems, mounting
-from nondum.host.drives.blocks import BlockSource
+from nondum.host.drives import filesystems, mounting, nodes
+from nondum.host.drives.blocks import Accepts, BlockSource
 from nondum.host.drives.source import DriveSource
 from nondum.host.lifecycle.folders import Folders
-from nondum.sdk.errors import PayloadRefused
+from nondum.sdk.errors import DriveGone, PayloadRefused
 
 LAMP_ID = "org.example.lamp"
 
@@ -32,24 +37,40 @@ pytestmark = [
 ]
 
 
-def image(tmp_path: Path, *parts: Part, size_mb: int = 24) -> Path:
-    """An ext4 image of a drive with one payload."""
-    make_payload(tmp_path / "content", *parts, payload_id=LAMP_ID)
+def image(
+    tmp_path: Path,
+    *parts: Part,
+    size_mb: int = 24,
+    payload_id: str = LAMP_ID,
+    spoilt: bool = False,
+) -> Path:
+    """An ext4 image of a drive with one payload; `spoilt`: a file changed since it was listed."""
+    folder = make_payload(tmp_path / "content", *parts, payload_id=payload_id)
+    if spoilt:
+        with (folder / "index.json").open("ab") as index:
+            index.write(b" ")
     file = tmp_path / "drive.img"
-    with file.open("wb") as out:
-        out.truncate(size_mb * 1024**2)
-    _run("mkfs.ext4", "-q", "-d", str(tmp_path / "content"), str(file))
+    make_ext4(tmp_path / "content", file, size_mb)
     return file
 
 
+def make_ext4(content: Path, file: Path, size_mb: int = 24) -> None:
+    """A file system of a folder's files."""
+    with file.open("wb") as out:
+        out.truncate(size_mb * 1024**2)
+    _run("mkfs.ext4", "-q", "-d", str(content), str(file))
+
+
 @contextmanager
-def attached(file: Path) -> Iterator[Path]:
+def attached(file: Path, *options: str) -> Iterator[Path]:
     """A loop device on an image."""
-    node = _run("losetup", "--find", "--show", str(file)).strip()
+    node = _run("losetup", "--find", "--show", *options, str(file)).strip()
     try:
         yield Path(node)
     finally:
         subprocess.run(["losetup", "--detach", node], check=False, capture_output=True)
+        # A stick that is pulled takes along that it was read-only; a loop device is used again.
+        _run("blockdev", "--setrw", node)
 
 
 def cut_off(file: Path) -> None:
@@ -62,14 +83,19 @@ def detach(node: Path) -> None:
     _run("losetup", "--detach", str(node))
 
 
-def sources(tmp_path: Path) -> Sequence[DriveSource]:
+def on(tmp_path: Path) -> Accepts:
     """Loop devices on this test's images, and no other block device of the machine."""
 
     def accepts(device: pyudev.Device) -> bool:
-        backing = Path(device.sys_path) / "loop/backing_file"
-        return backing.exists() and backing.read_text().startswith(str(tmp_path))
+        disk = Path(device.sys_path)
+        backing = (disk.parent if device.device_type == "partition" else disk) / "loop/backing_file"
+        return backing.exists() and backing.read_text().startswith(f"{tmp_path}/")
 
-    return [BlockSource(tmp_path / "state/mounts", accepts=accepts)]
+    return accepts
+
+
+def sources(tmp_path: Path) -> Sequence[DriveSource]:
+    return [BlockSource(tmp_path / "state/mounts", accepts=on(tmp_path))]
 
 
 async def until_drive_is(host: Living, state: DriveState) -> None:
@@ -159,6 +185,145 @@ def test_wrong_file_system_is_told(tmp_path: Path) -> None:
         mounting.mount(node, tmp_path / "mount", "exfat")
     assert refused.value.code == "FS_ERROR"
     assert not (tmp_path / "mount").exists()
+
+
+def attribute(node: Path, name: str) -> int:
+    """What sysfs says of a block device."""
+    return int(Path(f"/sys/block/{node.name}/{name}").read_text())
+
+
+def digest(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def dirty(tmp_path: Path) -> Path:
+    """An image as a stick has it that was pulled while it was written to: its journal is full."""
+    clean, folder, file = image(tmp_path, Part("lamp", LAMP)), tmp_path / "rw", tmp_path / "dirty"
+    folder.mkdir()
+    _run("mount", "-o", "loop", str(clean), str(folder))
+    try:
+        (folder / "letter").write_text("dear robot")
+        _run("sync", "-f", str(folder))
+        (folder / "letter").write_text("never finished")
+        _run("sync", "-f", str(folder))
+        file.write_bytes(clean.read_bytes())
+    finally:
+        _run("umount", str(folder))
+    assert "needs_recovery" in _run("dumpe2fs", "-h", str(file))
+    return file
+
+
+async def test_nothing_is_written_to_a_drive(tmp_path: Path) -> None:
+    file = dirty(tmp_path)
+    before = digest(file)
+    async with living(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
+        with attached(file) as node:
+            await host.until_step(LAMP_ID, Step.ACTIVE)
+            await until_drive_is(host, DriveState.IDLE)
+            _run("sync")
+            assert digest(file) == before
+            assert attribute(node, "ro") == 1
+            with pytest.raises(OSError), node.open("r+b", buffering=0) as device:
+                device.write(bytes(512))
+
+
+async def test_drive_that_came_in_place_of_another_is_not_taken_for_it(tmp_path: Path) -> None:
+    """What is mounted is what was announced: a node's name is no identity."""
+    with attached(image(tmp_path, Part("lamp", LAMP))) as node:
+        number = attribute(node, "diskseq")
+        with nodes.held(node, nodes.drive_name(node.name, number)) as source:
+            assert source.resolve() == node
+        with pytest.raises(DriveGone) as gone, nodes.held(node, f"{node.name}-{number - 1}"):
+            raise AssertionError("another drive was taken for it")
+        assert gone.value.code == "DRIVE_GONE"
+        with pytest.raises(DriveGone):
+            mounting.mount(node, tmp_path / "mount", "ext4", drive=f"{node.name}-1")
+        assert not (tmp_path / "mount").exists()
+
+
+async def test_next_stick_in_the_same_node_is_another_drive(tmp_path: Path) -> None:
+    first, second = tmp_path / "first", tmp_path / "second"
+    other = image(second, Part("other", LAMP), payload_id="org.example.other")
+    async with living(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
+        with attached(image(first, Part("lamp", LAMP))) as node:
+            await host.until_step(LAMP_ID, Step.ACTIVE)
+            (before,) = (drive.id for drive in host.snapshot.drives)
+            detach(node)
+            await asyncio.to_thread(_run, "losetup", str(node), str(other))
+            await host.until_step("org.example.other", Step.ACTIVE)
+            await host.until_gone(LAMP_ID)
+            (after,) = (drive.id for drive in host.snapshot.drives)
+            assert before.split("-")[0] == after.split("-")[0] == node.name
+            assert before != after
+
+
+async def test_drive_without_payloads_is_let_go_unread(tmp_path: Path) -> None:
+    content = tmp_path / "content"
+    (content / "holiday").mkdir(parents=True)
+    (content / "holiday/beach.jpg").write_bytes(b"sand")
+    file = tmp_path / "drive.img"
+    make_ext4(content, file)
+    async with living(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
+        with attached(file):
+            await until_drive_is(host, DriveState.IDLE)
+            (drive,) = host.snapshot.drives
+            assert [problem.code for problem in drive.problems] == ["DRIVE_NOT_PAYLOAD"]
+            await host.until(lambda: not mounting.mounted_below(host.folders.mounts))
+
+
+def partitioned(tmp_path: Path, *images: Path) -> Path:
+    """A disk with one Linux partition for each image, by a partition table of the old kind."""
+    disk, start, entries = tmp_path / "disk.img", 2048, b""
+    with disk.open("wb") as out:
+        for file in images:
+            sectors = file.stat().st_size // 512
+            entries += struct.pack("<8B2I", 0, 0, 0, 0, 0x83, 0, 0, 0, start, sectors)
+            out.seek(start * 512)
+            out.write(file.read_bytes())
+            start += sectors
+        out.seek(446)
+        out.write(entries.ljust(64, b"\0") + b"\x55\xaa")
+    return disk
+
+
+async def test_each_partition_is_judged_alone(tmp_path: Path) -> None:
+    good = image(tmp_path / "good", Part("lamp", LAMP))
+    bad = image(tmp_path / "bad", Part("worse", LAMP), payload_id="org.example.worse", spoilt=True)
+    disk = partitioned(tmp_path, good, bad)
+    async with living(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
+        with attached(disk, "--partscan"):
+            await host.until_step(LAMP_ID, Step.ACTIVE)
+            record = await host.until_step("org.example.worse", Step.REFUSED)
+            assert [problem.code for problem in record.problems] == ["HASH_MISMATCH"]
+            names = sorted(drive.id for drive in host.snapshot.drives)
+            assert [name.split("-")[0][-2:] for name in names] == ["p1", "p2"]
+
+
+async def test_composite_stick_is_refused_unread(tmp_path: Path) -> None:
+    """The loop device hangs, in a sysfs of the test's own, on a stick that is a keyboard too."""
+    file = image(tmp_path, Part("lamp", LAMP))
+    with attached(file) as node:
+        sysfs = tmp_path / "sys"
+        place = sysfs / "devices/virtual/block"
+        place.mkdir(parents=True)
+        (place / node.name).symlink_to(stick(sysfs, "08", "03"))
+
+        def composite(folders: Folders) -> Sequence[DriveSource]:
+            return [BlockSource(folders.mounts, accepts=on(tmp_path), sysfs=sysfs)]
+
+        async with living(tmp_path, sources=composite) as host:
+            await until_drive_is(host, DriveState.IDLE)
+            (drive,) = host.snapshot.drives
+            assert [problem.code for problem in drive.problems] == ["USB_EXTRA_INTERFACE"]
+            assert not [e for e in host.heard if isinstance(e, events.DriveRead)]
+            assert attribute(node, "ro") == 0, "it was not touched"
+
+        def allowed(folders: Folders) -> Sequence[DriveSource]:
+            rule = {"accepts": on(tmp_path), "sysfs": sysfs, "single_function": False}
+            return [BlockSource(folders.mounts, **rule)]
+
+        async with living(tmp_path, sources=allowed) as host:
+            await host.until_step(LAMP_ID, Step.ACTIVE)
 
 
 def _run(*command: str) -> str:

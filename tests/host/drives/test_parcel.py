@@ -12,6 +12,7 @@ from tests.payloads import Part, make_payload, seal
 
 from nondum.host.drives import parcel
 from nondum.sdk.errors import NondumError
+from nondum.wheelhouse import payload
 
 LAMP = """
 from nondum.sdk import Unit, hookimpl
@@ -130,6 +131,6 @@ def test_what_does_not_fit_is_refused(tmp_path: Path, requires: str, refusal: st
 def test_more_than_is_read_to_judge_is_refused(tmp_path: Path) -> None:
     folder = lamp(tmp_path / "drive")
     with (folder / "leaflet.txt").open("wb") as leaflet:
-        leaflet.truncate(parcel.MAX_METADATA)
+        leaflet.truncate(payload.MAX_METADATA)
     seal(folder, payload_id=PAYLOAD)
     assert code(parcel.outline, {"folder": str(folder)}, told) == "TOO_LARGE"

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from nondum.host.lifecycle.children import SPARES, Children
+from nondum.host.lifecycle.children import KEPT, Children
 from nondum.sdk.errors import DriveGone, InstallFailed
 
 pytestmark = pytest.mark.anyio
@@ -40,12 +40,28 @@ def drive(root: Path) -> dict[str, Any]:
     }
 
 
-async def test_child_answers_and_is_used_again(tmp_path: Path) -> None:
+async def test_child_works_again_for_the_same_drive_only(tmp_path: Path) -> None:
     async with children() as pool:
-        assert await pool.run("look", drive(tmp_path)) == NOTHING
-        (first,) = pool.pids()
-        assert await pool.run("look", drive(tmp_path)) == NOTHING
-        assert pool.pids() == {first}
+        assert await pool.run("look", drive(tmp_path), owner="a") == NOTHING
+        first = pool.kept()["a"]
+        assert await pool.run("look", drive(tmp_path), owner="a") == NOTHING
+        assert pool.kept() == {"a": first}
+        await pool.run("look", drive(tmp_path), owner="b")
+        assert pool.kept()["b"] != first
+
+
+async def test_child_without_an_owner_ends_with_its_job(tmp_path: Path) -> None:
+    async with children() as pool:
+        await pool.run("look", drive(tmp_path))
+        assert not pool.kept()
+
+
+async def test_few_children_are_kept_however_many_drives_there_are(tmp_path: Path) -> None:
+    async with children() as pool:
+        for name in "abcd":
+            await pool.run("look", drive(tmp_path), owner=name)
+        assert list(pool.kept()) == ["c", "d"]
+        assert len(pool.kept()) == KEPT
 
 
 async def test_typed_errors_come_back_typed(tmp_path: Path) -> None:
@@ -65,13 +81,23 @@ async def test_fault_of_ours_comes_back_as_a_problem(tmp_path: Path) -> None:
 
 async def test_child_that_dies_is_told(tmp_path: Path) -> None:
     async with children() as pool:
-        await pool.run("look", drive(tmp_path))
-        (pid,) = pool.pids()
-        os.kill(pid, signal.SIGKILL)
+        await pool.run("look", drive(tmp_path), owner="a")
+        os.kill(pool.kept()["a"], signal.SIGBUS)
         with pytest.raises(InstallFailed) as failed:
-            await pool.run("look", drive(tmp_path))
+            await pool.run("look", drive(tmp_path), owner="a")
         assert failed.value.code == "CHILD_DIED"
-        assert await pool.run("look", drive(tmp_path)) == NOTHING
+        assert "SIGBUS" in str(failed.value)
+        assert await pool.run("look", drive(tmp_path), owner="a") == NOTHING
+
+
+async def test_child_that_computes_for_ever_is_told(tmp_path: Path) -> None:
+    """What the kernel does at the end of the processor time, done here at once."""
+    async with children() as pool:
+        await pool.run("look", drive(tmp_path), owner="a")
+        os.kill(pool.kept()["a"], signal.SIGXCPU)
+        with pytest.raises(InstallFailed) as failed:
+            await pool.run("look", drive(tmp_path), owner="a")
+        assert failed.value.code == "CHILD_LIMIT"
 
 
 async def test_child_that_hangs_is_given_up(tmp_path: Path) -> None:
@@ -85,10 +111,10 @@ async def test_child_that_hangs_is_given_up(tmp_path: Path) -> None:
 async def test_cancelled_job_ends_its_child(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "CONTENTS")
     async with children() as pool:
-        await pool.run("look", drive(tmp_path))
-        busy = pool.pids()
+        await pool.run("look", drive(tmp_path), owner="a")
+        busy = set(pool.kept().values())
         arguments = {**host_facts(tmp_path), "staging": str(tmp_path)}
-        job = asyncio.create_task(pool.run("verify", arguments))
+        job = asyncio.create_task(pool.run("verify", arguments, owner="a"))
         await asyncio.sleep(0)  # the child has the job from now on
         job.cancel()
         await asyncio.gather(job, return_exceptions=True)
@@ -125,19 +151,12 @@ async def test_work_aside_gives_its_answer(tmp_path: Path) -> None:
 
 
 async def test_one_spare_stays_when_work_has_ended(tmp_path: Path) -> None:
-    async with children(quiet_s=0.2) as pool:
-        jobs = (pool.run("look", drive(tmp_path)) for _ in range(4))
-        await asyncio.gather(*jobs)
-        assert len(pool.pids()) == SPARES
-        first, second = pool.pids()
-        with process_ended(first) as one, process_ended(second) as other:
-            _, pending = await asyncio.wait(
-                [asyncio.create_task(ended.wait()) for ended in (one, other)],
-                return_when=asyncio.FIRST_COMPLETED,
-            )
-            for task in pending:
-                task.cancel()
-        assert len(pool.pids()) == 1
+    async with children(quiet_s=0.1) as pool:
+        await pool.run("look", drive(tmp_path), owner="a")
+        with process_ended(pool.kept()["a"]) as ended:
+            await ended.wait()
+        assert not pool.kept()
+        assert len(pool.pids()) <= 1
 
 
 @contextlib.contextmanager
@@ -155,8 +174,8 @@ def process_ended(pid: int) -> Iterator[asyncio.Event]:
 
 async def test_no_child_outlives_the_pool(tmp_path: Path) -> None:
     async with children() as pool:
-        await pool.run("look", drive(tmp_path))
-        (pid,) = pool.pids()
+        await pool.run("look", drive(tmp_path), owner="a")
+        pid = pool.kept()["a"]
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)
 

@@ -11,7 +11,7 @@ import errno
 import hashlib
 import os
 import stat
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
@@ -25,35 +25,52 @@ Progress = Callable[[str, int, int], None]
 
 FOLDER = "nondum"
 MAX_PAYLOADS = 64
+MAX_ENTRIES = 4096
+"""What is looked at in a drive's folder of payloads, whatever it is."""
 
 _CHUNK = 1024 * 1024
-_OPEN_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+_OPEN_ROOT = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
+"""A slot may be a link to what stands for the drive; what is on a drive may not."""
+_OPEN_FOLDER = _OPEN_ROOT | os.O_NOFOLLOW
 _OPEN_FILE = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 _GONE = frozenset({errno.EIO, errno.ENODEV, errno.ENXIO, errno.ENOMEDIUM, errno.ESTALE})
 _FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
+_COPY_AGAIN = "copy the payload to the drive again"
 
 
 def find_payloads(root: Path) -> tuple[Path, ...]:
     """The payload folders on a drive, by name; empty when it carries none.
 
-    Raises `DriveGone` when the drive cannot be read.
+    What else people and their machines leave on drives is passed over. Raises `DriveGone` when the
+    drive cannot be read, `PayloadRefused` (TOO_MANY_FILES) when there is more than a person puts
+    there.
     """
-    if (root / FOLDER).is_symlink():
-        return ()
-    try:
-        listed = sorted((root / FOLDER).iterdir())
-    except (FileNotFoundError, NotADirectoryError) as error:
-        if not root.exists():
+    with _folder(root, _OPEN_ROOT) as drive:
+        try:
+            with _inner(drive, FOLDER) as folder, os.scandir(folder) as entries:
+                found = sorted(_named(entries, root / FOLDER))
+        except (FileNotFoundError, _Unsafe):
+            return ()
+        except OSError as error:
             raise _gone(root, error) from error
-        return ()
-    except OSError as error:
-        raise _gone(root, error) from error
-    folders = [
-        path
-        for path in listed
-        if names.PAYLOAD_ID.fullmatch(path.name) and not path.is_symlink() and path.is_dir()
-    ]
-    return tuple(folders[:MAX_PAYLOADS])
+    if len(found) > MAX_PAYLOADS:
+        raise PayloadRefused(_crowded(root / FOLDER, f"{MAX_PAYLOADS} payloads"))
+    return tuple(root / FOLDER / name for name in found)
+
+
+def _named(entries: Iterable[os.DirEntry[str]], where: Path) -> Iterator[str]:
+    """Names of what are folders, and are called as payloads are."""
+    for number, entry in enumerate(entries):
+        if number == MAX_ENTRIES:
+            raise PayloadRefused(_crowded(where, f"{MAX_ENTRIES} entries"))
+        if names.PAYLOAD_ID.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False):
+            yield entry.name
+
+
+def _crowded(where: Path, most: str) -> Problem:
+    text = f"holds more than {most}"
+    fix = "put fewer payloads on one drive"
+    return Problem("TOO_MANY_FILES", text, where=str(where), fix=fix)
 
 
 def read_contents(folder: Path) -> bytes:
@@ -97,32 +114,38 @@ def copy(
     problems: list[Problem] = []
     done = 0
     staging.mkdir(parents=True, exist_ok=True)
+
+    def copied(size: int) -> None:
+        nonlocal done
+        done += size
+        if progress is not None:
+            progress("copy", done, total)
+
     with _folder(folder) as source:
         for entry in entries:
-            problem = _copy(source, folder, entry, staging / entry.path)
+            problem = _copy(source, folder, entry, staging / entry.path, copied)
             if problem is not None:
                 problems.append(problem)
-            done += entry.size
-            if progress is not None:
-                progress("copy", done, total)
     if problems:
         raise PayloadRefused(*problems)
     return total
 
 
-def _copy(source: int, folder: Path, entry: Entry, target: Path) -> Problem | None:
+def _copy(
+    source: int, folder: Path, entry: Entry, target: Path, copied: Callable[[int], None]
+) -> Problem | None:
     where = f"{folder.name}/{entry.path}"
     try:
         descriptor = _open(source, entry.path)
     except FileNotFoundError:
-        return Problem("FILE_MISSING", "is listed but not there", where=where)
+        return Problem("FILE_MISSING", "is listed but not there", where=where, fix=_COPY_AGAIN)
     except _Unsafe as unsafe:
-        return Problem("PATH_UNSAFE", str(unsafe), where=where)
+        return Problem("PATH_UNSAFE", str(unsafe), where=where, fix=_COPY_AGAIN)
     except OSError as error:
         raise _gone(folder, error) from error
     try:
         _make_folder(target.parent)
-        digest, size = _copy_bytes(descriptor, entry, target, folder)
+        digest, size = _copy_bytes(descriptor, entry, target, folder, copied)
     finally:
         os.close(descriptor)
     if size != entry.size or digest != entry.sha256:
@@ -132,12 +155,14 @@ def _copy(source: int, folder: Path, entry: Entry, target: Path) -> Problem | No
             where=where,
             need=f"{entry.size} bytes, {entry.sha256[:16]}…",
             have=f"{'more' if size > entry.size else size} bytes, {digest[:16]}…",
-            fix="copy the payload to the drive again",
+            fix=_COPY_AGAIN,
         )
     return None
 
 
-def _copy_bytes(descriptor: int, entry: Entry, target: Path, folder: Path) -> tuple[str, int]:
+def _copy_bytes(
+    descriptor: int, entry: Entry, target: Path, folder: Path, copied: Callable[[int], None]
+) -> tuple[str, int]:
     """Digest and size of what was read; at most one byte more than listed."""
     digest, size = hashlib.sha256(), 0
     try:
@@ -147,10 +172,9 @@ def _copy_bytes(descriptor: int, entry: Entry, target: Path, folder: Path) -> tu
                 digest.update(piece)
                 size += len(piece)
                 out.write(piece)
+                copied(len(piece))
     except OSError as error:
-        code = "DISK_FULL" if error.errno in _FULL else "IO_ERROR"
-        text = f"cannot be staged: {error.strerror}"
-        raise InstallFailed(Problem(code, text, where=str(target))) from error
+        raise _unstaged(target, error) from error
     return digest.hexdigest(), size
 
 
@@ -170,9 +194,14 @@ def _make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        code = "DISK_FULL" if error.errno in _FULL else "IO_ERROR"
-        text = f"cannot be staged: {error.strerror}"
-        raise InstallFailed(Problem(code, text, where=str(folder))) from error
+        raise _unstaged(folder, error) from error
+
+
+def _unstaged(path: Path, error: OSError) -> InstallFailed:
+    code = "DISK_FULL" if error.errno in _FULL else "IO_ERROR"
+    fix = "free some disk" if code == "DISK_FULL" else "see what is wrong with this host's disk"
+    text = f"cannot be staged: {error.strerror}"
+    return InstallFailed(Problem(code, text, where=str(path), fix=fix))
 
 
 class _Unsafe(Exception):
@@ -180,11 +209,21 @@ class _Unsafe(Exception):
 
 
 @contextmanager
-def _folder(folder: Path) -> Iterator[int]:
+def _folder(folder: Path, flags: int = _OPEN_FOLDER) -> Iterator[int]:
     try:
-        descriptor = os.open(folder, _OPEN_FOLDER)
+        descriptor = os.open(folder, flags)
     except OSError as error:
         raise _gone(folder, error) from error
+    try:
+        yield descriptor
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def _inner(folder: int, name: str) -> Iterator[int]:
+    """A folder in an open folder. Raises `_Unsafe`, `OSError`."""
+    descriptor = _step(name, _OPEN_FOLDER, folder)
     try:
         yield descriptor
     finally:
@@ -228,7 +267,8 @@ def _read_small(folder: Path, name: str, limit: int) -> bytes | None:
             return None
         except _Unsafe as unsafe:
             where = f"{folder.name}/{name}"
-            raise PayloadRefused(Problem("PATH_UNSAFE", str(unsafe), where=where)) from unsafe
+            problem = Problem("PATH_UNSAFE", str(unsafe), where=where, fix=_COPY_AGAIN)
+            raise PayloadRefused(problem) from unsafe
         except OSError as error:
             raise _gone(folder, error) from error
     try:
@@ -238,7 +278,8 @@ def _read_small(folder: Path, name: str, limit: int) -> bytes | None:
     if len(data) > limit:
         where = f"{folder.name}/{name}"
         text = f"is longer than {limit} bytes"
-        raise PayloadRefused(Problem("TOO_LARGE", text, where=where))
+        fix = "build the payload with fewer files in it"
+        raise PayloadRefused(Problem("TOO_LARGE", text, where=where, fix=fix))
     return data
 
 

@@ -11,19 +11,31 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import TypeVar
 
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem
-from nondum.wheelhouse import contents, drive, index, lock, manifest, wheel
+from nondum.wheelhouse import contents, drive, index, lock, manifest, tables, wheel
 from nondum.wheelhouse.contents import Contents
 from nondum.wheelhouse.drive import Progress
 from nondum.wheelhouse.index import Index
 from nondum.wheelhouse.lock import Lock, LockedWheel
 from nondum.wheelhouse.manifest import Manifest
-from nondum.wheelhouse.preflight import HostFacts, preflight, select, unmet
+from nondum.wheelhouse.preflight import (
+    HostFacts,
+    misfits,
+    preflight,
+    select,
+    unmet,
+    unpacked_problems,
+)
 from nondum.wheelhouse.signatures import Verifier
+from nondum.wheelhouse.wheel import Layout
 
 _T = TypeVar("_T")
+
+MAX_METADATA = 16 * 1024 * 1024
+"""Bytes of all files together that a payload is judged by."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,19 +75,60 @@ def is_metadata(path: str) -> bool:
     return not path.startswith("wheels/")
 
 
-def check_wheels(payload: StagedPayload, facts: HostFacts) -> tuple[Problem, ...]:
+def oversized(listed: Contents) -> Iterator[Problem]:
+    """Metadata that is longer than anybody reads, by the sizes that are listed."""
+    found = [entry for entry in listed.entries if is_metadata(entry.path)]
+    for entry in found:
+        most = _most_bytes(entry.path)
+        if entry.size > most:
+            yield _too_large(entry.path, most, entry.size)
+    total = sum(entry.size for entry in found)
+    if total > MAX_METADATA:
+        yield _too_large("everything but the wheels together", MAX_METADATA, total)
+
+
+def _most_bytes(path: str) -> int:
+    if path == manifest.NAME:
+        return tables.MAX_BYTES
+    if path == index.NAME:
+        return index.MAX_BYTES
+    return lock.MAX_BYTES if path.startswith("pylock.") else MAX_METADATA
+
+
+def _too_large(what: str, most: int, size: int) -> Problem:
+    text, fix = "is too long", "pack models and data as wheels, and say less about them"
+    return Problem("TOO_LARGE", text, what, f"at most {most} bytes", f"{size} bytes", fix)
+
+
+def check_wheels(
+    payload: StagedPayload, facts: HostFacts, stored: Mapping[str, Layout] = MappingProxyType({})
+) -> tuple[Problem, ...]:
     """What is wrong with the wheels that such a host would install, but for their contents,
-    which are checked as they are unpacked."""
+    which are checked as they are unpacked.
+
+    `stored` are wheels, by hash, that are in the host's store already and need not be staged.
+    """
     problems: list[Problem] = []
+    layouts: dict[str, Layout] = {}
     for component, chosen in payload.wheels(facts).items():
-        requirements = {}
         for locked in chosen:
-            with wheel.opened(payload.folder / locked.path) as data:
-                layout = wheel.lay_out(data, locked.filename)
-                problems.extend(p for p in layout.problems if p not in problems)
-                requirements[locked.name] = wheel.requirements(data, layout)
+            if locked.sha256 not in layouts:
+                layout = _layout(payload.folder / locked.path, stored.get(locked.sha256))
+                problems.extend(layout.problems)
+                problems.extend(misfits(layout, locked.filename, payload.manifest, facts))
+                layouts[locked.sha256] = layout
+        requirements = {w.name: layouts[w.sha256].needs.requirements for w in chosen}
         problems.extend(unmet(requirements, chosen, facts, lock.file_name(component)))
+    problems.extend(unpacked_problems(layouts.values(), facts, payload.manifest.id))
     return tuple(problems)
+
+
+def _layout(path: Path, stored: Layout | None) -> Layout:
+    """A wheel's layout; of one that is not staged, what the store knows of it."""
+    if stored is not None and not path.exists():
+        return stored
+    with wheel.opened(path) as data:
+        return wheel.lay_out(data, path.name)
 
 
 def verify_folder(
@@ -91,6 +144,8 @@ def verify_folder(
         if verdict.problems:
             return verdict.problems
         listed = contents.parse(data, f"{folder.name}/{contents.NAME}")
+        if problems := tuple(oversized(listed)):
+            return problems
         with tempfile.TemporaryDirectory(prefix="nondum-check-") as staging:
             copied = Path(staging) / "payload"
             drive.copy(folder, listed, copied, progress)
@@ -101,7 +156,7 @@ def verify_folder(
 
 def _verify_staged(payload: StagedPayload, facts: HostFacts | None) -> Iterator[Problem]:
     for path in sorted((payload.folder / "wheels").glob("*.whl")):
-        yield from wheel.check(path)
+        yield from wheel.check(path, payload.manifest.startup_hooks)
     if facts is not None:
         minimum = payload.contents.minimum_nondum
         problems = preflight(payload.manifest, payload.locks, facts, minimum_nondum=minimum)

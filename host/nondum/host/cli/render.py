@@ -70,5 +70,9 @@ def progress(made: Mapping[str, Any] | None) -> str:
 
     >>> progress({"phase": "copy", "fraction": 0.25}), progress(None)
     ('copy 25 %', '')
+    >>> progress({"phase": "queued", "total": 7, "fraction": 0.0})
+    'queued behind 7'
     """
+    if made and made["phase"] == "queued":
+        return f"queued behind {made['total']}"
     return f"{made['phase']} {100 * made['fraction']:.0f} %" if made else ""

@@ -7,10 +7,15 @@ from pathlib import Path
 
 import pyudev
 
+from nondum.host.drives import usb
+from nondum.host.drives.nodes import drive_name
 from nondum.host.events import DriveInserted, DriveRemoved, DrivesScanned, Emit
 from nondum.host.uevents import udev_runs, uevents
+from nondum.sdk.errors import Problem
 
 Accepts = Callable[[pyudev.Device], bool]
+
+SYSFS = Path("/sys")
 
 
 def is_usb_drive(device: pyudev.Device) -> bool:
@@ -23,9 +28,17 @@ class BlockSource:
 
     kind = "block"
 
-    def __init__(self, mounts: Path, *, accepts: Accepts = is_usb_drive) -> None:
-        self._mounts = mounts
-        self._accepts = accepts
+    def __init__(
+        self,
+        mounts: Path,
+        *,
+        accepts: Accepts = is_usb_drive,
+        single_function: bool = True,
+        sysfs: Path = SYSFS,
+    ) -> None:
+        """`single_function`: refuse what is something else beside a drive, as `sysfs` has it."""
+        self._mounts, self._accepts = mounts, accepts
+        self._single_function, self._sysfs = single_function, sysfs
         self._seen: dict[str, str] = {}
         """sysfs path → drive."""
 
@@ -46,10 +59,10 @@ class BlockSource:
     def _look_at_all(self, context: pyudev.Context, emit: Emit) -> None:
         """Compare what is there now with what was known."""
         present = {d.sys_path: d for d in context.list_devices(subsystem="block")}
-        for path in self._seen.keys() - present.keys():
+        for path in sorted(self._seen.keys() - present.keys()):
             emit(DriveRemoved(self._seen.pop(path)))
-        for device in present.values():
-            self._look(device, emit)
+        for path in sorted(present):
+            self._look(present[path], emit)
 
     def _look(self, device: pyudev.Device, emit: Emit) -> None:
         """Compare one device with what was known of it."""
@@ -67,8 +80,17 @@ class BlockSource:
                     self.kind,
                     node=Path(device.device_node),
                     filesystem=device.properties.get("ID_FS_TYPE", ""),
+                    problems=self._problems(device, drive),
+                    port=usb.port_of(Path(device.sys_path)),
                 )
             )
+
+    def _problems(self, device: pyudev.Device, drive: str) -> tuple[Problem, ...]:
+        """What keeps it from being read at all."""
+        if not self._single_function:
+            return ()
+        block = self._sysfs / Path(device.sys_path).relative_to(SYSFS)
+        return usb.extra_interfaces(block, where=drive)
 
     def _is_drive(self, device: pyudev.Device) -> bool:
         if device.action == "remove" or not device.device_node or not _size(device):
@@ -82,15 +104,22 @@ class BlockSource:
 
 def _drive(device: pyudev.Device) -> str:
     """Kernel name and insertion number: the next stick in the same port is another drive."""
-    number = device.properties.get("DISKSEQ")
-    return f"{device.sys_name}-{number}" if number else str(device.sys_name)
+    disk = Path(device.sys_path)
+    if device.device_type == "partition":
+        disk = disk.parent
+    return drive_name(device.sys_name, _number(disk / "diskseq"))
 
 
 def _size(device: pyudev.Device) -> int:
+    return _number(Path(device.sys_path) / "size") or 0
+
+
+def _number(attribute: Path) -> int | None:
+    """An attribute of sysfs; None: the kernel has it not, or the device is gone."""
     try:
-        return int((Path(device.sys_path) / "size").read_text())
+        return int(attribute.read_text(encoding="ascii"))
     except (OSError, ValueError):
-        return 0
+        return None
 
 
 def _has_partitions(device: pyudev.Device) -> bool:

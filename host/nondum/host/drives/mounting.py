@@ -1,17 +1,20 @@
 """Mount and unmount of drives, by mount(2) itself; needs root.
 
-Read-only, without set-uid, devices, execution or symlinks; a dirty ext4 journal is not replayed.
+Read-only, without set-uid, devices, execution or symlinks; a dirty ext4 journal is not replayed,
+and the device itself takes no writes any more.
 """
 
 from __future__ import annotations
 
 import ctypes
+import errno
 import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from nondum.sdk.errors import DriveGone, PayloadRefused, Problem
+from nondum.host.drives import filesystems, nodes
+from nondum.sdk.errors import DriveGone, NondumError, PayloadRefused, Problem
 
 MS_RDONLY = 0x1
 MS_NOSUID = 0x2
@@ -35,38 +38,26 @@ FILESYSTEMS: Mapping[str, str] = {
 _libc = ctypes.CDLL(None, use_errno=True)
 
 
-def mount(node: Path, target: Path, filesystem: str) -> None:
+def mount(node: Path, target: Path, filesystem: str, *, drive: str = "") -> None:
     """Mount a block device; the target folder is made. May hang as long as the device does.
 
-    Raises `PayloadRefused` (FS_UNSUPPORTED, FS_ERROR) and `DriveGone` (DRIVE_GONE).
+    Without a `filesystem`, the device says which it has. Given a `drive`, no other one is mounted
+    that has come to the same node since. Nothing can be written to the device afterwards. Raises
+    `PayloadRefused` (FS_UNSUPPORTED, FS_ERROR) and `DriveGone` (DRIVE_GONE).
     """
-    options = FILESYSTEMS.get(filesystem)
-    if options is None:
-        raise PayloadRefused(
-            Problem(
-                "FS_UNSUPPORTED",
-                "the drive's file system is not read",
-                where=str(node),
-                need=" or ".join(sorted(FILESYSTEMS)),
-                have=filesystem or "none",
-                fix="format the drive as exFAT, FAT32 or ext4",
-            )
-        )
-    target.mkdir(parents=True, exist_ok=True)
-    if _call_mount(node, target, filesystem, options) == 0:
-        return
-    error = OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()), str(node))
-    target.rmdir()
-    if not node.exists():
-        raise DriveGone(Problem("DRIVE_GONE", "went away while it was mounted", where=str(node)))
-    raise PayloadRefused(
-        Problem(
-            "FS_ERROR",
-            f"cannot be mounted as {filesystem} ({error.strerror})",
-            where=str(node),
-            fix="check the drive on another computer",
-        )
-    ) from error
+    with nodes.held(node, drive) as source:
+        filesystem = filesystem or _probed(source, node)
+        if filesystem not in FILESYSTEMS:
+            have = filesystem or "none that is known"
+            raise _unsupported(node, "the drive's file system is not read", have)
+        target.mkdir(parents=True, exist_ok=True)
+        error = _call_mount(source, target, filesystem, FILESYSTEMS[filesystem])
+        if error == 0:
+            return
+        target.rmdir()
+        if error == errno.ENODEV and not _is_known_to_kernel(filesystem):
+            raise _unsupported(node, "this host's kernel does not read its file system", filesystem)
+        raise _unmountable(node, filesystem, error)
 
 
 def unmount(target: Path) -> None:
@@ -93,15 +84,43 @@ def mounted_below(folder: Path) -> list[Path]:
     return sorted((p for p in points if base in p.parents), reverse=True)
 
 
-def _call_mount(node: Path, target: Path, filesystem: str, options: str) -> int:
+def _probed(source: Path, node: Path) -> str:
+    try:
+        return filesystems.probe(source)
+    except OSError as error:
+        text = f"cannot be read ({error.strerror})"
+        fix = "pull it and plug it in again"
+        raise DriveGone(Problem("DRIVE_GONE", text, where=str(node), fix=fix)) from error
+
+
+def _call_mount(source: Path, target: Path, filesystem: str, options: str) -> int:
+    """The error number; 0: it is mounted."""
     result: int = _libc.mount(
-        os.fsencode(node),
+        os.fsencode(source),
         os.fsencode(target),
         filesystem.encode(),
         ctypes.c_ulong(FLAGS),
         options.encode(),
     )
-    return result
+    return ctypes.get_errno() if result else 0
+
+
+def _is_known_to_kernel(filesystem: str) -> bool:
+    return f"\t{filesystem}\n" in Path("/proc/filesystems").read_text(encoding="ascii")
+
+
+def _unsupported(node: Path, text: str, have: str) -> PayloadRefused:
+    need, fix = " or ".join(sorted(FILESYSTEMS)), "format the drive as exFAT, FAT32 or ext4"
+    return PayloadRefused(Problem("FS_UNSUPPORTED", text, str(node), need, have, fix))
+
+
+def _unmountable(node: Path, filesystem: str, error: int) -> NondumError:
+    if not node.exists():
+        text = "went away while it was mounted"
+        return DriveGone(Problem("DRIVE_GONE", text, where=str(node), fix="plug it in again"))
+    text = f"cannot be mounted as {filesystem} ({os.strerror(error)})"
+    fix = "check the drive on another computer"
+    return PayloadRefused(Problem("FS_ERROR", text, where=str(node), fix=fix))
 
 
 def _unescaped(field: str) -> str:

@@ -10,14 +10,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from nondum.host.drives import filesystems, mounting, reader
+from nondum.host.drives import mounting, reader, trial
 from nondum.host.drives.reader import Arguments, Report
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
 from nondum.wheelhouse import contents, drive, payload, preflight
 from nondum.wheelhouse.contents import Contents, Entry
 
-MAX_METADATA = 16 * 1024 * 1024
-"""Bytes of all files together that a payload is judged by."""
 _MB = 1024 * 1024
 
 
@@ -29,13 +27,14 @@ def hand_over(arguments: Arguments, report: Report) -> dict[str, Any]:
     """
     root, target = Path(arguments["root"]), Path(arguments["target"])
     if arguments["node"] is not None:
-        node = Path(arguments["node"])
-        mounting.mount(node, root, arguments["filesystem"] or filesystems.probe(node))
+        node, drive_name = Path(arguments["node"]), arguments["drive"]
+        mounting.mount(node, root, arguments["filesystem"], drive=drive_name)
     folder = root / arguments["folder"]
     data = drive.read_contents(folder)
     if hashlib.sha256(data).hexdigest() != arguments["digest"]:
         text = "the contents list is not the one that was read before"
-        raise PayloadRefused(Problem("HASH_MISMATCH", text, where=folder.name))
+        fix = "pull the drive and plug it in again"
+        raise PayloadRefused(Problem("HASH_MISMATCH", text, where=folder.name, fix=fix))
     listed = contents.parse(data, f"{folder.name}/{contents.NAME}")
     wanted = _wanted(listed, arguments["wanted"])
     _check_room(target, wanted, arguments["reserve_mb"])
@@ -56,12 +55,9 @@ def outline(arguments: Arguments, report: Report) -> list[list[Any]]:
     Raises `PayloadRefused`.
     """
     listed = _listed(Path(arguments["folder"]))
+    if problems := tuple(payload.oversized(listed)):
+        raise PayloadRefused(*problems)
     found = [entry for entry in listed.entries if payload.is_metadata(entry.path)]
-    total = sum(entry.size for entry in found)
-    if total > MAX_METADATA:
-        need, have = f"at most {MAX_METADATA} bytes", f"{total} bytes"
-        text = "there is more to read before it can be judged than another host is sent"
-        raise PayloadRefused(Problem("TOO_LARGE", text, listed.payload_id, need, have))
     return [_row(entry) for entry in found]
 
 
@@ -73,6 +69,7 @@ def judge(arguments: Arguments, report: Report) -> dict[str, Any]:
     """
     folder = Path(arguments["folder"])
     listed = _listed(folder)
+    trial.run(lambda: payload.load(folder, listed), listed.payload_id)
     staged = payload.load(folder, listed)
     facts = reader.facts_of(arguments)
     problems = preflight.preflight(

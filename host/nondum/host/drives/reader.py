@@ -8,23 +8,26 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any
 
 from packaging.version import Version
 
-from nondum.host.drives import filesystems, mounting
+from nondum.host.drives import mounting, trial
 from nondum.host.trust.rules import Rules
 from nondum.sdk.errors import PayloadRefused, Problem
-from nondum.wheelhouse import contents, drive, lock, payload, preflight, wheel
+from nondum.wheelhouse import contents, drive, payload, preflight
 from nondum.wheelhouse.contents import Contents
+from nondum.wheelhouse.dist_info import Needs
 from nondum.wheelhouse.lock import LockedWheel
 from nondum.wheelhouse.payload import StagedPayload
 from nondum.wheelhouse.preflight import HostFacts
 from nondum.wheelhouse.signatures import Verifier
 from nondum.wheelhouse.store import Store
 from nondum.wheelhouse.stored import StoredWheel
+from nondum.wheelhouse.wheel import Layout
 
 Report = Callable[[str, int, int], None]
 """Phase, done, total."""
@@ -43,9 +46,8 @@ def look(arguments: Arguments, report: Report) -> dict[str, list[Any]]:
     """
     root = Path(arguments["root"])
     if arguments["node"] is not None:
-        node = Path(arguments["node"])
-        filesystem = arguments["filesystem"] or filesystems.probe(node)
-        mounting.mount(node, root, filesystem)
+        node, drive_name = Path(arguments["node"]), arguments["drive"]
+        mounting.mount(node, root, arguments["filesystem"], drive=drive_name)
     is_payload = arguments["kind"] == "installed"
     folders = (root,) if is_payload else drive.find_payloads(root)
     verifier = Rules.of(arguments).verifier()
@@ -73,12 +75,17 @@ def copy(arguments: Arguments, report: Report) -> dict[str, int]:
     data = drive.read_contents(folder)
     if hashlib.sha256(data).hexdigest() != arguments["digest"]:
         text = "the contents list is not the one that was read before"
-        raise PayloadRefused(Problem("HASH_MISMATCH", text, where=str(folder)))
+        fix = "pull the drive and plug it in again"
+        raise PayloadRefused(Problem("HASH_MISMATCH", text, where=str(folder), fix=fix))
     listed = contents.parse(data, f"{folder.name}/{contents.NAME}")
+    _refuse_if_any(tuple(payload.oversized(listed)))
     drive.copy(folder, listed, staging, wanted=lambda e: payload.is_metadata(e.path))
     (staging / contents.NAME).write_bytes(data)
+    trial.run(lambda: payload.load(staging, listed), listed.payload_id)
     staged = payload.load(staging, listed)
     facts = facts_of(arguments)
+    freed_mb = arguments["freed_memory_mb"]  # by the release that this one takes over from
+    facts = replace(facts, free_memory_mb=facts.free_memory_mb + freed_mb)
     minimum = listed.minimum_nondum
     _refuse_if_any(
         preflight.preflight(staged.manifest, staged.locks, facts, minimum_nondum=minimum)
@@ -98,23 +105,11 @@ def verify(arguments: Arguments, report: Report) -> list[str]:
     """
     facts = facts_of(arguments)
     staged = load_staged(Path(arguments["staging"]))
-    known = known_wheels(arguments, staged, facts)
-    problems: list[Problem] = []
-    for component, wheels in staged.wheels(facts).items():
-        requirements: dict[str, tuple[str, ...]] = {}
-        for locked in wheels:
-            path = staged.folder / locked.path
-            if not path.exists() and locked.sha256 in known:
-                requirements[locked.name] = _stored_requirements(known[locked.sha256])
-                continue
-            with wheel.opened(path) as data:
-                layout = wheel.lay_out(data, locked.filename)
-                problems.extend(p for p in layout.problems if p not in problems)
-                if not layout.problems:
-                    requirements[locked.name] = wheel.requirements(data, layout)
-        where = lock.file_name(component)
-        problems.extend(preflight.unmet(requirements, wheels, facts, where))
-    _refuse_if_any(problems)
+    stored = {
+        sha256: _stored_layout(found)
+        for sha256, found in known_wheels(arguments, staged, facts).items()
+    }
+    _refuse_if_any(payload.check_wheels(staged, facts, stored))
     return [component.id for component in staged.manifest.components]
 
 
@@ -193,9 +188,11 @@ def _version_problems(listed: Contents) -> Iterator[Problem]:
         )
 
 
-def _stored_requirements(stored: StoredWheel) -> tuple[str, ...]:
+def _stored_layout(stored: StoredWheel) -> Layout:
+    """What is known of a wheel that was judged when it was stored."""
     found = distributions(path=[str(stored.root)])
-    return tuple(line for distribution in found for line in distribution.requires or ())
+    requirements = tuple(line for distribution in found for line in distribution.requires or ())
+    return Layout((), stored.left_out, (), Needs(requirements))
 
 
 def _refuse_if_any(problems: tuple[Problem, ...] | list[Problem]) -> None:

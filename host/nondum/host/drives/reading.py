@@ -2,24 +2,55 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 
 from nondum.host.drives import mounting
 from nondum.host.effects import ReadDrive, ReleaseDrive
-from nondum.host.events import CertificatesBrought, DriveRead, Event, PayloadFound
+from nondum.host.events import (
+    CertificatesBrought,
+    DriveQueued,
+    DriveRead,
+    Emit,
+    Event,
+    PayloadFound,
+)
 from nondum.host.lifecycle.children import Children
 from nondum.host.lifecycle.lanes import in_thread
+from nondum.host.lifecycle.queue import Queue
 from nondum.sdk.errors import DriveGone, InstallFailed, Problem
 
 LOOK_S = 10.0
 """A drive that cannot be mounted and listed in this time hangs."""
 
+AT_ONCE = 4
+"""Drives that are looked through at the same time; the others wait. One that hangs takes the place
+of one that does not, so these are more than there are processors to keep busy."""
+
+
+@contextlib.contextmanager
+def telling_stalls(drive: str, stall_s: float) -> Iterator[None]:
+    """Have a child that hears nothing of its drive told as the drive's fault, not the child's.
+
+    Raises `DriveGone` (DRIVE_STALLED).
+    """
+    try:
+        yield
+    except InstallFailed as error:
+        if error.code != "CHILD_STALLED":
+            raise
+        message = f"does not answer within {stall_s:g} s"
+        fix = "pull it and plug it in again, or into another port"
+        raise DriveGone(Problem("DRIVE_STALLED", message, where=drive, fix=fix)) from error
+
 
 class DriveReading:
     """Looks through drives in children, and unmounts them."""
 
-    def __init__(self, children: Children, *, allow_unsigned: bool) -> None:
-        self._children = children
+    def __init__(self, children: Children, emit: Emit, *, allow_unsigned: bool) -> None:
+        self._children, self._emit = children, emit
+        self._queue = Queue(AT_ONCE)
         self._allow_unsigned = allow_unsigned
         self._mounted: dict[str, Path] = {}
         """Drive → where it is, or may be, mounted."""
@@ -29,24 +60,25 @@ class DriveReading:
 
         Raises `DriveGone`, `PayloadRefused`, `InstallFailed`.
         """
-        if effect.node is not None:
-            self._mounted[effect.drive] = effect.root
         arguments = {
+            "drive": effect.drive,
             "kind": effect.kind,
             "root": str(effect.root),
             "node": str(effect.node) if effect.node else None,
             "filesystem": effect.filesystem,
             "allow_unsigned": self._allow_unsigned,
         }
-        try:
-            found = await self._children.run("look", arguments, stall_s=LOOK_S)
-        except InstallFailed as error:
-            if error.code != "CHILD_STALLED":
-                raise
-            message = f"does not answer within {LOOK_S:g} s"
-            fix = "pull it and plug it in again, or into another port"
-            problem = Problem("DRIVE_STALLED", message, where=effect.drive, fix=fix)
-            raise DriveGone(problem) from error
+
+        def tell(ahead: int) -> None:
+            self._emit(DriveQueued(effect.drive, ahead))
+
+        async with self._queue.turn(effect.drive, tell):
+            if effect.node is not None:
+                self._mounted[effect.drive] = effect.root
+            with telling_stalls(effect.drive, LOOK_S):
+                found = await self._children.run(
+                    "look", arguments, owner=effect.drive, stall_s=LOOK_S
+                )
         payloads = [
             PayloadFound(
                 payload=said["payload"],

@@ -1,6 +1,6 @@
 """The other end of `children.py`: a process that does jobs, one after the other.
 
-It dies with the daemon, and its memory is bounded: what it reads was written by strangers.
+It dies with the daemon, and what it may use is bounded: what it reads was written by strangers.
 """
 
 from __future__ import annotations
@@ -8,7 +8,6 @@ from __future__ import annotations
 import ctypes
 import json
 import os
-import resource
 import signal
 import sys
 import time
@@ -17,12 +16,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
 
+from nondum.host.lifecycle.allowance import allowed, confine_process
 from nondum.host.lifecycle.jobs import JOBS
 from nondum.sdk.errors import NondumError, Problem
 from nondum.wheelhouse import preflight
 
-MEMORY_BYTES = 2 * 1024**3
-DESCRIPTORS = 512
 PROGRESS_S = 0.1
 """Between two reports of one phase."""
 
@@ -32,9 +30,7 @@ PR_SET_PDEATHSIG = 1
 def main(daemon: int) -> None:
     """Do jobs from stdin until it ends."""
     _bind_to(daemon)
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (min(DESCRIPTORS, hard), hard))
+    confine_process()
     # What is found and imported now is there when somebody waits for a job.
     preflight.probe(Path.cwd(), reserve_mb=0, confinement=0)
     # Whatever prints goes to stderr: stdout belongs to the conversation.
@@ -53,11 +49,12 @@ def _bind_to(daemon: int) -> None:
 
 def _do(job: str, arguments: dict[str, Any], answers: TextIO) -> dict[str, Any]:
     try:
-        return {"result": JOBS[job](arguments, _reporter(answers))}
+        with allowed(job):
+            return {"result": JOBS[job](arguments, _reporter(answers))}
     except NondumError as error:
         return _failure(type(error).__name__, *error.problems)
     except MemoryError:
-        return _failure("InstallFailed", Problem("NO_MEMORY", f"{job} needs more memory"))
+        return _failure("InstallFailed", _too_much(job))
     except OSError as error:
         message = f"{job}: {error.strerror} ({error.filename})"
         return _failure("InstallFailed", Problem("IO_ERROR", message))
@@ -65,6 +62,11 @@ def _do(job: str, arguments: dict[str, Any], answers: TextIO) -> dict[str, Any]:
         traceback.print_exc()
         message = f"{job}: {type(error).__name__}: {error}"
         return _failure("InstallFailed", Problem("INTERNAL", message))
+
+
+def _too_much(job: str) -> Problem:
+    fix = "build the payload with less in it, or give the host more memory"
+    return Problem("NO_MEMORY", f"{job} takes more memory than it may", fix=fix)
 
 
 def _failure(kind: str, *problems: Problem) -> dict[str, Any]:

@@ -1,7 +1,8 @@
 """Child processes that do what may block, hang or choke on hostile bytes: the daemon's end.
 
-Requests go down a child's stdin and answers come up its stdout, one JSON object a line. Spare
-children are kept warm, since starting an interpreter costs more than most jobs.
+Requests go down a child's stdin and answers come up its stdout, one JSON object a line. A spare
+child is kept warm, since starting an interpreter costs more than most jobs. What a child reads of a
+drive could take it over, so from then on it works for that drive only and never for anybody else.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import contextlib
 import json
 import logging
 import os
+import signal
 import sys
 from asyncio.subprocess import PIPE, Process
 from collections.abc import Callable, Mapping
@@ -22,11 +24,17 @@ from nondum.sdk.errors import InstallFailed, NondumError, Problem
 LINE_LIMIT = 16 * 1024 * 1024
 """Bytes of one answer: it may hold the descriptions of many components."""
 
-SPARES = 2
-"""Idle children that are kept while there is work; the one used last is used first."""
+KEPT = 2
+"""Children that wait for more work of their owners; those that worked last are kept."""
+
+WARM_S = 0.3
+"""After a spare was taken, the next is made: what it was taken for has the processor first."""
 
 QUIET_S = 30.0
-"""Without work for so long, one spare is enough."""
+"""Without work for so long, nothing is kept but the spare."""
+
+STALL_S = 60.0
+"""Silence that is borne from a child, unless its job is one that says more or less of itself."""
 
 ASIDE_STALL_S = 600.0
 """Silence that is borne from a child that works only while nobody else does."""
@@ -40,43 +48,48 @@ log = logging.getLogger(__name__)
 
 
 class Children:
-    """A pool that grows as jobs need it and shrinks to its spares. `close` it."""
+    """A pool that grows as jobs need it and shrinks to one spare. `close` it."""
 
     def __init__(self, *, quiet_s: float = QUIET_S) -> None:
         self._quiet_s = quiet_s
-        self._shrinking: asyncio.Task[None] | None = None
-        self._idle: list[Process] = []
+        self._spares: list[Process] = []
+        """Those that have done nothing yet."""
+        self._kept: dict[str, Process] = {}
+        """Owner → the child that worked for it, and for nobody else; the last ones last."""
         self._busy: set[Process] = set()
         self._warming: asyncio.Task[None] | None = None
+        self._shrinking: asyncio.Task[None] | None = None
 
     async def run(
         self,
         job: str,
         arguments: Mapping[str, Any],
         *,
+        owner: str = "",
         on_progress: OnProgress | None = None,
-        stall_s: float = 60.0,
+        stall_s: float = STALL_S,
     ) -> Any:
         """Have a child do a job, and give what it answers. Cancelling kills the child.
 
-        Raises the `NondumError` that the job did, or `InstallFailed`: CHILD_STALLED when nothing
-        was heard for `stall_s`, CHILD_DIED when it ended without an answer.
+        The child is one that worked for no other `owner`, which is whatever the bytes came from;
+        without one, it does this job and ends. Raises the `NondumError` that the job did, or
+        `InstallFailed`: CHILD_STALLED when nothing was heard for `stall_s`, CHILD_LIMIT when it
+        used up its processor time, CHILD_DIED when it ended without an answer otherwise.
         """
-        child = self._idle.pop() if self._idle else await _spawn()
+        child = await self._take(owner)
         self._busy.add(child)
         try:
             async with asyncio.timeout(None) as deadline:
                 answer = await _converse(child, job, arguments, on_progress, deadline, stall_s)
         except TimeoutError as error:
             await self._end(child)
-            self.warm()
             raise _stalled(job, stall_s) from error
         except BaseException:
             await self._end(child)
-            self.warm()
             raise
-        self._busy.discard(child)
-        await self._keep(child)
+        finally:
+            self._tend()
+        await self._keep(child, owner)
         return _result(answer)
 
     async def run_aside(
@@ -100,39 +113,68 @@ class Children:
 
     def warm(self) -> None:
         """Have a spare, soon, if there is none."""
-        if not self._idle and (self._warming is None or self._warming.done()):
+        if not self._spares and (self._warming is None or self._warming.done()):
             self._warming = asyncio.create_task(self._warm())
 
     def pids(self) -> set[int]:
         """Processes of all children."""
-        return {child.pid for child in (*self._idle, *self._busy)}
+        return {child.pid for child in (*self._spares, *self._kept.values(), *self._busy)}
+
+    def kept(self) -> dict[str, int]:
+        """Owner → the process of the child that waits for more of its work."""
+        return {owner: child.pid for owner, child in self._kept.items()}
 
     async def close(self) -> None:
         """Kill all children."""
-        if self._warming is not None:
-            await asyncio.wait([self._warming])
-        if self._shrinking is not None:
-            self._shrinking.cancel()
-            await asyncio.wait([self._shrinking])
-        await asyncio.gather(*(self._end(child) for child in (*self._idle, *self._busy)))
-        self._idle.clear()
+        for task in (self._warming, self._shrinking):
+            if task is not None:
+                task.cancel()
+                await asyncio.wait([task])
+        everyone = (*self._spares, *self._kept.values(), *self._busy)
+        await asyncio.gather(*(self._end(child) for child in everyone))
+        self._spares.clear()
+        self._kept.clear()
+
+    async def _take(self, owner: str) -> Process:
+        """A child that nobody else's bytes have touched."""
+        if owner in self._kept:
+            return self._kept.pop(owner)
+        child = self._spares.pop() if self._spares else await _spawn()
+        self.warm()
+        return child
 
     async def _warm(self) -> None:
-        self._idle.append(await _spawn())
+        await asyncio.sleep(WARM_S)
+        # Shielded: one that was begun is not lost when this is cancelled.
+        spawned = asyncio.ensure_future(_spawn())
+        try:
+            self._spares.append(await asyncio.shield(spawned))
+        except asyncio.CancelledError:
+            self._spares.append(await spawned)
+            raise
 
-    async def _keep(self, child: Process) -> None:
-        if len(self._idle) >= SPARES:
+    async def _keep(self, child: Process, owner: str) -> None:
+        """Keep a child for its owner, in the place of whichever was kept longest."""
+        self._busy.discard(child)
+        if not owner:
             await self._end(child)
             return
-        self._idle.append(child)
+        former = self._kept.pop(owner, None)
+        self._kept[owner] = child
+        oldest = next(iter(self._kept)) if len(self._kept) > KEPT else None
+        over = former or (self._kept.pop(oldest) if oldest else None)
+        if over is not None:
+            await self._end(over)
+
+    def _tend(self) -> None:
         if self._shrinking is not None:
             self._shrinking.cancel()
         self._shrinking = asyncio.create_task(self._shrink())
 
     async def _shrink(self) -> None:
         await asyncio.sleep(self._quiet_s)
-        while len(self._idle) > 1:
-            await self._end(self._idle.pop(0))
+        while self._kept:
+            await self._end(self._kept.pop(next(iter(self._kept))))
 
     async def _end(self, child: Process) -> None:
         self._busy.discard(child)
@@ -173,9 +215,7 @@ async def _converse(
         deadline.reschedule(loop.time() + stall_s)
         heard = await child.stdout.readline()
         if not heard:
-            code = await child.wait()
-            message = f"{job}: the child ended with {code} before it answered"
-            raise InstallFailed(Problem("CHILD_DIED", message))
+            raise _died(job, await child.wait())
         answer: dict[str, Any] = json.loads(heard)
         if "progress" not in answer:
             return answer
@@ -200,4 +240,17 @@ def _result(answer: Mapping[str, Any]) -> Any:
 
 def _stalled(job: str, stall_s: float) -> InstallFailed:
     message = f"{job}: nothing was heard for {stall_s:g} s"
-    return InstallFailed(Problem("CHILD_STALLED", message))
+    return InstallFailed(Problem("CHILD_STALLED", message, fix=_TRY_AGAIN))
+
+
+def _died(job: str, code: int) -> InstallFailed:
+    """What is told of a child that ended before it answered."""
+    if code == -signal.SIGXCPU:
+        message = f"{job}: took more processor time than it may"
+        return InstallFailed(Problem("CHILD_LIMIT", message, fix=_TRY_AGAIN))
+    names = {-number.value: number.name for number in signal.Signals}
+    message = f"{job}: the child ended with {names.get(code, code)} before it answered"
+    return InstallFailed(Problem("CHILD_DIED", message, fix=_TRY_AGAIN))
+
+
+_TRY_AGAIN = "pull the drive and plug it in again; if that does not help, build it anew"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from nondum.host.catalogue.records import DriveRecord, DriveState, PayloadRecord, Step
+from nondum.host.catalogue.state import HostState
 from nondum.host.effects import CopyPayload, ReadDrive, ReleaseDrive
 from nondum.host.events import (
     DriveInserted,
@@ -14,6 +15,7 @@ from nondum.host.events import (
     DriveUnreadable,
     PayloadWithdrawn,
 )
+from nondum.host.lifecycle import releases, tries
 from nondum.host.lifecycle.turn import Turn
 from nondum.sdk.errors import Problem
 
@@ -22,7 +24,8 @@ _GONE = {"placed": "the host that handed it over ended that, or is gone"}
 
 
 def on_drive_inserted(turn: Turn, event: DriveInserted) -> None:
-    """Read it. A drive that was there before the daemon's restart is read again."""
+    """Read it, unless it is not to be. One that was there before the daemon's restart is read
+    again."""
     turn.events.append(event)
     drive = DriveRecord(
         id=event.drive,
@@ -32,7 +35,11 @@ def on_drive_inserted(turn: Turn, event: DriveInserted) -> None:
         filesystem=event.filesystem,
         since=turn.at,
     )
-    read(turn, drive)
+    if problems := (*event.problems, *tries.drive_problems(turn.state, drive)):
+        turn.put_drive(drive)
+        turn.pending.append(DriveUnreadable(event.drive, problems))
+    else:
+        read(turn, drive)
 
 
 def on_drive_removed(turn: Turn, event: DriveRemoved) -> None:
@@ -98,7 +105,7 @@ def lose_source(turn: Turn, payload: PayloadRecord, drive: str, reason: str) -> 
     if not sources:
         turn.pending.append(PayloadWithdrawn(payload.key, reason))
     elif payload.step is Step.RECEIVED and first == drive:
-        turn.effects.append(copy_of(turn.state.payloads[payload.key]))
+        turn.effects.append(copy_of(turn.state.payloads[payload.key], turn.state))
 
 
 def read(turn: Turn, drive: DriveRecord) -> None:
@@ -107,10 +114,11 @@ def read(turn: Turn, drive: DriveRecord) -> None:
     turn.effects.append(ReadDrive(drive.id, drive.kind, drive.root, drive.node, drive.filesystem))
 
 
-def copy_of(payload: PayloadRecord) -> CopyPayload:
+def copy_of(payload: PayloadRecord, state: HostState) -> CopyPayload:
     """Copy a payload from its first source."""
     drive, folder = next(iter(payload.sources.items()))
-    return CopyPayload(payload.key, drive, folder, payload.digest)
+    old = releases.in_force(state, payload)
+    return CopyPayload(payload.key, drive, folder, payload.digest, old.key if old else "")
 
 
 def release_idle_drives(turn: Turn) -> None:

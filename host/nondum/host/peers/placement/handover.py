@@ -86,7 +86,10 @@ class Handover:
         async with self._copying:
             try:
                 copied = await self._children.run(
-                    "hand_over", self._arguments(wanted), on_progress=on_progress
+                    "hand_over",
+                    self._arguments(wanted),
+                    owner=self._parcel.drive.id,
+                    on_progress=on_progress,
                 )
             finally:
                 if self._parcel.drive.node is not None:
@@ -97,6 +100,7 @@ class Handover:
     def _arguments(self, wanted: Collection[str] | None) -> Mapping[str, Any]:
         drive = self._parcel.drive
         return {
+            "drive": drive.id,
             "node": str(drive.node) if drive.node else None,
             "filesystem": drive.filesystem,
             # A drive that was let go as safe to pull is not mounted any more, or again for others.

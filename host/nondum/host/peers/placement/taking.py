@@ -128,15 +128,19 @@ class Taking:
         guest.tell("checking")
         try:
             await self._fetch_contents(guest, fetching)
-            for row in await self._children.run("outline", {"folder": str(guest.folder)}):
+            for row in await self._run(guest, "outline", {}):
                 await fetching.fetch(Listed(*row))
-            arguments = {**self._rules, "folder": str(guest.folder)}
-            judged = await self._children.run("judge", arguments)
+            judged = await self._run(guest, "judge", self._rules)
             self._check_components(guest, tuple(judged["components"]))
             await self._fetch_wheels(guest, fetching, [Listed(*row) for row in judged["needed"]])
         except OSError as error:
             told = f"what is fetched cannot be written: {error.strerror}"
             raise InstallFailed(Problem("IO_ERROR", told, where=guest.offer.payload_id)) from error
+
+    async def _run(self, guest: Guest, job: str, arguments: Mapping[str, Any]) -> Any:
+        """Have a child that reads nothing but this guest do a job with its folder."""
+        given = {**arguments, "folder": str(guest.folder)}
+        return await self._children.run(job, given, owner=guest.drive)
 
     async def _fetch_contents(self, guest: Guest, fetching: Fetching) -> None:
         """The contents list, and whether this host's own rules let it in."""
@@ -146,7 +150,7 @@ class Taking:
             signature = guest.folder / contents.SIGNATURE_NAME
             await in_thread(signature.write_bytes, offer.signature)
         arguments = {"kind": PLACED, "root": str(guest.root), "node": None, **self._rules}
-        (said,) = (await self._children.run("look", arguments))["payloads"]
+        (said,) = (await self._run(guest, "look", arguments))["payloads"]
         found = PayloadFound(
             said["payload"],
             guest.drive,
