@@ -105,7 +105,7 @@ def test_a_missing_architecture_is_told_with_what_there_is() -> None:
         lock.select(lock.parse(text, "pylock.n.toml"), *host((3, 11), "x86_64"))
     (problem,) = found.value.problems
     assert problem.code == "WHEEL_INCOMPATIBLE"
-    assert problem.need == "wheels for x86_64, Python 3.11"
+    assert problem.need == "wheels for x86_64, Python 3.11, manylinux_2_28_x86_64 or older"
     assert problem.have == "cp311 on manylinux_2_28_aarch64"
     assert problem.where == "pylock.n.toml"
 
@@ -143,6 +143,19 @@ REFUSED = {
         HEAD + package("a", "1.0", wheel(A, rest=f'hashes = {{ sha256 = "{SHA}" }}')),
     ),
     "no-wheels": ("LOCK_INVALID", HEAD + package("a", "1.0", "wheels = []\n")),
+    "index": (
+        "LOCK_PATH",
+        HEAD + package("a", "1.0", wheel(A), more='index = "https://example.org/simple"\n'),
+    ),
+    "another-name-than-its-path": (
+        "LOCK_INVALID",
+        PLAIN.replace(f'name = "{A}"', 'name = "b.whl"'),
+    ),
+    "editable": (
+        "LOCK_NOT_WHEEL",
+        HEAD
+        + '[[packages]]\nname = "a"\nversion = "1.0"\ndirectory = { path = ".", editable = true }\n',
+    ),
     "sdist": (
         "LOCK_NOT_WHEEL",
         PLAIN + f'[packages.sdist]\npath = "a-1.0.tar.gz"\nsize = 1\nhashes.sha256 = "{SHA}"\n',

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-import stat
+import shutil
+import struct
+import subprocess
 import sys
 import time
+import zipfile
 import zlib
 from pathlib import Path
 
@@ -12,10 +15,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.payloads import installed_wheel, make_wheel, sdk_wheel
+from tests.wheelhouse.hostile import WHEELS, HostileWheel
 from tests.wheelhouse.hostile_wheels import (
     INFO,
+    METADATA,
     NAME,
     WHEEL,
+    End,
     Lie,
     WheelBuilder,
     ZipBuilder,
@@ -32,87 +38,113 @@ SOURCE = b"X = 1\n"
 RECORD = f"{INFO}/RECORD"
 
 
-def raw(name: str, data: bytes = b"x", **lie: object) -> ZipMember:
-    return ZipMember(name, data, Lie(**lie))  # type: ignore[arg-type]  # each test names its lie
-
-
 def with_file(path: str, data: bytes = b"x") -> WheelBuilder:
     return WheelBuilder(files={INIT: SOURCE, path: data})
 
 
-HOSTILE = {
-    "prefix": ("WHEEL_STRUCTURE", WheelBuilder(prefix=b"#!/bin/sh\n")),
-    "suffix": ("WHEEL_STRUCTURE", WheelBuilder(suffix=b"trailing")),
-    "second-archive": (
-        "WHEEL_STRUCTURE",
-        WheelBuilder(suffix=ZipBuilder().add("b", b"x").bytes()),
-    ),
-    "name-twice": ("WHEEL_STRUCTURE", WheelBuilder(extra=(raw(INIT, b"Y = 2\n"),))),
-    "other-local-name": ("WHEEL_STRUCTURE", WheelBuilder(lies={INIT: Lie(local_name="evil/b.py")})),
-    "other-local-size": ("WHEEL_STRUCTURE", WheelBuilder(lies={INIT: Lie(local_size=1)})),
-    "unlisted-member": (
-        "WHEEL_STRUCTURE",
-        WheelBuilder(extra=(raw("hidden.py", is_unlisted=True),)),
-    ),
-    "encrypted": ("WHEEL_STRUCTURE", WheelBuilder(lies={INIT: Lie(flags=1)})),
-    "bzip2": ("WHEEL_STRUCTURE", WheelBuilder(lies={INIT: Lie(method=12)})),
-    "no-dist-info": ("WHEEL_STRUCTURE", WheelBuilder(without=(f"{INFO}/WHEEL",))),
-    "foreign-dist-info": ("WHEEL_STRUCTURE", WheelBuilder(info="other-1.0.dist-info")),
-    "other-version-inside": ("WHEEL_STRUCTURE", WheelBuilder(info="evil-2.0.dist-info")),
-    "two-dist-infos": ("WHEEL_STRUCTURE", with_file("other-1.0.dist-info/WHEEL", WHEEL)),
-    "zeros-by-the-megabyte": ("WHEEL_BOMB", with_file("evil/zeros.bin", bytes(3 * 1024**2))),
-    "declared-too-big": ("WHEEL_BOMB", WheelBuilder(lies={INIT: Lie(size=3 * 1024**3)})),
-    "parent-folder": ("WHEEL_PATH", with_file("../evil.py")),
-    "parent-folder-deep": ("WHEEL_PATH", with_file("evil/../../x.py")),
-    "absolute": ("WHEEL_PATH", with_file("/etc/cron.d/evil")),
-    "backslash": ("WHEEL_PATH", with_file("evil\\b.py")),
-    "drive-letter": ("WHEEL_PATH", with_file("C:evil.py")),
-    "control-character": ("WHEEL_PATH", with_file("evil/a\nb.py")),
-    "doubled-slash": ("WHEEL_PATH", with_file("evil//b.py")),
-    "dot-part": ("WHEEL_PATH", with_file("evil/./b.py")),
-    "long-part": ("WHEEL_PATH", with_file(f"evil/{'a' * 300}.py")),
-    "case-pair": ("WHEEL_PATH", with_file("EVIL/__init__.py")),
-    "symlink": (
+@pytest.mark.parametrize("hostile", WHEELS, ids=lambda hostile: hostile.name)
+def test_hostile_wheel_is_refused(tmp_path: Path, hostile: HostileWheel) -> None:
+    path = tmp_path / hostile.filename
+    path.write_bytes(hostile.build(tmp_path / "canary"))
+    problems = wheel.check(path)
+    assert {p.code for p in problems} == {hostile.code}
+    assert all(p.where == hostile.filename and p.message for p in problems)
+    assert not (tmp_path / "canary").exists()
+
+
+def test_hostile_wheels_are_named_and_many() -> None:
+    assert len(WHEELS) >= 60
+    assert len({hostile.name for hostile in WHEELS}) == len(WHEELS)
+    assert {hostile.code for hostile in WHEELS} == {
+        "WHEEL_BOMB",
+        "WHEEL_DATA_SCHEME",
+        "WHEEL_METADATA",
         "WHEEL_PATH",
-        WheelBuilder(extra=(raw("evil/link", b"/etc/passwd", mode=stat.S_IFLNK | 0o777),)),
-    ),
-    "fifo": ("WHEEL_PATH", WheelBuilder(extra=(raw("evil/pipe", b"", mode=stat.S_IFIFO | 0o666),))),
-    "library-scheme-escapes": ("WHEEL_PATH", with_file("evil-1.0.data/purelib/../x.py")),
-    "file-and-folder": ("WHEEL_PATH", with_file(f"{INIT}/b.py")),
-    "one-place-of-two-schemes": ("WHEEL_PATH", with_file(f"evil-1.0.data/purelib/{INIT}")),
-    "no-record": ("WHEEL_RECORD", WheelBuilder(without=(RECORD,))),
-    "empty-record": ("WHEEL_RECORD", WheelBuilder(record=b"")),
-    "record-not-csv": ("WHEEL_RECORD", WheelBuilder(record=b"a,b\n")),
-    "record-not-text": ("WHEEL_RECORD", WheelBuilder(record=b"\xff\xfe")),
-    "record-weak-digest": ("WHEEL_RECORD", WheelBuilder(record=f"{INIT},md5=abc,6\n".encode())),
-    "record-lists-absent": (
         "WHEEL_RECORD",
-        WheelBuilder(record=record_of({INIT: SOURCE, "evil/gone.py": b""}, RECORD)),
-    ),
-    "pth": ("WHEEL_STARTUP_HOOK", with_file("evil.pth", b"import os; os.system('id')\n")),
-    "pth-in-purelib": ("WHEEL_STARTUP_HOOK", with_file("evil-1.0.data/purelib/evil.pth")),
-    "sitecustomize": ("WHEEL_STARTUP_HOOK", with_file("sitecustomize.py")),
-    "usercustomize-package": ("WHEEL_STARTUP_HOOK", with_file("usercustomize/__init__.py")),
-    "sitecustomize-extension": (
+        "WHEEL_SHADOWS",
         "WHEEL_STARTUP_HOOK",
-        with_file("sitecustomize.cpython-311-x86_64-linux-gnu.so"),
-    ),
-    "shadows-stdlib-module": ("WHEEL_SHADOWS", with_file("json.py")),
-    "shadows-stdlib-package": ("WHEEL_SHADOWS", with_file("asyncio/__init__.py")),
-    "shadows-in-platlib": ("WHEEL_SHADOWS", with_file("evil-1.0.data/platlib/ssl.py")),
-    "takes-nondum": ("WHEEL_SHADOWS", with_file("nondum/__init__.py")),
-    "takes-the-sdk": ("WHEEL_SHADOWS", with_file("nondum/sdk/wire.py")),
-    "replaces-python": ("WHEEL_DATA_SCHEME", with_file("evil-1.0.data/data/bin/python3")),
-    "replaces-pip": ("WHEEL_DATA_SCHEME", with_file("evil-1.0.data/scripts/pip")),
-    "replaces-activate": ("WHEEL_DATA_SCHEME", with_file("evil-1.0.data/scripts/activate")),
-}
+        "WHEEL_STRUCTURE",
+    }
 
 
-@pytest.mark.parametrize(("code", "builder"), HOSTILE.values(), ids=HOSTILE)
-def test_hostile_wheel_is_refused(tmp_path: Path, code: str, builder: WheelBuilder) -> None:
-    problems = wheel.check(builder.write(tmp_path))
-    assert {p.code for p in problems} == {code}
-    assert all(p.where == NAME and p.message for p in problems)
+@pytest.mark.parametrize("name", ["pluggy", "msgpack", "rich"])
+def test_other_readers_see_the_same_in_real_wheels(name: str) -> None:
+    path = installed_wheel(name)
+    with wheel.opened(path) as data:
+        ours = {m.path: m.size for m in archive.read(data, path.name).members}
+    assert ours == by_zipfile(path) == by_unzip(path) == front_to_back(path)
+
+
+LIES = st.builds(
+    Lie,
+    local_name=st.sampled_from([None, INIT, "evil/b.py"]),
+    local_size=st.sampled_from([None, 0, 8, 0xFFFFFFFF]),
+    local_crc=st.sampled_from([None, 0, 1]),
+    local_flags=st.sampled_from([None, 0, 8, 0x800]),
+    local_method=st.sampled_from([None, 0, 8]),
+    local_extra=st.sampled_from([b"", bytes(4), struct.pack("<HHQQ", 1, 16, 6, 8), b"\1\0"]),
+    size=st.sampled_from([None, 6, 7, 0xFFFFFFFF]),
+    flags=st.sampled_from([0, 2, 8, 0x800]),
+    method=st.sampled_from([None, 0, 8]),
+    attributes=st.sampled_from([0, 0x10]),
+    extra=st.sampled_from([b"", bytes(4), struct.pack("<HHQ", 1, 8, 6)]),
+    after=st.sampled_from([b"", b"ab", struct.pack("<3L", zlib.crc32(SOURCE), 8, 6)]),
+)
+ENDS = st.builds(
+    End,
+    count=st.sampled_from([None, 3, 0xFFFF]),
+    directory_offset=st.sampled_from([None, 0, 0xFFFFFFFF]),
+    with_zip64=st.booleans(),
+    zip64_count=st.sampled_from([None, 4]),
+    between=st.sampled_from([b"", b"x"]),
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.one_of(st.just(Lie()), LIES), st.one_of(st.just(End()), ENDS))
+def test_other_readers_see_the_same_in_all_that_is_accepted(
+    tmp_path_factory: pytest.TempPathFactory, lie: Lie, end: End
+) -> None:
+    folder = tmp_path_factory.mktemp("wheel")
+    path = WheelBuilder(lies={INIT: lie}, end=end).write(folder)
+    if wheel.check(path) == ():
+        assert by_zipfile(path) == by_unzip(path) == front_to_back(path)
+    shutil.rmtree(folder)
+
+
+def by_zipfile(path: Path) -> dict[str, int]:
+    with zipfile.ZipFile(path) as found:
+        assert found.testzip() is None
+        return {info.filename: info.file_size for info in found.infolist()}
+
+
+def by_unzip(path: Path) -> dict[str, int]:
+    listed = subprocess.run(["unzip", "-l", path], capture_output=True, text=True, check=True)
+    rows = [line.split(maxsplit=3) for line in listed.stdout.splitlines()[3:-2]]
+    return {row[3]: int(row[0]) for row in rows}
+
+
+def front_to_back(path: Path) -> dict[str, int]:
+    """What a reader sees that takes member after member and never looks at the directory."""
+    data, at, seen = path.read_bytes(), 0, {}
+    while data[at : at + 4] == b"PK\x03\x04":
+        flags, method, _, _, _, packed, _, name, extra = struct.unpack_from(
+            "<5H3L2H", data, at + 4
+        )[1:]
+        at += 30 + name + extra
+        if packed == 0xFFFFFFFF:
+            packed = struct.unpack_from("<Q", data, at - 8)[0]
+        seen_name = data[at - name - extra : at - extra].decode()
+        unpacked = data[at : at + packed]
+        if method == 8:
+            inflate = zlib.decompressobj(-zlib.MAX_WBITS)
+            unpacked = inflate.decompress(data[at:])
+            packed = len(data) - at - len(inflate.unused_data)
+        at += packed
+        if flags & 8:
+            at += 16 if data[at : at + 4] == b"PK\x07\x08" else 12
+        seen[seen_name] = len(unpacked)
+    return seen
 
 
 def test_plain_wheel_passes(tmp_path: Path) -> None:
@@ -139,7 +171,8 @@ def test_sdk_may_bring_no_more_than_its_own(tmp_path: Path) -> None:
 
 
 def test_wrong_digest_is_found_by_reading(tmp_path: Path) -> None:
-    record = record_of({INIT: SOURCE, f"{INFO}/METADATA": b"", f"{INFO}/WHEEL": WHEEL}, RECORD)
+    wrong = METADATA.swapcase()
+    record = record_of({INIT: SOURCE, f"{INFO}/METADATA": wrong, f"{INFO}/WHEEL": WHEEL}, RECORD)
     problems = wheel.check(WheelBuilder(record=record).write(tmp_path))
     assert [(p.code, p.message) for p in problems] == [
         ("WHEEL_RECORD", f"member '{INFO}/METADATA': it is not what RECORD says")
@@ -153,7 +186,7 @@ def test_wrong_checksum_is_found_by_reading(tmp_path: Path) -> None:
 
 def test_understated_size_is_found_by_reading(tmp_path: Path) -> None:
     builder = WheelBuilder(lies={INIT: Lie(size=2)})
-    assert [p.code for p in wheel.check(builder.write(tmp_path))] == ["WHEEL_RECORD"]
+    assert {p.code for p in wheel.check(builder.write(tmp_path))} == {"WHEEL_RECORD"}
 
 
 def test_overlapping_members_are_a_bomb() -> None:
@@ -194,6 +227,37 @@ def test_no_wheel_name_is_refused(tmp_path: Path, name: str) -> None:
     assert [p.code for p in problems] == ["WHEEL_STRUCTURE"]
 
 
+def test_hooks_that_the_manifest_names_are_left_out(tmp_path: Path) -> None:
+    path = with_file("evil.pth", b"import evil\n").write(tmp_path)
+    assert [p.code for p in wheel.check(path, ["other.pth"])] == ["WHEEL_STARTUP_HOOK"]
+    assert wheel.check(path, ["evil.pth"]) == ()
+
+
+def test_refused_hook_says_how_it_is_allowed(tmp_path: Path) -> None:
+    (problem,) = wheel.check(with_file("evil.pth", b"import evil\n").write(tmp_path))
+    assert 'startup_hooks = ["evil.pth"] in payload.toml' in problem.fix
+
+
+def test_repaired_wheel_may_name_an_older_libc(tmp_path: Path) -> None:
+    told = WHEEL.replace(b"py3-none-any", b"cp311-cp311-linux_x86_64")
+    path = WheelBuilder(wheel=told).write(tmp_path, "evil-1.0-cp311-cp311-manylinux1_x86_64.whl")
+    assert wheel.check(path) == ()
+
+
+def test_sizes_in_records_of_zip64_are_taken(tmp_path: Path) -> None:
+    sizes = struct.pack("<HHQQ", 1, 16, len(SOURCE), len(ZipMember(INIT, SOURCE).packed))
+    lies = {INIT: Lie(local_extra=sizes, local_size=0xFFFFFFFF)}
+    assert wheel.check(WheelBuilder(lies=lies, end=End(with_zip64=True)).write(tmp_path)) == ()
+
+
+def test_sizes_after_a_member_are_taken(tmp_path: Path) -> None:
+    packed = len(ZipMember(INIT, SOURCE).packed)
+    told = struct.pack("<3L", zlib.crc32(SOURCE), packed, len(SOURCE))
+    for after in (b"PK\x07\x08" + told, told):
+        lie = Lie(flags=8, local_crc=0, local_size=0, after=after)
+        assert wheel.check(WheelBuilder(lies={INIT: lie}).write(tmp_path)) == ()
+
+
 def test_everything_wrong_is_told_at_once(tmp_path: Path) -> None:
     files = {INIT: SOURCE, "json.py": b"", "evil.pth": b"", "evil-1.0.data/scripts/pip": b""}
     problems = wheel.check(WheelBuilder(files=files).write(tmp_path))
@@ -230,7 +294,7 @@ def test_libraries_of_both_schemes_are_laid_out_together(tmp_path: Path) -> None
 def test_requirements_are_read_from_metadata(tmp_path: Path) -> None:
     path = make_wheel(tmp_path, "plain", "1", {"plain.py": ""}, requires=["a>=1", "b; extra=='c'"])
     with wheel.opened(path) as data:
-        found = wheel.requirements(data, wheel.lay_out(data, path.name))
+        found = wheel.lay_out(data, path.name).needs.requirements
     assert found == ("a>=1", "b; extra=='c'")
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from tests.wheelhouse.hostile_wheels import INFO, NAME, Lie, WheelBuilder, ZipMember
 
+TRUTH = Lie()
 INIT = "evil/__init__.py"
 SOURCE = b"X = 1\n"
 RECORD = f"{INFO}/RECORD"
@@ -27,19 +28,11 @@ class HostileWheel:
     build: Callable[[Path], bytes]
     """Its bytes; given is the file that its code would make if it ever ran."""
     filename: str = NAME
-    zipfile_reads_it: bool = True
-    """Whether Python's zipfile opens and unpacks it without complaint."""
-    is_hurtful_to_unzip: bool = False
-    """Whether other programs should be kept from it: a bomb."""
 
 
-def built(
-    name: str, code: str, builder: WheelBuilder, filename: str = NAME, *, unreadable: bool = False
-) -> HostileWheel:
+def built(name: str, code: str, builder: WheelBuilder, filename: str = NAME) -> HostileWheel:
     """A hostile wheel without code."""
-    return HostileWheel(
-        name, code, lambda canary: builder.bytes(), filename, zipfile_reads_it=not unreadable
-    )
+    return HostileWheel(name, code, lambda canary: builder.bytes(), filename)
 
 
 def planted(name: str, code: str, path: str, *, line: bool = False) -> HostileWheel:
@@ -62,6 +55,6 @@ def with_file(path: str, data: bytes = b"x") -> WheelBuilder:
     return WheelBuilder(files={INIT: SOURCE, path: data})
 
 
-def raw(name: str, data: bytes = b"x", lie: Lie = Lie()) -> ZipMember:  # frozen
+def raw(name: str, data: bytes = b"x", lie: Lie = TRUTH) -> ZipMember:
     """A member as it is to be written."""
     return ZipMember(name, data, lie)

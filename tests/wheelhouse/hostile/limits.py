@@ -11,13 +11,11 @@ CODE = "WHEEL_BOMB"
 _MB = 1024**2
 
 
-def _bomb(name: str, builder: WheelBuilder, *, reads: bool = True) -> HostileWheel:
+def _bomb(name: str, builder: WheelBuilder) -> HostileWheel:
     return HostileWheel(
         name,
         CODE,
         lambda canary: builder.bytes(),
-        zipfile_reads_it=reads,
-        is_hurtful_to_unzip=True,
     )
 
 
@@ -45,12 +43,14 @@ def _noise(size: int) -> bytes:
 
 
 WHEELS: tuple[HostileWheel, ...] = (
-    _bomb("zeros-by-the-megabyte", with_file("evil/zeros.bin", bytes(3 * _MB))),
-    _bomb("declared-too-big", WheelBuilder(lies={INIT: Lie(size=3 * 1024**3)}), reads=False),
-    HostileWheel(
-        "too-big-together", CODE, _many_declared, zipfile_reads_it=False, is_hurtful_to_unzip=True
+    _bomb("zeros-by-the-megabyte", with_file("evil/zeros.bin", bytes(32 * _MB))),
+    _bomb(
+        "many-zeros-together",
+        WheelBuilder(extra=tuple(ZipMember(f"evil/{n}.bin", bytes(_MB)) for n in range(40))),
     ),
-    HostileWheel("too-many-members", CODE, _crowd, is_hurtful_to_unzip=True),
+    _bomb("declared-too-big", WheelBuilder(lies={INIT: Lie(size=3 * 1024**3)})),
+    HostileWheel("too-big-together", CODE, _many_declared),
+    HostileWheel("too-many-members", CODE, _crowd),
     HostileWheel("too-deep", "WHEEL_PATH", _folders),
     HostileWheel(
         "metadata-too-long",

@@ -12,13 +12,13 @@ CODE = "WHEEL_STRUCTURE"
 _MANY = 0xFFFFFFFF
 
 
-def _lie(name: str, lie: Lie, *, unreadable: bool = False) -> HostileWheel:
-    return built(name, CODE, WheelBuilder(lies={INIT: lie}), unreadable=unreadable)
+def _lie(name: str, lie: Lie) -> HostileWheel:
+    return built(name, CODE, WheelBuilder(lies={INIT: lie}))
 
 
-def _named(name: str, path: str, lie: Lie, *, unreadable: bool = False) -> HostileWheel:
+def _named(name: str, path: str, lie: Lie) -> HostileWheel:
     builder = WheelBuilder(extra=(raw(path, b"x", lie),))
-    return built(name, CODE, builder, unreadable=unreadable)
+    return built(name, CODE, builder)
 
 
 def _extra(kind: int, body: bytes) -> bytes:
@@ -39,18 +39,18 @@ _PACKED = len(raw(INIT, SOURCE).packed)
 _TOLD_LATER = {"flags": 8, "local_crc": 0, "local_size": 0}
 
 WHEELS: tuple[HostileWheel, ...] = (
-    _lie("other-name-inside", Lie(local_name="evil/b.py"), unreadable=True),
+    _lie("other-name-inside", Lie(local_name="evil/b.py")),
     _lie("other-size-inside", Lie(local_size=1)),
     _lie("other-checksum-inside", Lie(local_crc=1)),
     _lie("other-method-inside", Lie(local_method=0)),
     _lie("other-flags-inside", Lie(local_flags=8)),
-    _lie("encrypted", Lie(flags=1), unreadable=True),
-    _lie("strongly-encrypted", Lie(flags=0x41), unreadable=True),
-    _lie("patched-data", Lie(flags=0x20), unreadable=True),
+    _lie("encrypted", Lie(flags=1)),
+    _lie("strongly-encrypted", Lie(flags=0x41)),
+    _lie("patched-data", Lie(flags=0x20)),
     _lie("masked-headers", Lie(flags=0x2000)),
-    _lie("bzip2", Lie(method=12), unreadable=True),
-    _lie("lzma", Lie(method=14), unreadable=True),
-    _lie("unknown-method", Lie(method=99), unreadable=True),
+    _lie("bzip2", Lie(method=12)),
+    _lie("lzma", Lie(method=14)),
+    _lie("unknown-method", Lie(method=99)),
     _lie("on-another-disk", Lie(disk=3)),
     _lie("comment-of-a-member", Lie(comment=b"PK\x05\x06" + bytes(18))),
     _lie("other-name-in-extra-field", Lie(extra=_unicode_path(b"evil/c.py"))),
@@ -83,6 +83,5 @@ WHEELS: tuple[HostileWheel, ...] = (
         "name-marked-as-utf-8-is-none",
         "evil/é.py",
         Lie(raw_name=b"evil/\xe9.py", flags=0x800),
-        unreadable=True,
     ),
 )

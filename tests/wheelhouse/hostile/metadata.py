@@ -43,7 +43,6 @@ WHEELS: tuple[HostileWheel, ...] = (
     _wheel("wheel-format-is-none", WHEEL.replace(b"Wheel-Version: 1.0", b"Wheel-Version: new")),
     _wheel("purelib-is-neither", WHEEL.replace(b"Purelib: true", b"Purelib: perhaps")),
     _wheel("other-tag-inside", WHEEL.replace(b"py3-none-any", b"cp311-cp311-linux_aarch64")),
-    _wheel("no-tag-inside", WHEEL.replace(b"Tag: py3-none-any\n", b"")),
     _wheel("tag-is-none", WHEEL.replace(b"py3-none-any", b"py3")),
     _entry_points("entry-points-are-garbage", b"\x00\x01[[[\n= = =\n"),
     _entry_points("entry-points-not-text", b"[nondum.plugins]\na = \xff\xfe\n"),

@@ -64,14 +64,10 @@ WHEELS: tuple[HostileWheel, ...] = (
         "two-names-for-one-member",
         "WHEEL_STRUCTURE",
         _same_bytes,
-        zipfile_reads_it=False,
-        is_hurtful_to_unzip=True,
     ),
     HostileWheel(
         "headers-quoted",
         CODE,
         lambda canary: quoted(40, 100_000),
-        zipfile_reads_it=False,
-        is_hurtful_to_unzip=True,
     ),
 )

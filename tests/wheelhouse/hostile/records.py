@@ -60,13 +60,11 @@ WHEELS: tuple[HostileWheel, ...] = (
         "checksum-wrong",
         CODE,
         WheelBuilder(lies={INIT: Lie(crc=1)}),
-        unreadable=True,
     ),
     built(
         "size-understated",
         CODE,
         WheelBuilder(lies={INIT: Lie(size=2)}),
-        unreadable=True,
     ),
     built(
         "bytes-are-not-deflated",

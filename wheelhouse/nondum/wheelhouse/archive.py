@@ -11,30 +11,33 @@ import itertools
 import re
 import stat
 import struct
+import unicodedata
 import zipfile
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from nondum.sdk.errors import Problem
+from nondum.wheelhouse import outline
 from nondum.wheelhouse.inflate import crc32, inflated
 
 Bytes = memoryview
 MAX_MEMBERS = 20_000
 MAX_TOTAL_BYTES = 2 * 1024**3
 MAX_RATIO = 1000
-RATIO_COUNTS_ABOVE = 1024**2
+"""A member may unpack to so many times its packed size; deflate can do no more than 1032."""
+MAX_WHOLE_RATIO = 100
+"""And a wheel to so many times its own size: of 430 widely used ones, none reaches 11."""
+RATIO_COUNTS_ABOVE = 16 * 1024**2
+"""Bytes: test data of a few megabytes of zeros is in honest wheels."""
 MAX_NAME = 255
+MAX_PATH = 1000
+"""Bytes of a whole path: it is laid below folders of the store, and Linux takes 4096."""
+MAX_DEPTH = 64
 
-_END = b"PK\x05\x06"
-_END_LENGTH = 22
-_LOCAL = struct.Struct("<4s5H3L2H")
-_ZIP64 = 0xFFFFFFFF
-"""In a size's place: the true size is in an extra field."""
-_DESCRIPTOR_MAX = 24
-"""Longest data descriptor that may follow a member; no header fits in it."""
 _CHUNK = 1024 * 1024
-_CONTROL = re.compile(r"[\x00-\x1f]")
+_RESERVED = re.compile(r"(con|prn|aux|nul|(com|lpt)[0-9¹²³])(\..*)?", re.IGNORECASE)
+"""Names that are devices on Windows, whatever follows a dot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,14 +66,19 @@ class Archive:
 
 def read(data: Bytes, where: str) -> Archive:
     """List the members of an archive, and everything that makes it unsafe to unpack."""
+    if flaws := list(outline.end_flaws(data)):
+        return Archive((), tuple(Problem("WHEEL_STRUCTURE", text, where=where) for text in flaws))
     try:
         found = zipfile.ZipFile(io.BufferedReader(_View(data)))
     except (zipfile.BadZipFile, NotImplementedError, OSError, ValueError, struct.error) as error:
         return Archive((), (Problem("WHEEL_STRUCTURE", f"is no zip file ({error})", where=where),))
-    listed, flaws = found.infolist(), _outline_flaws(data, found)
+    listed = found.infolist()
+    if len(listed) > MAX_MEMBERS:
+        text = f"has {len(listed)} members, more than {MAX_MEMBERS}"
+        return Archive((), (Problem("WHEEL_BOMB", text, where=where),))
     problems = [
-        *(Problem("WHEEL_STRUCTURE", text, where=where) for text in flaws),
-        *(Problem("WHEEL_BOMB", text, where=where) for text in _bomb_flaws(listed)),
+        *(Problem("WHEEL_STRUCTURE", text, where=where) for text in _outline_flaws(data, found)),
+        *(Problem("WHEEL_BOMB", text, where=where) for text in _bomb_flaws(listed, len(data))),
         *_path_problems(listed, where),
     ]
     if problems:
@@ -106,7 +114,7 @@ def _checked(pieces: Iterator[bytes], member: Member) -> Iterator[bytes]:
 
 
 def _member(data: Bytes, info: zipfile.ZipInfo) -> Member:
-    start, end = _span(data, info)
+    start, end = outline.span(data, info)
     return Member(
         path=info.filename,
         size=info.file_size,
@@ -118,64 +126,20 @@ def _member(data: Bytes, info: zipfile.ZipInfo) -> Member:
     )
 
 
-def _outline_flaws(data: Bytes, archive: zipfile.ZipFile) -> Iterator[str]:
-    listed = archive.infolist()
-    if len(data) < _END_LENGTH or bytes(data[-_END_LENGTH:][:4]) != _END:
-        yield "bytes follow the end of the archive"
-    if listed and min(info.header_offset for info in listed) != 0:
-        yield "bytes precede the archive"
+def _outline_flaws(data: Bytes, found: zipfile.ZipFile) -> Iterator[str]:
+    listed = found.infolist()
     names = Counter(info.filename for info in listed)
     for name in sorted(name for name, count in names.items() if count > 1)[:3]:
         yield f"{name!r} stands twice"
-    flaws = [flaw for info in listed for flaw in _entry_flaws(data, info)]
-    yield from flaws or _hidden(data, listed, archive.start_dir)
+    yield from outline.flaws(data, listed, found.start_dir)
 
 
-def _hidden(data: Bytes, listed: list[zipfile.ZipInfo], directory: int) -> Iterator[str]:
-    """Bytes between members that only a reader from front to back would see as members."""
-    starts = sorted([*(info.header_offset for info in listed), directory])
-    ends = sorted(_span(data, info)[1] for info in listed)
-    for end, start in zip(ends, starts[1:], strict=True):
-        if start - end > _DESCRIPTOR_MAX:
-            yield f"{start - end} bytes at {end} belong to no member"
-
-
-def _span(data: Bytes, info: zipfile.ZipInfo) -> tuple[int, int]:
-    """Where a member's packed bytes begin and end."""
-    local = _LOCAL.unpack_from(data, info.header_offset)
-    start = info.header_offset + _LOCAL.size + local[9] + local[10]
-    return start, start + info.compress_size
-
-
-def _entry_flaws(data: Bytes, info: zipfile.ZipInfo) -> Iterator[str]:
-    if info.flag_bits & 0x1:
-        yield f"{info.filename!r} is encrypted"
-    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-        yield f"{info.filename!r} is packed by another method than deflate"
-    try:
-        local = _LOCAL.unpack_from(data, info.header_offset)
-    except struct.error:
-        yield f"{info.filename!r} lies outside the file"
-        return
-    start = info.header_offset + _LOCAL.size
-    name = bytes(data[start : start + local[9]])
-    if local[0] != b"PK\x03\x04" or name != info.orig_filename.encode(
-        "utf-8" if info.flag_bits & 0x800 else "cp437"
-    ):
-        yield f"{info.filename!r} has another name in its own header"
-    is_told_later = info.flag_bits & 0x8 or _ZIP64 in local[7:9]
-    if not is_told_later and local[6:9] != (info.CRC, info.compress_size, info.file_size):
-        yield f"{info.filename!r} has another size or checksum in its own header"
-    if start + local[9] + local[10] + info.compress_size > len(data):
-        yield f"{info.filename!r} lies outside the file"
-
-
-def _bomb_flaws(listed: list[zipfile.ZipInfo]) -> Iterator[str]:
-    if len(listed) > MAX_MEMBERS:
-        yield f"has {len(listed)} members, more than {MAX_MEMBERS}"
+def _bomb_flaws(listed: list[zipfile.ZipInfo], packed: int) -> Iterator[str]:
     total = sum(info.file_size for info in listed)
     if total > MAX_TOTAL_BYTES:
         yield f"unpacks to {total} bytes, more than {MAX_TOTAL_BYTES}"
+    elif total > max(RATIO_COUNTS_ABOVE, MAX_WHOLE_RATIO * packed):
+        yield f"unpacks to more than {MAX_WHOLE_RATIO} times its size"
     for info in listed:
         grows = info.file_size > MAX_RATIO * max(info.compress_size, 1)
         if info.file_size > RATIO_COUNTS_ABOVE and grows:
@@ -192,13 +156,18 @@ def _overlaps(members: tuple[Member, ...]) -> Iterator[str]:
 def _path_problems(listed: list[zipfile.ZipInfo], where: str) -> Iterator[Problem]:
     folded: dict[str, str] = {}
     for info in listed:
-        if flaw := _path_flaw(info):
+        if flaw := _path_flaw(info) or _kind_flaw(info):
             text = f"member {info.filename[:80]!r} {flaw}"
             yield Problem("WHEEL_PATH", text, where=where)
-        other = folded.setdefault(info.filename.lower(), info.filename)
+        other = folded.setdefault(_folded(info.filename), info.filename)
         if other != info.filename:
-            text = f"{info.filename!r} and {other!r} are one file on some systems"
+            text = f"{info.filename[:80]!r} and {other[:80]!r} are one file on some systems"
             yield Problem("WHEEL_PATH", text, where=where)
+
+
+def _folded(path: str) -> str:
+    """What a file system that folds cases and spellings takes a path for."""
+    return path.lower() if path.isascii() else unicodedata.normalize("NFC", path).casefold()
 
 
 def _path_flaw(info: zipfile.ZipInfo) -> str | None:
@@ -206,15 +175,34 @@ def _path_flaw(info: zipfile.ZipInfo) -> str | None:
     parts = path.rstrip("/").split("/")
     if path.startswith("/") or ".." in parts:
         return "leaves the wheel"
-    if "\\" in info.orig_filename or ":" in path or _CONTROL.search(info.orig_filename):
+    if "\\" in info.orig_filename or ":" in path or not _is_plain(info.orig_filename):
         return "has characters that paths may not have"
     if "" in parts or "." in parts:
         return "is not in its shortest form"
     if any(len(part.encode()) > MAX_NAME for part in parts):
         return f"has a part longer than {MAX_NAME} bytes"
+    if len(path.encode()) > MAX_PATH or len(parts) > MAX_DEPTH:
+        return f"is longer than {MAX_PATH} bytes, or deeper than {MAX_DEPTH} folders"
+    if any(part[-1] in ". " or _RESERVED.fullmatch(part) for part in parts):
+        return "has a name that some systems take for another"
+    return None
+
+
+def _is_plain(path: str) -> bool:
+    """Whether nothing in a path hides or turns round what people read."""
+    return path.isprintable() or not any(
+        unicodedata.category(letter) in ("Cc", "Cf", "Cs", "Zl", "Zp") for letter in path
+    )
+
+
+def _kind_flaw(info: zipfile.ZipInfo) -> str | None:
     kind = stat.S_IFMT(info.external_attr >> 16)
     if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
         return "is no regular file"
+    if info.is_dir() and info.file_size:
+        return "is a folder that has bytes"
+    if kind == stat.S_IFDIR and not info.is_dir():
+        return "is a folder by its mode, and a file by its name"
     return None
 
 

@@ -73,7 +73,7 @@ def build(package: Path, drive: Path, options: Options, progress: Progress) -> P
         locked = {target: chosen[target] for target in options.targets}
         folder = work / said.id
         _write(folder, package, said, locked, described)
-        _judge(folder / "wheels")
+        _judge(folder / "wheels", said)
         _seal(folder, said.id, _version(own), options)
         progress("copying it to the drive", steps - 1, steps)
         target = _delivered(folder, drive)
@@ -216,12 +216,14 @@ def _version(own: Path) -> str:
     return str(parse_wheel_filename(own.name)[1])
 
 
-def _judge(wheels: Path) -> None:
+def _judge(wheels: Path, said: Manifest) -> None:
     """Refuse wheels that every host would refuse."""
     problems: list[Problem] = []
     for path in sorted(wheels.glob("*.whl")):
         with wheel.opened(path) as data:
-            problems.extend(wheel.lay_out(data, path.name).problems)
+            layout = wheel.lay_out(data, path.name)
+        problems += layout.problems
+        problems += wheel.hook_problems(layout.left_out, path.name, said.startup_hooks)
     wheel.refuse_if_any(tuple(problems))
 
 

@@ -103,8 +103,7 @@ def select(lock: Lock, environment: Environment, tags: Sequence[Tag]) -> tuple[L
                 "WHEEL_INCOMPATIBLE",
                 str(error),
                 where=lock.where,
-                need=f"wheels for {environment['platform_machine']}, "
-                f"Python {environment['python_version']}",
+                need=_needed(environment, tags),
                 have=", ".join(sorted(_platforms(lock))) or "none",
                 fix="build the payload for this architecture and Python",
             )
@@ -118,6 +117,8 @@ def _flaws(package: Package, where: str) -> Iterator[Problem]:
     for source in ("vcs", "directory", "archive", "sdist"):
         if getattr(package, source) is not None:
             yield _flaw("LOCK_NOT_WHEEL", f"{name} comes from a {source}, not a wheel", where)
+    if package.index is not None:
+        yield _flaw("LOCK_PATH", f"{name} is looked for in an index, not in the payload", where)
     if not package.wheels:
         yield _flaw("LOCK_NOT_WHEEL", f"{name} has no wheel", where)
     if package.version is None:
@@ -132,6 +133,9 @@ def _flaws(package: Package, where: str) -> Iterator[Problem]:
             yield _flaw("LOCK_PATH", f"path {wheel.path[:80]!r}: {flaw}", place)
         else:
             yield from _wheel_flaws(wheel.path, package, place)
+        if wheel.name is not None and wheel.path and wheel.name != PurePosixPath(wheel.path).name:
+            text = f"{wheel.path} is called {wheel.name[:80]!r}"
+            yield _flaw("LOCK_INVALID", text, place)
         if not _SHA256.fullmatch(wheel.hashes.get("sha256", "")):
             yield _flaw("LOCK_HASH", f"{wheel.path} has no sha256 of 64 hex digits", place)
         if wheel.size is None:
@@ -158,6 +162,15 @@ def _wheels(parsed: Pylock) -> Iterator[LockedWheel]:
                 sha256=wheel.hashes["sha256"],
                 size=int(wheel.size or 0),
             )
+
+
+def _needed(environment: Environment, tags: Sequence[Tag]) -> str:
+    """What a host takes, in words; the first tag tells its libc best."""
+    platform = next((tag.platform for tag in tags if tag.platform != "any"), "any")
+    return (
+        f"wheels for {environment['platform_machine']}, Python {environment['python_version']}, "
+        f"{platform} or older"
+    )
 
 
 def _platforms(lock: Lock) -> set[str]:

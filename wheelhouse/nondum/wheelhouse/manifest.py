@@ -40,6 +40,8 @@ class Requires:
     gpu_memory_mb: int = 0
     confinement: int = 0
     """The least level that its workers may run at."""
+    alone: bool = False
+    """Whether no other release of it may run beside it: an upgrade stops the old one first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +77,9 @@ class Manifest:
     homepage: str
     requires: Requires
     components: tuple[ComponentManifest, ...]
+    startup_hooks: tuple[str, ...] = ()
+    """Files of wheels that an interpreter would run at its start: their packer knows that workers
+    do not, and that they are left out."""
 
 
 def parse(text: str, where: str) -> Manifest:
@@ -89,6 +94,7 @@ def parse(text: str, where: str) -> Manifest:
         homepage=root.text("homepage", default=""),
         requires=_requires(root.table("requires")),
         components=tuple(_component(table) for table in root.tables("component", required=True)),
+        startup_hooks=root.texts("startup_hooks"),
     )
     root.close()
     if not manifest.components and not report.problems:
@@ -108,6 +114,7 @@ def _requires(table: Table) -> Requires:
         memory_mb=table.integer("memory_mb", 0),
         gpu_memory_mb=table.integer("gpu_memory_mb", 0),
         confinement=table.integer("confinement", 0),
+        alone=table.flag("alone"),
     )
     try:
         SpecifierSet(requires.python)

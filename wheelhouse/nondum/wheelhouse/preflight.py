@@ -9,7 +9,7 @@ import functools
 import os
 import platform
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -17,17 +17,18 @@ from types import MappingProxyType
 
 from packaging import markers, tags
 from packaging.markers import UndefinedComparison, UndefinedEnvironmentName
-from packaging.requirements import InvalidRequirement, Requirement
+from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 from packaging.tags import Tag
 from packaging.utils import canonicalize_name
 from packaging.version import Version
 
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem
-from nondum.wheelhouse import gpu
+from nondum.wheelhouse import gpu, wheel
 from nondum.wheelhouse import lock as locks_module
 from nondum.wheelhouse.lock import Lock, LockedWheel
 from nondum.wheelhouse.manifest import Manifest
+from nondum.wheelhouse.wheel import Layout
 
 GROWTH = 4
 """Unpacked wheels are at most about so many times their size; measured: 2.8 to 2.9."""
@@ -66,8 +67,8 @@ def probe(state: Path, *, reserve_mb: int, confinement: int) -> HostFacts:
         environment=_environment(),
         tags=_tags(),
         free_disk_mb=max(0, shutil.disk_usage(there).free // _MB - reserve_mb),
-        free_memory_mb=_free_memory_mb(),
-        gpu_memory_mb=gpu.free_memory_mb(_free_memory_mb),
+        free_memory_mb=free_memory_mb(),
+        gpu_memory_mb=gpu.free_memory_mb(free_memory_mb),
         confinement=confinement,
         nondum=nondum_version(),
     )
@@ -172,7 +173,7 @@ def unmet(
         for line in requirements.get(distribution, ()):
             try:
                 wanted = _wanted(line, extra, facts)
-            except (InvalidRequirement, UndefinedComparison, UndefinedEnvironmentName):
+            except (ValueError, RecursionError, UndefinedComparison, UndefinedEnvironmentName):
                 text = f"{distribution} has a dependency that cannot be read: {line[:80]!r}"
                 yield Problem("WHEEL_METADATA", text, where=where)
                 continue
@@ -185,6 +186,30 @@ def unmet(
             more = {(str(name), wanted_extra) for wanted_extra in wanted.extras} - asked
             asked |= more
             pending += sorted(more)
+
+
+def misfits(
+    layout: Layout, filename: str, manifest: Manifest, facts: HostFacts
+) -> Iterator[Problem]:
+    """Why a sound wheel is not for this payload or host."""
+    yield from wheel.hook_problems(layout.left_out, filename, manifest.startup_hooks)
+    python = SpecifierSet(layout.needs.python)
+    if not layout.problems and not python.contains(facts.python, prereleases=True):
+        yield Problem(
+            "WHEEL_INCOMPATIBLE",
+            "is not for this Python, whatever its name says",
+            where=filename,
+            need=f"Python {python}",
+            have=facts.python,
+            fix="build the payload for this architecture and Python",
+        )
+
+
+def unpacked_problems(layouts: Iterable[Layout], facts: HostFacts, where: str) -> Iterator[Problem]:
+    """When wheels are too much for the disk, by the sizes of all their files."""
+    needed = sum(file.member.size for layout in layouts for file in layout.files) // _MB
+    if needed > facts.free_disk_mb:
+        yield _short("DISK_FULL", "disk", needed, facts.free_disk_mb, where)
 
 
 def _wanted(line: str, extra: str, facts: HostFacts) -> Requirement | None:
@@ -237,16 +262,17 @@ def _version_problems(
             where=manifest.id,
             need=f"level {manifest.requires.confinement}",
             have=f"level {facts.confinement}",
+            fix="see `nondum doctor` for what confinement lacks on this host, or use another host",
         )
 
 
 def _resource_problems(manifest: Manifest, facts: HostFacts) -> Iterator[Problem]:
     needs = manifest.requires
     if needs.memory_mb > facts.free_memory_mb:
-        yield _short("NO_MEMORY", "memory", needs.memory_mb, facts.free_memory_mb, manifest)
+        yield _short("NO_MEMORY", "memory", needs.memory_mb, facts.free_memory_mb, manifest.id)
     if needs.gpu_memory_mb > (facts.gpu_memory_mb or 0):
         have = facts.gpu_memory_mb or 0
-        yield _short("NO_GPU_MEMORY", "GPU memory", needs.gpu_memory_mb, have, manifest)
+        yield _short("NO_GPU_MEMORY", "GPU memory", needs.gpu_memory_mb, have, manifest.id)
 
 
 def _disk_problems(
@@ -255,21 +281,22 @@ def _disk_problems(
     wheels = {wheel.sha256: wheel.size for group in chosen.values() for wheel in group}
     needed = max(manifest.requires.disk_mb, GROWTH * sum(wheels.values()) // _MB)
     if needed > facts.free_disk_mb:
-        yield _short("DISK_FULL", "disk", needed, facts.free_disk_mb, manifest)
+        yield _short("DISK_FULL", "disk", needed, facts.free_disk_mb, manifest.id)
 
 
-def _short(code: str, what: str, need: int, have: int, manifest: Manifest) -> Problem:
+def _short(code: str, what: str, need: int, have: int, where: str) -> Problem:
     return Problem(
         code,
         f"there is too little {what}",
-        where=manifest.id,
+        where=where,
         need=f"{need} MB",
         have=f"{have} MB",
         fix=f"free some {what}, or use another host",
     )
 
 
-def _free_memory_mb() -> int:
+def free_memory_mb() -> int:
+    """Memory that can be had without swapping (proc_meminfo(5)), in MB."""
     for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
         if line.startswith("MemAvailable:"):
             return int(line.split()[1]) // 1024

@@ -8,26 +8,19 @@ beside or instead of its worker.
 
 from __future__ import annotations
 
-import base64
-import binascii
-import csv
 import hashlib
-import io
 import mmap
 import sys
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from email.parser import HeaderParser
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
-from packaging.utils import InvalidWheelFilename, parse_wheel_filename
-from packaging.version import InvalidVersion, Version
-
 from nondum.sdk.errors import PayloadRefused, Problem
-from nondum.wheelhouse import archive
+from nondum.wheelhouse import archive, dist_info, record
 from nondum.wheelhouse.archive import Bytes, Member
+from nondum.wheelhouse.dist_info import Needs, WheelName
 
 SDK = "nondum-sdk"
 HARMLESS_HOOKS = frozenset({"distutils-precedence.pth", "a1_coverage.pth"})
@@ -35,7 +28,8 @@ HARMLESS_HOOKS = frozenset({"distutils-precedence.pth", "a1_coverage.pth"})
 STARTUP_MODULES = frozenset({"sitecustomize", "usercustomize"})
 INTERPRETER_NAMES = ("python", "pip", "activate")
 LIBRARY_SCHEMES = ("purelib", "platlib")
-MAX_METADATA_BYTES = 16 * 1024**2
+SCHEMES = (*LIBRARY_SCHEMES, "scripts", "headers", "data")
+ENTRY_POINTS = "entry_points.txt"
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +50,8 @@ class Layout:
     left_out: tuple[str, ...]
     """Members that are not installed: scripts, headers, data."""
     problems: tuple[Problem, ...]
+    needs: Needs = field(default_factory=Needs)
+    """What its metadata asks for."""
 
 
 @contextmanager
@@ -74,52 +70,71 @@ def opened(path: Path) -> Iterator[Bytes]:
 
 
 def lay_out(data: Bytes, filename: str) -> Layout:
-    """Judge a wheel but for its files' contents, and say where they go."""
+    """Judge a wheel but for its files' contents, and say where they go.
+
+    Start-up hooks are left out; `hook_problems` judges those.
+    """
     found = archive.read(data, filename)
     if found.problems:
         return Layout((), (), found.problems)
     try:
-        name, version, _, _ = parse_wheel_filename(filename)
-    except InvalidWheelFilename as error:
+        named = WheelName.parse(filename)
+        info = dist_info.folder([_target(m.path) or m.path for m in found.members], named)
+    except ValueError as error:  # InvalidWheelFilename among them
         return Layout((), (), (Problem("WHEEL_STRUCTURE", str(error), where=filename),))
-    info = _dist_info(found.members, str(name), str(version))
-    if info is None:
-        text = f"has no .dist-info folder of {name} {version}"
-        return Layout((), (), (Problem("WHEEL_STRUCTURE", text, where=filename),))
+    by_path = {member.path: member for member in found.members}
     try:
-        record = _record(data, found.members, info)
-    except (ValueError, csv.Error, KeyError) as error:
+        listed = record.parse(read_text(data, by_path, f"{info}/RECORD", record.MAX_BYTES))
+    except ValueError as error:
         text = f"RECORD is missing or cannot be read ({error})"
         return Layout((), (), (Problem("WHEEL_RECORD", text, where=filename),))
+    needs, metadata_flaws = _described(data, by_path, info, named)
     problems = [
-        *_record_problems(found.members, record, info, filename),
-        *_content_problems(found.members, str(name), filename),
+        *_problems("WHEEL_RECORD", record.flaws(found.members, listed, info), filename),
+        *_problems("WHEEL_METADATA", metadata_flaws, filename),
+        *_problems("WHEEL_DATA_SCHEME", _scheme_flaws(found.members, named), filename),
+        *_content_problems(found.members, named.name, filename),
     ]
     files, left_out = [], []
     for member in found.members:
         target = _target(member.path)
-        if target is None or target in HARMLESS_HOOKS:
+        if target is None or _is_hook(target):
             left_out.append(member.path)
         else:
-            files.append(PlannedFile(target, member, record.get(member.path, "")))
+            row = listed.get(member.path)
+            files.append(PlannedFile(target, member, row.sha256 if row else ""))
     problems.extend(_target_problems(files, filename))
-    return Layout(tuple(files), tuple(left_out), tuple(problems))
+    return Layout(tuple(files), tuple(left_out), tuple(problems), needs)
 
 
-def check(path: Path) -> tuple[Problem, ...]:
+def hook_problems(
+    left_out: Iterable[str], filename: str, allowed: Collection[str] = ()
+) -> tuple[Problem, ...]:
+    """Start-up hooks among what is left out of a wheel, but for those that the manifest names.
+
+    None is ever installed, since workers run no hooks; but a wheel that counts on one would not
+    work, and one that nobody expects is most often an attack.
+    """
+    hooks = [target for path in left_out if _is_hook(target := _target(path) or "")]
+    return tuple(
+        Problem(
+            "WHEEL_STARTUP_HOOK",
+            f"{hook!r} would run when an interpreter starts",
+            where=filename,
+            fix=f'if it is harmless to do without it, put startup_hooks = ["{hook}"] in '
+            "payload.toml, and build the payload again",
+        )
+        for hook in hooks
+        if hook not in HARMLESS_HOOKS and hook not in allowed
+    )
+
+
+def check(path: Path, allowed_hooks: Collection[str] = ()) -> tuple[Problem, ...]:
     """Everything wrong with a wheel, its files' contents included."""
     with opened(path) as data:
         layout = lay_out(data, path.name)
-        return (*layout.problems, *_damaged(data, layout, path.name))
-
-
-def requirements(data: Bytes, layout: Layout) -> tuple[str, ...]:
-    """The `Requires-Dist` lines of a wheel that was laid out without problems."""
-    for file in layout.files:
-        if file.target.count("/") == 1 and file.target.endswith(".dist-info/METADATA"):
-            metadata = HeaderParser().parsestr(read_text(data, file.member))
-            return tuple(str(line) for line in metadata.get_all("Requires-Dist", ()))
-    return ()
+        hooks = hook_problems(layout.left_out, path.name, allowed_hooks)
+        return (*layout.problems, *hooks, *_damaged(data, layout, path.name))
 
 
 def _damaged(data: Bytes, layout: Layout, filename: str) -> Iterator[Problem]:
@@ -148,75 +163,56 @@ def refuse_if_any(problems: tuple[Problem, ...]) -> None:
         raise PayloadRefused(*problems)
 
 
-def _dist_info(members: tuple[Member, ...], name: str, version: str) -> str | None:
-    marks = [PurePosixPath(m.path) for m in members if m.path.endswith(".dist-info/WHEEL")]
-    folders = {str(mark.parent) for mark in marks if len(mark.parts) == 2}  # not vendored ones
-    wanted = f"{name.replace('-', '_')}-{version}.dist-info"
-    for folder in folders:
-        stem = folder.removesuffix(".dist-info")
-        found_name, _, found_version = stem.rpartition("-")
-        same_name = found_name.lower().replace("-", "_").replace(".", "_") == name.replace("-", "_")
-        if folder == wanted or (same_name and _same_version(found_version, version)):
-            return folder if len(folders) == 1 else None
-    return None
+def _described(
+    data: Bytes, by_path: Mapping[str, Member], info: str, named: WheelName
+) -> tuple[Needs, list[str]]:
+    """What the wheel's metadata asks for, and what is wrong in it."""
+    flaws: list[str] = []
+
+    def text_of(name: str, limit: int) -> str | None:
+        try:
+            return read_text(data, by_path, f"{info}/{name}", limit)
+        except ValueError as error:
+            flaws.append(f"{name} is missing or cannot be read ({error})")
+            return None
+
+    if (metadata := text_of("METADATA", dist_info.MAX_METADATA)) is not None:
+        flaws += dist_info.metadata_flaws(metadata, named)
+    if (wheel := text_of("WHEEL", dist_info.MAX_METADATA)) is not None:
+        flaws += dist_info.wheel_flaws(wheel, named)
+    has_entry_points = f"{info}/{ENTRY_POINTS}" in by_path
+    if has_entry_points and (text := text_of(ENTRY_POINTS, dist_info.MAX_ENTRY_POINTS)) is not None:
+        flaws += dist_info.entry_point_flaws(text)
+    return dist_info.needs(metadata or ""), flaws
 
 
-def _same_version(one: str, other: str) -> bool:
-    try:
-        return Version(one.replace("_", "-")) == Version(other)
-    except InvalidVersion:
-        return False
-
-
-def _record(data: Bytes, members: tuple[Member, ...], info: str) -> dict[str, str]:
-    by_path = {member.path: member for member in members}
-    text = read_text(data, by_path[f"{info}/RECORD"])
-    record: dict[str, str] = {}
-    for row in csv.reader(io.StringIO(text)):
-        if not row:
-            continue
-        if len(row) != 3:
-            raise ValueError(f"row {','.join(row)[:60]!r} has not three columns")
-        path, digest, _ = row
-        if path in record:
-            raise ValueError(f"{path!r} stands twice")
-        record[path] = _hex(digest)
-    return record
-
-
-def _hex(digest: str) -> str:
-    """RECORD's `sha256=<urlsafe base64>` as hex; empty when it gives none."""
-    if not digest:
-        return ""
-    method, _, value = digest.partition("=")
-    if method != "sha256":
-        raise ValueError(f"digest by {method[:20]!r}, not sha256")
-    try:
-        return base64.urlsafe_b64decode(value + "=" * (-len(value) % 4)).hex()
-    except binascii.Error as error:
-        raise ValueError(f"digest {value[:20]!r} is no base64") from error
-
-
-def read_text(data: Bytes, member: Member) -> str:
-    """A member as text. Raises `ValueError` when it is too long, damaged or not UTF-8."""
-    if member.size > MAX_METADATA_BYTES:
-        raise ValueError(f"{member.path} is longer than {MAX_METADATA_BYTES} bytes")
+def read_text(data: Bytes, by_path: Mapping[str, Member], path: str, limit: int) -> str:
+    """A member as text. Raises `ValueError` when it is missing, too long, damaged or not UTF-8."""
+    member = by_path.get(path)
+    if member is None:
+        raise ValueError("it is not there")
+    if member.size > limit:
+        raise ValueError(f"it is longer than {limit} bytes")
     return b"".join(archive.unpack(data, member)).decode()
 
 
-def _record_problems(
-    members: tuple[Member, ...], record: dict[str, str], info: str, filename: str
-) -> Iterator[Problem]:
-    may_lack_digest = {f"{info}/RECORD", f"{info}/RECORD.jws", f"{info}/RECORD.p7s"}
+def _problems(code: str, flaws: Iterable[str], filename: str) -> Iterator[Problem]:
+    return (Problem(code, flaw, where=filename) for flaw in flaws)
+
+
+def _scheme_flaws(members: Sequence[Member], named: WheelName) -> Iterator[str]:
     for member in members:
-        if member.path not in record and member.path not in may_lack_digest:
-            text = f"member {member.path!r} is not in RECORD"
-            yield Problem("WHEEL_RECORD", text, where=filename)
-        elif not record.get(member.path) and member.path not in may_lack_digest:
-            text = f"member {member.path!r} has no digest in RECORD"
-            yield Problem("WHEEL_RECORD", text, where=filename)
-    for path in record.keys() - {member.path for member in members} - may_lack_digest:
-        yield Problem("WHEEL_RECORD", f"RECORD lists {path!r}, which is not there", where=filename)
+        top, _, rest = member.path.partition("/")
+        if not rest or not top.endswith(".data"):
+            continue
+        scheme, _, inside = rest.partition("/")
+        leaf = PurePosixPath(member.path).name.lower()
+        if not named.is_folder(top, ".data"):
+            yield f"member {member.path!r} is in the data folder of another distribution"
+        elif scheme not in SCHEMES or not inside:
+            yield f"member {member.path!r} is in no known part of a data folder"
+        elif scheme not in LIBRARY_SCHEMES and leaf.startswith(INTERPRETER_NAMES):
+            yield f"member {member.path!r} would stand in for the interpreter or pip"
 
 
 def _content_problems(members: tuple[Member, ...], name: str, filename: str) -> Iterator[Problem]:
@@ -224,17 +220,11 @@ def _content_problems(members: tuple[Member, ...], name: str, filename: str) -> 
     for member in members:
         target = _target(member.path)
         if target is None:
-            leaf = PurePosixPath(member.path).name.lower()
-            if leaf.startswith(INTERPRETER_NAMES):
-                text = f"member {member.path!r} would stand in for the interpreter or pip"
-                yield Problem("WHEEL_DATA_SCHEME", text, where=filename)
             continue
         top, _, rest = target.partition("/")
-        tops.add(top.split(".")[0] if not rest or top.endswith(".py") else top)
-        if top.endswith(".pth") and not rest and top not in HARMLESS_HOOKS:
-            text = f"{target!r} would run when an interpreter starts"
-            yield Problem("WHEEL_STARTUP_HOOK", text, where=filename)
-        if top == "nondum" and not (name == SDK and target.startswith("nondum/sdk/")):
+        module = top.split(".")[0] if not rest or top.endswith(".py") else top
+        tops.add(module)
+        if module == "nondum" and not (name == SDK and target.startswith("nondum/sdk/")):
             text = f"{target!r} lies in nondum's own namespace"
             yield Problem("WHEEL_SHADOWS", text, where=filename)
     for hook in sorted(tops & STARTUP_MODULES):
@@ -258,6 +248,11 @@ def _target_problems(files: Sequence[PlannedFile], filename: str) -> Iterator[Pr
         if count > 1 or target in folders:
             text = f"{target!r} would be two things at once"
             yield Problem("WHEEL_PATH", text, where=filename)
+
+
+def _is_hook(target: str) -> bool:
+    """Whether `site` would act by a file (PEP 829 adds `.start` to `.pth`)."""
+    return "/" not in target and target.endswith((".pth", ".start"))
 
 
 def _target(path: str) -> str | None:

@@ -1,0 +1,184 @@
+"""The `.dist-info` folder of a wheel: METADATA, WHEEL and entry points, held to the file's name.
+
+What is installed goes by these files, what is chosen by the name: if they differ, a wheel could be
+chosen as one thing and be another. ("Core metadata", "Binary distribution format" and "Entry
+points" of the PyPA.)
+"""
+
+from __future__ import annotations
+
+import configparser
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from email.message import Message
+from email.parser import HeaderParser
+from pathlib import PurePosixPath
+
+from packaging.requirements import Requirement
+from packaging.specifiers import InvalidSpecifier, SpecifierSet
+from packaging.tags import Tag, parse_tag
+from packaging.utils import canonicalize_name, parse_wheel_filename
+from packaging.version import InvalidVersion, Version
+
+MAX_METADATA = 4 * 1024**2
+MAX_ENTRY_POINTS = 1024**2
+MAX_REQUIREMENTS = 2000
+MAX_REQUIREMENT = 8000
+"""Characters of one."""
+OWN_GROUPS = "nondum."
+"""Groups of entry points that are read here begin so."""
+
+_OBJECT = re.compile(r"[\w.]+(\s*:\s*[\w.]+)?(\s*\[[^\]]*\])?")
+_PLATFORM = re.compile(r"(?:linux|manylinux\d+|(?:many|musl)linux_\d+_\d+)_(\w+)")
+_WHEEL_VERSION = re.compile(r"1\.\d{1,4}")
+
+
+@dataclass(frozen=True, slots=True)
+class WheelName:
+    """What a wheel's file name says."""
+
+    name: str
+    """Normalised."""
+    version: Version
+    tags: frozenset[Tag]
+
+    @classmethod
+    def parse(cls, filename: str) -> WheelName:
+        """Raises `InvalidWheelFilename`."""
+        name, version, _, tags = parse_wheel_filename(filename)
+        return cls(str(name), version, tags)
+
+    def is_folder(self, folder: str, suffix: str) -> bool:
+        """Whether `folder` is this wheel's `<name>-<version><suffix>`, however it is written."""
+        name, _, version = folder.removesuffix(suffix).rpartition("-")
+        same_name = canonicalize_name(name) == self.name
+        return (
+            folder.endswith(suffix) and same_name and _is(version.replace("_", "-"), self.version)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Needs:
+    """What a distribution needs, by its METADATA."""
+
+    requirements: tuple[str, ...] = ()
+    """`Requires-Dist` lines."""
+    python: str = ""
+    """`Requires-Python`; empty: any."""
+
+
+def folder(paths: Sequence[str], named: WheelName) -> str:
+    """The one `.dist-info` folder. Raises `ValueError` when it is missing, or another is there.
+
+    Vendored ones, deeper down, are nobody's business.
+    """
+    tops = {PurePosixPath(path).parts[0] for path in paths}
+    found = sorted(top for top in tops if top.endswith((".dist-info", ".egg-info", ".egg-link")))
+    own = [top for top in found if named.is_folder(top, ".dist-info")]
+    if len(own) != 1 or f"{own[0]}/WHEEL" not in paths:
+        raise ValueError(f"has no .dist-info folder of {named.name} {named.version}")
+    if others := [top for top in found if top not in own]:
+        raise ValueError(f"has {others[0]!r}, which speaks for another distribution")
+    return own[0]
+
+
+def metadata_flaws(text: str, named: WheelName) -> Iterator[str]:
+    """What is wrong with METADATA."""
+    said = _headers(text)
+    names, versions = said.get_all("Name", []), said.get_all("Version", [])
+    if [canonicalize_name(str(name)) for name in names] != [named.name]:
+        yield f"METADATA is of {', '.join(map(str, names))[:80] or 'nobody'!r}, not {named.name!r}"
+    if len(versions) != 1 or not _is(str(versions[0]), named.version):
+        told = ", ".join(map(str, versions))[:80]
+        yield f"METADATA is of version {told!r}, not {named.version}"
+    needed = needs(text)
+    if len(needed.requirements) > MAX_REQUIREMENTS:
+        yield f"METADATA has more than {MAX_REQUIREMENTS} dependencies"
+        return
+    for line in needed.requirements:
+        if flaw := _requirement_flaw(line):
+            yield f"the dependency {line[:80]!r} {flaw}"
+    try:
+        SpecifierSet(needed.python)
+    except InvalidSpecifier:
+        yield f"Requires-Python {needed.python[:80]!r} is no version specifier"
+
+
+def needs(text: str) -> Needs:
+    """What METADATA asks for."""
+    said = _headers(text)
+    requirements = tuple(str(line) for line in said.get_all("Requires-Dist", []))
+    return Needs(requirements, str(said.get("Requires-Python", "")).strip())
+
+
+def wheel_flaws(text: str, named: WheelName) -> Iterator[str]:
+    """What is wrong with WHEEL."""
+    said = _headers(text)
+    version = str(said.get("Wheel-Version", "")).strip()
+    if not _WHEEL_VERSION.fullmatch(version):
+        yield f"WHEEL is of format {version[:40]!r}, expected '1.x'"
+    purelib = str(said.get("Root-Is-Purelib", "")).strip().lower()
+    if purelib not in ("true", "false"):
+        yield f"Root-Is-Purelib is {purelib[:40]!r}, neither true nor false"
+    try:
+        lines = (str(line).strip() for line in said.get_all("Tag", []))
+        tags = frozenset(tag for line in lines for tag in parse_tag(line))
+    except ValueError:
+        yield "a Tag in WHEEL is none"
+        return
+    if tags and not {_machine(tag) for tag in named.tags} <= {_machine(tag) for tag in tags}:
+        yield f"its name says that it is for {_shown(named.tags)}, WHEEL says {_shown(tags)}"
+
+
+def entry_point_flaws(text: str) -> Iterator[str]:
+    """What is wrong with entry_points.txt."""
+    parser = configparser.ConfigParser(delimiters=("=",), interpolation=None)
+    parser.optionxform = str  # type: ignore[assignment,method-assign]  # names keep their case
+    try:
+        parser.read_string(text)
+    except configparser.Error as error:
+        yield f"entry_points.txt cannot be read ({' '.join(str(error).split())[:120]})"
+        return
+    for group in parser.sections():
+        if group.startswith(OWN_GROUPS):
+            yield from _object_flaws(group, parser[group])
+
+
+def _object_flaws(group: str, entries: Mapping[str, str]) -> Iterator[str]:
+    for name, value in entries.items():
+        if not _OBJECT.fullmatch(value.strip()):
+            yield f"entry point {name[:40]!r} of {group} names no object: {value[:60]!r}"
+
+
+def _requirement_flaw(line: str) -> str | None:
+    if len(line) > MAX_REQUIREMENT:
+        return "is too long"
+    try:
+        wanted = Requirement(line)
+    except (ValueError, RecursionError):  # InvalidRequirement among them
+        return "cannot be read"
+    return "is an address, not a version" if wanted.url else None
+
+
+def _headers(text: str) -> Message:
+    return HeaderParser().parsestr(text)
+
+
+def _is(told: str, version: Version) -> bool:
+    try:
+        return Version(told.strip()) == version
+    except InvalidVersion:
+        return False
+
+
+def _machine(tag: Tag) -> tuple[str, str, bool]:
+    """What a tag runs on, but for the age of its libc: repairing a wheel changes that alone."""
+    found = _PLATFORM.fullmatch(tag.platform)
+    architecture = found[1] if found else tag.platform
+    return tag.interpreter, architecture, tag.platform.startswith("musl")
+
+
+def _shown(tags: frozenset[Tag]) -> str:
+    told = sorted(map(str, tags))
+    return ", ".join(told[:3]) + (" …" if len(told) > 3 else "") if told else "nothing"
