@@ -33,6 +33,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from datetime import UTC, datetime
 
 from nondum.sdk.errors import PayloadRefused, Problem, TrustRefused
@@ -76,7 +77,9 @@ def parse(text: str, where: str) -> Trust:
     try:
         return _parse(text, where)
     except PayloadRefused as refused:
-        raise TrustRefused(*refused.problems) from refused
+        fix = "correct it there, and have the roots sign it anew: `nondum keys sign FILE`"
+        told = (replace(problem, fix=problem.fix or fix) for problem in refused.problems)
+        raise TrustRefused(*told) from refused
 
 
 def parse_bytes(data: bytes, where: str) -> Trust:

@@ -1,0 +1,144 @@
+"""Which trust file may follow which: version N+1 after N, signed by the roots of both.
+
+As TUF has it for its root (theupdateframework/specification, section 5.3): the roots in force sign,
+so that nobody else can change them; the new ones sign too, so that none is named who could not go
+on. A file is parsed once enough roots in force have signed it, not before.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from nondum.sdk.errors import NondumError, PayloadRefused, Problem, TrustRefused
+from nondum.wheelhouse.trust import sshsig, trust_file
+from nondum.wheelhouse.trust.trust import Roots, Trust
+
+_SIGN = "`nondum keys sign FILE --key KEY`, once for each root, adds signatures"
+
+
+@dataclass(frozen=True, slots=True)
+class SignedFile:
+    """A trust file and its signatures, as bytes that nobody has parsed."""
+
+    data: bytes
+    signature: bytes | None
+    where: str = trust_file.NAME
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the file."""
+        return hashlib.sha256(self.data).hexdigest()
+
+
+@dataclass(frozen=True, slots=True)
+class Extended:
+    """What became of the trust in force when files were offered."""
+
+    trust: Trust
+    accepted: tuple[SignedFile, ...] = ()
+    """In the order of their versions."""
+    problems: tuple[Problem, ...] = ()
+    """Of the files that were refused."""
+
+
+def extend(trust: Trust, known: Sequence[str], offered: Sequence[SignedFile]) -> Extended:
+    """Follow the chain as far as it leads; `known` are digests of the files that led to `trust`."""
+    accepted: list[SignedFile] = []
+    left = [file for file in offered if file.digest not in known]
+    problems: dict[str, tuple[Problem, ...]] = {}
+    is_longer = True
+    while left and is_longer:
+        is_longer = False
+        for file in tuple(left):
+            try:
+                trust = successor(trust, file)
+            except NondumError as refused:
+                problems[file.digest] = refused.problems
+            else:
+                accepted.append(file)
+                left = [other for other in left if other.digest != file.digest]
+                is_longer = True
+    told = (problem for file in left for problem in problems[file.digest])
+    return Extended(trust, tuple(accepted), tuple(dict.fromkeys(told)))
+
+
+def successor(trust: Trust, file: SignedFile) -> Trust:
+    """The trust that a file brings into force after another.
+
+    Raises `TrustRefused` (TRUST_SIGNATURE, TRUST_OWNER, TRUST_VERSION, TRUST_…), `PayloadRefused`
+    (SIG_MALFORMED, SIG_WRONG_PURPOSE).
+    """
+    _check_signed(trust.roots, f"version {trust.version}", file)
+    new = trust_file.parse_bytes(file.data, file.where)
+    if new.owner != trust.owner:
+        told, fix = "it is another owner's trust file", "only its own owner's can follow"
+        raise _refused("TRUST_OWNER", told, file, trust.owner, new.owner, fix)
+    if new.version != trust.version + 1:
+        raise _out_of_order(trust, new, file)
+    if new.made < trust.made:
+        told, fix = "it was made before the one in force", "write the date into `made` anew"
+        need, have = f"{trust.made:%F %T} or later", f"{new.made:%F %T}"
+        raise _refused("TRUST_VERSION", told, file, need, have, fix)
+    _check_signed(new.roots, f"version {new.version}", file)
+    return new
+
+
+def check_first(file: SignedFile) -> Trust:
+    """A trust file that begins a chain: whoever puts it there vouches for it; its own roots must
+    have signed it if anybody has. Raises as `successor`."""
+    trust = trust_file.parse_bytes(file.data, file.where)
+    if file.signature is not None:
+        _check_signed(trust.roots, f"version {trust.version}", file)
+    return trust
+
+
+def signers(file: SignedFile) -> frozenset[bytes]:
+    """The keys (their 32 bytes) whose signatures over a trust file hold.
+
+    Raises `TrustRefused` (TRUST_SIGNATURE), `PayloadRefused` (SIG_MALFORMED, SIG_WRONG_PURPOSE).
+    """
+    if file.signature is None:
+        raise _refused("TRUST_SIGNATURE", "nobody has signed it", file, "", "", _SIGN)
+    where, points = f"{file.where}.sig", set()
+    for one in sshsig.parse(file.signature, where):
+        if one.namespace != sshsig.TRUST:
+            told, need = "a signature was not made for trust files", f"namespace {sshsig.TRUST}"
+            have = one.namespace[:60]
+            raise PayloadRefused(Problem("SIG_WRONG_PURPOSE", told, where, need, have, _SIGN))
+        if not one.holds(file.data):
+            told = f"the signature of {one.key.fingerprint} does not fit it"
+            fix = "it was changed after it was signed: get it anew, or sign it again"
+            raise _refused("TRUST_SIGNATURE", told, file, "", "", fix)
+        points.add(one.key.point)
+    return frozenset(points)
+
+
+def _check_signed(roots: Roots, whose: str, file: SignedFile) -> None:
+    points = signers(file)
+    signed = sorted(root.name for root in roots.keys if root.key.point in points)
+    if len(signed) < roots.threshold:
+        names = ", ".join(root.name for root in roots.keys)
+        told = f"too few of the roots of {whose} have signed it"
+        need, have = f"{roots.threshold} of {names}", ", ".join(signed) or "none of them"
+        raise _refused("TRUST_SIGNATURE", told, file, need, have, _SIGN)
+
+
+def _out_of_order(trust: Trust, new: Trust, file: SignedFile) -> TrustRefused:
+    need, have = f"version {trust.version + 1}", f"version {new.version}"
+    if new.version == trust.version:
+        told = "its roots have signed another trust file of the version that is in force"
+        fix = "find out which is genuine: somebody may have the keys of the roots"
+        return _refused("TRUST_CONFLICT", told, file, need, have, fix)
+    if new.version < trust.version:
+        told, fix = "an older trust file than the one in force", "bring the newest one"
+    else:
+        told, fix = "versions are missing between", "bring those in between, too"
+    return _refused("TRUST_VERSION", told, file, need, have, fix)
+
+
+def _refused(
+    code: str, told: str, file: SignedFile, need: str, have: str, fix: str
+) -> TrustRefused:
+    return TrustRefused(Problem(code, told, file.where, need, have, fix))
