@@ -12,7 +12,16 @@ from typing import Any, TypeVar
 import pluggy
 
 from nondum.host.events import BehaviourEnded, Event
-from nondum.host.workers import Call, Limits, Timing, Workers, WorkerSpec, base_interpreter
+from nondum.host.workers import (
+    Call,
+    Limits,
+    Timing,
+    WorkerLauncher,
+    Workers,
+    WorkerSpec,
+    base_interpreter,
+)
+from nondum.host.workers.confinements import Confinement
 from nondum.sdk.description import Behaviour, Input, Output, PluginDescription, Unit
 
 SDK = Path(__file__).parents[3] / "plugins/sdk"
@@ -30,11 +39,17 @@ class House:
 
     folder: Path
     timing: Timing = QUICK
+    confinement: Confinement | None = None
+        Boxed("bwrap")
+        if os.environ.get("H4") == "3"
+        else (Held() if os.environ.get("H4") == "1" else None)
+    )
     events: list[Event] = field(default_factory=list)
     _arrived: asyncio.Event = field(default_factory=asyncio.Event)
 
     def __post_init__(self) -> None:
-        self.workers = Workers(HOST, self._on_event, timing=self.timing)
+        launcher = WorkerLauncher(self.confinement)
+        self.workers = Workers(HOST, self._on_event, launcher=launcher, timing=self.timing)
 
     def spec(
         self,

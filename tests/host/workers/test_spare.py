@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 from tests.host.workers.house import SDK, House, is_alive, until_gone
 
+from nondum.host.inside.bootstrap import PRELOADED
 from nondum.host.workers import base_interpreter
-from nondum.host.workers.bootstrap import PRELOADED
-from nondum.host.workers.launcher import MARK, RlimitLauncher
+from nondum.host.workers.launcher import MARK, WorkerLauncher
 from nondum.host.workers.leftovers import end_leftovers
 
 pytestmark = pytest.mark.anyio
@@ -32,7 +32,7 @@ FORKING = (
 
 def spare_of(house: House) -> int:
     launcher = house.workers.launcher
-    assert isinstance(launcher, RlimitLauncher)
+    assert isinstance(launcher, WorkerLauncher)
     assert launcher._spare is not None
     return launcher._spare.popen.pid
 

@@ -1,8 +1,7 @@
-"""The seam of confinement: how a worker's process is started, and what then holds it.
+"""How a worker's process is started: an interpreter on some ground, which then becomes a worker.
 
-Level 3 will be bubblewrap with cgroup limits, 2 a systemd service, 1 a user of its own with
-Landlock. Here is what needs nothing of the system: resource limits, a session of its own, no new
-privileges, nothing inherited but the link.
+What holds it is the confinement's matter (`confinements.py`). All levels have a session of its
+own, resource limits, no new privileges, and nothing inherited but the link.
 """
 
 from __future__ import annotations
@@ -14,9 +13,11 @@ from dataclasses import asdict
 from typing import Any, Protocol
 
 from nondum.host.cgroups import Cages
+from nondum.host.confinement.level import NAMES
+from nondum.host.workers.confinements import Confinement, Entry, Unconfined
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spare import ROOM, ROOM_BYTES, Spare
-from nondum.host.workers.spec import WorkerSpec, base_interpreter
+from nondum.host.workers.spec import WorkerSpec
 from nondum.sdk.errors import Problem, WorkerFailed
 
 MARK = "NONDUM_WORKER"
@@ -51,32 +52,33 @@ class Launcher(Protocol):
         ...
 
 
-class RlimitLauncher:
-    """Holds workers with resource limits only."""
+class WorkerLauncher:
+    """Starts workers in one confinement, from a spare interpreter if there is one that will do."""
 
-    level = 0
-    name = "resource limits"
-
-    def __init__(self, cages: Cages | None = None) -> None:
+    def __init__(self, confinement: Confinement | None = None, cages: Cages | None = None) -> None:
+        self._confinement = confinement or Unconfined()
         self._cages = cages
         self._spare: Spare | None = None
+        self.level = int(self._confinement.level)
+        self.name = NAMES[self._confinement.level]
 
-    def launch(self, spec: WorkerSpec, sock: socket.socket) -> WorkerProcess:
-        """Start a worker (see `Launcher`), from the spare interpreter if there is one."""
-        spare, self._spare = self._spare, None
+    def launch(
+        self, spec: WorkerSpec, sock: socket.socket, *, looks: bool = False
+    ) -> WorkerProcess:
+        """Start a worker (see `Launcher`); one that `looks` only tells what it sees."""
         try:
             spec.scratch.mkdir(parents=True, exist_ok=True, mode=0o700)
-            parameters = _parameters(spec)
-            if spare is not None and spare.python == spec.python:
-                spare.limit(spec.limits)
-                if spare.become(parameters, sock):
-                    return WorkerProcess(spare.popen, spare.cage)
-            elif spare is not None:
-                spare.close()
-            started = Spare(spec.python, self._cages)
-            started.limit(spec.limits)
-            if started.become(parameters, sock):
-                return WorkerProcess(started.popen, started.cage)
+            ground = self._confinement.ground(spec)
+            with self._confinement.entry(spec, ground) as entry:
+                parameters = {**_parameters(spec, entry), "looks": looks}
+                for started in (self._taken(), None):
+                    if started is not None and started.ground != ground:
+                        started.close()
+                        continue
+                    spare = started or Spare(self._confinement, ground, self._cages)
+                    spare.limit(spec.limits)
+                    if spare.become(parameters, sock, entry.ruleset):
+                        return spare.process()
         except OSError as error:
             problem = Problem("LAUNCH_FAILED", str(error), where=spec.component)
             raise WorkerFailed(problem) from error
@@ -87,24 +89,27 @@ class RlimitLauncher:
         """Have a spare interpreter."""
         if self._spare is None:
             try:
-                self._spare = Spare(base_interpreter(), self._cages)
+                ground = self._confinement.ground(None)
+                self._spare = Spare(self._confinement, ground, self._cages)
             except OSError as error:  # launching will tell, should it be lasting
                 log.warning("no spare interpreter: %s", error)
 
     def close(self) -> None:
         """End the spare interpreter."""
-        if self._spare is not None:
-            self._spare.close()
-            self._spare = None
+        if (spare := self._taken()) is not None:
+            spare.close()
+
+    def _taken(self) -> Spare | None:
+        spare, self._spare = self._spare, None
+        return spare
 
 
-def _parameters(spec: WorkerSpec) -> dict[str, Any]:
+def _parameters(spec: WorkerSpec, entry: Entry) -> dict[str, Any]:
     """What `bootstrap.py` is told. Raises `OSError` when the mark finds no room."""
     mark = f"{MARK}={spec.scratch}"
     if len(os.fsencode(mark)) >= ROOM_BYTES:
         raise OSError(f"the path of the scratch folder is too long: {spec.scratch}")
     return {
-        "host_pid": os.getpid(),
         "component": spec.component,
         "entry_point": spec.entry_point,
         "distribution": spec.distribution,
@@ -113,7 +118,9 @@ def _parameters(spec: WorkerSpec) -> dict[str, Any]:
         "scratch": str(spec.scratch),
         "environment": _environment(spec),
         "mark": mark,
-        "room": ROOM,
+        "room_for_mark": ROOM,
+        "room": entry.room,
+        "walls": entry.walls,
     }
 
 

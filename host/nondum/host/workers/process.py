@@ -10,6 +10,7 @@ import subprocess
 from typing import IO
 
 from nondum.host.cgroups import Cage
+from nondum.host.workers.keeper import Keeper
 
 DETACH_S = 1.0
 """How long a process that was killed is waited for; one in the kernel's hands may never end."""
@@ -18,15 +19,27 @@ DETACH_S = 1.0
 class WorkerProcess:
     """A started process that leads a session of its own. Make it on the loop; it reaps itself."""
 
-    def __init__(self, popen: subprocess.Popen[bytes], cage: Cage | None = None) -> None:
+    def __init__(
+        self,
+        popen: subprocess.Popen[bytes],
+        cage: Cage | None = None,
+        keeper: Keeper | None = None,
+    ) -> None:
+        """`keeper`, which it takes over, is that of a worker in a room of its own."""
         self._popen = popen
+        self._keeper = keeper
         self.cage = cage
         """What holds it and all that it starts; whoever ends the process ends the cage."""
-        self.pid = popen.pid
         self.exited: asyncio.Future[int] = asyncio.get_running_loop().create_future()
         """Its exit status, negative for the signal that ended it."""
         self._pidfd = os.pidfd_open(popen.pid)
         asyncio.get_running_loop().add_reader(self._pidfd, self._on_exit)
+
+    @property
+    def pid(self) -> int:
+        """The worker's own id, as soon as it is known; until then that of what makes its room."""
+        inner = self._keeper.worker if self._keeper is not None else None
+        return inner if inner is not None else self._popen.pid
 
     @property
     def outputs(self) -> tuple[IO[bytes], IO[bytes]]:
@@ -37,8 +50,23 @@ class WorkerProcess:
     def signal(self, number: signal.Signals) -> None:
         """Send a signal to the whole group, if any of it is left."""
         if not self.exited.done():  # from then on the id may be somebody else's
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(self.pid, number)
+            inner = self._keeper.worker if self._keeper is not None else None
+            if inner is not None:  # its room and keeper only end, by themselves or like this
+                _signal_group(inner, number)
+            if inner is None or number is signal.SIGKILL:
+                _signal_group(self._popen.pid, number)
+
+    async def grant(self, need: str, node: str) -> str:
+        """Let it have a device; gives the path at which it finds it.
+
+        Raises `WorkerFailed` (DEVICE_REFUSED).
+        """
+        return node if self._keeper is None else await self._keeper.grant(need, node)
+
+    async def revoke(self, need: str) -> None:
+        """Take a device away."""
+        if self._keeper is not None:
+            await self._keeper.revoke(need)
 
     async def wait(self, timeout_s: float) -> bool:
         """Wait for the exit at most so long; answer whether it came."""
@@ -59,7 +87,16 @@ class WorkerProcess:
         os.close(self._pidfd)
         # Its children in the group go with it. It is not reaped yet, so the id is still its own.
         self.signal(signal.SIGKILL)
-        self.exited.set_result(self._popen.wait())
+        status = self._popen.wait()
+        if self._keeper is not None:
+            self._keeper.close()
+            status = 128 - status if status > 128 else status  # as shells and bwrap(1) tell it
+        self.exited.set_result(status)
+
+
+def _signal_group(leader: int, number: signal.Signals) -> None:
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(leader, number)
 
 
 def exit_words(status: int) -> str:

@@ -7,17 +7,18 @@ the same for all workers: it is done before anybody waits for it.
 from __future__ import annotations
 
 import json
-import os
 import socket
 import subprocess
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from nondum.host.cgroups import Cage, CageLimits, Cages
+from nondum.host.confinement.bubblewrap import Ground
+from nondum.host.workers.confinements import Confinement
+from nondum.host.workers.keeper import Keeper
+from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spec import Limits
 
-BOOTSTRAP = Path(__file__).with_name("bootstrap.py")
 ROOM = "NONDUM_ROOM"
 """Environment variable that keeps room for the mark of the worker (see `launcher.py`)."""
 ROOM_BYTES = 2048
@@ -26,14 +27,20 @@ ROOM_BYTES = 2048
 class Spare:
     """A started interpreter. It ends when it is closed, or with the thread that started it."""
 
-    def __init__(self, python: Path, cages: Cages | None = None) -> None:
+    def __init__(
+        self, confinement: Confinement, ground: Ground, cages: Cages | None = None
+    ) -> None:
         """Start it, in a cage of its own. Raises `OSError`."""
-        self.python = python
+        self.ground = ground
         self.cage: Cage | None = None
+        self._has_keeper = confinement.has_keeper
         self._orders, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        if self._has_keeper:  # whose a message is comes with it
+            self._orders.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
         try:
             with theirs:
-                self.popen = _started(python, theirs.fileno())
+                command = confinement.command(ground, theirs.fileno())
+                self.popen = _started(command, theirs.fileno())
         except OSError:
             self._orders.close()
             raise
@@ -45,18 +52,27 @@ class Spare:
         if self.cage is not None:
             self.cage.limit(limits.of_cage())
 
-    def become(self, parameters: Mapping[str, Any], link: socket.socket) -> bool:
+    def become(
+        self, parameters: Mapping[str, Any], link: socket.socket, ruleset: int | None
+    ) -> bool:
         """Have it become a worker on its end of a link; answer whether it could be told.
 
-        From then on the process is the caller's. See `bootstrap.py` for the parameters.
+        From then on it is the caller's, see `process`. See `bootstrap.py` for the parameters.
         """
+        descriptors = [link.fileno(), *([] if ruleset is None else [ruleset])]
         try:
-            socket.send_fds(self._orders, [json.dumps(parameters).encode()], [link.fileno()])
+            socket.send_fds(self._orders, [json.dumps(parameters).encode()], descriptors)
         except OSError:
             self.close()
             return False
-        self._orders.close()
         return True
+
+    def process(self) -> WorkerProcess:
+        """The worker that it has become. Call it once, on the loop."""
+        if self._has_keeper:
+            return WorkerProcess(self.popen, self.cage, Keeper(self._orders))
+        self._orders.close()
+        return WorkerProcess(self.popen, self.cage)
 
     def close(self) -> None:
         """End it unused."""
@@ -78,15 +94,15 @@ class Spare:
             raise
 
 
-def _started(python: Path, orders: int) -> subprocess.Popen[bytes]:
+def _started(command: list[str], orders: int) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
-        [python, "-I", "-S", "-B", "-u", BOOTSTRAP, str(orders), str(os.getpid())],
+        command,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         bufsize=0,
         pass_fds=(orders,),
-        start_new_session=True,
+        start_new_session=True,  # no terminal reaches it
         cwd="/",
         env={
             "PATH": "/usr/local/bin:/usr/bin:/bin",

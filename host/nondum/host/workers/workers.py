@@ -16,7 +16,7 @@ from nondum.host.events import Emit, Event, FactKnown, StreamFlowing, WorkerFail
 from nondum.host.streams import Streams
 from nondum.host.workers import problems
 from nondum.host.workers.call import Call
-from nondum.host.workers.launcher import Launcher, RlimitLauncher
+from nondum.host.workers.launcher import Launcher, WorkerLauncher
 from nondum.host.workers.logs import LogLine, Logs
 from nondum.host.workers.proxies import Answer, Proxy, plugin_manager
 from nondum.host.workers.spec import Timing, WorkerSpec
@@ -55,7 +55,7 @@ class Workers:
         launcher: Launcher | None = None,
         timing: Timing | None = None,
     ) -> None:
-        self.launcher = launcher or RlimitLauncher()
+        self.launcher = launcher or WorkerLauncher()
         self.timing = timing or Timing()
         self.streams = Streams(host)
         self.logs = Logs()

@@ -1,0 +1,119 @@
+"""Process 1 of a worker of level 3: reaps what the worker leaves behind, hands in devices, and ends
+the whole namespace once the worker or the host has ended.
+
+The worker, in a user namespace of its own, can neither look into it nor signal it.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import json
+import os
+import select
+import signal
+import socket
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from nondum.host.inside import kernel, room
+
+GRACE_S = 2.0
+"""What a worker has to leave everything safe once the host has ended."""
+ORDER_BYTES = 4096
+HOST_GONE = 1
+"""Exit status, when the host was gone before the worker."""
+
+
+def keep(orders: socket.socket, given: Mapping[str, Any], links: Sequence[int]) -> None:
+    """Furnish the room and fork; returns in the worker only. Raises `OSError`."""
+    # The host's end is seen at the socket from now on: the plugin may have two seconds.
+    kernel.prctl(kernel.PR_SET_PDEATHSIG, 0)
+    room.furnish(given)
+    worker = os.fork()
+    if worker == 0:
+        os.setsid()
+        orders.send(json.dumps({"is": "worker"}).encode())  # the kernel adds whose it is
+        orders.close()
+        room.move_in(given)
+        return
+    for link in links:
+        os.close(link)
+    os._exit(_Keeper(orders, given, worker).run())
+
+
+class _Keeper:
+    def __init__(self, orders: socket.socket, given: Mapping[str, Any], worker: int) -> None:
+        self._orders, self._given, self._worker = orders, given, worker
+        self._poll = select.poll()
+
+    def run(self) -> int:
+        """Keep house; the worker's exit status, 128 and more for a signal."""
+        awoken = self._settle()
+        self._poll.register(awoken, select.POLLIN)
+        self._poll.register(self._orders, select.POLLIN)
+        deadline_s: float | None = None
+        while (status := self._reaped()) is None:
+            left_s = None if deadline_s is None else deadline_s - time.monotonic()
+            if left_s is not None and left_s <= 0:
+                return HOST_GONE
+            for ready, _ in self._poll.poll(None if left_s is None else left_s * 1000):
+                if ready == awoken:
+                    with contextlib.suppress(BlockingIOError):
+                        os.read(awoken, 512)
+                elif not self._obeyed():
+                    self._poll.unregister(self._orders)
+                    deadline_s = time.monotonic() + GRACE_S
+        return (
+            os.waitstatus_to_exitcode(status) % 256
+            if os.WIFEXITED(status)
+            else (128 + os.WTERMSIG(status))
+        )
+
+    def _settle(self) -> int:
+        """Give up all but the mounts; returns what becomes readable when a child ends."""
+        awoken, alarm = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        signal.set_wakeup_fd(alarm, warn_on_full_buffer=False)
+        signal.signal(signal.SIGCHLD, lambda *_: None)
+        nothing = os.open(os.devnull, os.O_RDWR)
+        for standard in (1, 2):  # the worker's alone: the host waits for their end
+            os.dup2(nothing, standard)
+        kernel.prctl(kernel.PR_SET_NAME, kernel.text("keeper"))
+        kernel.prctl(kernel.PR_SET_DUMPABLE, 0)
+        kernel.keep_capabilities(kernel.CAP_SYS_ADMIN)
+        if self._given["keeper_filter"] is not None:
+            kernel.filter_calls(base64.b64decode(self._given["keeper_filter"]))
+        return awoken
+
+    def _reaped(self) -> int | None:
+        """Reap all that has ended; the worker's status once it has."""
+        with contextlib.suppress(ChildProcessError):
+            while True:
+                pid, status = os.waitpid(-1, os.WNOHANG)
+                if pid == self._worker:
+                    return status
+                if pid == 0:
+                    return None
+        return None
+
+    def _obeyed(self) -> bool:
+        """Carry out one order; False once nobody gives any more."""
+        try:
+            data = self._orders.recv(ORDER_BYTES)
+        except OSError:
+            return False
+        if not data:
+            return False
+        order = json.loads(data)
+        error = ""
+        try:
+            if order["do"] == "grant":
+                room.grant(self._given["outside"], order["need"], order["node"])
+            else:
+                room.revoke(order["need"])
+        except OSError as failure:
+            error = str(failure)
+        with contextlib.suppress(OSError):
+            self._orders.send(json.dumps({"is": "done", "error": error}).encode())
+        return True

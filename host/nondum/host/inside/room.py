@@ -1,0 +1,118 @@
+"""The room of a worker of level 3: what is seen in it, and what is no more.
+
+Bubblewrap has made the namespaces and the bare walls. Two mount namespaces follow: the *keeper's*
+(process 1), which still sees the devices of the machine so that one can be handed in while the
+worker runs, and the worker's own, a copy of it in which everything outside is unmounted. What is
+mounted below `/dev/nondum` in the first appears in the second (mount_namespaces(7), propagation).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from nondum.host.inside import kernel
+
+DEVICES = "/dev/nondum"
+NOBODY = 65534
+_BOUND = kernel.MS_BIND | kernel.MS_REMOUNT
+
+
+def furnish(room: Mapping[str, Any]) -> None:
+    """Bring in what the worker may see. Raises `OSError`.
+
+    `outside`: where the host's folders are seen. `code`: folders to read. `scratch`: the folder to
+    write. `nodes`: devices, as paths on the host, under their own names.
+    `shared_mb`: size of /dev/shm. `is_last`: whether user namespaces end here.
+    """
+    outside = room["outside"]
+    for folder in room["code"]:
+        _bind(outside + folder, folder, kernel.MS_RDONLY if room["protects_code"] else 0)
+    _bind(outside + room["scratch"], room["scratch"], 0)
+    _mount_memory("/dev/shm", room["shared_mb"] * 1024)  # of this namespace only
+    _mount_memory(DEVICES, 64)
+    kernel.mount(None, DEVICES, None, kernel.MS_SHARED)
+    for node in room["nodes"]:
+        with contextlib.suppress(FileNotFoundError):  # not every machine has it
+            _bind_node(outside + node, node)
+    _write_users(room["scratch"])
+    if room["is_last"]:  # the worker's own, below, is the only one there will ever be
+        Path("/proc/sys/user/max_user_namespaces").write_text("1")
+
+
+def move_in(room: Mapping[str, Any]) -> None:
+    """Leave the keeper's view for the worker's, and its user for one that owns nothing of it.
+
+    Raises `OSError`.
+    """
+    kernel.unshare(kernel.CLONE_NEWNS)
+    kernel.mount(None, DEVICES, None, kernel.MS_SLAVE)
+    if room["hides_outside"]:
+        for folder in reversed(room["seen_outside"]):
+            kernel.unmount(room["outside"] + folder)
+    for folder in room["protected"]:
+        kernel.mount(None, folder, None, _BOUND | kernel.MS_RDONLY | _flags_of(folder))
+    user, group = os.geteuid(), os.getegid()
+    if room["changes_user"]:
+        kernel.unshare(kernel.CLONE_NEWUSER)
+        Path("/proc/self/setgroups").write_text("deny")
+        Path("/proc/self/uid_map").write_text(f"{NOBODY} {user} 1")
+        Path("/proc/self/gid_map").write_text(f"{NOBODY} {group} 1")
+
+
+def grant(outside: str, need: str, node: str) -> None:
+    """Make a device of the host appear below `DEVICES`. Raises `OSError`."""
+    revoke(need)
+    _bind_node(outside + node, f"{DEVICES}/{need}")
+
+
+def revoke(need: str) -> None:
+    """Make it vanish; descriptors of it live on, which the plugin is told otherwise."""
+    target = f"{DEVICES}/{need}"
+    with contextlib.suppress(OSError):
+        kernel.unmount(target)
+    with contextlib.suppress(FileNotFoundError):
+        os.unlink(target)  # noqa: PTH108  # no class for each of a few plain calls
+
+
+def _bind(source: str, target: str, more: int) -> None:
+    os.makedirs(target, exist_ok=True)  # noqa: PTH103
+    kernel.mount(source, target, None, kernel.MS_BIND)
+    flags = _flags_of(target) | kernel.MS_NOSUID | kernel.MS_NODEV | more
+    kernel.mount(None, target, None, _BOUND | flags)
+
+
+def _bind_node(source: str, target: str) -> None:
+    """A device, or a folder of devices, and nothing else."""
+    mode = os.stat(source).st_mode  # noqa: PTH116
+    if stat.S_ISDIR(mode):
+        os.makedirs(target, exist_ok=True)  # noqa: PTH103
+    elif stat.S_ISCHR(mode) or stat.S_ISBLK(mode):
+        os.makedirs(os.path.dirname(target), exist_ok=True)  # noqa: PTH103, PTH120
+        os.close(os.open(target, os.O_CREAT | os.O_CLOEXEC, 0o600))
+    else:
+        raise OSError(f"{source} is no device")
+    kernel.mount(source, target, None, kernel.MS_BIND)
+
+
+def _mount_memory(target: str, kilobytes: int) -> None:
+    os.makedirs(target, exist_ok=True)  # noqa: PTH103
+    flags = kernel.MS_NOSUID | kernel.MS_NODEV | kernel.MS_NOEXEC
+    kernel.mount("tmpfs", target, "tmpfs", flags, f"size={kilobytes}k,mode=755")
+
+
+def _flags_of(target: str) -> int:
+    """Flags of a mount that a remount must repeat: some may not be taken back (mount(2))."""
+    flags = os.statvfs(target).f_flag
+    return flags & (kernel.MS_RDONLY | kernel.MS_NOSUID | kernel.MS_NODEV | kernel.MS_NOEXEC)
+
+
+def _write_users(home: str) -> None:
+    """Who the worker is, for programs that ask by number (getpwuid(3))."""
+    os.makedirs("/etc", exist_ok=True)  # noqa: PTH103
+    Path("/etc/passwd").write_text(f"worker:x:{NOBODY}:{NOBODY}::{home}:/usr/sbin/nologin\n")
+    Path("/etc/group").write_text(f"worker:x:{NOBODY}:\n")

@@ -1,0 +1,246 @@
+"""What holds a worker at each level that needs no service manager: how its interpreter is started,
+and what it is told to give up before it becomes a worker.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import os
+import stat
+import zlib
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from nondum.host.confinement import bubblewrap, landlock, refusals
+from nondum.host.confinement.bubblewrap import Ground
+from nondum.host.confinement.filters import Rule
+from nondum.host.confinement.level import Level
+from nondum.host.inside import room
+from nondum.host.workers.spec import WorkerSpec, base_interpreter
+
+BOOTSTRAP = bubblewrap.INSIDE / "bootstrap.py"
+_ALL = (Path("/"),)
+_CHANGES_GROUND = frozenset({"network", "gpu"})
+SHARED_MB = 64
+"""Size of /dev/shm."""
+
+NODES: Mapping[str, tuple[str, ...]] = {
+    "audio": ("/dev/snd",),
+    "gpu": ("/dev/dri", "/dev/kfd", "/dev/nvidia*"),
+}
+"""Device nodes that a permission stands for."""
+INSTRUMENTS = (
+    *("/dev/pts", "/dev/bus/usb", "/dev/ttyUSB*", "/dev/ttyACM*", "/dev/video*"),
+    *("/dev/hidraw*", "/dev/i2c-*", "/dev/spidev*", "/dev/gpiochip*", "/dev/media*"),
+)
+"""Where no room can be made for a worker, what one that declares devices may open."""
+FIRST_USER, USERS = 61184, 4336
+"""Ids of users that no account has: those that systemd gives out likewise (DynamicUser=)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """How one interpreter becomes one worker."""
+
+    walls: Mapping[str, Any]
+    """See `nondum.host.inside.walls`."""
+    room: Mapping[str, Any] | None = None
+    """See `nondum.host.inside.room`; None: it stays where it is."""
+    ruleset: int | None = None
+    """Landlock's, by descriptor."""
+
+
+class Confinement(Protocol):
+    """One level's way to hold workers."""
+
+    level: Level
+    has_keeper: bool
+    """Whether its interpreter is process 1 of a namespace, and hears orders as long as it runs."""
+
+    def ground(self, spec: WorkerSpec | None) -> Ground:
+        """What a worker's interpreter is started with, or that of a spare, of any worker."""
+        ...
+
+    def command(self, ground: Ground, orders: int) -> list[str]:
+        """The command that starts it; `orders` is the descriptor that it hears at."""
+        ...
+
+    def entry(self, spec: WorkerSpec, ground: Ground) -> AbstractContextManager[Entry]:
+        """How it becomes this worker. Raises `OSError`."""
+        ...
+
+
+class Unconfined:
+    """Level 0: resource limits and no new privileges, which all levels have."""
+
+    level = Level.LIMITS
+    has_keeper = False
+
+    def ground(self, spec: WorkerSpec | None) -> Ground:
+        """The interpreter, wherever it is."""
+        return Ground(spec.python if spec else base_interpreter(), _ALL)
+
+    def command(self, ground: Ground, orders: int) -> list[str]:
+        """The interpreter itself."""
+        return _interpreter(ground, orders)
+
+    @contextlib.contextmanager
+    def entry(self, spec: WorkerSpec, ground: Ground) -> Iterator[Entry]:
+        """Nothing is given up."""
+        yield Entry({"user": None, "keeps_capabilities": True, "filter": None})
+
+
+class Held:
+    """Level 1: the worker stays on the host and gives up what it can of it."""
+
+    level = Level.KERNEL
+    has_keeper = False
+
+    def __init__(self, *, without: Collection[str] = ()) -> None:
+        """`without` leaves walls out, so that each can be seen to matter."""
+        self._without = frozenset(without)
+        self._abi = landlock.version()
+
+    def ground(self, spec: WorkerSpec | None) -> Ground:
+        """The interpreter, wherever it is."""
+        return Ground(spec.python if spec else base_interpreter(), _ALL)
+
+    def command(self, ground: Ground, orders: int) -> list[str]:
+        """The interpreter itself."""
+        return _interpreter(ground, orders)
+
+    @contextlib.contextmanager
+    def entry(self, spec: WorkerSpec, ground: Ground) -> Iterator[Entry]:
+        """Files by Landlock, calls by a filter, and a user of its own if the host is root."""
+        has_network = "network" in spec.permissions
+        groups = {**refusals.GROUPS, "sockets": refusals.WITHOUT_NAMESPACES[has_network]}
+        user = None if "user" in self._without else user_for(spec)
+        if user is not None:
+            os.chown(spec.scratch, user, user)
+        walls = {
+            "user": user,
+            "keeps_capabilities": "capabilities" in self._without,
+            "filter": _filter(groups, self._without),
+        }
+        if "landlock" in self._without or not self._abi:
+            yield Entry(walls)
+            return
+        patterns = INSTRUMENTS if spec.index.devices else ()
+        with landlock.ruleset(
+            readable=(*spec.site_packages, *bubblewrap.prefixes(), *_more_files(spec)),
+            writable=(spec.scratch,),
+            nodes=(*_existing(patterns), *_nodes(spec)),
+            has_network=has_network,
+            abi=self._abi,
+        ) as ruleset:
+            yield Entry(walls, ruleset=ruleset)
+
+
+class Boxed:
+    """Level 3: a room of its own, made by bubblewrap."""
+
+    level = Level.BOX
+    has_keeper = True
+
+    def __init__(
+        self, bwrap: str, places: tuple[Path, ...] = (), *, without: Collection[str] = ()
+    ) -> None:
+        """`places` are folders in which most workers' code and scratch are: a spare sees them until
+        it becomes one. `without` leaves walls out, so that each can be seen to matter.
+        """
+        self._bwrap, self._places = bwrap, places
+        self._without = frozenset(without)
+
+    def ground(self, spec: WorkerSpec | None) -> Ground:
+        """Where the worker's folders are; the usual places will do if they are there."""
+        if spec is None:
+            return Ground(base_interpreter(), self._places)
+        permissions = _CHANGES_GROUND & frozenset(spec.permissions)
+        folders = (*spec.site_packages, spec.scratch)
+        usual = Ground(spec.python, self._places, permissions)
+        if usual.carries(spec.python, folders, permissions):
+            return usual
+        return Ground(spec.python, folders, permissions)
+
+    def command(self, ground: Ground, orders: int) -> list[str]:
+        """Bubblewrap, with the interpreter in it."""
+        return bubblewrap.command(self._bwrap, ground, orders, without=self._without)
+
+    @contextlib.contextmanager
+    def entry(self, spec: WorkerSpec, ground: Ground) -> Iterator[Entry]:
+        """Its own folders and nodes are brought in, everything outside is shut out."""
+        kept = self._without
+        mounts_too = {*kept, "mounts"}
+        given = {
+            "outside": bubblewrap.OUTSIDE,
+            "seen_outside": bubblewrap.seen_outside(ground),
+            "hides_outside": "outside" not in kept,
+            "code": [str(folder) for folder in spec.site_packages],
+            "protects_code": "code" not in kept,
+            "scratch": str(spec.scratch),
+            "nodes": list(_nodes(spec)),
+            "shared_mb": SHARED_MB,
+            "protected": [*(() if "system" in kept else ("/", "/dev")), room.DEVICES],
+            "is_last": "user namespaces" not in kept,
+            "changes_user": "user" not in kept,
+            "keeper_filter": _filter(refusals.GROUPS, mounts_too),
+        }
+        walls = {
+            "user": None,
+            "keeps_capabilities": "capabilities" in kept,
+            "filter": _filter(refusals.GROUPS, kept),
+        }
+        yield Entry(walls, room=given)
+
+
+def user_for(spec: WorkerSpec) -> int | None:
+    """The user that a worker of root runs as, the same each time; None where there is none to be
+    had: the host is not root, or what the worker must read is root's alone.
+    """
+    if os.getuid() != 0:
+        return None
+    needed = (*bubblewrap.prefixes(), *spec.site_packages, spec.scratch.parent)
+    if not all(map(_is_open, needed)):
+        return None
+    return FIRST_USER + zlib.crc32(spec.component.encode()) % USERS
+
+
+def _is_open(folder: Path) -> bool:
+    """Whether everybody may go there and read."""
+    real = folder.resolve()
+    try:
+        above = all(p.stat().st_mode & stat.S_IXOTH for p in real.parents)
+        return above and bool(real.stat().st_mode & stat.S_IROTH)
+    except OSError:
+        return False
+
+
+def _interpreter(ground: Ground, orders: int) -> list[str]:
+    python = str(ground.python)
+    return [python, "-I", "-S", "-B", "-u", str(BOOTSTRAP), str(orders), str(os.getpid())]
+
+
+def _filter(groups: Mapping[str, tuple[Rule, ...]], without: Collection[str]) -> str | None:
+    machine = refusals.machine()
+    if "filter" in without or not refusals.is_known(machine):
+        return None
+    return base64.b64encode(refusals.filter_of(groups, machine, without=without)).decode()
+
+
+def _nodes(spec: WorkerSpec) -> Iterator[str]:
+    for permission in sorted(spec.permissions):
+        yield from _existing(NODES.get(permission, ()))
+
+
+def _more_files(spec: WorkerSpec) -> Iterator[Path]:
+    if "gpu" in spec.permissions:
+        yield Path("/sys")
+
+
+def _existing(patterns: Collection[str]) -> Iterator[str]:
+    for pattern in patterns:
+        yield from sorted(map(str, Path("/").glob(pattern.lstrip("/"))))

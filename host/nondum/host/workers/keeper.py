@@ -1,0 +1,104 @@
+"""The host's end of the socket at which the keeper of a worker's room hears.
+
+The keeper is process 1 of the room and runs `nondum.host.inside.keeper`; the worker can make it
+slow, so nothing waits for it without a limit.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import socket
+import struct
+from typing import Any
+
+from nondum.host.inside.room import DEVICES
+from nondum.sdk.errors import Problem, WorkerFailed
+
+ANSWER_S = 2.0
+"""How long one order may take."""
+_ANSWER_BYTES = 4096
+_CREDENTIALS = struct.Struct("=iII")
+"""`struct ucred` (unix(7)): process, user, group."""
+
+
+class Keeper:
+    """One worker's. Make it on the loop; `close` it once its process has ended."""
+
+    def __init__(self, orders: socket.socket) -> None:
+        """Takes over the socket."""
+        self._orders = orders
+        self._orders.settimeout(0)
+        self._turn = asyncio.Lock()
+        self._worker: int | None = None
+        self._answers: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
+        asyncio.get_running_loop().add_reader(orders.fileno(), self._read)
+
+    @property
+    def worker(self) -> int | None:
+        """The worker's process, as this host counts; None before it has said so."""
+        if self._worker is None and self._orders.fileno() >= 0:
+            self._read()
+        return self._worker
+
+    async def grant(self, need: str, node: str) -> str:
+        """Have a device appear in the room, and give its path there.
+
+        Raises `WorkerFailed` (DEVICE_REFUSED).
+        """
+        answer = await self._ask({"do": "grant", "need": need, "node": _real(node)})
+        if answer["error"]:
+            raise WorkerFailed(
+                Problem(
+                    "DEVICE_REFUSED",
+                    f"the device cannot be handed in: {answer['error']}",
+                    where=f"{need}: {node}",
+                    fix="see that it is a device below /dev that the host's user may open",
+                )
+            )
+        return f"{DEVICES}/{need}"
+
+    async def revoke(self, need: str) -> None:
+        """Have it vanish."""
+        await self._ask({"do": "revoke", "need": need})
+
+    def close(self) -> None:
+        """Give no more orders."""
+        if self._orders.fileno() >= 0:
+            asyncio.get_running_loop().remove_reader(self._orders.fileno())
+            self._orders.close()
+            self._answers.put_nowait({"error": "the worker has ended"})
+
+    async def _ask(self, order: dict[str, str]) -> dict[str, Any]:
+        async with self._turn:
+            while not self._answers.empty():  # of an order that was given up
+                self._answers.get_nowait()
+            try:
+                self._orders.send(json.dumps(order).encode())
+                async with asyncio.timeout(ANSWER_S):
+                    return await self._answers.get()
+            except (OSError, TimeoutError) as error:
+                return {"error": str(error) or f"no answer for {ANSWER_S:g} s"}
+
+    def _read(self) -> None:
+        room_for_credentials = socket.CMSG_SPACE(_CREDENTIALS.size)
+        with contextlib.suppress(BlockingIOError):
+            try:
+                data, more, _, _ = self._orders.recvmsg(_ANSWER_BYTES, room_for_credentials)
+            except ConnectionError:
+                data, more = b"", []
+            if not data:
+                self.close()
+                return
+            said = json.loads(data)
+            if said["is"] == "worker":
+                self._worker = next(_CREDENTIALS.unpack(value)[0] for _, _, value in more)
+            else:
+                self._answers.put_nowait(said)
+
+
+def _real(node: str) -> str:
+    """Without links: they would lead elsewhere in the room."""
+    return os.path.realpath(node)
