@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from nondum.host import verbs
 from nondum.host.announcements import announced
+from nondum.host.catalogue import backups, opening
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.config import HostConfig
 from nondum.host.control.server import ControlServer
@@ -25,6 +26,7 @@ from nondum.host.devices.udev import UdevSource
 from nondum.host.drives.blocks import BlockSource
 from nondum.host.drives.slots import SlotSource
 from nondum.host.drives.source import DriveSource
+from nondum.host.drives.steady import Steady
 from nondum.host.events import Event, HostStarted, Recomposed
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.lifecycle.children import Children
@@ -61,7 +63,8 @@ async def run_host(config: HostConfig, *, more_drives: Sequence[DriveSource] = (
     folders = Folders(config.host.state)
     held = claim(folders)
     try:
-        catalogue = await Catalogue.open(folders.catalogue, config.host.name)
+        keep = config.journal.keep
+        catalogue = await Catalogue.open(folders.catalogue, config.host.name, keep=keep)
         try:
             await _run(config, folders, catalogue, more_drives, stop)
         finally:
@@ -127,6 +130,7 @@ async def _run(
             stop,
             manager.run(),
             mind.run(),
+            backups.keep(catalogue.backups, lambda: catalogue.revision, config.backups.every_s),
             Conversation(mind, workers.plugins, workers.pids, _take(neighbours)).run(),
             *(source.watch(bus.emit) for source in device_sources(config)),
         )
@@ -169,7 +173,8 @@ def drive_sources(config: HostConfig, folders: Folders) -> list[DriveSource]:
     if config.drives.slots:
         sources.append(SlotSource(config.drives.slots))
     if config.drives.block_devices:
-        sources.append(BlockSource(folders.mounts))
+        single_function = config.drives.single_function
+        sources.append(Steady(BlockSource(folders.mounts, single_function=single_function)))
     return sources
 
 
@@ -236,8 +241,13 @@ def _install_options(config: HostConfig) -> InstallOptions:
 def _warnings(config: HostConfig, catalogue: Catalogue) -> Iterator[str]:
     if config.drives.allow_unsigned:
         yield UnsignedAllowed.warning
-    if catalogue.set_aside is not None:
-        yield f"the catalogue was damaged and begun anew; the old one is {catalogue.set_aside}"
+    if catalogue.loss is not None:
+        yield str(opening.problem_of(catalogue.loss, ()))
+    if catalogue.why_unwritten:
+        yield (
+            f"the catalogue cannot be written ({catalogue.why_unwritten}): what happens now may be "
+            "forgotten when this host starts again; see to its disk"
+        )
 
 
 def _told_to_stop() -> asyncio.Event:

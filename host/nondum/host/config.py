@@ -41,6 +41,8 @@ class DrivesSection:
     """Folders whose entries stand for drives."""
     block_devices: bool = True
     """Mount USB drives; needs root."""
+    single_function: bool = True
+    """Refuse USB drives that are something else too, such as a keyboard or a network adapter."""
     allow_unsigned: bool = False
     """Accept payloads without a signature: for development; every status says so."""
 
@@ -53,6 +55,22 @@ class DevicesSection:
     """Folders of TOML files that stand for devices."""
     udev: bool = True
     """Follow the machine's own devices."""
+
+
+@dataclass(frozen=True, slots=True)
+class JournalSection:
+    """What is kept of what happened."""
+
+    keep: int = 20_000
+    """Entries; of older ones the oldest go first. At least 1000 are kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class BackupsSection:
+    """Copies of the catalogue, for the day on which its file is damaged."""
+
+    every_s: float = 900.0
+    """Time between two, if anything changed; the last two are kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +166,8 @@ class HostConfig:
     drives: DrivesSection = field(default_factory=DrivesSection)
     devices: DevicesSection = field(default_factory=DevicesSection)
     install: InstallSection = field(default_factory=InstallSection)
+    journal: JournalSection = field(default_factory=JournalSection)
+    backups: BackupsSection = field(default_factory=BackupsSection)
     workers: WorkersSection = field(default_factory=WorkersSection)
     planning: PlanningSection = field(default_factory=PlanningSection)
     peers: PeersSection = field(default_factory=PeersSection)

@@ -48,6 +48,8 @@ class CopyPayload(PayloadEffect):
     drive: str
     folder: Path
     digest: str
+    beside: str = ""
+    """Key of the release of it that is in force, which would make room for it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,15 +71,39 @@ class StoreWheels(PayloadEffect):
 class ProbeComponents(PayloadEffect):
     """Make the venvs, start the workers, compare what they say with the index."""
 
+    beside: str = ""
+    """Key of the release of it that is in force, and goes on meanwhile."""
+    after: str = ""
+    """Key of a payload whose workers must have ended first."""
+
 
 @dataclass(frozen=True, slots=True)
 class ActivatePayload(PayloadEffect):
     """Make the components' records for the catalogue."""
 
+    beside: str = ""
+    """Key of the release that it is to take over from, once it was seen to be healthy."""
+
 
 @dataclass(frozen=True, slots=True)
 class CompileWheels(PayloadEffect):
     """Byte-compile what an active payload runs, for the next start; it may fail or never end."""
+
+
+@dataclass(frozen=True, slots=True)
+class RestPayload(PayloadEffect):
+    """Stop what runs of a superseded payload; it may be wanted again at once."""
+
+    components: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class NoteInstalled(PayloadEffect):
+    """Write down beside a payload's files that it was installed for good, or undo that."""
+
+    drive: str
+    folder: Path | None
+    """Where it came from; None: it is not installed for good any more."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sqlite3
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,8 +12,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from nondum.host.catalogue import database
+from nondum.host.catalogue import database, journal
 from nondum.host.catalogue.catalogue import Catalogue
+from nondum.host.catalogue.opening import Instead
 from nondum.host.catalogue.records import (
     ComponentRecord,
     ComponentState,
@@ -68,7 +69,6 @@ def payload(key: str = "k1", step: Step = Step.ACTIVE) -> PayloadRecord:
         step=step,
         sources={"b": Path("/drives/b"), "a": Path("/drives/a")},
         phases={"seen": AT, "ready": Moment(2.5, 3.5)},
-        attempts=2,
         waits_for="k9",
         components=("eye",),
         problems=(PROBLEM,),
@@ -123,6 +123,8 @@ FULL = HostState(
     highwater={("red", "org.example.eye"): Highwater(7, "digest-k1")},
     goals={"3": GoalRecord("3", "look at the lamp", "(seen lamp)", "achieve", -2)},
     former={"org.example.arm": former()},
+    tries={"k1": 2, "block:sdb1-7": 4},
+    is_stopped=True,
 )
 
 
@@ -182,16 +184,128 @@ async def test_journal_cannot_be_changed(tmp_path: Path) -> None:
     connection.close()
 
 
+def damaged(file: Path) -> None:
+    file.write_bytes(b"\xff" * 8192)
+
+
+def gone(file: Path) -> None:
+    file.unlink()
+
+
+def cut(file: Path) -> None:
+    """As after a file system's repair."""
+    with file.open("r+b") as out:
+        out.truncate(file.stat().st_size // 2)
+
+
+def unreadable(file: Path) -> None:
+    """Sound as a file, and not in what it says."""
+    with contextlib.closing(sqlite3.connect(file)) as connection, connection:
+        connection.execute("UPDATE components SET description = '{'")
+
+
+Harm = Callable[[Path], None]
+
+
 @pytest.mark.anyio
-async def test_damaged_file_is_set_aside(tmp_path: Path) -> None:
+@pytest.mark.parametrize("harm", [damaged, cut, unreadable])
+async def test_damaged_file_is_set_aside(tmp_path: Path, harm: Harm) -> None:
     async with opened(tmp_path) as catalogue:
         await catalogue.commit(FULL, ())
-    file = tmp_path / "catalogue.sqlite"
-    file.write_bytes(b"\xff" * 8192)
+    harm(tmp_path / "catalogue.sqlite")
     async with opened(tmp_path) as catalogue:
         assert catalogue.state == HostState("spot")
-        assert catalogue.set_aside is not None
-        assert catalogue.set_aside.exists()
+        assert catalogue.loss is not None
+        assert catalogue.loss.instead is Instead.NOTHING
+        assert catalogue.loss.aside is not None
+        assert catalogue.loss.aside.exists()
+
+
+@pytest.mark.anyio
+@pytest.mark.parametrize("harm", [damaged, gone, cut, unreadable])
+@pytest.mark.parametrize("is_last_whole", [True, False], ids=["last", "one-before"])
+async def test_backup_takes_the_place_of_what_is_lost(
+    tmp_path: Path, harm: Harm, is_last_whole: bool
+) -> None:
+    async with opened(tmp_path) as catalogue:
+        await catalogue.commit(FULL, (entry(),))
+        catalogue.backups.make()
+        if not is_last_whole:
+            catalogue.backups.make()
+            damaged(catalogue.backups.newest)
+        await catalogue.commit(replace(FULL, revision=6), (entry(),))
+    harm(tmp_path / "catalogue.sqlite")
+    async with opened(tmp_path) as catalogue:
+        assert catalogue.state == FULL
+        assert catalogue.loss is not None
+        assert (catalogue.loss.instead, catalogue.loss.revision) == (Instead.BACKUP, 5)
+        assert [told.id for told in await catalogue.journal()] == [1]
+        await catalogue.commit(replace(FULL, revision=7), (entry(),))
+    async with opened(tmp_path) as catalogue:
+        assert (catalogue.loss, catalogue.revision) == (None, 7)
+
+
+@pytest.mark.anyio
+async def test_file_that_is_damaged_under_a_daemon_is_written_anew(tmp_path: Path) -> None:
+    async with opened(tmp_path) as catalogue:
+        await catalogue.commit(FULL, (entry(),))
+    async with opened(tmp_path) as catalogue:
+        damaged(tmp_path / "catalogue.sqlite")
+        later = replace(FULL, revision=6)
+        await catalogue.commit(later, (entry(),))
+        assert catalogue.loss is not None
+        assert catalogue.loss.instead is Instead.MEMORY
+    async with opened(tmp_path) as catalogue:
+        assert catalogue.state == later
+
+
+@pytest.mark.anyio
+async def test_backup_does_not_wait_for_writers_nor_they_for_it(tmp_path: Path) -> None:
+    async with opened(tmp_path) as catalogue:
+        await catalogue.commit(FULL, ())
+        writer = sqlite3.connect(tmp_path / "catalogue.sqlite", isolation_level=None)
+        writer.execute("BEGIN IMMEDIATE")
+        writer.execute("UPDATE host SET revision = 99")
+        catalogue.backups.make()
+        writer.execute("COMMIT")
+        writer.close()
+        (backup,) = catalogue.backups.found()
+    with contextlib.closing(sqlite3.connect(backup)) as connection:
+        assert connection.execute("SELECT revision FROM host").fetchall() == [(FULL.revision,)]
+
+
+@pytest.mark.anyio
+async def test_journal_keeps_the_last_entries(tmp_path: Path) -> None:
+    catalogue = await Catalogue.open(tmp_path / "catalogue.sqlite", "spot", keep=journal.KEEP_LEAST)
+    for n in range(8):
+        await catalogue.commit(replace(FULL, revision=n), [entry(f"s{n}")] * 250)
+    kept = await catalogue.journal(limit=10_000)
+    await catalogue.close()
+    assert [kept[-1].id, kept[-1].subject] == [2000, "s7"]
+    assert journal.KEEP_LEAST <= len(kept) <= journal.KEEP_LEAST + journal.BATCH
+
+
+@pytest.mark.anyio
+async def test_what_cannot_be_written_is_owed(tmp_path: Path) -> None:
+    """Somebody else holds the file: as a disk that fails for a while."""
+    async with opened(tmp_path) as catalogue:
+        await catalogue.commit(FULL, (entry("one"),))
+        await catalogue._run(catalogue._connection.execute, "PRAGMA busy_timeout = 0")
+        other = sqlite3.connect(tmp_path / "catalogue.sqlite", isolation_level=None)
+        other.execute("BEGIN IMMEDIATE")
+        two, three = replace(FULL, revision=6), replace(FULL, revision=7, goals={})
+        with pytest.raises(sqlite3.OperationalError) as failed:
+            await catalogue.commit(two, (entry("two"),))
+        assert catalogue.state == FULL
+        catalogue.owe(two, (entry("two"),), failed.value)
+        assert (catalogue.state, catalogue.why_unwritten) == (two, "database is locked")
+        other.execute("COMMIT")
+        other.close()
+        await catalogue.commit(three, (entry("three"),))
+        assert not catalogue.why_unwritten
+        assert [told.subject for told in await catalogue.journal()] == ["one", "two", "three"]
+    async with opened(tmp_path) as catalogue:
+        assert catalogue.state == three
 
 
 @pytest.mark.anyio
@@ -207,9 +321,16 @@ async def test_file_of_another_version_is_left_alone(tmp_path: Path) -> None:
     assert refused.value.code == "CATALOGUE_VERSION"
 
 
+OF_4 = replace(FULL, tries={}, is_stopped=False, rollbacks={})
+THE_4 = (
+    "DROP TABLE tries; DROP TABLE rollbacks; ALTER TABLE host DROP COLUMN stopped;"
+    "ALTER TABLE payloads ADD COLUMN attempts INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE payloads DROP COLUMN was;"
+)
 OLDER = {
-    1: ("DROP TABLE goals; DROP TABLE former;", replace(FULL, goals={}, former={})),
-    2: ("DROP TABLE former;", replace(FULL, former={})),
+    1: (f"{THE_4} DROP TABLE goals; DROP TABLE former;", replace(OF_4, goals={}, former={})),
+    2: (f"{THE_4} DROP TABLE former;", replace(OF_4, former={})),
+    3: (THE_4, OF_4),
 }
 """Schema → what makes it of the present one, and what it can hold of `FULL`."""
 

@@ -12,6 +12,8 @@ from nondum.host.catalogue.state import HostState
 from nondum.host.lifecycle.folders import Folders, claim, remove, sweep
 from nondum.sdk.errors import ConfigRefused
 
+NOTE = "installed/known.json"
+
 
 def state(step: Step) -> HostState:
     payload = PayloadRecord(
@@ -34,8 +36,7 @@ def fill(folders: Folders) -> None:
         for folder in folders.of(key):
             folder.mkdir(parents=True)
             (folder / "file").touch()
-    for component in ("eye", "stray"):
-        folders.scratch(component).mkdir(parents=True)
+        folders.scratch(key, "eye").mkdir(parents=True, exist_ok=True)
 
 
 def test_second_daemon_is_turned_away(tmp_path: Path) -> None:
@@ -50,8 +51,8 @@ def test_second_daemon_is_turned_away(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("step", "kept"),
     [
-        (Step.STORED, {"payloads/known", "venvs/known", "scratch/eye"}),
-        (Step.QUARANTINED, {"payloads/known"}),
+        (Step.STORED, {"payloads/known", NOTE, "venvs/known", "scratch/known"}),
+        (Step.QUARANTINED, {"payloads/known", NOTE}),
         (Step.REFUSED, set()),
         (Step.REMOVING, set()),
     ],

@@ -11,8 +11,6 @@ files are used again they are hashed again. Venvs are hard links to them.
 
 from __future__ import annotations
 
-import ctypes
-import errno
 import os
 import shutil
 from collections.abc import Callable, Collection, Sequence
@@ -20,14 +18,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
-from nondum.wheelhouse import bytecode, checking, unpacking
+from nondum.wheelhouse import bytecode, checking, disk, unpacking
 from nondum.wheelhouse.stored import FILES, MANIFEST, CompiledFiles, StoredWheel, read_entry
 from nondum.wheelhouse.unpacking import Progress, Source, Unpacked
 
 UNFINISHED = ".part"
 """Folder of an entry for what is not in its place yet."""
-
-_libc = ctypes.CDLL(None, use_errno=True)
 
 
 class Store:
@@ -35,7 +31,7 @@ class Store:
 
     def __init__(self, root: Path) -> None:
         self.root = root
-        root.mkdir(parents=True, exist_ok=True)
+        disk.make_folder(root)
 
     def add(
         self,
@@ -70,8 +66,10 @@ class Store:
         try:
             stored.update((wheel.sha256, wheel) for wheel in self._unpack(sources, progress))
         except OSError as error:
+            names = ", ".join(source.path.name for source in sources)
+            failed = _failed(error, names, self.root)  # says how full the disk is now
             self._clear_away(sources)
-            raise _failed(error, ", ".join(source.path.name for source in sources)) from error
+            raise failed from error
         except PayloadRefused:
             self._clear_away(sources)
             raise
@@ -114,7 +112,7 @@ class Store:
             for file in stored.all_files[len(stored.files) :]:
                 (stored.root / file.path).unlink(missing_ok=True)
         except OSError as error:
-            raise _failed(error, stored.filename) from error
+            raise _failed(error, stored.filename, self.root) from error
         return kept
 
     def compile(self, sha256: str, progress: Callable[[int], None] | None = None) -> StoredWheel:
@@ -138,10 +136,10 @@ class Store:
                 (unfinished / file.path).rename(target)
             compiled = (*stored.compiled, CompiledFiles(bytecode.TAG, files))
             stored = replace(stored, compiled=compiled)
-            _sync_file_system(stored.folder)
+            disk.sync_file_system(stored.folder)
             _replace_manifest(stored)
         except OSError as error:
-            raise _failed(error, stored.filename) from error
+            raise _failed(error, stored.filename, self.root) from error
         finally:
             shutil.rmtree(unfinished, ignore_errors=True)
         return stored
@@ -193,10 +191,10 @@ class Store:
         self._clear_away(sources)
         unpacked = unpacking.unpack(sources, progress)
         stored = tuple(self._told(s, found) for s, found in zip(sources, unpacked, strict=True))
-        _sync_file_system(self.root)
+        disk.sync_file_system(self.root)
         for wheel in stored:
             self._unfinished(wheel.sha256).rename(wheel.folder)
-        _sync_folder(self.root)
+        disk.sync(self.root)
         return stored
 
     def _told(self, source: Source, unpacked: Unpacked) -> StoredWheel:
@@ -230,31 +228,9 @@ def _replace_manifest(wheel: StoredWheel) -> None:
         manifest.flush()
         os.fsync(manifest.fileno())
     (unfinished / MANIFEST).rename(wheel.folder / MANIFEST)
-    _sync_folder(wheel.folder)
+    disk.sync(wheel.folder)
     shutil.rmtree(unfinished)
 
 
-def _sync_file_system(folder: Path) -> None:
-    """syncfs(2): one call for all files just written, cheaper than an fsync for each."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        if _libc.syncfs(descriptor) != 0:
-            code = ctypes.get_errno()
-            raise OSError(code, os.strerror(code))
-    finally:
-        os.close(descriptor)
-
-
-def _sync_folder(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
-def _failed(error: OSError, what: str) -> InstallFailed:
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        fix = "free some disk, or lower the store's quota"
-        return InstallFailed(Problem("DISK_FULL", "there is no room to store it", what, fix=fix))
-    return InstallFailed(Problem("IO_ERROR", f"cannot be stored: {error.strerror}", where=what))
+def _failed(error: OSError, wheels: str, where: Path) -> InstallFailed:
+    return disk.failed(error, f"{wheels} cannot be stored", where)

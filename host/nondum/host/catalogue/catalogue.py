@@ -7,53 +7,69 @@ stops the daemon's loop.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import os
 import sqlite3
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
-from nondum.host.catalogue import database
+from nondum.host.catalogue import database, journal, opening
+from nondum.host.catalogue.backups import Backups
+from nondum.host.catalogue.opening import Instead, Loss, Opened
 from nondum.host.catalogue.records import JournalEntry, Moment, Snapshot
+from nondum.host.catalogue.reserve import Reserve
 from nondum.host.catalogue.state import HostState
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
+
+OWED_LIMIT = 10_000
+"""Entries that are kept for a journal that cannot be written; beyond them the oldest are lost."""
 
 
 class Catalogue:
     """One open catalogue. `close` it."""
 
     def __init__(
-        self, connection: sqlite3.Connection, state: HostState, thread: ThreadPoolExecutor
+        self, path: Path, opened: Opened, thread: ThreadPoolExecutor, keep: int = journal.KEEP
     ) -> None:
-        self._connection = connection
-        self._state = state
+        self._path = path
+        self._connection = opened.connection
+        self._state = self._written = opened.state
+        self._owed: deque[JournalEntry] = deque(maxlen=OWED_LIMIT)
         # What the last daemon left is for recovery only: nobody else sees it.
-        self._snapshot = Snapshot(state.host, state.revision)
+        self._snapshot = Snapshot(opened.state.host, opened.state.revision)
         self._thread = thread
+        self._keep = keep
+        self._reserve = Reserve(path.with_name("reserve"))
+        self.backups = Backups(path)
         self.boot = f"{os.getpid()}-{time.time_ns()}"
         """Names this run of the daemon in the journal."""
-        self.set_aside: Path | None = None
-        """Where a damaged file was moved, if one was found."""
+        self.loss = opened.loss
+        """What became of a file that could not be used, if there was one."""
+        self.why_unwritten = ""
+        """Why the state is newer than what is on disk; empty: it is not."""
 
     @classmethod
-    async def open(cls, path: Path, host: str) -> Catalogue:
-        """Open the file; a damaged one is set aside beside it and a new one begun."""
+    async def open(cls, path: Path, host: str, *, keep: int = journal.KEEP) -> Catalogue:
+        """Open the file, or what there is in its place (see `opening`); of the journal, about so
+        many entries are kept.
+
+        Raises `ConfigRefused` (CATALOGUE_VERSION, STATE_UNWRITABLE).
+        """
         thread = ThreadPoolExecutor(1, thread_name_prefix="catalogue")
         loop = asyncio.get_running_loop()
-        connection, aside = await loop.run_in_executor(thread, _connect, path)
-        state = await loop.run_in_executor(thread, database.load, connection, host)
-        catalogue = cls(connection, state, thread)
-        catalogue.set_aside = aside
+        opened = await loop.run_in_executor(thread, opening.open_file, path, host)
+        catalogue = cls(path, opened, thread, keep)
+        await catalogue._run(catalogue._reserve.take)
         return catalogue
 
     @property
     def state(self) -> HostState:
-        """The state last committed."""
+        """The state last committed, or gone on with."""
         return self._state
 
     @property
@@ -66,21 +82,79 @@ class Catalogue:
         return self._snapshot
 
     async def commit(self, after: HostState, entries: Sequence[JournalEntry]) -> None:
-        """Make `after` the state, in one transaction with the journal entries that tell why."""
-        await self._run(database.write, self._connection, self._state, after, entries)
-        self._state = after
-        self._snapshot = after.snapshot()
+        """Make `after` the state, in one transaction with the journal entries that tell why, and
+        with what is owed.
+
+        A file that proves damaged is replaced by a new one with this state. Raises
+        `sqlite3.Error`, `OSError`; then the state is what it was.
+        """
+        work = asyncio.ensure_future(self._run(self._write, after, (*self._owed, *entries)))
+        try:
+            await asyncio.shield(work)
+        except asyncio.CancelledError:
+            await asyncio.wait([work])  # the thread goes on: what it came to counts
+            if work.exception() is None:
+                self._wrote(after)
+            raise
+        self._wrote(after)
+
+    def owe(self, after: HostState, entries: Sequence[JournalEntry], why: Exception) -> None:
+        """Go on with a state that cannot be written: whoever starts next may not find it.
+
+        The next commit that works writes it, too.
+        """
+        self._owed.extend(entries)
+        self.why_unwritten = str(why)
+        self._take(after)
 
     async def journal(
         self, *, subject: str | None = None, after: int = 0, limit: int = 200
     ) -> tuple[JournalEntry, ...]:
         """The last entries, oldest first: about one subject, or with ids above `after`."""
-        return await self._run(database.journal, self._connection, subject, after, limit)
+        return await self._run(journal.read, self._connection, subject, after, limit)
 
     async def close(self) -> None:
         """Finish what was asked for and close the file."""
         await self._run(self._connection.close)
         self._thread.shutdown()
+
+    def _wrote(self, after: HostState) -> None:
+        self._owed.clear()
+        self._written = after
+        self.why_unwritten = ""
+        self._take(after)
+
+    def _take(self, after: HostState) -> None:
+        self._state = after
+        self._snapshot = after.snapshot()
+
+    def _write(self, after: HostState, entries: Sequence[JournalEntry]) -> None:
+        """On the catalogue's thread."""
+        try:
+            self._write_once(self._written, after, entries)
+        except sqlite3.DatabaseError as error:
+            if database.is_damaged(error):
+                self._replace(after, entries)
+            elif database.is_out_of_room(error) and self._reserve.release():
+                self._write_once(self._written, after, entries)
+            else:
+                raise
+        else:
+            if not self._reserve.is_taken:
+                self._reserve.take()
+
+    def _replace(self, after: HostState, entries: Sequence[JournalEntry]) -> None:
+        """Begin a new file with all that is known: the one there is damaged."""
+        self._connection.close()
+        aside = opening.set_aside(self._path)
+        self._connection = database.connect(self._path)
+        self._write_once(HostState(after.host), after, entries)
+        self.loss = Loss(aside, Instead.MEMORY, after.revision)
+
+    def _write_once(
+        self, before: HostState, after: HostState, entries: Sequence[JournalEntry]
+    ) -> None:
+        database.write(self._connection, before, after, entries, self._keep)
 
     async def _run(self, function: Callable[_P, _R], *args: _P.args, **kwargs: _P.kwargs) -> _R:
         def call() -> _R:
@@ -92,18 +166,3 @@ class Catalogue:
 def now() -> Moment:
     """This moment by both clocks."""
     return Moment(time.monotonic(), time.time())
-
-
-def _connect(path: Path) -> tuple[sqlite3.Connection, Path | None]:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        return database.connect(path), None
-    except sqlite3.DatabaseError as error:
-        if not database.is_damaged(error):
-            raise
-        aside = path.with_name(f"{path.name}.damaged-{time.time_ns()}")
-        path.rename(aside)
-        for suffix in ("-wal", "-shm"):
-            with contextlib.suppress(FileNotFoundError):
-                path.with_name(path.name + suffix).rename(aside.with_name(aside.name + suffix))
-        return database.connect(path), aside

@@ -11,18 +11,29 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from nondum.host.catalogue import rows
-from nondum.host.catalogue.records import ComponentRecord, JournalEntry
+from nondum.host.catalogue import journal, rows
+from nondum.host.catalogue.records import ComponentRecord, JournalEntry, Rollback
 from nondum.host.catalogue.state import Highwater, HostState
 from nondum.sdk.errors import ConfigRefused, Problem
 
-SCHEMA = 3
+SCHEMA = 4
 
 _UPGRADES = {
     1: "CREATE TABLE goals (id TEXT PRIMARY KEY, text TEXT NOT NULL, pddl TEXT NOT NULL,"
     " kind TEXT NOT NULL, priority INTEGER NOT NULL) STRICT;",
     2: "CREATE TABLE former (payload_id TEXT PRIMARY KEY, version TEXT NOT NULL,"
     " components TEXT NOT NULL, left_wall_s REAL NOT NULL) STRICT;",
+    3: "ALTER TABLE host ADD COLUMN stopped INTEGER NOT NULL DEFAULT 0;"
+    "CREATE TABLE tries (subject TEXT PRIMARY KEY, deaths INTEGER NOT NULL) STRICT;"
+    "INSERT INTO tries SELECT key, attempts FROM payloads WHERE attempts > 0;"
+    "ALTER TABLE payloads DROP COLUMN attempts;"
+    "ALTER TABLE payloads ADD COLUMN was INTEGER NOT NULL DEFAULT 0;"
+    "CREATE TABLE rollbacks (fleet TEXT NOT NULL, payload_id TEXT NOT NULL, digest TEXT NOT NULL,"
+    " release INTEGER NOT NULL, below INTEGER NOT NULL, PRIMARY KEY (fleet, payload_id)) STRICT;"
+    "DROP TRIGGER journal_is_never_deleted;"
+    "CREATE TRIGGER journal_is_never_deleted BEFORE DELETE ON journal"
+    " WHEN old.id > (SELECT max(id) FROM journal) - 1000"
+    " BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;",
 }
 """Schema → what makes the next one of it."""
 
@@ -57,7 +68,12 @@ def connect(path: Path) -> sqlite3.Connection:
 
 def is_damaged(error: sqlite3.DatabaseError) -> bool:
     """Whether the file itself is broken, not only out of reach or out of room."""
-    return error.sqlite_errorcode in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+    return error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+
+
+def is_out_of_room(error: sqlite3.DatabaseError) -> bool:
+    """Whether a full disk may be what is wrong: SQLite tells of some as errors of the disk."""
+    return error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
 
 
 def _damaged(verdict: str) -> sqlite3.DatabaseError:
@@ -98,16 +114,11 @@ def load(connection: sqlite3.Connection, host: str) -> HostState:
     def every(table: str, order: str = "rowid") -> list[sqlite3.Row]:
         return connection.execute(f"SELECT * FROM {table} ORDER BY {order}").fetchall()
 
-    sources, claims = every("sources", "position"), every("claims", "position")
-    payloads = [
-        rows.payload(row, [s for s in sources if s["payload"] == row["key"]])
-        for row in every("payloads")
-    ]
-    components = [
-        rows.component(row, [c for c in claims if c["component"] == row["id"]])
-        for row in every("components")
-    ]
-    found = connection.execute("SELECT revision FROM host").fetchone()
+    sources = _grouped(every("sources", "position"), "payload")
+    claims = _grouped(every("claims", "position"), "component")
+    payloads = [rows.payload(row, sources.get(row["key"], ())) for row in every("payloads")]
+    components = [rows.component(row, claims.get(row["id"], ())) for row in every("components")]
+    found = connection.execute("SELECT revision, stopped FROM host").fetchone()
     return HostState(
         host=host,
         revision=found["revision"] if found else 0,
@@ -122,7 +133,21 @@ def load(connection: sqlite3.Connection, host: str) -> HostState:
             (row["fleet"], row["payload_id"]): Highwater(row["release"], row["digest"])
             for row in every("highwater")
         },
+        rollbacks={
+            (row["fleet"], row["payload_id"]): Rollback(row["digest"], row["release"], row["below"])
+            for row in every("rollbacks")
+        },
+        tries={row["subject"]: row["deaths"] for row in every("tries")},
+        is_stopped=bool(found["stopped"]) if found else False,
     )
+
+
+def _grouped(parts: list[sqlite3.Row], owner: str) -> dict[str, list[sqlite3.Row]]:
+    """Rows by whose they are, in their order."""
+    groups: dict[str, list[sqlite3.Row]] = {}
+    for part in parts:
+        groups.setdefault(part[owner], []).append(part)
+    return groups
 
 
 def write(
@@ -130,40 +155,33 @@ def write(
     before: HostState,
     after: HostState,
     entries: Sequence[JournalEntry],
+    keep: int = journal.KEEP,
 ) -> None:
-    """Commit, at once, the difference of two states and the journal entries that tell of it."""
+    """Commit, at once, the difference of two states and the journal entries that tell of it.
+
+    The journal keeps about `keep` entries.
+    """
     connection.execute("BEGIN IMMEDIATE")
     try:
         _write_state(connection, before, after)
-        for entry in entries:
-            _insert(connection, "journal", rows.entry_row(entry))
+        journal.append(connection, entries, keep)
         connection.execute("COMMIT")
     except BaseException:
-        connection.execute("ROLLBACK")
+        if connection.in_transaction:  # SQLite ends it by itself when a disk is full
+            connection.execute("ROLLBACK")
         raise
 
 
-def journal(
-    connection: sqlite3.Connection, subject: str | None, after: int, limit: int
-) -> tuple[JournalEntry, ...]:
-    """The last `limit` entries with an id above `after`, oldest first."""
-    found = connection.execute(
-        "SELECT * FROM journal WHERE id > ? AND (? IS NULL OR subject = ?) "
-        "ORDER BY id DESC LIMIT ?",
-        (after, subject, subject, limit),
-    )
-    return tuple(rows.entry(row) for row in reversed(found.fetchall()))
-
-
 def _write_state(connection: sqlite3.Connection, before: HostState, after: HostState) -> None:
-    if (before.host, before.revision) != (after.host, after.revision):
+    if _host_row(before) != _host_row(after):
         connection.execute("DELETE FROM host")
-        _insert(connection, "host", {"name": after.host, "revision": after.revision})
+        _insert(connection, "host", _host_row(after))
     simple: Iterable[tuple[str, str, Any, Any, Callable[[Any], rows.Row]]] = (
         ("drives", "id", before.drives, after.drives, rows.drive_row),
         ("mounts", "unit", before.mounts, after.mounts, rows.mount_row),
         ("goals", "id", before.goals, after.goals, rows.goal_row),
         ("former", "payload_id", before.former, after.former, rows.former_row),
+        ("tries", "subject", _tries(before), _tries(after), _try_row),
     )
     for table, key, old, new, as_row in simple:
         _difference(connection, table, key, old, new, as_row)
@@ -172,10 +190,34 @@ def _write_state(connection: sqlite3.Connection, before: HostState, after: HostS
             known = {"fleet": fleet, "payload_id": payload_id}
             row = {**known, "release": newest.release, "digest": newest.digest}
             _insert(connection, "highwater", row)
+    _write_rollbacks(connection, before, after)
     _difference(connection, "payloads", "key", before.payloads, after.payloads, rows.payload_row)
     for payload in _changed(before.payloads, after.payloads):
         _replace_parts(connection, "sources", "payload", payload.key, rows.source_rows(payload))
     _write_components(connection, before, after)
+
+
+def _write_rollbacks(connection: sqlite3.Connection, before: HostState, after: HostState) -> None:
+    """All of them: there are few, and they seldom change."""
+    if before.rollbacks == after.rollbacks:
+        return
+    connection.execute("DELETE FROM rollbacks")
+    for (fleet, payload_id), back in after.rollbacks.items():
+        row = {"digest": back.digest, "release": back.release, "below": back.below}
+        _insert(connection, "rollbacks", {"fleet": fleet, "payload_id": payload_id, **row})
+
+
+def _host_row(state: HostState) -> rows.Row:
+    return {"name": state.host, "revision": state.revision, "stopped": int(state.is_stopped)}
+
+
+def _tries(state: HostState) -> dict[str, tuple[str, int]]:
+    return {subject: (subject, deaths) for subject, deaths in state.tries.items()}
+
+
+def _try_row(one: tuple[str, int]) -> rows.Row:
+    subject, deaths = one
+    return {"subject": subject, "deaths": deaths}
 
 
 def _write_components(connection: sqlite3.Connection, before: HostState, after: HostState) -> None:

@@ -16,6 +16,10 @@ from nondum.sdk.signature import parse_signature
 Xyz = tuple[float, float, float]
 
 
+INSTALLED = "installed"
+"""Kind of the drives that stand for initial components: no source watches them."""
+
+
 class Step(Enum):
     """How far a payload has come on this host. `transitions.py` says what leads where."""
 
@@ -33,6 +37,8 @@ class Step(Enum):
     """Each worker runs and said what the index says."""
     ACTIVE = "active"
     """Its components are in the catalogue and may act."""
+    SUPERSEDED = "superseded"
+    """Another release of it is in force, or is tried first; it waits, installed, to come back."""
     REMOVING = "removing"
     """Withdrawn; its processes end and its files are deleted."""
     REFUSED = "refused"
@@ -235,17 +241,28 @@ class PayloadRecord:
     """Drive → the payload's folder on it."""
     phases: Mapping[str, Moment]
     """`seen`, `verified`, `installed`, `ready` → when, as far as it has come."""
-    attempts: int = 0
-    """How often a daemon has set out to bring it to life since it last was active."""
     waits_for: str = ""
     """Key of a payload that must be gone first: it brings the same components."""
     components: tuple[str, ...] = ()
     problems: tuple[Problem, ...] = ()
+    was: int = 0
+    """The release that it took over from when it last became active; 0: none."""
 
     @property
     def drives(self) -> tuple[str, ...]:
         """Where it is, by name."""
         return tuple(sorted(self.sources))
+
+
+@dataclass(frozen=True, slots=True)
+class Rollback:
+    """A person wants an earlier release of a payload to be in force."""
+
+    digest: str
+    """The release that is to be."""
+    release: int
+    below: int
+    """The newest release that it goes before; a newer one counts again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -295,6 +312,8 @@ class Snapshot:
     drives: tuple[DriveRecord, ...] = ()
     devices: tuple[DeviceRecord, ...] = ()
     mounts: tuple[MountPose, ...] = ()
+    rollbacks: tuple[str, ...] = ()
+    """Digests of the releases that people went back to."""
     goals: tuple[GoalRecord, ...] = ()
     """In the order they were given."""
     former: tuple[FormerPayload, ...] = ()

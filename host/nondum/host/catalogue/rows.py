@@ -82,10 +82,10 @@ def payload_row(payload: PayloadRecord) -> Row:
         "fleet": payload.fleet,
         "step": payload.step.value,
         "phases": as_json({name: _pair(moment) for name, moment in payload.phases.items()}),
-        "attempts": payload.attempts,
         "waits_for": payload.waits_for,
         "components": as_json(payload.components),
         "problems": as_json(payload.problems),
+        "was": payload.was,
     }
 
 
@@ -102,10 +102,10 @@ def payload(row: sqlite3.Row, sources: Iterable[sqlite3.Row]) -> PayloadRecord:
         step=Step(row["step"]),
         sources={source["drive"]: Path(source["folder"]) for source in sources},
         phases={name: Moment(*pair) for name, pair in phases.items()},
-        attempts=row["attempts"],
         waits_for=row["waits_for"],
         components=tuple(json.loads(row["components"])),
         problems=_problems(row["problems"]),
+        was=row["was"],
     )
 
 

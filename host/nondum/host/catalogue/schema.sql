@@ -3,7 +3,8 @@
 
 CREATE TABLE host (
     name      TEXT NOT NULL,
-    revision  INTEGER NOT NULL
+    revision  INTEGER NOT NULL,
+    stopped   INTEGER NOT NULL DEFAULT 0 -- 1: the daemon that wrote it was told to end
 ) STRICT;
 
 CREATE TABLE drives (
@@ -26,10 +27,10 @@ CREATE TABLE payloads (
     fleet       TEXT NOT NULL,
     step        TEXT NOT NULL,
     phases      TEXT NOT NULL,           -- JSON {phase: [monotonic_s, wall_s]}
-    attempts    INTEGER NOT NULL,
     waits_for   TEXT NOT NULL,
     components  TEXT NOT NULL,           -- JSON, as its manifest names them
-    problems    TEXT NOT NULL            -- JSON
+    problems    TEXT NOT NULL,           -- JSON
+    was         INTEGER NOT NULL DEFAULT 0 -- the release that it took over from
 ) STRICT;
 
 CREATE TABLE sources (
@@ -89,6 +90,15 @@ CREATE TABLE highwater (                 -- never pruned
     PRIMARY KEY (fleet, payload_id)
 ) STRICT;
 
+CREATE TABLE rollbacks (                 -- earlier releases that people went back to
+    fleet       TEXT NOT NULL,
+    payload_id  TEXT NOT NULL,
+    digest      TEXT NOT NULL,
+    release     INTEGER NOT NULL,
+    below       INTEGER NOT NULL,
+    PRIMARY KEY (fleet, payload_id)
+) STRICT;
+
 CREATE TABLE goals (                     -- those that are not over
     id        TEXT PRIMARY KEY,
     text      TEXT NOT NULL,
@@ -102,6 +112,11 @@ CREATE TABLE former (                    -- payloads that were active and are go
     version      TEXT NOT NULL,
     components   TEXT NOT NULL,          -- JSON {component: description}
     left_wall_s  REAL NOT NULL
+) STRICT;
+
+CREATE TABLE tries (                     -- what daemons were at when they died, and how often
+    subject  TEXT PRIMARY KEY,           -- drive or payload key
+    deaths   INTEGER NOT NULL
 ) STRICT;
 
 CREATE TABLE journal (
@@ -122,6 +137,7 @@ CREATE TRIGGER journal_is_never_changed BEFORE UPDATE ON journal
 BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;
 
 CREATE TRIGGER journal_is_never_deleted BEFORE DELETE ON journal
+WHEN old.id > (SELECT max(id) FROM journal) - 1000 -- only what is long past is let go
 BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;
 
 CREATE VIEW behaviours AS

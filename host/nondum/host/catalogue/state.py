@@ -14,6 +14,7 @@ from nondum.host.catalogue.records import (
     MountPose,
     PayloadRecord,
     PeerRecord,
+    Rollback,
     Snapshot,
 )
 
@@ -39,10 +40,16 @@ class HostState:
     mounts: Mapping[str, MountPose] = field(default_factory=dict)
     highwater: Mapping[tuple[str, str], Highwater] = field(default_factory=dict)
     """(fleet, payload id) → newest release."""
+    rollbacks: Mapping[tuple[str, str], Rollback] = field(default_factory=dict)
+    """(fleet, payload id) → the earlier release that a person went back to."""
     goals: Mapping[str, GoalRecord] = field(default_factory=dict)
     """Those that are not over."""
     former: Mapping[str, FormerPayload] = field(default_factory=dict)
     """Key → what is remembered of a payload; none of them is active."""
+    tries: Mapping[str, int] = field(default_factory=dict)
+    """Drive or payload key → how many daemons in a row died while they were at it."""
+    is_stopped: bool = False
+    """Whether the daemon that wrote this ended because it was told to."""
     peers: Mapping[str, PeerRecord] = field(default_factory=dict)
     """Key → a peer that is there. Not kept when the daemon ends: who is there is found out anew."""
 
@@ -56,6 +63,7 @@ class HostState:
             drives=tuple(self.drives.values()),
             devices=tuple(self.devices.values()),
             mounts=tuple(self.mounts.values()),
+            rollbacks=tuple(rollback.digest for rollback in self.rollbacks.values()),
             goals=tuple(self.goals.values()),
             former=tuple(sorted(self.former.values(), key=lambda f: f.left_wall_s)),
             peers=tuple(sorted(self.peers.values(), key=lambda p: p.name)),

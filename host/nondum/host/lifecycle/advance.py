@@ -20,6 +20,9 @@ from nondum.host.lifecycle import (
     goal_rules,
     payload_rules,
     peer_rules,
+    rebuilding,
+    releases,
+    tries,
 )
 from nondum.host.lifecycle.turn import Outcome, Turn
 from nondum.host.transitions import TRANSITIONS
@@ -35,6 +38,9 @@ RULES: Mapping[type[Event], _Rule] = {
     events.DrivesScanned: drive_rules.on_drives_scanned,
     events.PayloadFound: payload_rules.on_payload_found,
     events.PayloadVerified: payload_rules.on_payload_verified,
+    events.WheelsStored: payload_rules.on_wheels_stored,
+    events.BesideRefused: releases.on_beside_refused,
+    events.RollbackAsked: payload_rules.on_rollback_asked,
     events.RetryAsked: component_rules.on_retry_asked,
     events.ForgetAsked: payload_rules.on_forget_asked,
     events.WorkerReady: component_rules.on_worker_news,
@@ -46,6 +52,7 @@ RULES: Mapping[type[Event], _Rule] = {
     events.GoalGiven: goal_rules.on_goal_given,
     events.GoalReached: goal_rules.on_goal_over,
     events.GoalEnded: goal_rules.on_goal_over,
+    events.HostSteady: tries.on_host_steady,
     events.PeerJoined: peer_rules.on_peer_joined,
     events.PeerShared: peer_rules.on_peer_shared,
     events.PeerLeft: peer_rules.on_peer_left,
@@ -56,13 +63,23 @@ RULES: Mapping[type[Event], _Rule] = {
 def advance(state: HostState, event: Event, at: Moment) -> Outcome:
     """Follow one event, and all that it entails, through the rules."""
     turn = Turn(state, at, pending=[event])
-    while turn.pending:
-        follow(turn, turn.pending.pop(0))
+    follow_all(turn)
     return settle(turn, state)
+
+
+def follow_all(turn: Turn) -> None:
+    """Apply the rules until nothing follows any more, releases that are wanted now included."""
+    while True:
+        while turn.pending:
+            follow(turn, turn.pending.pop(0))
+        turn.pending.extend(releases.settle(turn))
+        if not turn.pending:
+            return
 
 
 def follow(turn: Turn, event: Event) -> None:
     """Apply the rule for one event; what follows from it is left pending."""
+    tries.on_event(turn, event)
     rule = RULES.get(type(event))
     if rule is not None:
         rule(turn, event)
@@ -73,6 +90,7 @@ def follow(turn: Turn, event: Event) -> None:
 def settle(turn: Turn, before: HostState) -> Outcome:
     """End a turn: idle drives, claims of devices, and the revision if anything was recomposed."""
     drive_rules.release_idle_drives(turn)
+    rebuilding.settle(turn, before)
     if turn.state.components != before.components or turn.state.devices != before.devices:
         claims.settle(turn)
     parts = ("components", "mounts", "former")

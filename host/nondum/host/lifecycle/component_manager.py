@@ -6,30 +6,32 @@ Nothing is done before the journal tells of it; an executor reports what it did 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import sqlite3
 from collections.abc import Sequence
-from pathlib import Path
+from dataclasses import replace
 from typing import Protocol
 
+from nondum.host.catalogue import opening
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.catalogue.records import Snapshot
+from nondum.host.catalogue.records import INSTALLED, Moment, Snapshot
 from nondum.host.catalogue.state import HostState
 from nondum.host.drives.source import DriveSource
 from nondum.host.effects import Effect
-from nondum.host.events import CatalogueSetAside, DrivesScanned
+from nondum.host.events import CatalogueSetAside, DrivesScanned, HostSteady, HostStopped
 from nondum.host.lifecycle.advance import advance
 from nondum.host.lifecycle.bus import Bus, Stamped, is_told_early
+from nondum.host.lifecycle.rebuilding import noting_all
 from nondum.host.lifecycle.recovery import recover
 from nondum.host.lifecycle.telling import entries_of
+from nondum.host.lifecycle.tries import STEADY_S
 from nondum.host.lifecycle.turn import Outcome
-from nondum.sdk.errors import Problem
 
 COMMIT_AGAIN_S = 0.5
 """After a commit failed: on a full disk, say."""
-
-INSTALLED = "installed"
-"""Kind of the drives that stand for initial components: no source watches them."""
+COMMIT_TRIES = 1
+"""So many more, before the host goes on with what cannot be written down."""
 
 log = logging.getLogger(__name__)
 
@@ -37,8 +39,20 @@ log = logging.getLogger(__name__)
 class Executes(Protocol):
     """Whoever carries effects out and reports by events."""
 
+    async def rebuild(self, state: HostState, at: Moment) -> HostState:
+        """The state, with what is installed for good and is not in it: its catalogue was lost."""
+        ...
+
+    async def missing(self, state: HostState) -> frozenset[str]:
+        """Keys of payloads of the state whose files are gone."""
+        ...
+
     async def prepare(self, state: HostState) -> None:
         """Clear away what a recovered state does not account for, before anything is started."""
+        ...
+
+    def adopt(self, state: HostState) -> None:
+        """Take note of what was committed, before anybody is told; never blocks, never raises."""
         ...
 
     def start(self, effect: Effect) -> None:
@@ -58,6 +72,7 @@ class ComponentManager:
         self._executor = executor
         self._bus = bus
         self._sources: list[DriveSource] = []
+        self._trial: asyncio.TimerHandle | None = None
 
     def add_source(self, source: DriveSource) -> None:
         """Watch one more source of drives; call it before `run`."""
@@ -79,57 +94,100 @@ class ComponentManager:
                 for source in self._sources:
                     tasks.create_task(source.watch(self._bus.emit))
                 tasks.create_task(self._follow_all())
+        except asyncio.CancelledError:
+            await self._stop()
+            raise
         finally:
+            if self._trial is not None:
+                self._trial.cancel()
             await self._executor.close()
 
     async def _start(self) -> None:
-        recovered = recover(self._catalogue.state, self._bus.clock())
-        await self._executor.prepare(recovered.state)
-        at = self._bus.clock()
+        """The recovered state is committed first: who dies of what follows is counted by it."""
+        state, at = self._catalogue.state, self._bus.clock()
+        if self._catalogue.loss is not None:
+            rebuilt = await self._executor.rebuild(state, at)
+            self._tell_loss(state, rebuilt)
+            state = rebuilt
+        missing = await self._executor.missing(state)
+        recovered = recover(state, at, missing)
         await self._commit(recovered.state, [(event, at) for event in recovered.events])
+        await self._executor.prepare(recovered.state)
         self._bus.tell(recovered.events)
-        for effect in recovered.effects:
+        for effect in (*recovered.effects, *noting_all(recovered.state)):
             self._executor.start(effect)
-        if (aside := self._catalogue.set_aside) is not None:
-            self._bus.emit(CatalogueSetAside(recovered.state.host, (_set_aside(aside),)))
         watched = {INSTALLED, *(source.kind for source in self._sources)}
         for kind in {drive.kind for drive in recovered.state.drives.values()} - watched:
             self._bus.emit(DrivesScanned(kind, ()))
 
+    async def _stop(self) -> None:
+        """Write down that this daemon ended because it was told to: nothing is to blame for it."""
+        state = self._catalogue.state
+        with contextlib.suppress(sqlite3.Error, OSError):
+            stopped = HostStopped(state.host)
+            entries = entries_of([(stopped, self._bus.clock())], state, state, self._catalogue.boot)
+            await self._catalogue.commit(replace(state, is_stopped=True), list(entries))
+
+    def _tell_loss(self, before: HostState, after: HostState) -> None:
+        assert self._catalogue.loss is not None
+        found = [p.payload_id for key, p in after.payloads.items() if key not in before.payloads]
+        problem = opening.problem_of(self._catalogue.loss, tuple(found))
+        log.warning("%s", problem)
+        self._bus.emit(CatalogueSetAside(after.host, (problem,)))
+
     async def _follow_all(self) -> None:
         while True:
-            await self._follow(await self._bus.batch())
+            patience = COMMIT_AGAIN_S if self._catalogue.why_unwritten else None
+            try:
+                async with asyncio.timeout(patience):
+                    batch = await self._bus.batch()
+            except TimeoutError:
+                batch = []
+            await self._follow(batch)
 
     async def _follow(self, batch: Sequence[Stamped]) -> None:
         """Events that waited together share one commit."""
         outcome, told = _advance_all(self._catalogue.state, batch)
         await self._commit(outcome.state, told)
+        self._executor.adopt(outcome.state)
         early = {id(event) for event, _ in batch if is_told_early(event)}
         self._bus.tell([event for event in outcome.events if id(event) not in early])
         for effect in outcome.effects:
             self._executor.start(effect)
 
     async def _commit(self, after: HostState, told: Sequence[Stamped]) -> None:
-        before = self._catalogue.state
-        if after is before and not told:
+        """Write a state down. Where that cannot be done, go on with it all the same: what was
+        pulled must go, whatever the disk does. What is owed is written as soon as it can be."""
+        catalogue = self._catalogue
+        before, loss = catalogue.state, catalogue.loss
+        if after is before and not told and not catalogue.why_unwritten:
             return
-        entries = list(entries_of(told, before, after, self._catalogue.boot))
+        entries = list(entries_of(told, before, after, catalogue.boot))
+        tries_left = 0 if catalogue.why_unwritten else COMMIT_TRIES
         while True:
             try:
-                await self._catalogue.commit(after, entries)
-                return
-            except sqlite3.OperationalError:
+                await catalogue.commit(after, entries)
+                break
+            except (sqlite3.Error, OSError) as error:
+                if not tries_left:
+                    catalogue.owe(after, entries, error)
+                    break
                 log.exception("the catalogue cannot be written; trying again")
+                tries_left -= 1
                 await asyncio.sleep(COMMIT_AGAIN_S)
+        if catalogue.loss is not loss:
+            self._tell_loss(after, after)
+        self._try(after)
 
+    def _try(self, state: HostState) -> None:
+        """See after a while whether all is well with what others may have died of."""
+        if state.tries and self._trial is None:
+            self._trial = asyncio.get_running_loop().call_later(STEADY_S, self._tried)
 
-def _set_aside(file: Path) -> Problem:
-    return Problem(
-        "CATALOGUE_REBUILT",
-        "the catalogue was damaged; drives are read anew, what was installed for good is not here",
-        where=str(file),
-        fix="install initial components again",
-    )
+    def _tried(self) -> None:
+        self._trial = None
+        self._bus.emit(HostSteady(self._catalogue.state.host))
+        self._try(self._catalogue.state)
 
 
 def _advance_all(state: HostState, batch: Sequence[Stamped]) -> tuple[Outcome, list[Stamped]]:

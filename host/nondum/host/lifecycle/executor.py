@@ -10,9 +10,11 @@ import contextlib
 import logging
 from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from nondum.host import effects
+from nondum.host.catalogue.records import Moment
 from nondum.host.catalogue.state import HostState
 from nondum.host.drives.reading import DriveReading
 from nondum.host.effects import Effect
@@ -31,11 +33,13 @@ from nondum.host.lifecycle.lanes import Lanes
 from nondum.host.lifecycle.quiet import Quiet
 from nondum.host.workers import Workers
 from nondum.sdk.errors import DriveGone, NondumError, Problem
+from nondum.wheelhouse import disk
 
 _Hand = Callable[[Any], Awaitable[tuple[Event, ...]]]
 
 _INSTEAD = (
     effects.CopyPayload,
+    effects.RestPayload,
     effects.SuspendPayload,
     effects.ClearPayload,
     effects.ReleaseDrive,
@@ -61,7 +65,7 @@ class Executor:
         self.children = Children()
         self._lanes = Lanes()
         self._quiet = Quiet()
-        self._drives = DriveReading(self.children, allow_unsigned=options.allow_unsigned)
+        self._drives = DriveReading(self.children, emit, allow_unsigned=options.allow_unsigned)
         self.installation = Installation(host, folders, workers, self.children, emit, options)
         self._hands: Mapping[type[Effect], _Hand] = {
             effects.ReadDrive: self._drives.read,
@@ -73,6 +77,8 @@ class Executor:
             effects.ProbeComponents: self.installation.probe,
             effects.ActivatePayload: self.installation.activate,
             effects.CompileWheels: self._compile,
+            effects.NoteInstalled: self.installation.note,
+            effects.RestPayload: self.installation.rest,
             effects.SuspendPayload: self.installation.suspend,
             effects.ClearPayload: self.installation.clear,
             effects.RestartWorker: self._restart,
@@ -80,9 +86,21 @@ class Executor:
             effects.DetachDevice: self._detach,
         }
 
+    async def rebuild(self, state: HostState, at: Moment) -> HostState:
+        """The state, with what is installed for good and is not in it."""
+        return await self.installation.rebuild(state, at)
+
+    async def missing(self, state: HostState) -> frozenset[str]:
+        """Payloads of the state whose files are gone."""
+        return await self.installation.missing(state)
+
     async def prepare(self, state: HostState) -> None:
         """Clear away what a recovered state does not account for; start a spare child."""
         await self.installation.prepare(state)
+
+    def adopt(self, state: HostState) -> None:
+        """Have the workers stand for components that the catalogue says."""
+        self._workers.take_over({id: c.payload for id, c in state.components.items()})
 
     def start(self, effect: Effect) -> None:
         """Set an effect going."""
@@ -103,6 +121,10 @@ class Executor:
                 reported = await self._hands[type(effect)](effect)
         except NondumError as error:
             reported = _failure(effect, error)
+        except OSError as error:
+            log.exception("%r", effect)
+            where = Path(error.filename or "")
+            reported = _failure(effect, disk.failed(error, type(effect).__name__, where))
         except Exception as error:
             log.exception("%r", effect)
             internal = Problem("INTERNAL", f"{type(effect).__name__}: {error!r}")
@@ -162,8 +184,11 @@ def _failure(effect: Effect, error: NondumError) -> tuple[Event, ...]:
         case effects.ClearPayload():
             log.error("%s is not cleared away whole: %s", effect.payload, error)
             return (PayloadCleared(effect.payload),)
-        case effects.SuspendPayload():
+        case effects.RestPayload() | effects.SuspendPayload():
             log.error("%s is not suspended whole: %s", effect.payload, error)
+            return ()
+        case effects.NoteInstalled():
+            log.warning("%s: the note of its installation is not kept: %s", effect.payload, error)
             return ()
         case effects.CompileWheels():
             log.info("%s stays as it is, not all compiled: %s", effect.payload, error)

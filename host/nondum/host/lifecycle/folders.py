@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import fcntl
+import logging
 import os
-import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,10 +12,15 @@ from pathlib import Path
 from nondum.host.catalogue.records import Step
 from nondum.host.catalogue.state import HostState
 from nondum.host.drives import mounting
+from nondum.host.workers import scratch
 from nondum.sdk.errors import ConfigRefused, Problem
+from nondum.wheelhouse import disk
 
-_KEEPS_FOLDER = frozenset({Step.STAGED, Step.STORED, Step.PROBED, Step.ACTIVE, Step.QUARANTINED})
-_KEEPS_VENVS = frozenset({Step.STORED, Step.PROBED, Step.ACTIVE})
+_KEEPS_VENVS = frozenset({Step.STORED, Step.PROBED, Step.ACTIVE, Step.SUPERSEDED})
+KEEPS_FOLDER = _KEEPS_VENVS | {Step.STAGED, Step.QUARANTINED}
+"""Steps at which a payload's checked files are there."""
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,35 +68,57 @@ class Folders:
         """A payload while it is copied and checked."""
         return self.root / "staging" / payload
 
+    @property
+    def payloads(self) -> Path:
+        """The checked files of all payloads that are here."""
+        return self.root / "payloads"
+
     def payload(self, payload: str) -> Path:
         """A payload's checked files but its wheels, as long as it is here."""
-        return self.root / "payloads" / payload
+        return self.payloads / payload
 
     def venvs(self, payload: str) -> Path:
         """A payload's venvs, one for each component."""
         return self.root / "venvs" / payload
 
-    def scratch(self, component: str) -> Path:
-        """What a component may write to while it is here."""
-        return self.scratches / component
+    def scratch(self, payload: str, component: str) -> Path:
+        """What a component may write to while it is here; releases of it have one each."""
+        return self.scratches_of(payload) / component
+
+    def scratches_of(self, payload: str) -> Path:
+        """The scratch folders of a payload's components."""
+        return self.scratches / payload
+
+    def note(self, payload: str) -> Path:
+        """What tells that a payload was installed for good, and from where."""
+        return self.notes / f"{payload}.json"
+
+    @property
+    def notes(self) -> Path:
+        """These of all payloads."""
+        return self.root / "installed"
 
     def all_payloads(self) -> tuple[Path, ...]:
         """The folders of all payloads that are here."""
-        folder = self.root / "payloads"
-        return tuple(sorted(folder.iterdir())) if folder.is_dir() else ()
+        return tuple(sorted(self.payloads.iterdir())) if self.payloads.is_dir() else ()
 
     def of(self, payload: str) -> tuple[Path, ...]:
-        """All folders that are a payload's own, but for its components' scratch."""
-        return self.staging(payload), self.payload(payload), self.venvs(payload)
+        """All folders that are a payload's own."""
+        scratches = self.scratches_of(payload)
+        kept = self.payload(payload), self.note(payload)
+        return self.staging(payload), *kept, self.venvs(payload), scratches
 
 
 def claim(folders: Folders) -> int:
     """Make the state folder this daemon's alone. Returns the descriptor that holds the claim.
 
-    Raises `ConfigRefused` (ALREADY_RUNNING).
+    Raises `ConfigRefused` (ALREADY_RUNNING, STATE_UNWRITABLE).
     """
-    folders.root.mkdir(parents=True, exist_ok=True)
-    held = os.open(folders.root / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    try:
+        disk.make_folder(folders.root)
+        held = os.open(folders.root / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    except OSError as error:
+        raise ConfigRefused(_unwritable(folders.root, error)) from error
     try:
         fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
@@ -109,7 +135,10 @@ def claim(folders: Folders) -> int:
 
 def sweep(folders: Folders, state: HostState) -> tuple[Path, ...]:
     """Delete every folder and undo every mount that a recovered state does not account for."""
-    mounting.unmount_all(folders.mounts)
+    try:
+        mounting.unmount_all(folders.mounts)
+    except OSError:
+        log.exception("what is mounted below %s could not be undone", folders.mounts)
     orphans = tuple(_orphans(folders, state))
     for orphan in orphans:
         remove(orphan)
@@ -117,15 +146,27 @@ def sweep(folders: Folders, state: HostState) -> tuple[Path, ...]:
 
 
 def remove(folder: Path) -> None:
-    """Delete a folder, whatever a plugin did to the permissions in it; nothing there is fine."""
-    if folder.is_symlink() or folder.is_file():
-        folder.unlink()
-        return
-    for path, inner, _ in os.walk(folder):
-        for name in inner:
-            with contextlib.suppress(OSError):  # a link that leads nowhere
-                Path(path, name).chmod(0o700)
-    shutil.rmtree(folder, ignore_errors=True)
+    """Delete a folder, whatever a plugin did in it; nothing there is fine.
+
+    What cannot be deleted is left for the next sweep.
+    """
+    try:
+        if folder.is_symlink() or folder.is_file():
+            folder.unlink()
+        elif folder.is_dir():
+            scratch.empty(folder)
+            folder.rmdir()
+    except OSError as error:
+        log.warning("%s is not deleted whole: %s", folder, error)
+
+
+def missing(folders: Folders, state: HostState) -> frozenset[str]:
+    """Keys of payloads whose checked files should be there and are not."""
+    return frozenset(
+        key
+        for key, payload in state.payloads.items()
+        if payload.step in KEEPS_FOLDER and not folders.payload(key).is_dir()
+    )
 
 
 def _orphans(folders: Folders, state: HostState) -> Iterator[Path]:
@@ -134,15 +175,20 @@ def _orphans(folders: Folders, state: HostState) -> Iterator[Path]:
         "staging": frozenset[str](),
         "handover": frozenset(),
         "placed": frozenset(),
-        "payloads": {key for key, step in steps.items() if step in _KEEPS_FOLDER},
+        "payloads": {key for key, step in steps.items() if step in KEEPS_FOLDER},
         "venvs": {key for key, step in steps.items() if step in _KEEPS_VENVS},
-        "scratch": {
-            component
-            for payload in state.payloads.values()
-            if payload.step in _KEEPS_VENVS
-            for component in payload.components
-        },
+        "scratch": {key for key, step in steps.items() if step in _KEEPS_VENVS},
+        "installed": {f"{key}.json" for key, step in steps.items() if step in KEEPS_FOLDER},
     }
     for name, names in kept.items():
         if (folders.root / name).is_dir():
             yield from (p for p in (folders.root / name).iterdir() if p.name not in names)
+
+
+def _unwritable(root: Path, error: OSError) -> Problem:
+    return Problem(
+        "STATE_UNWRITABLE",
+        f"the state folder cannot be used ({error.strerror})",
+        where=str(root),
+        fix="see to it that the disk works and is not read-only, or give another `state` folder",
+    )

@@ -6,14 +6,19 @@ Each may be done again after a crash, and leaves either its result or what was t
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from nondum.host import effects
+from nondum.host.catalogue.records import Moment
 from nondum.host.catalogue.state import HostState
+from nondum.host.drives.reading import telling_stalls
 from nondum.host.events import (
+    BesideRefused,
     ComponentsProbed,
     Emit,
     Event,
@@ -26,19 +31,29 @@ from nondum.host.events import (
     WheelsCompiled,
     WheelsStored,
 )
-from nondum.host.lifecycle.children import Children
-from nondum.host.lifecycle.folders import Folders, remove, sweep
+from nondum.host.lifecycle.children import STALL_S, Children
+from nondum.host.lifecycle.folders import Folders, missing, remove, sweep
 from nondum.host.lifecycle.lanes import in_thread
 from nondum.host.lifecycle.prepared import Prepared
+from nondum.host.lifecycle.queue import Queue
+from nondum.host.lifecycle.rebuilding import with_found, write_note
+from nondum.host.lifecycle.room import Needs, used_mb, why_not_beside
 from nondum.host.workers import Limits, Workers, base_interpreter, end_leftovers
 from nondum.sdk.errors import NondumError, WorkerFailed, problems_of
+from nondum.wheelhouse import preflight
 
 AT_ONCE = 2
-"""Payloads that are copied or checked at the same time; the others wait."""
+"""Payloads that are brought in at the same time, from the first byte copied until they are active
+or refused; the others wait."""
+
+COPY_SILENCE_S = 20.0
+"""A drive that gives not a megabyte in this time hangs."""
 
 STOP_S = 1.5
 """What workers have to end once their payload is withdrawn; the rest of the two promised seconds
 is for deleting."""
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,34 +86,60 @@ class Installation:
         self._host, self._folders, self._options = host, folders, options
         self._workers, self._children, self._emit = workers, children, emit
         self._prepared: dict[str, tuple[Prepared, ...]] = {}
-        self._turns = asyncio.Semaphore(AT_ONCE)
+        self._needs: dict[str, Needs] = {}
+        self._queue = Queue(AT_ONCE)
+        self._drives: dict[str, str] = {}
+        """Payload → the drive that it was copied from: the owner of the children that read it."""
         self._store = asyncio.Lock()
         """One process writes to the store."""
         self._uncompiled: set[str] = set()
         """Payloads whose workers would be started sooner if their modules were compiled."""
 
+    async def rebuild(self, state: HostState, at: Moment) -> HostState:
+        """The state, with what is installed for good and is not in it."""
+        notes, payloads = self._folders.notes, self._folders.payloads
+        arguments = self._arguments(notes=str(notes), payloads=str(payloads))
+        return with_found(state, await self._children.run("found", arguments), at)
+
+    async def missing(self, state: HostState) -> frozenset[str]:
+        """Payloads of the state whose files are gone."""
+        return await in_thread(missing, self._folders, state)
+
     async def prepare(self, state: HostState) -> None:
-        """Clear away what a recovered state does not account for."""
+        """Clear away what a recovered state does not account for. What cannot be is left."""
         await in_thread(end_leftovers, self._folders.scratches)
         await in_thread(sweep, self._folders, state)
-        await self._children.run("sweep", self._arguments())
+        try:
+            await self._children.run("sweep", self._arguments())
+        except NondumError as error:
+            log.warning("the store is not swept: %s", error)
+
+    async def note(self, effect: effects.NoteInstalled) -> tuple[Event, ...]:
+        """Keep the note that tells what is installed for good."""
+        note = self._folders.note(effect.payload)
+        await in_thread(write_note, note, effect.drive, effect.folder)
+        return ()
 
     async def copy(self, effect: effects.CopyPayload) -> tuple[Event, ...]:
         """Copy to a staging folder that is empty at first."""
         staging = self._folders.staging(effect.payload)
+        self._drives[effect.payload] = effect.drive
+        await self._queue.enter(effect.payload, partial(self._tell_queued, effect.payload))
         await in_thread(remove, staging)
         arguments = self._arguments(
-            folder=str(effect.folder), digest=effect.digest, staging=str(staging)
+            folder=str(effect.folder),
+            digest=effect.digest,
+            staging=str(staging),
+            freed_memory_mb=await self._used_mb(effect.beside),
         )
-        async with self._turns:
-            copied = await self._run("copy", effect.payload, arguments)
+        with telling_stalls(effect.drive, COPY_SILENCE_S):
+            copied = await self._run("copy", effect.payload, arguments, COPY_SILENCE_S)
         return (PayloadCopied(effect.payload, copied["copied"], copied["known"]),)
 
     async def verify(self, effect: effects.VerifyPayload) -> tuple[Event, ...]:
         """Check the staged copy."""
         arguments = self._arguments(staging=str(self._folders.staging(effect.payload)))
-        async with self._turns:
-            components = await self._run("verify", effect.payload, arguments)
+        components = await self._run("verify", effect.payload, arguments)
         return (PayloadVerified(effect.payload, tuple(components)),)
 
     async def stage(self, effect: effects.StagePayload) -> tuple[Event, ...]:
@@ -120,13 +161,16 @@ class Installation:
         key = effect.payload
         if key not in self._prepared:  # a restart of the daemon, or another try
             await self._install(key)
+        if effect.beside and (reason := await self._why_not_beside(effect)):
+            return (BesideRefused(key, reason),)
+        await self._workers.ended(effect.after)
         specs = [component.spec(key, self._options.limits) for component in self._prepared[key]]
         started = await asyncio.gather(
             *(self._workers.start(spec) for spec in specs), return_exceptions=True
         )
         failed = [error for error in started if isinstance(error, BaseException)]
         if failed:
-            await self._stop(tuple(component.id for component in self._prepared[key]))
+            await self._stop(key, tuple(component.id for component in self._prepared[key]))
             known = [error for error in failed if isinstance(error, NondumError)]
             if len(known) < len(failed):
                 raise next(error for error in failed if not isinstance(error, NondumError))
@@ -136,6 +180,11 @@ class Installation:
     async def activate(self, effect: effects.ActivatePayload) -> tuple[Event, ...]:
         """Make the records that the catalogue takes in at once."""
         prepared = self._prepared[effect.payload]
+        if effect.beside:
+            await asyncio.gather(
+                *(self._workers.watched(component.id, effect.payload) for component in prepared)
+            )
+        self._queue.leave(effect.payload)
         return (
             PayloadActivated(
                 effect.payload,
@@ -156,15 +205,22 @@ class Installation:
             self._uncompiled.discard(effect.payload)
         return (WheelsCompiled(effect.payload),)
 
+    async def rest(self, effect: effects.RestPayload) -> tuple[Event, ...]:
+        """Keep all of a payload but its processes."""
+        self._queue.leave(effect.payload)
+        await self._stop(effect.payload, effect.components)
+        await in_thread(end_leftovers, self._folders.scratches_of(effect.payload))
+        return ()
+
     async def suspend(self, effect: effects.SuspendPayload) -> tuple[Event, ...]:
         """Keep of a payload only what another try needs."""
-        await self._stop(effect.components)
+        await self._stop(effect.payload, effect.components)
         await self._delete(effect, self._folders.venvs(effect.payload))
         return ()
 
     async def clear(self, effect: effects.ClearPayload) -> tuple[Event, ...]:
         """Keep nothing of a payload but its wheels in the store, as far as the quota goes."""
-        await self._stop(effect.components)
+        await self._stop(effect.payload, effect.components)
         await self._delete(effect, *self._folders.of(effect.payload))
         return (PayloadCleared(effect.payload),)
 
@@ -191,28 +247,48 @@ class Installation:
         if told["uncompiled"]:
             self._uncompiled.add(key)
         self._prepared[key] = tuple(
-            Prepared.parse(said, self._folders.scratch(said["id"])) for said in told["components"]
+            Prepared.parse(said, self._folders.scratch(key, said["id"]))
+            for said in told["components"]
         )
+        self._needs[key] = Needs.parse(told["needs"])
         return int(told["fresh"])
 
-    async def _run(self, job: str, payload: str, arguments: dict[str, Any]) -> Any:
+    async def _why_not_beside(self, effect: effects.ProbeComponents) -> str:
+        used_mb = await self._used_mb(effect.beside)
+        return why_not_beside(self._needs[effect.payload], used_mb, preflight.free_memory_mb())
+
+    async def _used_mb(self, payload: str) -> int:
+        """Memory that is free once a payload's workers have ended."""
+        return await in_thread(used_mb, self._workers.pids_of(payload))
+
+    def _tell_queued(self, payload: str, ahead: int) -> None:
+        self._emit(ProgressMade(payload, "queued" if ahead else "copy", 0, ahead))
+
+    async def _run(
+        self, job: str, payload: str, arguments: dict[str, Any], stall_s: float = STALL_S
+    ) -> Any:
         def on_progress(phase: str, done: int, total: int) -> None:
             self._emit(ProgressMade(payload, phase, done, total))
 
-        return await self._children.run(job, arguments, on_progress=on_progress)
+        owner = self._drives.get(payload, payload)
+        return await self._children.run(
+            job, arguments, owner=owner, on_progress=on_progress, stall_s=stall_s
+        )
 
-    async def _stop(self, components: tuple[str, ...]) -> None:
-        await asyncio.gather(*(self._workers.stop(id, STOP_S) for id in components))
+    async def _stop(self, payload: str, components: tuple[str, ...]) -> None:
+        await asyncio.gather(*(self._workers.stop(id, STOP_S, payload) for id in components))
 
     async def _delete(
         self, effect: effects.ClearPayload | effects.SuspendPayload, *folders: Path
     ) -> None:
+        self._queue.leave(effect.payload)
+        self._drives.pop(effect.payload, None)
         self._prepared.pop(effect.payload, None)
+        self._needs.pop(effect.payload, None)
         self._uncompiled.discard(effect.payload)
-        scratches = [self._folders.scratch(component) for component in effect.components]
-        for scratch in scratches:
-            await in_thread(end_leftovers, scratch)
-        await in_thread(_remove_all, (*folders, *scratches))
+        scratches = self._folders.scratches_of(effect.payload)
+        await in_thread(end_leftovers, scratches)
+        await in_thread(_remove_all, (*folders, scratches))
 
     def _places(self, key: str) -> dict[str, str]:
         """Where a payload's metadata and venvs are."""

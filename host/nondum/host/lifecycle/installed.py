@@ -9,10 +9,9 @@ import asyncio
 from pathlib import Path
 
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.catalogue.records import PayloadRecord, Step
+from nondum.host.catalogue.records import INSTALLED, PayloadRecord, Step
 from nondum.host.events import DriveInserted, DriveRemoved
 from nondum.host.lifecycle.bus import Bus
-from nondum.host.lifecycle.component_manager import INSTALLED
 from nondum.sdk.errors import PayloadRefused, Problem
 
 _SETTLED = frozenset({Step.ACTIVE, Step.REFUSED, Step.QUARANTINED})

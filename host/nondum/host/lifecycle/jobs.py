@@ -7,7 +7,7 @@ from typing import Any
 
 from nondum.host.drives import parcel, reader
 from nondum.host.drives.reader import Arguments, Report
-from nondum.host.lifecycle import compiling, installing
+from nondum.host.lifecycle import compiling, installing, rebuilding
 
 Job = Callable[[Arguments, Report], Any]
 
@@ -23,4 +23,5 @@ JOBS: Mapping[str, Job] = {
     "prune": installing.prune,
     "listing": installing.listing,
     "sweep": installing.sweep,
+    "found": rebuilding.found,
 }

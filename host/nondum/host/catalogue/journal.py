@@ -1,0 +1,50 @@
+"""The journal's table: appended to with every commit, read from its end, and kept to a length."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Sequence
+from dataclasses import replace
+
+from nondum.host.catalogue import rows
+from nondum.host.catalogue.records import JournalEntry
+
+KEEP = 20_000
+"""So many of the last entries are kept unless somebody says otherwise: some eight megabytes."""
+KEEP_LEAST = 1000
+"""Fewer are never kept; the schema sees to that, too."""
+BATCH = 200
+"""So many of the oldest are let go together."""
+PROBLEMS_LIMIT = 50
+"""Problems of one entry: a payload may have thousands, and its record has them all."""
+
+
+def append(connection: sqlite3.Connection, entries: Sequence[JournalEntry], keep: int) -> None:
+    """Add entries, and let go of the oldest, within the caller's transaction."""
+    last = 0
+    for entry in entries:
+        row = rows.entry_row(replace(entry, problems=entry.problems[:PROBLEMS_LIMIT]))
+        names, marks = ", ".join(row), ", ".join(f":{name}" for name in row)
+        statement = f"INSERT INTO journal ({names}) VALUES ({marks})"
+        last = connection.execute(statement, row).lastrowid or 0
+    if last:
+        _let_go(connection, last - max(keep, KEEP_LEAST))
+
+
+def read(
+    connection: sqlite3.Connection, subject: str | None, after: int, limit: int
+) -> tuple[JournalEntry, ...]:
+    """The last `limit` entries with an id above `after`, oldest first."""
+    found = connection.execute(
+        "SELECT * FROM journal WHERE id > ? AND (? IS NULL OR subject = ?) "
+        "ORDER BY id DESC LIMIT ?",
+        (after, subject, subject, limit),
+    )
+    return tuple(rows.entry(row) for row in reversed(found.fetchall()))
+
+
+def _let_go(connection: sqlite3.Connection, last: int) -> None:
+    """Delete entries up to an id, once they are enough to be worth it."""
+    (first,) = connection.execute("SELECT min(id) FROM journal").fetchone()
+    if last - first >= BATCH:
+        connection.execute("DELETE FROM journal WHERE id <= ?", (last,))

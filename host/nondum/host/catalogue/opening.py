@@ -1,0 +1,142 @@
+"""Opening the catalogue's file, whatever became of it: as it is, from a backup, or as a new one."""
+
+from __future__ import annotations
+
+import contextlib
+import sqlite3
+import time
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+from nondum.host.catalogue import database
+from nondum.host.catalogue.backups import Backups
+from nondum.host.catalogue.state import HostState
+from nondum.sdk.errors import ConfigRefused, NondumError, Problem
+from nondum.wheelhouse import disk
+
+
+class Instead(Enum):
+    """What took the place of a file that could not be used."""
+
+    BACKUP = "backup"
+    """A copy of it."""
+    MEMORY = "memory"
+    """What the running daemon knew."""
+    NOTHING = "nothing"
+    """An empty one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """What became of a file that could not be used."""
+
+    aside: Path | None
+    """Where it was moved; None: there was none."""
+    instead: Instead
+    revision: int = 0
+    """Of what took its place."""
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """A catalogue's file that is open."""
+
+    connection: sqlite3.Connection
+    state: HostState
+    loss: Loss | None = None
+
+
+def open_file(path: Path, host: str) -> Opened:
+    """Open the file, made if there is none. A damaged one is set aside; the last whole backup, or
+    else an empty one, takes its place. So it is for one that is gone, where there are backups.
+
+    Raises `ConfigRefused` (CATALOGUE_VERSION, STATE_UNWRITABLE).
+    """
+    backups = Backups(path)
+    try:
+        disk.make_folder(path.parent)
+        if path.exists() or not any(True for _ in backups.found()):
+            opened = _opened(path, host)
+            if opened is not None:
+                return opened
+        return _instead(path, host, backups)
+    except (OSError, sqlite3.OperationalError) as error:
+        raise ConfigRefused(_unwritable(path, error)) from error
+
+
+def set_aside(path: Path) -> Path | None:
+    """Move a file that is of no use out of the way, with its log; where to, if it is there."""
+    aside = path.with_name(f"{path.name}.damaged-{time.time_ns()}")
+    moved = False
+    for suffix in ("", "-wal", "-shm"):
+        with contextlib.suppress(FileNotFoundError):
+            path.with_name(path.name + suffix).rename(aside.with_name(aside.name + suffix))
+            moved = moved or not suffix
+    disk.sync(path.parent)
+    return aside if moved else None
+
+
+def _opened(path: Path, host: str) -> Opened | None:
+    """The file as it is; None: it is damaged, or says what nobody can read."""
+    try:
+        connection = database.connect(path)
+    except sqlite3.DatabaseError as error:
+        if not database.is_damaged(error):
+            raise
+        return None
+    try:
+        return Opened(connection, database.load(connection, host))
+    except (sqlite3.DatabaseError, NondumError, LookupError, TypeError, ValueError) as error:
+        connection.close()
+        if isinstance(error, sqlite3.OperationalError) and not database.is_damaged(error):
+            raise
+        return None
+
+
+def _instead(path: Path, host: str, backups: Backups) -> Opened:
+    aside = set_aside(path)
+    for backup in backups.found():
+        backups.restore(backup)
+        opened = _opened(path, host)
+        if opened is not None:
+            loss = Loss(aside, Instead.BACKUP, opened.state.revision)
+            return Opened(opened.connection, opened.state, loss)
+        set_aside(path)
+    return Opened(database.connect(path), HostState(host), Loss(aside, Instead.NOTHING))
+
+
+def problem_of(loss: Loss, installed: tuple[str, ...]) -> Problem:
+    """What is told of a loss; `installed` are the payloads that were found in their folders."""
+    came = "is gone" if loss.aside is None else "was damaged"
+    instead = _INSTEAD[loss.instead].format(loss.revision)
+    found = f"; found again: {', '.join(installed)}" if installed else ""
+    return Problem(
+        "CATALOGUE_REBUILT",
+        f"the catalogue {came}; {instead}{found}",
+        where=str(loss.aside or ""),
+        have=_LOST[loss.instead],
+        fix="see `nondum status`: install, set or ask for again what is not there",
+    )
+
+
+_INSTEAD = {
+    Instead.BACKUP: "a copy of revision {} took its place, and drives are read anew",
+    Instead.MEMORY: "what the running daemon knew (revision {}) was written to a new one",
+    Instead.NOTHING: "there was no copy of it, so a new one was begun, and drives are read anew",
+}
+_LOST = {
+    Instead.BACKUP: "lost: what was told, set and asked for since the copy was made",
+    Instead.MEMORY: "lost: the journal until now",
+    Instead.NOTHING: "lost: the journal, goals, mounts that people set, releases of payloads that "
+    "are not here",
+}
+
+
+def _unwritable(path: Path, error: Exception) -> Problem:
+    return Problem(
+        "STATE_UNWRITABLE",
+        f"the catalogue can neither be read nor made ({error})",
+        where=str(path),
+        fix="see to it that the disk works, has room, and that this user may write there",
+    )

@@ -1,0 +1,145 @@
+"""Who is at fault when daemons die: what they were at is counted, and after a while left alone.
+
+A daemon commits what it is going to do before it does it, so a daemon that starts finds what the
+last one was at. One that ended because it was told to counts for nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from nondum.host.catalogue.records import (
+    INSTALLED,
+    DriveRecord,
+    DriveState,
+    PayloadRecord,
+    Step,
+)
+from nondum.host.catalogue.state import HostState
+from nondum.host.events import (
+    DriveRead,
+    DriveRemoved,
+    DrivesScanned,
+    DriveUnreadable,
+    Event,
+    HostSteady,
+    PayloadFound,
+    PayloadWithdrawn,
+    RetryAsked,
+)
+from nondum.host.lifecycle.turn import Turn
+from nondum.sdk.errors import Problem
+
+ATTEMPTS = 5
+"""So many daemons in a row may die at the same drive or payload; the next one leaves it alone."""
+
+STEADY_S = 5.0
+"""A daemon that lives so long beside what it brought to life does not die of it."""
+
+_BEGUN = frozenset(
+    {Step.RECEIVED, Step.COPIED, Step.VERIFIED, Step.STAGED, Step.STORED, Step.PROBED}
+)
+
+
+def subject_of(drive: DriveRecord) -> str:
+    """What a drive is counted by; a payload is by its key."""
+    return f"{drive.kind}:{drive.id}"
+
+
+def counted(state: HostState) -> Mapping[str, int]:
+    """The tries once the daemon that left this state is known to be dead."""
+    if state.is_stopped:
+        return state.tries
+    return {**state.tries, **{s: state.tries.get(s, 0) + 1 for s in _suspects(state)}}
+
+
+def is_left_alone(state: HostState, subject: str) -> bool:
+    """Whether too many daemons died at it."""
+    return state.tries.get(subject, 0) >= ATTEMPTS
+
+
+def left_alone(where: str) -> Problem:
+    """What is told of it."""
+    return Problem(
+        "QUARANTINED",
+        f"{ATTEMPTS} daemons in a row ended while they were at it, so it is left alone",
+        where=where,
+        fix="pull it and plug it in again, or ask for another try with `nondum payload retry`",
+    )
+
+
+def drive_problems(state: HostState, drive: DriveRecord) -> tuple[Problem, ...]:
+    """What there is against looking at a drive."""
+    return (left_alone(drive.id),) if is_left_alone(state, subject_of(drive)) else ()
+
+
+def payload_problems(state: HostState, found: PayloadFound) -> tuple[Problem, ...]:
+    """What there is against taking in a payload."""
+    return (left_alone(found.payload_id),) if is_left_alone(state, found.payload) else ()
+
+
+def on_event(turn: Turn, event: Event) -> None:
+    """Clear what was survived, was pulled, or is to be tried again."""
+    match event:
+        case DriveRead() | DriveUnreadable():
+            drive = turn.state.drives.get(event.drive)
+            if drive is not None and not is_left_alone(turn.state, subject_of(drive)):
+                _clear(turn, subject_of(drive))
+        case DriveRemoved():
+            if (drive := turn.state.drives.get(event.drive)) is not None:
+                _clear(turn, subject_of(drive))
+        case DrivesScanned():
+            there = {f"{event.kind}:{drive}" for drive in event.drives}
+            known = {s for s in turn.state.tries if s.startswith(f"{event.kind}:")}
+            _clear(turn, *(known - there))
+        case PayloadWithdrawn() | RetryAsked():
+            _clear(turn, event.payload)
+
+
+def _clear(turn: Turn, *subjects: str) -> None:
+    if any(subject in turn.state.tries for subject in subjects):
+        kept = {s: deaths for s, deaths in turn.state.tries.items() if s not in subjects}
+        turn.change(tries=kept)
+
+
+def on_host_steady(turn: Turn, event: HostSteady) -> None:
+    """Clear what has been lived with for a while, and what did not come again."""
+    state = turn.state
+    if any(drive.state is DriveState.READING for drive in state.drives.values()):
+        return
+    drives = {subject_of(drive) for drive in state.drives.values()}
+    kept = {
+        subject: deaths
+        for subject, deaths in state.tries.items()
+        if subject in drives or _is_on_trial(turn, state.payloads.get(subject))
+    }
+    if kept != state.tries:
+        turn.change(tries=kept)
+
+
+def _is_on_trial(turn: Turn, payload: PayloadRecord | None) -> bool:
+    if payload is None:
+        return False
+    if payload.step is not Step.ACTIVE:
+        return payload.step in _BEGUN
+    return turn.at.monotonic_s - payload.phases["ready"].monotonic_s < STEADY_S
+
+
+def _suspects(state: HostState) -> frozenset[str]:
+    """What was begun and not ended; if nothing was, the guests that were running.
+
+    What is installed for good is no guest: a host without it is of no use.
+    """
+    reading = {subject_of(d) for d in state.drives.values() if d.state is DriveState.READING}
+    begun = {p.key for p in state.payloads.values() if p.step in _BEGUN}
+    if reading or begun:
+        return frozenset(reading | begun)
+    return frozenset(
+        p.key for p in state.payloads.values() if p.step is Step.ACTIVE and not is_initial(state, p)
+    )
+
+
+def is_initial(state: HostState, payload: PayloadRecord) -> bool:
+    """Whether a payload was installed for good."""
+    kinds = {state.drives[drive].kind for drive in payload.sources if drive in state.drives}
+    return INSTALLED in kinds
