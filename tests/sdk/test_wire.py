@@ -132,9 +132,12 @@ def packed(value: Any) -> bytes:
         pytest.param(packed([6, True]), "PACKET_FIELDS", id="id-true"),
         pytest.param(packed([6, MAX_ID + 1]), "PACKET_FIELDS", id="id-too-big"),
         pytest.param(packed([2, 1, "v" * 65, {}]), "PACKET_FIELDS", id="verb-too-long"),
+        pytest.param(packed([2, 1, [1], {}]), "PACKET_FIELDS", id="verb-no-text"),
         pytest.param(packed([2, 1, "v", []]), "PACKET_FIELDS", id="body-no-table"),
         pytest.param(packed([0, [], "1", 1]), "PACKET_FIELDS", id="no-versions"),
         pytest.param(packed([4, 1, []]), "PACKET_FIELDS", id="no-problem"),
+        pytest.param(packed([4, 1, 7]), "PACKET_FIELDS", id="problems-no-list"),
+        pytest.param(packed([4, 1, [7]]), "PACKET_FIELDS", id="problem-no-table"),
         pytest.param(packed([4, 1, [{"code": "X"}]]), "PACKET_FIELDS", id="problem-no-message"),
         pytest.param(
             packed([4, 1, [{"code": "X", "message": "m", "x": ""}]]),
