@@ -46,8 +46,9 @@ async def check_undone(host: Living, root: Path) -> None:
     kept = {good, "good"}
     assert {path.name for path in left_over(host.folders)} <= kept
     assert set(host.workers.pids()) == {"good"}
-    scratch = host.folders.scratch("lamp")
-    assert not await asyncio.to_thread(processes_of, scratch)
+    scratches = [path for path in host.folders.scratches.iterdir() if path.name != good]
+    for scratch in (*scratches, host.folders.venvs("lamp")):
+        assert not await asyncio.to_thread(processes_of, scratch)
 
 
 async def plug_good(host: Living, root: Path) -> None:

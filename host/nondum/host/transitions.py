@@ -26,7 +26,15 @@ class Transition:
 _Rows = Mapping[tuple[Step, type[Event]], Transition]
 
 _INSTALLING = (Step.RECEIVED, Step.COPIED, Step.VERIFIED, Step.STAGED)
-_PRESENT = (*_INSTALLING, Step.STORED, Step.PROBED, Step.ACTIVE, Step.REFUSED, Step.QUARANTINED)
+_PRESENT = (
+    *_INSTALLING,
+    Step.STORED,
+    Step.PROBED,
+    Step.ACTIVE,
+    Step.SUPERSEDED,
+    Step.REFUSED,
+    Step.QUARANTINED,
+)
 
 TRANSITIONS: _Rows = {
     (Step.GONE, events.PayloadFound): Transition(Step.RECEIVED, effects.CopyPayload),
@@ -42,14 +50,18 @@ TRANSITIONS: _Rows = {
     },
     **{
         (step, events.PayloadFailed): Transition(Step.QUARANTINED, effects.SuspendPayload)
-        for step in (Step.STORED, Step.PROBED)
+        for step in (Step.STORED, Step.PROBED, Step.ACTIVE)
     },
+    (Step.STORED, events.PayloadSuperseded): Transition(Step.SUPERSEDED, effects.RestPayload),
+    (Step.ACTIVE, events.PayloadSuperseded): Transition(Step.SUPERSEDED, effects.RestPayload),
+    (Step.SUPERSEDED, events.PayloadResumed): Transition(Step.STORED, effects.ProbeComponents),
     **{
         (step, events.PayloadSentAway): Transition(Step.REFUSED, effects.ClearPayload)
         for step in _PRESENT
         if step is not Step.REFUSED
     },
     (Step.REFUSED, events.RetryAsked): Transition(Step.REMOVING, effects.ClearPayload),
+    (Step.REFUSED, events.RollbackAsked): Transition(Step.REMOVING, effects.ClearPayload),
     (Step.QUARANTINED, events.RetryAsked): Transition(Step.STORED, effects.ProbeComponents),
     **{
         (step, events.PayloadWithdrawn): Transition(Step.REMOVING, effects.ClearPayload)
@@ -67,6 +79,7 @@ RECOVERY: Mapping[Step, Transition] = {
     Step.STORED: Transition(Step.STORED, effects.ProbeComponents),
     Step.PROBED: Transition(Step.STORED, effects.ProbeComponents),
     Step.ACTIVE: Transition(Step.STORED, effects.ProbeComponents),
+    Step.SUPERSEDED: Transition(Step.SUPERSEDED),
     Step.REMOVING: Transition(Step.REMOVING, effects.ClearPayload),
     Step.REFUSED: Transition(Step.REFUSED),
     Step.QUARANTINED: Transition(Step.QUARANTINED),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -22,13 +23,15 @@ from nondum.host.catalogue.state import HostState
 from nondum.host.effects import Effect
 from nondum.host.events import Event
 from nondum.host.lifecycle.advance import advance
-from nondum.host.lifecycle.recovery import ATTEMPTS, recover
+from nondum.host.lifecycle.recovery import recover
+from nondum.host.lifecycle.tries import ATTEMPTS
 from nondum.host.transitions import COMPONENT_TRANSITIONS, RECOVERY, TRANSITIONS
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
 
 AT = Moment(1.0, 2.0)
 PROBLEM = Problem("TEST", "made up")
+OLDER = Problem("ROLLBACK", "made up")
 
 
 def drive(name: str = "a", kind: str = "slot") -> events.DriveInserted:
@@ -93,18 +96,33 @@ def active(id: str = "eye", need: str = "") -> HostState:
 def at_step(step: Step) -> HostState:
     """A payload `k1` on drive `a`, at a step."""
     way = way_to_active()
-    order = [s for s in Step if s not in (Step.REMOVING, Step.REFUSED, Step.QUARANTINED, Step.GONE)]
+    order = list(Step)[: list(Step).index(Step.ACTIVE) + 1]
     match step:
         case Step.GONE:
             return after(drive())[0]
         case Step.REMOVING:
             return after(drive(), *way, events.PayloadWithdrawn("k1", "test"))[0]
+        case Step.SUPERSEDED:
+            return after(drive("b"), *upgrade(), state=after(drive(), *way)[0])[0]
         case Step.REFUSED:
-            return after(drive(), way[0], events.PayloadRefused("k1", (PROBLEM,)))[0]
+            return after(drive(), way[0], events.PayloadRefused("k1", (OLDER,)))[0]
         case Step.QUARANTINED:
             return after(drive(), *way[:5], events.PayloadFailed("k1", (PROBLEM,)))[0]
         case _:
             return after(drive(), *way[: order.index(step) + 1])[0]
+
+
+def upgrade(key: str = "k2", drive: str = "b", release: int = 2, id: str = "eye") -> list[Event]:
+    """What happens to a newer release of `k1` until it is active."""
+    newer = found(key, drive, release=release)
+    return [newer, *way_to_active(key, drive, id)[1:]]
+
+
+def with_newer(state: HostState) -> HostState:
+    """With a newer release of `k1` that is just being brought up."""
+    old = state.payloads["k1"]
+    newer = replace(old, key="k2", digest="newer", release=2, step=Step.STORED, components=())
+    return replace(state, payloads={**state.payloads, newer.key: newer})
 
 
 EVENTS: dict[type[Event], Event] = {
@@ -116,6 +134,9 @@ EVENTS: dict[type[Event], Event] = {
         events.PayloadSentAway("k1", "mule", (PROBLEM,)),
         events.PayloadWithdrawn("k1", "test"),
         events.PayloadCleared("k1"),
+        events.PayloadSuperseded("k1", "k2", "test"),
+        events.PayloadResumed("k1", "test"),
+        events.RollbackAsked("k1", 1, 2),
         events.RetryAsked("k1"),
     )
 }
@@ -126,7 +147,8 @@ EVENTS: dict[type[Event], Event] = {
 )
 def test_each_row_leads_where_it_says(step: Step, kind: type[Event]) -> None:
     row = TRANSITIONS[step, kind]
-    outcome = advance(at_step(step), EVENTS[kind], AT)
+    state = with_newer(at_step(step)) if kind is events.PayloadSuperseded else at_step(step)
+    outcome = advance(state, EVENTS[kind], AT)
     payload = outcome.state.payloads.get("k1")
     assert (payload.step if payload else Step.GONE) is row.to
     assert row.effect is None or row.effect in map(type, outcome.effects)
@@ -136,7 +158,8 @@ def test_each_row_leads_where_it_says(step: Step, kind: type[Event]) -> None:
 @pytest.mark.parametrize("step", Step)
 @pytest.mark.parametrize("kind", EVENTS, ids=lambda kind: kind.__name__)
 def test_news_of_an_earlier_life_is_dropped(step: Step, kind: type[Event]) -> None:
-    if (step, kind) in TRANSITIONS or kind in (events.PayloadFound, events.RetryAsked):
+    asked = (events.RetryAsked, events.RollbackAsked)
+    if (step, kind) in TRANSITIONS or kind in (events.PayloadFound, *asked):
         return
     state = at_step(step)
     outcome = advance(state, EVENTS[kind], AT)
@@ -332,7 +355,7 @@ def test_payload_swapped_while_the_daemon_was_down_is_withdrawn() -> None:
 
 def test_payload_that_ends_the_daemon_is_quarantined() -> None:
     state = active()
-    for _ in range(ATTEMPTS):
+    for _ in range(ATTEMPTS - 1):
         state = recover(state, AT).state
         assert state.payloads["k1"].step is Step.STORED
     outcome = recover(state, AT)

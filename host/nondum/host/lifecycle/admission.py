@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from nondum.host.catalogue.records import Moment, PayloadRecord, Step
 from nondum.host.catalogue.state import HostState
 from nondum.host.events import PayloadFound
+from nondum.host.lifecycle import releases
 from nondum.sdk.errors import Problem
 
 RELEASE_JUMP = 1_000_000
@@ -23,14 +24,14 @@ def release_problems(state: HostState, found: PayloadFound, at: Moment) -> Itera
         return
     where = found.payload_id
     limit = max(newest.release, int(at.wall_s)) + RELEASE_JUMP
-    if found.release < newest.release:
+    if found.release < newest.release and not releases.is_overruled(state, found):
         yield Problem(
             "ROLLBACK",
             "an older release than was active here before",
             where=where,
             need=f"release {newest.release} or newer",
             have=f"release {found.release}",
-            fix="plug in the newer release",
+            fix=f"plug in the newer release, or `nondum payload rollback {where}`",
         )
     elif found.release == newest.release and found.digest != newest.digest:
         yield Problem(
@@ -57,8 +58,15 @@ def rivals(state: HostState, payload: str, components: tuple[str, ...]) -> list[
         for other in state.payloads.values()
         if other.key != payload
         and other.step not in _HOLDS_NOTHING
+        and not _is_same_payload(state, other, payload)
         and set(other.components) & set(components)
     ]
+
+
+def _is_same_payload(state: HostState, other: PayloadRecord, payload: str) -> bool:
+    """Whether it is another release of the same one: one of them is in force at a time."""
+    known = state.payloads.get(payload)
+    return known is not None and releases.key_of(known) == releases.key_of(other)
 
 
 def taken(rival: PayloadRecord, components: tuple[str, ...]) -> Problem:

@@ -6,7 +6,7 @@ by id, that needs it. Who else wants it is told, and nothing that nobody needs i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 
@@ -41,6 +41,42 @@ def serves(device: DeviceRecord, claim: DeviceClaim) -> bool:
     return all(
         fnmatchcase(device.properties.get(name, ""), pattern)
         for name, pattern in claim.match.items()
+    )
+
+
+def handed_over(
+    new: Sequence[ComponentRecord],
+    old: Mapping[str, ComponentRecord],
+    devices: Mapping[str, DeviceRecord],
+) -> tuple[ComponentRecord, ...]:
+    """Components of a release that takes over, with the devices that those of `old` have.
+
+    A device goes to the same need of the same component if it still serves it; what is left, as
+    after a change of names, to the first other need that it serves.
+    """
+    free = {c.device: (o.id, c.name) for o in old.values() for c in o.devices if c.device}
+    given: dict[tuple[str, str], str] = {}
+    for is_same in (True, False):
+        for component in new:
+            for claim in component.devices:
+                need = component.id, claim.name
+                fitting = (
+                    device
+                    for device, owner in sorted(free.items())
+                    if (owner == need or not is_same) and serves(devices[device], claim)
+                )
+                if need not in given and (device := next(fitting, None)) is not None:
+                    given[need] = device
+                    del free[device]
+    return tuple(
+        replace(
+            component,
+            devices=tuple(
+                replace(claim, device=given.get((component.id, claim.name)))
+                for claim in component.devices
+            ),
+        )
+        for component in new
     )
 
 

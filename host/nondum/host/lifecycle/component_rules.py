@@ -16,15 +16,17 @@ from nondum.host.events import (
     WorkerFailed,
     WorkerReady,
 )
-from nondum.host.lifecycle.payload_rules import on_payload_step
+from nondum.host.lifecycle import releases
+from nondum.host.lifecycle.payload_rules import on_payload_tried
 from nondum.host.lifecycle.turn import Turn
 from nondum.host.transitions import COMPONENT_TRANSITIONS
+from nondum.sdk.errors import Problem
 
 
 def on_worker_news(turn: Turn, event: WorkerReady | WorkerExited | WorkerFailed) -> None:
     """Follow the table of components; one that is not active yet fails with its payload."""
     component = turn.state.components.get(event.component)
-    if component is None:
+    if component is None or event.payload not in ("", component.payload):
         _fail_probed(turn, event)
         return
     state = COMPONENT_TRANSITIONS.get((component.state, type(event)))
@@ -33,13 +35,19 @@ def on_worker_news(turn: Turn, event: WorkerReady | WorkerExited | WorkerFailed)
     turn.events.append(event)
     problems = event.problems if isinstance(event, WorkerFailed) else ()
     turn.put_component(replace(component, state=state, problems=problems))
+    if problems:
+        payload = turn.state.payloads[component.payload]
+        turn.pending.extend(releases.gives_way(turn.state, payload, problems))
 
 
 def on_retry_asked(turn: Turn, event: RetryAsked) -> None:
     """Try a refused or quarantined payload, or quarantined components of an active one, again."""
     payload = turn.state.payloads.get(event.payload)
+    if payload is not None and payload.step is Step.SUPERSEDED:
+        releases.on_retry_asked(turn, payload, event)
+        return
     if payload is None or payload.step is not Step.ACTIVE:
-        on_payload_step(turn, event)
+        on_payload_tried(turn, event)
         return
     for component in turn.state.components.values():
         state = COMPONENT_TRANSITIONS.get((component.state, RetryAsked))
@@ -74,9 +82,24 @@ def on_device_removed(turn: Turn, event: DeviceRemoved) -> None:
 
 
 def _fail_probed(turn: Turn, event: WorkerReady | WorkerExited | WorkerFailed) -> None:
-    if not isinstance(event, WorkerFailed):
-        return
+    """A worker that was given up fails its payload, and one that as much as ended does that to a
+    release that is to take over from another one."""
     for payload in turn.state.payloads.values():
-        if payload.step is Step.PROBED and event.component in payload.components:
-            turn.events.append(event)
-            turn.pending.append(PayloadFailed(payload.key, event.problems))
+        is_its = event.payload in ("", payload.key) and event.component in payload.components
+        if payload.step is Step.PROBED and is_its:
+            problems = _problems_of(event, is_watched=bool(releases.in_force(turn.state, payload)))
+            if problems:
+                turn.events.append(event)
+                turn.pending.append(PayloadFailed(payload.key, problems))
+
+
+def _problems_of(
+    event: WorkerReady | WorkerExited | WorkerFailed, *, is_watched: bool
+) -> tuple[Problem, ...]:
+    if isinstance(event, WorkerFailed):
+        return event.problems
+    if isinstance(event, WorkerExited) and is_watched:
+        text = f"its worker ended while it was watched: {event.reason}"
+        fix = "see `nondum logs`; plug in a release that works"
+        return (Problem("WORKER_EXITED", text, where=event.component, fix=fix),)
+    return ()

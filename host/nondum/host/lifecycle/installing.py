@@ -46,7 +46,9 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
     if not by_pip:
         shutil.rmtree(folder / "wheels", ignore_errors=True)  # the store has them now
     components = [_told(staged, component, root) for component in staged.manifest.components]
-    return {"fresh": fresh, "uncompiled": uncompiled, "components": components}
+    requires = staged.manifest.requires
+    needs = {"memory_mb": requires.memory_mb, "alone": requires.alone}
+    return {"fresh": fresh, "uncompiled": uncompiled, "components": components, "needs": needs}
 
 
 def _make(

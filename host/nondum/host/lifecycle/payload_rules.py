@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
-from nondum.host.catalogue.records import MountPose, PayloadRecord, Step
-from nondum.host.catalogue.state import Highwater
+from nondum.host.catalogue.records import ComponentRecord, MountPose, PayloadRecord, Step
+from nondum.host.catalogue.state import Highwater, HostState
 from nondum.host.effects import (
+    ActivatePayload,
+    AttachDevice,
     ClearPayload,
     CopyPayload,
     PayloadEffect,
+    ProbeComponents,
+    RestPayload,
     SuspendPayload,
     VerifyPayload,
 )
@@ -22,11 +26,16 @@ from nondum.host.events import (
     PayloadFailed,
     PayloadFound,
     PayloadRefused,
+    PayloadResumed,
     PayloadSentAway,
+    PayloadSuperseded,
     PayloadVerified,
+    PayloadWithdrawn,
     RetryAsked,
+    RollbackAsked,
+    WheelsStored,
 )
-from nondum.host.lifecycle import admission
+from nondum.host.lifecycle import admission, releases, tries
 from nondum.host.lifecycle.drive_rules import copy_of, read
 from nondum.host.lifecycle.turn import Turn
 from nondum.host.transitions import TRANSITIONS, Transition
@@ -60,7 +69,12 @@ def on_payload_found(turn: Turn, event: PayloadFound) -> None:
         sources={event.drive: event.folder},
         phases={"seen": turn.state.drives[event.drive].since},
     )
-    problems = (*event.problems, *admission.release_problems(turn.state, event, turn.at))
+    releases.on_found(turn, event)
+    problems = (
+        *event.problems,
+        *admission.release_problems(turn.state, event, turn.at),
+        *tries.payload_problems(turn.state, event),
+    )
     enter(turn, new, event, TRANSITIONS[Step.GONE, PayloadFound], with_effect=not problems)
     if problems:
         turn.pending.append(PayloadRefused(event.payload, problems))
@@ -79,6 +93,37 @@ def on_payload_verified(turn: Turn, event: PayloadVerified) -> None:
     elif rivals:
         turn.put_payload(replace(payload, waits_for=rivals[0].key))
     else:
+        on_payload_step(turn, event)
+
+
+def on_wheels_stored(turn: Turn, event: WheelsStored) -> None:
+    """Bring it to life, unless another release of it is in force or comes first."""
+    payload = turn.state.payloads.get(event.payload)
+    if payload is None or payload.step is not Step.STAGED:
+        return
+    other = releases.waits_behind(turn.state, payload)
+    row = TRANSITIONS[Step.STAGED, WheelsStored]
+    enter(turn, payload, event, row, with_effect=other is None)
+    if other is not None:
+        turn.pending.append(releases.waiting(payload, other))
+
+
+def on_payload_tried(turn: Turn, event: RetryAsked) -> None:
+    """Try a refused or quarantined payload again, once other releases of it are out of the way."""
+    payload = turn.state.payloads.get(event.payload)
+    row = TRANSITIONS.get((payload.step, RetryAsked)) if payload is not None else None
+    if payload is None or row is None:
+        return
+    starts = row.to is Step.STORED
+    other = releases.waits_behind(turn.state, payload) if starts else None
+    enter(turn, payload, event, row, with_effect=other is None)
+    if other is not None:
+        turn.pending.append(releases.waiting(payload, other))
+
+
+def on_rollback_asked(turn: Turn, event: RollbackAsked) -> None:
+    """Go back to an earlier release; one that was refused for being older is read anew."""
+    if releases.on_rollback_asked(turn, event):
         on_payload_step(turn, event)
 
 
@@ -102,6 +147,7 @@ def enter(
 ) -> None:
     """Bring a payload to the step that a row of a table leads to."""
     turn.events.append(event)
+    effect = effect_for(row.effect, payload, turn.state) if row.effect and with_effect else None
     payload = _told(replace(payload, step=row.to, waits_for=""), event)
     if row.to in PHASES:
         payload = replace(payload, phases={**payload.phases, PHASES[row.to]: turn.at})
@@ -110,10 +156,12 @@ def enter(
         _activate(turn, payload, event)
     else:
         turn.drop_components(payload.key)
+    if isinstance(event, PayloadWithdrawn):
+        releases.on_withdrawn(turn, payload)
     if row.to is Step.GONE:
         _leave(turn, payload)
-    if row.effect is not None and with_effect:
-        turn.effects.append(effect_for(row.effect, payload))
+    if effect is not None:
+        turn.effects.append(effect)
 
 
 def _told(payload: PayloadRecord, event: Event) -> PayloadRecord:
@@ -123,10 +171,10 @@ def _told(payload: PayloadRecord, event: Event) -> PayloadRecord:
             return replace(payload, components=event.components)
         case PayloadRefused() | PayloadFailed() | PayloadSentAway():
             return replace(payload, problems=event.problems)
-        case PayloadActivated():
-            return replace(payload, attempts=0)
         case RetryAsked():
-            return replace(payload, problems=(), attempts=0)
+            return replace(payload, problems=())
+        case PayloadSuperseded() | PayloadResumed():
+            return replace(payload, was=0)
         case _:
             return payload
 
@@ -138,31 +186,61 @@ def on_forget_asked(turn: Turn, event: ForgetAsked) -> None:
         turn.forget(event.payload)
 
 
-def effect_for(kind: type[PayloadEffect], payload: PayloadRecord) -> PayloadEffect:
+def effect_for(
+    kind: type[PayloadEffect], payload: PayloadRecord, state: HostState
+) -> PayloadEffect:
     """An effect of a row of a table, for one payload."""
     if kind is CopyPayload:
-        return copy_of(payload)
-    if issubclass(kind, ClearPayload | SuspendPayload):
+        return copy_of(payload, state)
+    if issubclass(kind, ClearPayload | RestPayload | SuspendPayload):
         return kind(payload.key, payload.components)
+    if issubclass(kind, ProbeComponents | ActivatePayload):
+        old = releases.in_force(state, payload)
+        return kind(payload.key, beside=old.key if old else "")
     return kind(payload.key)
 
 
 def _activate(turn: Turn, payload: PayloadRecord, event: PayloadActivated) -> None:
+    for component in _entering(turn, payload, event):
+        turn.put_component(replace(component, payload_id=payload.payload_id))
+    turn.forget(payload.payload_id)
+    turn.change(mounts={**_by_unit(event.mounts), **turn.state.mounts})
+    newest = turn.state.highwater.get(releases.key_of(payload))
+    if newest is None or newest.release <= payload.release:
+        reached = Highwater(payload.release, payload.digest)
+        turn.change(highwater={**turn.state.highwater, releases.key_of(payload): reached})
+
+
+def _entering(
+    turn: Turn, payload: PayloadRecord, event: PayloadActivated
+) -> Iterator[ComponentRecord]:
+    """The components with their ranks. Those of a release that it takes over from are withdrawn,
+    and leave them their ranks and devices."""
+    new = event.components
+    old = releases.in_force(turn.state, payload)
+    if old is not None:
+        before = [c for c in turn.state.components.values() if c.payload == old.key]
+        turn.put_payload(replace(payload, was=old.release))
+        on_payload_step(turn, releases.superseded(old, payload))
+        new = releases.inherited(new, before, turn.state.devices)
+        for component in new:
+            turn.effects.extend(_attached(turn, component))
     initial = any(turn.state.drives[d].kind == "installed" for d in payload.sources)
     base = 0 if initial else GUEST_RANK
     ranks = [c.rank for c in turn.state.components.values() if (c.rank >= GUEST_RANK) != initial]
-    for offset, component in enumerate(event.components):
-        rank = max(ranks, default=base) + 1 + offset
-        entered = replace(component, payload_id=payload.payload_id, rank=rank)
-        turn.put_component(entered)
-    turn.forget(payload.payload_id)
-    turn.change(
-        mounts={**_by_unit(event.mounts), **turn.state.mounts},
-        highwater={
-            **turn.state.highwater,
-            (payload.fleet, payload.payload_id): Highwater(payload.release, payload.digest),
-        },
-    )
+    next_rank = max(ranks, default=base) + 1
+    for component in new:
+        if component.rank:
+            yield component
+        else:
+            yield replace(component, rank=next_rank)
+            next_rank += 1
+
+
+def _attached(turn: Turn, component: ComponentRecord) -> Iterator[AttachDevice]:
+    for claim in component.devices:
+        if claim.device is not None:
+            yield AttachDevice(component.id, claim.name, turn.state.devices[claim.device])
 
 
 def _by_unit(mounts: Iterable[MountPose]) -> dict[str, MountPose]:

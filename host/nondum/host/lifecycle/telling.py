@@ -7,13 +7,14 @@ from collections.abc import Iterator, Sequence
 
 from nondum.host.catalogue.records import JournalEntry, Moment, PayloadRecord
 from nondum.host.catalogue.state import HostState
-from nondum.host.events import Event, PayloadFound, RetryAsked
+from nondum.host.events import Event, PayloadFound, RetryAsked, RollbackAsked
 from nondum.host.transitions import TRANSITIONS
 
 _SUBJECTS = ("component", "goal", "unit", "device", "drive", "kind", "host")
 
-_STEPS = {event: row.to.value for (_, event), row in TRANSITIONS.items() if event is not RetryAsked}
-"""The step that an event leads to; only a retry leads to two."""
+_ASKED = (RetryAsked, RollbackAsked)
+_STEPS = {event: row.to.value for (_, event), row in TRANSITIONS.items() if event not in _ASKED}
+"""The step that an event leads to; where people ask for something, that depends."""
 
 
 def entries_of(
@@ -44,7 +45,7 @@ def entries_of(
 def _subject(event: Event, payloads: dict[str, PayloadRecord], found: dict[str, str]) -> str:
     """Payload id, component, device, drive or goal that an event is about."""
     names = {field.name for field in dataclasses.fields(event)}
-    if "payload" in names:
+    if "payload" in names and "component" not in names:
         key: str = getattr(event, "payload")  # noqa: B009  # only some events have the field
         known = payloads.get(key)
         return known.payload_id if known else found.get(key, key)

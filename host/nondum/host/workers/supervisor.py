@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 from nondum.host import events
@@ -13,6 +13,7 @@ from nondum.host.events import Event
 from nondum.host.workers import problems, supervision
 from nondum.host.workers.launcher import Launcher
 from nondum.host.workers.spec import Timing, WorkerSpec
+from nondum.host.workers.standing import HEARD, Standing
 from nondum.host.workers.supervision import Supervision
 from nondum.host.workers.worker import Worker, start_worker
 from nondum.sdk.errors import Problem, WorkerFailed
@@ -46,8 +47,12 @@ class Household(Protocol):
 class Supervisor:
     """One component's worker and the ones that come after it."""
 
-    def __init__(self, spec: WorkerSpec, household: Household) -> None:
+    def __init__(
+        self, spec: WorkerSpec, household: Household, standing: Standing = Standing.IN_FORCE
+    ) -> None:
         self.spec = spec
+        self.standing = standing
+        """How much it counts; what happens to it is told accordingly."""
         self._worker: Worker | None = None
         self._household = household
         self._supervision = Supervision()
@@ -81,11 +86,22 @@ class Supervisor:
             raise
         self._task = asyncio.create_task(self._keep_alive())
 
+    def come_into_force(self) -> None:
+        """From now on it stands for its component."""
+        self.standing = Standing.IN_FORCE
+        if self._worker is not None:
+            self._household.on_ready(self._worker)
+
+    def withdraw(self) -> None:
+        """Nobody shall count on it any more; `stop` it."""
+        self._on_gone()
+        self.standing = Standing.LEAVING
+
     async def stop(self, grace_s: float) -> None:
         """End the worker, if there is one, and start no more. Stopping twice is allowed."""
         self.is_stopping = True
         if self._worker is not None:
-            self._household.on_gone(self._worker)  # nobody shall count on it any more
+            self._on_gone()
             await self._worker.stop(grace_s, problems.removed(self.spec.component))
         elif self._task is not None:
             self._task.cancel()
@@ -101,7 +117,7 @@ class Supervisor:
             problem = await self._work()
             if self.is_stopping:
                 return
-            self._emit(events.WorkerExited(self.spec.component, str(problem)))
+            self._emit(events.WorkerExited(self.spec.component, str(problem), self.spec.payload))
             if not await self._restart(problem):
                 return
 
@@ -110,8 +126,8 @@ class Supervisor:
         worker = self._worker
         assert worker is not None, "only called after a start"
         problem = await asyncio.shield(worker.gone)
+        self._on_gone()
         self._worker = None
-        self._household.on_gone(worker)
         return problem
 
     async def _restart(self, problem: Problem) -> bool:
@@ -133,20 +149,28 @@ class Supervisor:
         problem = problems.crash_loop(
             self.spec.component, supervision.RESTARTS, supervision.WINDOW_S, last
         )
-        self._emit(events.WorkerFailed(self.spec.component, (problem, last)))
+        self._emit(events.WorkerFailed(self.spec.component, (problem, last), self.spec.payload))
 
     async def _start_worker(self) -> None:
         household = self._household
+        is_in_force = self.standing is Standing.IN_FORCE
+        welcome = household.welcome(self.spec)
         self._worker = await start_worker(
             self.spec,
-            household.welcome(self.spec),
+            welcome if is_in_force else {**welcome, "devices": {}},
             launcher=household.launcher,
             timing=household.timing,
-            emit=household.emit,
+            emit=self._emit,
         )
-        household.on_ready(self._worker)
-        self._emit(events.WorkerReady(self.spec.component, self.spec.index))
+        if self.standing is Standing.IN_FORCE:
+            household.on_ready(self._worker)
+        self._emit(events.WorkerReady(self.spec.component, self.spec.index, self.spec.payload))
 
-    @property
-    def _emit(self) -> Callable[[Event], None]:
-        return self._household.emit
+    def _emit(self, event: Event) -> None:
+        """Tell what has happened, as far as it is anybody's business."""
+        if isinstance(event, HEARD[self.standing]):
+            self._household.emit(event)
+
+    def _on_gone(self) -> None:
+        if self._worker is not None and self.standing is Standing.IN_FORCE:
+            self._household.on_gone(self._worker)

@@ -119,7 +119,7 @@ class Worker:
         wanted = self._beats + beats
         while self._beats < wanted and not self.gone.done():
             self._beaten.clear()
-            beaten = asyncio.ensure_future(self._beaten.wait())
+            beaten: asyncio.Future[Any] = asyncio.ensure_future(self._beaten.wait())
             await asyncio.wait([beaten, self.gone], return_when=asyncio.FIRST_COMPLETED)
             beaten.cancel()
 

@@ -18,16 +18,17 @@ from nondum.host.workers import problems
 from nondum.host.workers.call import Call
 from nondum.host.workers.launcher import Launcher, WorkerLauncher
 from nondum.host.workers.logs import LogLine, Logs
+from nondum.host.workers.others import Granted, Others
 from nondum.host.workers.proxies import Answer, Proxy, plugin_manager
+from nondum.host.workers.rounds import Rounds
 from nondum.host.workers.spec import Timing, WorkerSpec
+from nondum.host.workers.standing import Standing
 from nondum.host.workers.supervisor import Supervisor
 from nondum.host.workers.worker import Worker
 from nondum.planning.running import RunState
 from nondum.sdk import errors
 from nondum.sdk.description import PluginDescription
 
-Granted: TypeAlias = dict[str, dict[str, Any]]
-"""Declared need → node and properties of the device that serves it."""
 FactValue: TypeAlias = tuple[str, Sequence[str], Any]
 """Predicate, objects, and the value as it travels; None: it has none (any more)."""
 
@@ -57,11 +58,14 @@ class Workers:
     ) -> None:
         self.launcher = launcher or WorkerLauncher()
         self.timing = timing or Timing()
+        self._rounds = Rounds(self._running, self.emit, self.timing.look_s)
+        self._going_round: asyncio.Task[None] | None = None
         self.streams = Streams(host)
         self.logs = Logs()
         self._host, self._emit = host, emit
         self._manager = plugin_manager()
         self._supervisors: dict[str, Supervisor] = {}
+        self._others = Others()
         self._devices: dict[str, Granted] = {}
         self._mounts: Mapping[str, Any] = {}
         self._call_ids = itertools.count(1)
@@ -77,17 +81,58 @@ class Workers:
     async def start(self, spec: WorkerSpec) -> PluginDescription:
         """Start a component's worker and keep one alive until `stop`.
 
-        Returns once its plugin has described itself as the index says and has started. Raises
-        `errors.WorkerFailed` with what went wrong, and `ValueError` when it has a worker already;
-        one that is being stopped is waited for.
+        Beside one of another payload it stands for nothing until `take_over`. Returns once its
+        plugin has described itself as the index says and has started. Raises `errors.WorkerFailed`
+        with what went wrong, and `ValueError` when it has a worker already; one that is being
+        stopped is waited for.
         """
-        while (present := self._supervisors.get(spec.component)) and present.is_alive:
+        while (present := self._found(spec.component, spec.payload)) and present.is_alive:
             if not present.is_stopping:
                 raise ValueError(f"component {spec.component!r} has a worker already")
             await present.ended()
-        supervisor = self._supervisors[spec.component] = Supervisor(spec, self)
+        in_force = self._supervisors.get(spec.component)
+        if in_force is not None and in_force.spec.payload != spec.payload:
+            supervisor = Supervisor(spec, self, Standing.BESIDE)
+            self._others.add(supervisor)
+        else:
+            supervisor = self._supervisors[spec.component] = Supervisor(spec, self)
+        if self._going_round is None:
+            self._going_round = asyncio.create_task(self._rounds.run())
         await supervisor.start()
         return spec.index
+
+    async def watched(self, component: str, payload: str) -> None:
+        """Wait until a worker that was started was seen to be healthy for a while.
+
+        Raises `errors.WorkerFailed` where it ended instead.
+        """
+        supervisor = self._found(component, payload)
+        worker = supervisor.worker if supervisor is not None else None
+        if worker is not None:
+            await worker.heard(self.timing.settle_beats)
+        if worker is None or worker.gone.done():
+            ended = worker.gone.result() if worker else problems.not_running(component)
+            raise errors.WorkerFailed(ended)
+
+    def take_over(self, owners: Mapping[str, str]) -> None:
+        """Have the workers of those payloads stand for their components that the catalogue says:
+        component → payload. Who stood for one before is not heard any more, and to be stopped."""
+        for component, payload in owners.items():
+            new = self._others.beside(component, payload)
+            if new is None:
+                continue
+            old = self._supervisors.get(component)
+            if old is not None:
+                old.withdraw()
+                self._others.add(old, self._devices.pop(component, {}))
+            self._others.drop(new)
+            self._supervisors[component] = new
+            new.come_into_force()
+
+    async def ended(self, payload: str) -> None:
+        """Wait until no worker of a payload is left; somebody else stops them."""
+        every = (*self._supervisors.values(), *self._others)
+        await asyncio.gather(*(s.ended() for s in every if s.spec.payload == payload))
 
     async def restart(self, component: str) -> None:
         """Try a component that was given up once more; `WorkerReady` or `WorkerFailed` tells.
@@ -102,22 +147,32 @@ class Workers:
         except errors.WorkerFailed as error:
             self.emit(WorkerFailed(component, error.problems))
 
-    async def stop(self, component: str, grace_s: float = GRACE_S) -> None:
+    async def stop(self, component: str, grace_s: float = GRACE_S, payload: str = "") -> None:
         """End a component's worker within `grace_s`: ask, then SIGTERM, then SIGKILL to the group.
 
         It is withdrawn at once: no stream, hook or behaviour reaches it any more. Unknown
-        components are ignored; one that is being started is given up.
+        components are ignored; one that is being started is given up. Of two side by side only that
+        of `payload` is ended.
         """
-        supervisor = self._supervisors.get(component)
-        self._devices.pop(component, None)
-        if supervisor is not None:
+        supervisor = self._found(component, payload)
+        if supervisor is None:
+            return
+        if supervisor.standing is Standing.IN_FORCE:
+            self._others.add(supervisor, self._devices.pop(component, {}))
+        try:
             await supervisor.stop(grace_s)
+        finally:
+            self._others.drop(supervisor)
             if self._supervisors.get(component) is supervisor:
                 del self._supervisors[component]
 
     async def close(self, grace_s: float = GRACE_S) -> None:
         """End all workers."""
-        await asyncio.gather(*(self.stop(name, grace_s) for name in tuple(self._supervisors)))
+        if self._going_round is not None:
+            self._going_round.cancel()
+        every = (*self._supervisors.values(), *self._others)
+        stopping = (self.stop(s.spec.component, grace_s, s.spec.payload) for s in every)
+        await asyncio.gather(*stopping)
         await asyncio.gather(*self._calls, return_exceptions=True)
         await self.streams.close()
         if self._warming is not None:
@@ -162,7 +217,11 @@ class Workers:
     async def attach(
         self, component: str, need: str, node: str, properties: Mapping[str, str]
     ) -> None:
-        """Grant a device for a declared need, to this worker and those after it."""
+        """Grant a device for a declared need, to this worker and those after it.
+
+        Another worker that has it, and is being stopped, is waited for.
+        """
+        await self._others.released(node)
         device = {"node": node, "properties": dict(properties)}
         self._devices.setdefault(component, {})[need] = device
         await self._ask_if_running(component, "attach", {"device": need, **device})
@@ -199,8 +258,13 @@ class Workers:
 
     def pids(self) -> dict[str, int]:
         """The process of each running worker, by component."""
-        workers = ((name, s.worker) for name, s in sorted(self._supervisors.items()))
-        return {name: worker.pid for name, worker in workers if worker is not None}
+        return {worker.spec.component: worker.pid for worker in self._running()}
+
+    def pids_of(self, payload: str) -> tuple[int, ...]:
+        """The processes of a payload's workers."""
+        every = (*self._supervisors.values(), *self._others)
+        mine = (s.worker for s in every if s.spec.payload == payload)
+        return tuple(worker.pid for worker in mine if worker is not None)
 
     # What supervisors need
 
@@ -247,6 +311,18 @@ class Workers:
             self._manager.unregister(name=component)
         self.streams.leave(component)
 
+    def _found(self, component: str, payload: str) -> Supervisor | None:
+        """The worker of a component that a payload has, or without one that which counts."""
+        supervisor = self._supervisors.get(component)
+        if supervisor is not None and payload in ("", supervisor.spec.payload):
+            return supervisor
+        return self._others.get(component, payload)
+
+    def _running(self) -> list[Worker]:
+        """The workers in force."""
+        found = (supervisor.worker for _, supervisor in sorted(self._supervisors.items()))
+        return [worker for worker in found if worker is not None]
+
     def _warm_later(self) -> None:
         """Not while workers are being started: they need the processors."""
         if self._warming is not None:
@@ -264,6 +340,7 @@ class Workers:
     async def _carry_out(self, worker: Worker, call: Call, values: Sequence[FactValue]) -> None:
         sent = [[p, list(objects), value] for p, objects, value in values if value is not None]
         try:
+            await self._others.left(call.component)  # two releases do not act at the same time
             async with self.streams.wired(call.component, call.behaviour, call.arguments):
                 if call.is_halting:
                     call.end(RunState.HALTED, "halted before it began")

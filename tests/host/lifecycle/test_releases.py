@@ -1,0 +1,441 @@
+"""Which release of a payload is in force, whatever is plugged, pulled, broken or asked for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+from tests.host.lifecycle.test_advance import (
+    AT,
+    PROBLEM,
+    active,
+    after,
+    component,
+    drive,
+    found,
+    upgrade,
+    way_to_active,
+)
+
+from nondum.host import effects, events
+from nondum.host.catalogue.records import ComponentState, PayloadRecord, Step
+from nondum.host.catalogue.state import HostState
+from nondum.host.effects import Effect
+from nondum.host.events import Event
+from nondum.host.lifecycle import releases
+from nondum.host.lifecycle.advance import advance
+from nondum.host.lifecycle.recovery import recover
+from nondum.host.lifecycle.tries import ATTEMPTS
+
+RELEASES = (1, 2, 3)
+TAKEN_IN = (Step.SUPERSEDED, Step.STORED, Step.PROBED, Step.ACTIVE)
+
+
+def upgraded(*, need: str = "") -> HostState:
+    """Release 2 (`k2`, drive `b`) is in force, release 1 (`k1`, drive `a`) waits."""
+    newer = upgrade()
+    entered = events.PayloadActivated("k2", (component("eye", "k2", need),))
+    return after(drive("b"), *newer[:-1], entered, state=active(need=need))[0]
+
+
+def steps(state: HostState) -> dict[str, Step]:
+    return {key: payload.step for key, payload in state.payloads.items()}
+
+
+def codes(state: HostState, key: str) -> list[str]:
+    return [problem.code for problem in state.payloads[key].problems]
+
+
+# Taking over
+
+
+def test_newer_release_is_brought_up_beside_the_one_in_force() -> None:
+    state, done = after(drive("b"), *upgrade()[:5], state=active())
+    assert steps(state) == {"k1": Step.ACTIVE, "k2": Step.STORED}
+    assert effects.ProbeComponents("k2", beside="k1") in done
+    assert state.components["eye"].payload == "k1"
+    state, done = after(events.ComponentsProbed("k2"), state=state)
+    assert done == [effects.ActivatePayload("k2", beside="k1")]
+
+
+def test_it_takes_over_in_one_revision() -> None:
+    before, _ = after(drive("b"), *upgrade()[:-1], state=active())
+    outcome = advance(before, upgrade()[-1], AT)
+    assert outcome.state.revision == before.revision + 1
+    assert steps(outcome.state) == {"k1": Step.SUPERSEDED, "k2": Step.ACTIVE}
+    assert outcome.state.components["eye"].payload == "k2"
+    assert outcome.state.payloads["k2"].was == 1
+    assert not outcome.state.former
+    assert [event.name for event in outcome.events] == [
+        "PayloadActivated",
+        "PayloadSuperseded",
+        "Recomposed",
+    ]
+    assert effects.RestPayload("k1", ("eye",)) in outcome.effects
+
+
+def test_ranks_mounts_and_devices_are_kept() -> None:
+    port = events.DeviceAppeared("usb1", Path("/dev/x"), {"ID_MODEL": "PTU"})
+    rival = way_to_active("k9", "c", "arm", "PTU", payload_id="org.y")
+    said = events.MountSet("spot__eye__camera", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    before, _ = after(port, drive("c"), *rival, said, state=active(need="PTU"))
+    assert before.components["eye"].devices[0].device == "usb1"
+    new = component("eye", "k2", "PTU")
+    entered = events.PayloadActivated("k2", (new,))
+    state, done = after(drive("b"), *upgrade()[:-1], entered, state=before)
+    assert state.components["eye"].rank == before.components["eye"].rank
+    assert state.components["eye"].devices[0].device == "usb1"
+    assert state.components["arm"].devices[0].device is None
+    assert effects.AttachDevice("eye", "port", state.devices["usb1"]) in done
+    assert state.mounts["spot__eye__camera"].origin == "person"
+
+
+def test_device_goes_to_a_component_that_has_another_name_now() -> None:
+    port = events.DeviceAppeared("usb1", Path("/dev/x"), {"ID_MODEL": "PTU"})
+    rival = way_to_active("k9", "c", "arm", "PTU", payload_id="org.y")
+    before, _ = after(port, drive("c"), *rival, state=active(need="PTU"))
+    entered = events.PayloadActivated("k2", (component("gaze", "k2", "PTU"),))
+    newer = upgrade(id="gaze")
+    state, _ = after(drive("b"), *newer[:-1], entered, state=before)
+    assert state.components["gaze"].devices[0].device == "usb1"
+    assert set(state.components) == {"gaze", "arm"}
+
+
+def test_release_with_a_component_of_another_payload_is_refused_and_the_old_one_stays() -> None:
+    rival = way_to_active("k9", "c", "arm", payload_id="org.y")
+    before, _ = after(drive("c"), *rival, state=active())
+    newer = [*upgrade()[:2], events.PayloadVerified("k2", ("eye", "arm"))]
+    state, _ = after(drive("b"), *newer, state=before)
+    assert codes(state, "k2") == ["COMPONENT_TAKEN"]
+    assert steps(state)["k1"] is Step.ACTIVE
+
+
+def test_components_of_a_release_that_waits_are_held_for_it() -> None:
+    rival = way_to_active("k9", "c", "eye", payload_id="org.y")[:3]
+    entered = events.PayloadActivated("k2", (component("gaze", "k2"),))
+    state, _ = after(drive("b"), *upgrade(id="gaze")[:-1], entered, state=active())
+    state, _ = after(drive("c"), *rival, state=state)
+    assert codes(state, "k9") == ["COMPONENT_TAKEN"]
+
+
+# Failing
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        events.PayloadFailed("k2", (PROBLEM,)),
+        events.WorkerFailed("eye", (PROBLEM,), "k2"),
+        events.WorkerExited("eye", "it crashed", "k2"),
+    ],
+    ids=lambda event: event.name,
+)
+def test_release_that_fails_while_it_is_watched_leaves_the_old_one_alone(event: Event) -> None:
+    before, _ = after(drive("b"), *upgrade()[:6], state=active())
+    state, done = after(event, state=before)
+    assert steps(state) == {"k1": Step.ACTIVE, "k2": Step.QUARANTINED}
+    assert state.components == before.components
+    assert state.revision == before.revision
+    assert done == [effects.SuspendPayload("k2", ("eye",))]
+
+
+def test_worker_of_the_one_in_force_may_restart_meanwhile() -> None:
+    before, _ = after(drive("b"), *upgrade()[:6], state=active())
+    state, _ = after(events.WorkerExited("eye", "signal 9", "k1"), state=before)
+    assert state.components["eye"].state is ComponentState.RESTARTING
+    assert steps(state)["k2"] is Step.PROBED
+
+
+def test_release_that_breaks_later_gives_way_to_the_one_before() -> None:
+    state, done = after(events.WorkerFailed("eye", (PROBLEM,), "k2"), state=upgraded())
+    assert steps(state) == {"k1": Step.STORED, "k2": Step.QUARANTINED}
+    assert done == [effects.SuspendPayload("k2", ("eye",)), effects.ProbeComponents("k1")]
+
+
+def test_release_that_cannot_run_beside_the_other_one_takes_its_place_first() -> None:
+    before, _ = after(drive("b"), *upgrade()[:5], state=active())
+    state, done = after(events.BesideRefused("k2", "no room"), state=before)
+    assert steps(state) == {"k1": Step.SUPERSEDED, "k2": Step.STORED}
+    assert set(done) == {
+        effects.RestPayload("k1", ("eye",)),
+        effects.ProbeComponents("k2", after="k1"),
+    }
+    state, done = after(events.PayloadFailed("k2", (PROBLEM,)), state=state)
+    assert steps(state) == {"k1": Step.STORED, "k2": Step.QUARANTINED}
+    assert effects.ProbeComponents("k1") in done
+
+
+# Pulling
+
+
+def test_pulled_release_gives_way_to_the_one_that_waits() -> None:
+    state, done = after(events.DriveRemoved("b"), state=upgraded())
+    assert steps(state) == {"k1": Step.STORED, "k2": Step.REMOVING}
+    assert effects.ProbeComponents("k1") in done
+
+
+def test_old_drive_may_be_pulled_during_the_bring_up() -> None:
+    before, _ = after(drive("b"), *upgrade()[:5], state=active())
+    state, _ = after(events.DriveRemoved("a"), *upgrade()[5:], state=before)
+    assert steps(state) == {"k1": Step.REMOVING, "k2": Step.ACTIVE}
+
+
+def test_release_that_comes_during_a_bring_up_waits_for_its_turn() -> None:
+    before, _ = after(drive("b"), *upgrade()[:5], state=active())
+    third = upgrade("k3", "c", 3)
+    state, done = after(drive("c"), *third[:5], state=before)
+    assert steps(state) == {"k1": Step.ACTIVE, "k2": Step.STORED, "k3": Step.SUPERSEDED}
+    assert not any(isinstance(e, effects.ProbeComponents) and e.payload == "k3" for e in done)
+    state, done = after(*upgrade()[5:], state=state)
+    assert steps(state) == {"k1": Step.SUPERSEDED, "k2": Step.ACTIVE, "k3": Step.STORED}
+    assert effects.ProbeComponents("k3", beside="k2") in done
+
+
+# Going back
+
+
+def test_person_goes_back_and_the_newer_one_waits() -> None:
+    state, done = after(events.RollbackAsked("k1", 1, 2), state=upgraded())
+    assert steps(state) == {"k1": Step.STORED, "k2": Step.ACTIVE}
+    assert done == [effects.ProbeComponents("k1", beside="k2")]
+    back, _ = after(*way_to_active()[5:], state=state)
+    assert steps(back) == {"k1": Step.ACTIVE, "k2": Step.SUPERSEDED}
+    assert back.payloads["k1"].was == 2
+    assert back.highwater["", "org.x"].release == 2, "one is as protected as before"
+
+
+def gone_back() -> HostState:
+    asked = events.RollbackAsked("k1", 1, 2)
+    return after(asked, *way_to_active()[5:], state=upgraded())[0]
+
+
+def test_going_back_outlives_the_daemon() -> None:
+    state, _ = after(*way_to_active()[5:], state=recover(gone_back(), AT).state)
+    assert steps(state) == {"k1": Step.ACTIVE, "k2": Step.SUPERSEDED}
+
+
+def test_still_newer_release_counts_again() -> None:
+    third = upgrade("k3", "c", 3)
+    state, _ = after(drive("c"), *third, state=gone_back())
+    assert steps(state)["k3"] is Step.ACTIVE
+
+
+def test_retry_goes_forward_again() -> None:
+    state, done = after(events.RetryAsked("k2"), state=gone_back())
+    assert done == [effects.ProbeComponents("k2", beside="k1")]
+    assert not state.rollbacks
+
+
+def test_newer_release_that_is_plugged_in_anew_counts_again() -> None:
+    pulled, _ = after(events.DriveRemoved("b"), events.PayloadCleared("k2"), state=gone_back())
+    state, _ = after(drive("b"), *upgrade(), state=pulled)
+    assert steps(state) == {"k1": Step.SUPERSEDED, "k2": Step.ACTIVE}
+
+
+def test_refused_older_release_is_let_pass_once() -> None:
+    refused, _ = after(events.DriveRemoved("a"), events.PayloadCleared("k1"), state=upgraded())
+    refused, _ = after(drive("a"), found(), events.DriveRead("a", ("k1",)), state=refused)
+    assert codes(refused, "k1") == ["ROLLBACK"]
+    target = releases.can_go_back_to(refused, refused.payloads["k2"])
+    assert target is not None
+    assert target.key == "k1"
+    asked = events.RollbackAsked("k1", 1, 2)
+    state, done = after(asked, events.PayloadCleared("k1"), state=refused)
+    assert effects.ReadDrive("a", "slot", Path("/drives/a")) in done
+    state, _ = after(*way_to_active(), state=state)
+    assert steps(state) == {"k1": Step.ACTIVE, "k2": Step.SUPERSEDED}
+    again, _ = after(events.DriveRemoved("a"), events.PayloadCleared("k1"), state=state)
+    again, _ = after(drive("a"), found(), state=again)
+    assert codes(again, "k1") == ["ROLLBACK"], "it was let pass once"
+
+
+def test_what_is_refused_for_more_than_its_age_is_not_let_pass() -> None:
+    state = upgraded()
+    worse = replace(
+        state.payloads["k1"],
+        step=Step.REFUSED,
+        problems=(PROBLEM, replace(PROBLEM, code=releases.OVERRULED)),
+    )
+    state = replace(state, payloads={**state.payloads, "k1": worse})
+    assert releases.can_go_back_to(state, state.payloads["k2"]) is None
+    assert after(events.RollbackAsked("k1", 1, 2), state=state) == (state, [])
+
+
+# Crashing
+
+
+def test_after_a_crash_the_one_in_force_comes_first() -> None:
+    before, _ = after(drive("b"), *upgrade()[:6], state=active())
+    outcome = recover(before, AT)
+    assert steps(outcome.state) == {"k1": Step.STORED, "k2": Step.SUPERSEDED}
+    assert outcome.effects == (effects.ProbeComponents("k1"),)
+    state, done = after(*way_to_active()[5:], state=outcome.state)
+    assert effects.ProbeComponents("k2", beside="k1") in done
+    assert steps(state) == {"k1": Step.ACTIVE, "k2": Step.STORED}
+
+
+# Whatever happens
+
+
+def key(release: int) -> str:
+    return f"k{release}"
+
+
+def name(release: int) -> str:
+    return f"d{release}"
+
+
+class Releases(RuleBasedStateMachine):
+    """One payload in three releases on three drives. What the host wants done is done in any order
+    across payloads, in the order given for each; each release may turn out not to work."""
+
+    @initialize(broken=st.sets(st.sampled_from(RELEASES)), alone=st.booleans())
+    def begin(self, broken: set[int], alone: bool) -> None:
+        self.state = HostState("spot")
+        self.broken, self.alone = broken, alone
+        self.todo: list[Effect] = []
+        self.plugged: set[int] = set()
+        self.crashes = 0
+
+    def happen(self, event: Event) -> None:
+        outcome = advance(self.state, event, AT)
+        self.state = outcome.state
+        self.todo.extend(outcome.effects)
+
+    # What people do
+
+    @rule(release=st.sampled_from(RELEASES))
+    def plug(self, release: int) -> None:
+        if release not in self.plugged:
+            self.plugged.add(release)
+            self.happen(drive(name(release)))
+
+    @rule(release=st.sampled_from(RELEASES))
+    def pull(self, release: int) -> None:
+        if release in self.plugged:
+            self.plugged.remove(release)
+            self.todo = [e for e in self.todo if getattr(e, "drive", "") != name(release)]
+            self.happen(events.DriveRemoved(name(release)))
+
+    @rule(release=st.sampled_from(RELEASES))
+    def retry(self, release: int) -> None:
+        self.happen(events.RetryAsked(key(release)))
+
+    @rule()
+    def roll_back(self) -> None:
+        for payload in tuple(self.state.payloads.values()):
+            if payload.step is Step.ACTIVE:
+                target = releases.can_go_back_to(self.state, payload)
+                if target is not None:
+                    asked = events.RollbackAsked(target.key, target.release, payload.release)
+                    self.happen(asked)
+
+    # What happens by itself
+
+    @rule(release=st.sampled_from(RELEASES))
+    def break_down(self, release: int) -> None:
+        """Supervision gives a worker up."""
+        payload = self.state.payloads.get(key(release))
+        if payload is not None and payload.step in (Step.PROBED, Step.ACTIVE):
+            self.happen(events.WorkerFailed("eye", (PROBLEM,), payload.key))
+
+    @rule(release=st.sampled_from(RELEASES))
+    def mend(self, release: int) -> None:
+        self.broken.discard(release)
+
+    @precondition(lambda self: self.crashes < ATTEMPTS - 1)
+    @rule()
+    def crash(self) -> None:
+        self.crashes += 1
+        outcome = recover(self.state, AT)
+        self.state, self.todo = outcome.state, list(outcome.effects)
+        for release in sorted(self.plugged):
+            self.happen(drive(name(release)))
+        self.happen(events.DrivesScanned("slot", tuple(map(name, sorted(self.plugged)))))
+
+    @precondition(lambda self: self.todo)
+    @rule(which=st.integers(0, 20))
+    def work(self, which: int) -> None:
+        """Carry out some effect that is the next one in its lane."""
+        effect = self.todo[which % len(self.todo)]
+        payload = getattr(effect, "payload", None)
+        first = next(e for e in self.todo if getattr(e, "payload", None) == payload)
+        self.carry_out(first if payload else effect)
+
+    def carry_out(self, effect: Effect) -> None:
+        self.todo.remove(effect)
+        match effect:
+            case effects.ReadDrive(drive=where):
+                release = int(where[1:])
+                self.happen(found(key(release), where, release=release))
+                self.happen(events.DriveRead(where, (key(release),)))
+            case effects.CopyPayload(payload=payload):
+                self.happen(events.PayloadCopied(payload))
+            case effects.VerifyPayload(payload=payload):
+                self.happen(events.PayloadVerified(payload, ("eye",)))
+            case effects.StagePayload(payload=payload):
+                self.happen(events.PayloadStaged(payload))
+            case effects.StoreWheels(payload=payload):
+                self.happen(events.WheelsStored(payload, 1))
+            case effects.ProbeComponents(payload=payload, beside=beside):
+                self.probe(payload, is_beside=bool(beside))
+            case effects.ActivatePayload(payload=payload):
+                entered = component("eye", payload)
+                self.happen(events.PayloadActivated(payload, (entered,)))
+            case effects.ClearPayload(payload=payload):
+                self.happen(events.PayloadCleared(payload))
+
+    def probe(self, payload: str, *, is_beside: bool) -> None:
+        if is_beside and self.alone:
+            self.happen(events.BesideRefused(payload, "test"))
+        elif int(payload[1:]) in self.broken:
+            self.happen(events.PayloadFailed(payload, (PROBLEM,)))
+        else:
+            self.happen(events.ComponentsProbed(payload))
+
+    # What holds
+
+    @invariant()
+    def one_at_most_is_in_force(self) -> None:
+        if not hasattr(self, "state"):
+            return
+        in_force = [p.key for p in self.state.payloads.values() if p.step is Step.ACTIVE]
+        starting = [p for p in self.state.payloads.values() if p.step in releases.STARTING]
+        assert len(in_force) <= 1
+        assert len(starting) <= 1
+        assert [c.payload for c in self.state.components.values()] == in_force
+
+    def teardown(self) -> None:
+        """In the end the highest that is here and works is in force, and nothing else is left."""
+        if not hasattr(self, "state"):
+            return
+        while self.todo:
+            self.carry_out(self.todo[0])
+        present = self.state.payloads
+        assert {p.key for p in present.values()} == {key(release) for release in self.plugged}
+        works = [p for p in present.values() if p.step in TAKEN_IN]
+        assert all(p.step in (Step.ACTIVE, Step.SUPERSEDED) for p in works)
+        if works:
+            best = max(works, key=self.standing)
+            assert best.step is Step.ACTIVE
+        else:
+            assert not self.state.components
+        for release in sorted(self.plugged):
+            self.pull(release)
+        while self.todo:
+            self.carry_out(self.todo[0])
+        assert not self.state.payloads
+        assert not self.state.components
+        assert not self.state.rollbacks
+        assert not self.state.drives
+
+    def standing(self, payload: PayloadRecord) -> tuple[int, bool]:
+        return releases.standing(self.state, payload)
+
+
+Releases.TestCase.settings = settings(max_examples=150, stateful_step_count=40, deadline=None)
+TestReleases = Releases.TestCase
