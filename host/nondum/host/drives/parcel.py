@@ -10,8 +10,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from nondum.host.drives import mounting, reader, trial
+from nondum.host.drives import reader, trial
 from nondum.host.drives.reader import Arguments, Report
+from nondum.host.helper import privileged
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
 from nondum.wheelhouse import contents, drive, payload, preflight
 from nondum.wheelhouse.contents import Contents, Entry
@@ -28,7 +29,7 @@ def hand_over(arguments: Arguments, report: Report) -> dict[str, Any]:
     root, target = Path(arguments["root"]), Path(arguments["target"])
     if arguments["node"] is not None:
         node, drive_name = Path(arguments["node"]), arguments["drive"]
-        mounting.mount(node, root, arguments["filesystem"], drive=drive_name)
+        root = privileged().mount(node, root, arguments["filesystem"], drive_name, "handover")
     folder = root / arguments["folder"]
     data = drive.read_contents(folder)
     if hashlib.sha256(data).hexdigest() != arguments["digest"]:

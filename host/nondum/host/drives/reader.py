@@ -15,7 +15,8 @@ from typing import Any
 
 from packaging.version import Version
 
-from nondum.host.drives import mounting, trial
+from nondum.host.drives import trial
+from nondum.host.helper import privileged
 from nondum.host.trust.rules import Rules
 from nondum.sdk.errors import PayloadRefused, Problem
 from nondum.wheelhouse import contents, drive, payload, preflight
@@ -47,7 +48,7 @@ def look(arguments: Arguments, report: Report) -> dict[str, list[Any]]:
     root = Path(arguments["root"])
     if arguments["node"] is not None:
         node, drive_name = Path(arguments["node"]), arguments["drive"]
-        mounting.mount(node, root, arguments["filesystem"], drive=drive_name)
+        root = privileged().mount(node, root, arguments["filesystem"], drive_name, "read")
     is_payload = arguments["kind"] == "installed"
     folders = (root,) if is_payload else drive.find_payloads(root)
     verifier = Rules.of(arguments).verifier()

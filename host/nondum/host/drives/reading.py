@@ -6,7 +6,6 @@ import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from nondum.host.drives import mounting
 from nondum.host.effects import ReadDrive, ReleaseDrive
 from nondum.host.events import (
     CertificatesBrought,
@@ -16,6 +15,7 @@ from nondum.host.events import (
     Event,
     PayloadFound,
 )
+from nondum.host.helper import privileged
 from nondum.host.lifecycle.children import Children
 from nondum.host.lifecycle.lanes import in_thread
 from nondum.host.lifecycle.queue import Queue
@@ -101,7 +101,7 @@ class DriveReading:
     async def release(self, effect: ReleaseDrive) -> tuple[Event, ...]:
         """Unmount a drive that was mounted for reading."""
         if (root := self._mounted.pop(effect.drive, None)) is not None:
-            await in_thread(mounting.unmount, root)
+            await in_thread(privileged().unmount, root, effect.drive, "read")
         return ()
 
     async def close(self) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from nondum.host.drives import mounting
+from nondum.host.helper import privileged
 from nondum.host.lifecycle.children import Children, OnProgress
 from nondum.host.lifecycle.folders import Folders, remove
 from nondum.host.lifecycle.lanes import in_thread
@@ -93,7 +93,8 @@ class Handover:
                 )
             finally:
                 if self._parcel.drive.node is not None:
-                    await in_thread(mounting.unmount, self._mount)
+                    drive = self._parcel.drive.id
+                    await in_thread(privileged().unmount, self._mount, drive, "handover")
         self._files |= {sha256: self._folder / path for sha256, path in copied["files"]}
         return int(copied["contents"])
 

@@ -1,0 +1,66 @@
+"""The helper's command line, as its service unit has it: `python -m nondum.host.helper`."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import pwd
+import socket
+from collections.abc import Sequence
+from pathlib import Path
+
+from nondum.host.cgroups import mounts
+from nondum.host.cgroups.cages import tree
+from nondum.host.helper.disks import Disks
+from nondum.host.helper.nodes import Nodes
+from nondum.host.helper.server import IDLE_S, Server
+from nondum.host.helper.service import Service
+
+RUN = Path("/run/nondum")
+FIRST = 3
+"""SD_LISTEN_FDS_START."""
+OWNER = "nondum-helper"
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Serve one user by the socket that systemd hands over."""
+    told = _parser().parse_args(arguments)
+    os.umask(0o022)
+    uid = pwd.getpwnam(told.user).pw_uid
+    service = Service(
+        uid=uid,
+        mounts=told.run / "mounts",
+        disks=Disks(allow_loop=told.allow_loop),
+        nodes=Nodes(told.run / "devices", uid, frozenset(told.allow_subsystem)),
+        tree=tree(mounts.here(), f"{OWNER}-{uid}"),
+    )
+    with _handed_over() as listening:
+        Server(listening, service, told.idle_s).run()
+    service.tree.close()
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="nondum-helper", description=__doc__)
+    parser.add_argument("--user", default="nondum", help="the one user who is served")
+    parser.add_argument("--run", type=Path, default=RUN, help="folder for mounts and devices")
+    parser.add_argument("--idle-s", type=float, default=IDLE_S, help="end after such a silence")
+    parser.add_argument("--allow-loop", action="store_true", help="loop devices are drives, too")
+    parser.add_argument(
+        "--allow-subsystem",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="give components devices of this subsystem that do not hang on USB",
+    )
+    return parser
+
+
+def _handed_over() -> socket.socket:
+    """The socket from systemd (sd_listen_fds(3))."""
+    if os.environ.get("LISTEN_FDS") != "1" or os.environ.get("LISTEN_PID") != str(os.getpid()):
+        raise SystemExit("this is started by nondum-helper.socket")
+    return socket.socket(fileno=FIRST)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,162 @@
+"""Asks the helper: for a daemon that is not root, and its children."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import re
+import socket
+import stat
+from pathlib import Path
+from typing import Any
+
+from nondum.host.cgroups.cage import CageLimits, Usage
+from nondum.host.helper import requests
+from nondum.host.helper.requests import Request
+from nondum.sdk import errors
+from nondum.sdk.errors import InstallFailed, NondumError, Problem
+
+SOCKET = Path("/run/nondum/helper.sock")
+WAIT_S = 15.0
+"""Longer than the helper waits for a drive."""
+
+log = logging.getLogger(__name__)
+
+
+class HelperClient:
+    """Satisfies `Privileged` with one connection for each question."""
+
+    def __init__(self, path: Path = SOCKET) -> None:
+        self._path = path
+
+    def mount(self, node: Path, root: Path, filesystem: str, drive: str, use: str) -> Path:
+        """Have a drive mounted where the helper has its mounts (see `Privileged`)."""
+        _, _, number = drive.partition("-")
+        request = requests.Mount(node.name, int(number) if number else None, filesystem, use)
+        return Path(self._ask(request)["at"])
+
+    def unmount(self, root: Path, drive: str, use: str) -> None:
+        """Have what was mounted detached."""
+        self._try(requests.Unmount(drive, use))
+
+    def unmount_all(self, folder: Path) -> None:
+        """Have all drives detached."""
+        self._try(requests.UnmountAll())
+
+    def put_node(self, component: str, need: str, node: Path) -> Path:
+        """Have a node made, of a device that this user may not open; else the device's own."""
+        if os.access(node, os.R_OK | os.W_OK):
+            return node
+        found = node.stat()
+        if not stat.S_ISCHR(found.st_mode):
+            return node
+        major, minor = os.major(found.st_rdev), os.minor(found.st_rdev)
+        return Path(self._ask(requests.PutNode(component, _word(need), major, minor))["at"])
+
+    def take_node(self, component: str, need: str) -> None:
+        """Have a node removed."""
+        self._try(requests.TakeNode(component, _word(need)))
+
+    def cages(self) -> HelperTree:
+        """The cgroups of the helper's making. Raises `NondumError`."""
+        return HelperTree(self)
+
+    def ask(self, request: Request) -> dict[str, Any]:
+        """Ask one thing. Raises what the helper raised, `InstallFailed` (HELPER_SILENT)."""
+        return self._ask(request)
+
+    def _try(self, request: Request) -> None:
+        """Ask for something to be taken away; should that fail, the next daemon's sweep does it."""
+        try:
+            self._ask(request)
+        except NondumError as error:
+            log.warning("%s", error)
+
+    def _ask(self, request: Request) -> dict[str, Any]:
+        try:
+            with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as asked:
+                asked.settimeout(WAIT_S)
+                asked.connect(str(self._path))
+                asked.send(requests.encode(request))
+                answer = asked.recv(requests.ANSWER_BYTES)
+        except OSError as error:
+            raise _silent(str(error)) from error
+        if not answer:
+            raise _silent("it hung up")
+        said: dict[str, Any] = json.loads(answer)
+        if "problems" in said:
+            kind = getattr(errors, said["error"], NondumError)
+            failure: NondumError = kind(*(Problem(**problem) for problem in said["problems"]))
+            raise failure
+        return said
+
+
+class HelperTree:
+    """Satisfies `Tree`: cages that the helper makes; their use is read directly where it can be."""
+
+    def __init__(self, helper: HelperClient) -> None:
+        self._helper = helper
+        listed = helper.ask(requests.ListCages())
+        self.kind: str = listed["kind"]
+        self.controllers = frozenset(listed["controllers"])
+
+    def make(self, name: str) -> None:
+        """Make a cage."""
+        self._told(requests.MakeCage(name))
+
+    def limit(self, name: str, limits: CageLimits) -> None:
+        """Set its limits."""
+        self._told(
+            requests.LimitCage(
+                name, limits.memory_mb, limits.tasks, limits.cpu_weight, limits.processors
+            )
+        )
+
+    def add(self, name: str, pid: int) -> None:
+        """Put one process in."""
+        self._told(requests.FillCage(name, pid))
+
+    def kill(self, name: str) -> None:
+        """SIGKILL all that is in it."""
+        self._told(requests.KillCage(name))
+
+    def remove(self, name: str) -> bool:
+        """Remove it if it is empty."""
+        return bool(self._told(requests.RemoveCage(name))["gone"])
+
+    def pids(self, name: str) -> tuple[int, ...]:
+        """The processes in it."""
+        return tuple(self._told(requests.LookAtCage(name))["pids"])
+
+    def usage(self, name: str) -> Usage:
+        """What it uses."""
+        return Usage(**self._told(requests.LookAtCage(name))["usage"])
+
+    def names(self) -> tuple[str, ...]:
+        """All cages."""
+        return tuple(self._told(requests.ListCages())["cages"])
+
+    def close(self) -> None:
+        """The place of the cages stays the helper's."""
+
+    def _told(self, request: Request) -> dict[str, Any]:
+        """Ask; what fails is an `OSError`, as it is with one's own cages."""
+        try:
+            return self._helper.ask(request)
+        except NondumError as error:
+            raise OSError(str(error)) from error
+
+
+def _word(need: str) -> str:
+    """A need's name, as a file may have it.
+
+    >>> _word("front camera")
+    'front_camera'
+    """
+    return re.sub(r"[^A-Za-z0-9-]", "_", need)[:63]
+
+
+def _silent(why: str) -> InstallFailed:
+    fix = "`systemctl status nondum-helper.socket nondum-helper.service`"
+    return InstallFailed(Problem("HELPER_SILENT", f"the helper does not answer ({why})", fix=fix))

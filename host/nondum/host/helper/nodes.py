@@ -1,0 +1,105 @@
+"""Nodes of devices that components were granted: a folder for each, on a file system of its own.
+
+/run may hold no devices (`nodev`), so the folder is a small tmpfs; only who owns a node opens it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+
+from nondum.host.helper.requests import refused
+
+SYS = Path("/sys")
+SIZE = "size=256k,nr_inodes=4096,mode=0755"
+MS_NOSUID, MS_NOEXEC = 0x2, 0x8
+_RAW = frozenset({"scsi_generic", "bsg", "nvme", "nvme-generic"})
+"""Subsystems whose nodes give away whole disks."""
+KEYBOARD = ("03", "01")
+"""Interface class and protocol (USB HID 1.11, 4.2): what is typed is nobody's but the machine's."""
+HUB = "09"
+
+
+@dataclass(frozen=True, slots=True)
+class Nodes:
+    """The folders below `base`, whose nodes belong to `uid`."""
+
+    base: Path
+    uid: int
+    subsystems: frozenset[str] = frozenset()
+    """Those of which devices may be had that do not hang on USB: root's word."""
+    sys: Path = SYS
+
+    def put(self, component: str, need: str, major: int, minor: int) -> Path:
+        """Make a node for a device that was plugged in. Raises `NondumError` (HELPER_REFUSED)."""
+        self._check(major, minor)
+        self._mount()
+        folder = self.base / component
+        folder.mkdir(mode=0o755, exist_ok=True)
+        node, fresh = folder / need, folder / f".{need}"
+        fresh.unlink(missing_ok=True)
+        os.mknod(fresh, stat.S_IFCHR | 0o600, os.makedev(major, minor))
+        os.chown(fresh, self.uid, -1)
+        fresh.rename(node)  # whoever looks finds the old one or the new one
+        return node
+
+    def take(self, component: str, need: str) -> None:
+        """Remove a node; none there is fine."""
+        (self.base / component / need).unlink(missing_ok=True)
+
+    def clear(self, component: str) -> None:
+        """Remove all nodes of a component; of all where that is empty."""
+        if not self.base.is_dir():
+            return
+        for folder in (self.base / component,) if component else tuple(self.base.iterdir()):
+            with contextlib.suppress(FileNotFoundError):
+                for node in tuple(folder.iterdir()):
+                    node.unlink(missing_ok=True)
+                folder.rmdir()
+
+    def _check(self, major: int, minor: int) -> None:
+        link = self.sys / "dev/char" / f"{major}:{minor}"
+        if not link.exists():
+            raise refused("there is no such device", f"{major}:{minor}")
+        device = link.resolve()
+        subsystem = (device / "subsystem").resolve().name
+        if subsystem in _RAW or _is_keyboard(device) or _attribute(device, "bDeviceClass") == HUB:
+            raise refused("a component is not given disks, keyboards or hubs", f"{major}:{minor}")
+        if not _usb(device) and subsystem not in self.subsystems:
+            raise refused("it does not hang on USB", f"{major}:{minor}")
+
+    def _mount(self) -> None:
+        self.base.mkdir(mode=0o755, parents=True, exist_ok=True)
+        if not os.statvfs(self.base).f_flag & os.ST_NODEV:
+            return
+        libc = ctypes.CDLL(None, use_errno=True)
+        flags = ctypes.c_ulong(MS_NOSUID | MS_NOEXEC)
+        if libc.mount(b"nondum", os.fsencode(self.base), b"tmpfs", flags, SIZE.encode()) != 0:
+            raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()), str(self.base))
+
+
+def _usb(device: Path) -> tuple[Path, ...]:
+    """The device and what it hangs on, as far as the bus's own top; none: not on USB."""
+    line = (device, *device.parents)
+    tops = [n for n, at in enumerate(line) if at.name.startswith("usb") and at.name[3:].isdigit()]
+    return line[: tops[0]] if tops else ()
+
+
+def _is_keyboard(device: Path) -> bool:
+    """Whether it, an interface that it hangs on, or one that it has, is a keyboard."""
+    interfaces = (*_usb(device), *device.glob("*:*"))
+    return any(
+        (_attribute(at, "bInterfaceClass"), _attribute(at, "bInterfaceProtocol")) == KEYBOARD
+        for at in interfaces
+    )
+
+
+def _attribute(device: Path, name: str) -> str:
+    try:
+        return (device / name).read_text(encoding="ascii").strip()
+    except (OSError, UnicodeDecodeError):
+        return ""

@@ -1,0 +1,101 @@
+"""The seam of what needs root: done in this process, by the helper, or refused."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Protocol
+
+from nondum.host.cgroups.cage import Tree
+from nondum.host.cgroups.cages import NoTree
+from nondum.host.drives import mounting
+from nondum.host.helper.client import SOCKET, HelperClient
+from nondum.sdk.errors import InstallFailed, Problem
+
+
+class Privileged(Protocol):
+    """What a daemon needs root for. All of it may block: not for the loop."""
+
+    def mount(self, node: Path, root: Path, filesystem: str, drive: str, use: str) -> Path:
+        """Mount a drive, and tell where: at `root`, or where the helper has its mounts.
+
+        `use` is `read`, or `handover` to another host: a drive may be mounted once for each.
+
+        Raises `PayloadRefused` (FS_UNSUPPORTED, FS_ERROR), `DriveGone`, `InstallFailed`.
+        """
+        ...
+
+    def unmount(self, root: Path, drive: str, use: str) -> None:
+        """Detach what was mounted so; nothing there is fine."""
+        ...
+
+    def unmount_all(self, folder: Path) -> None:
+        """Detach all drives of a daemon that has died."""
+        ...
+
+    def put_node(self, component: str, need: str, node: Path) -> Path:
+        """A node of a device that this daemon's user may open. Raises `NondumError`."""
+        ...
+
+    def take_node(self, component: str, need: str) -> None:
+        """Remove a node that was made for a component."""
+        ...
+
+    def cages(self) -> Tree:
+        """Where cages are that this process may not make itself."""
+        ...
+
+
+class InProcess:
+    """For a daemon that is root."""
+
+    def mount(self, node: Path, root: Path, filesystem: str, drive: str, use: str) -> Path:
+        """Mount a drive (see `Privileged`)."""
+        mounting.mount(node, root, filesystem, drive=drive)
+        return root
+
+    def unmount(self, root: Path, drive: str, use: str) -> None:
+        """Detach what is mounted there."""
+        mounting.unmount(root)
+
+    def unmount_all(self, folder: Path) -> None:
+        """Detach all drives."""
+        mounting.unmount_all(folder)
+
+    def put_node(self, component: str, need: str, node: Path) -> Path:
+        """Root opens the node itself."""
+        return node
+
+    def take_node(self, component: str, need: str) -> None:
+        """Nothing was made."""
+
+    def cages(self) -> Tree:
+        """None but its own."""
+        return NoTree()
+
+
+class Unprivileged(InProcess):
+    """For a user's daemon without the helper: no drives but slots, and what the user may open."""
+
+    def mount(self, node: Path, root: Path, filesystem: str, drive: str, use: str) -> Path:
+        """Refuse. Raises `InstallFailed` (HELPER_MISSING)."""
+        raise InstallFailed(
+            Problem(
+                "HELPER_MISSING",
+                "drives are mounted by root or by the helper, and neither is here",
+                where=drive,
+                need=str(SOCKET),
+                have="no such socket",
+                fix="`systemctl start nondum-helper.socket`, or run the daemon as root",
+            )
+        )
+
+    def unmount_all(self, folder: Path) -> None:
+        """Nothing was mounted."""
+
+
+def privileged(socket: Path = SOCKET) -> Privileged:
+    """What this process can have done: as root itself, else by the helper if it is there."""
+    if os.geteuid() == 0:
+        return InProcess()
+    return HelperClient(socket) if socket.exists() else Unprivileged()

@@ -1,0 +1,224 @@
+"""What the helper can be asked, as values and as bytes: a packet of JSON for each. Pure.
+
+No request carries a path: drives are named by kernel name and insertion number, folders of devices
+by component, cages by their own names. Everything else is refused before anything is done.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, TypeAlias, get_args, get_type_hints
+
+from nondum.host.cgroups.cage import NAME as CAGE
+from nondum.host.cgroups.cage import CageLimits
+from nondum.sdk.errors import NondumError, Problem
+
+MAX_BYTES = 1024
+"""Of a request."""
+ANSWER_BYTES = 64 * 1024
+
+DEVICE = re.compile(r"[a-z][a-z0-9]{1,31}")
+DRIVE = re.compile(r"[a-z][a-z0-9]{1,31}(-[0-9]{1,19})?")
+USE = re.compile("read|handover")
+COMPONENT = re.compile(r"[a-z0-9][a-z0-9-]{0,62}")
+NEED = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}")
+FILESYSTEM = re.compile(r"[a-z0-9]{0,16}")
+
+
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """Mount a drive for reading; the answer is where."""
+
+    device: str
+    """Kernel name: `sdb1`."""
+    diskseq: int | None
+    """Insertion number; None: the kernel counts none."""
+    filesystem: str
+    """Empty: as the drive says."""
+    use: str
+    """`read` by this host, or `handover` to another: a drive may be mounted once for each."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unmount:
+    """Unmount a drive."""
+
+    drive: str
+    """Kernel name and insertion number: `sdb1-42`."""
+    use: str
+
+
+@dataclass(frozen=True, slots=True)
+class UnmountAll:
+    """Unmount all drives: what a daemon left that died."""
+
+
+@dataclass(frozen=True, slots=True)
+class PutNode:
+    """Make a node of a character device in a component's folder; the answer is where."""
+
+    component: str
+    need: str
+    major: int
+    minor: int
+
+
+@dataclass(frozen=True, slots=True)
+class TakeNode:
+    """Remove a node."""
+
+    component: str
+    need: str
+
+
+@dataclass(frozen=True, slots=True)
+class ClearNodes:
+    """Remove all nodes of a component; empty: of all."""
+
+    component: str
+
+
+@dataclass(frozen=True, slots=True)
+class ListCages:
+    """Which kind of cgroups there is, what they limit, and which cages there are."""
+
+
+@dataclass(frozen=True, slots=True)
+class LookAtCage:
+    """What a cage uses, and the processes in it."""
+
+    cage: str
+
+
+@dataclass(frozen=True, slots=True)
+class MakeCage:
+    """Make a cage without limits."""
+
+    cage: str
+
+
+@dataclass(frozen=True, slots=True)
+class LimitCage:
+    """Set a cage's limits."""
+
+    cage: str
+    memory_mb: int
+    tasks: int
+    cpu_weight: int
+    processors: float
+
+    @property
+    def limits(self) -> CageLimits:
+        """The limits. Raises `ValueError`."""
+        return CageLimits(self.memory_mb, self.tasks, self.cpu_weight, self.processors)
+
+
+@dataclass(frozen=True, slots=True)
+class FillCage:
+    """Put a process of the caller's own user into a cage."""
+
+    cage: str
+    pid: int
+
+
+@dataclass(frozen=True, slots=True)
+class KillCage:
+    """SIGKILL all that is in a cage."""
+
+    cage: str
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveCage:
+    """Remove an empty cage; the answer is whether it is gone."""
+
+    cage: str
+
+
+Request: TypeAlias = (
+    Mount
+    | Unmount
+    | UnmountAll
+    | PutNode
+    | TakeNode
+    | ClearNodes
+    | ListCages
+    | LookAtCage
+    | MakeCage
+    | LimitCage
+    | FillCage
+    | KillCage
+    | RemoveCage
+)
+
+_VERBS: Mapping[str, type[Any]] = {kind.__name__: kind for kind in get_args(Request)}
+_FORMS = {
+    "device": DEVICE,
+    "drive": DRIVE,
+    "use": USE,
+    "component": COMPONENT,
+    "need": NEED,
+    "filesystem": FILESYSTEM,
+    "cage": CAGE,
+}
+_MOST = 2**63 - 1
+
+
+def encode(request: Request) -> bytes:
+    """A request as it travels.
+
+    >>> encode(Unmount("sdb1-7", "read"))
+    b'{"verb":"Unmount","drive":"sdb1-7","use":"read"}'
+    """
+    body = {"verb": type(request).__name__, **asdict(request)}
+    return json.dumps(body, separators=(",", ":")).encode()
+
+
+def parse(data: bytes) -> Request:
+    """The request in a packet. Raises `NondumError` (HELPER_REFUSED)."""
+    if len(data) > MAX_BYTES:
+        raise refused(f"a request is longer than {MAX_BYTES} bytes")
+    try:
+        body = json.loads(data)
+    except (ValueError, RecursionError):
+        raise refused("a request is not JSON") from None
+    if not isinstance(body, dict) or not isinstance(body.get("verb"), str):
+        raise refused("a request has no verb")
+    kind = _VERBS.get(body.pop("verb"))
+    if kind is None:
+        raise refused("there is no such verb")
+    hints = get_type_hints(kind)
+    if body.keys() != hints.keys():
+        raise refused(f"{kind.__name__} takes {', '.join(hints) or 'nothing'}")
+    request: Request = kind(**{name: _typed(name, hints[name], body[name]) for name in hints})
+    if isinstance(request, LimitCage):
+        try:
+            _ = request.limits
+        except ValueError as error:
+            raise refused(str(error)) from None
+    return request
+
+
+def refused(message: str, where: str = "") -> NondumError:
+    """What the helper answers when it will not."""
+    fix = "this is for nondum's own daemon: report it, if that was the one who asked"
+    return NondumError(Problem("HELPER_REFUSED", message, where=where, fix=fix))
+
+
+def _typed(name: str, hint: Any, value: Any) -> Any:
+    if hint is str:
+        form = _FORMS[name]
+        is_none = name == "component" and value == ""
+        if not isinstance(value, str) or not (is_none or form.fullmatch(value)):
+            raise refused(f"that is no {name}")
+        return value
+    if value is None and hint == (int | None):
+        return None
+    if hint is float and type(value) in (int, float):
+        return float(value)
+    if type(value) is not int or not 0 <= value <= _MOST:
+        raise refused(f"{name} is no number")
+    return value

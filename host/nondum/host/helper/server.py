@@ -1,0 +1,132 @@
+"""Listens for the daemon: one user, small packets, a child for each connection, and an early end.
+
+The socket comes from systemd (sd_listen_fds(3)), which starts the helper when somebody connects.
+What a drive makes hang, hangs one child; the others go on.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import signal
+import socket
+import struct
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from nondum.host.helper import requests
+from nondum.host.helper.requests import refused
+from nondum.host.helper.service import Service
+from nondum.sdk.errors import InstallFailed, NondumError, Problem
+
+IDLE_S = 30.0
+"""Without a question for so long, the helper ends; systemd keeps listening."""
+QUESTION_S = 5.0
+"""From a connection to its question."""
+DRIVE_S = 12.0
+"""After that a child that hangs in its drive is killed, as far as it can be."""
+MOST_CHILDREN = 32
+_CREDENTIALS = struct.Struct("3i")
+
+
+class Server:
+    """Serves connections until nobody comes any more."""
+
+    def __init__(self, listening: socket.socket, service: Service, idle_s: float = IDLE_S) -> None:
+        self._listening, self._service, self._idle_s = listening, service, idle_s
+        self._children: set[int] = set()
+
+    def run(self) -> None:
+        """Serve; returns after `idle_s` without a connection and with no child left."""
+        self._listening.settimeout(0)
+        while True:
+            ready, _, _ = select.select([self._listening], [], [], self._idle_s)
+            self._reap()
+            if ready:
+                self._accept()
+            elif not self._children:
+                return
+
+    def _accept(self) -> None:
+        try:
+            connection, _ = self._listening.accept()
+        except OSError:  # it has gone again
+            return
+        with connection:
+            if _peer(connection) != self._service.uid:
+                _say(connection, _failure(refused("this user is not served")))
+            elif len(self._children) >= MOST_CHILDREN:
+                _say(connection, _failure(_busy()))
+            else:
+                self._children.add(_child(lambda: self._answer(connection)))
+
+    def _answer(self, connection: socket.socket) -> None:
+        self._listening.close()
+        connection.settimeout(QUESTION_S)
+        _say(connection, answer(connection, self._service))
+
+    def _reap(self) -> None:
+        while self._children:
+            pid, _ = os.waitpid(-1, os.WNOHANG)
+            if pid == 0:
+                return
+            self._children.discard(pid)
+
+
+def answer(connection: socket.socket, service: Service) -> dict[str, Any]:
+    """Take one question and do what it asks; the answer, or what is wrong."""
+    try:
+        # Without room for descriptors none is taken over: the kernel closes them.
+        data, _, flags, _ = connection.recvmsg(requests.MAX_BYTES + 1)
+        if flags & (socket.MSG_TRUNC | socket.MSG_CTRUNC):
+            raise refused("a question is one short packet, and brings no descriptors")
+        return service.serve(requests.parse(data))
+    except NondumError as error:
+        return _failure(error)
+    except OSError as error:
+        text = f"{error.strerror or error} ({error.filename})" if error.filename else str(error)
+        return _failure(InstallFailed(Problem("HELPER_FAILED", text, fix=_LOOK)))
+
+
+def _child(work: Callable[[], None]) -> int:
+    pid = os.fork()
+    if pid:
+        return pid
+    try:
+        signal.alarm(int(DRIVE_S))
+        work()
+    except Exception as error:
+        sys.stderr.write(f"{error!r}\n")
+    finally:
+        os._exit(0)
+
+
+def _peer(connection: socket.socket) -> int:
+    """The user at the other end, as it was when it connected (SO_PEERCRED, unix(7))."""
+    told = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+    uid: int = _CREDENTIALS.unpack(told)[1]
+    return uid
+
+
+def _say(connection: socket.socket, said: dict[str, Any]) -> None:
+    try:
+        connection.send(json.dumps(said, separators=(",", ":")).encode(), socket.MSG_DONTWAIT)
+    except OSError:  # nobody waits for it
+        return
+
+
+def _failure(error: NondumError) -> dict[str, Any]:
+    problems = [problem.to_dict() for problem in error.problems]
+    return {"error": type(error).__name__, "problems": problems}
+
+
+def _busy() -> InstallFailed:
+    problem = Problem(
+        "HELPER_BUSY", f"the helper does {MOST_CHILDREN} things at once already", fix=_LOOK
+    )
+    return InstallFailed(problem)
+
+
+_LOOK = "`journalctl -u nondum-helper` says more"
