@@ -11,7 +11,7 @@ from pathlib import Path
 
 from nondum.host.catalogue.records import Step
 from nondum.host.catalogue.state import HostState
-from nondum.host.drives import mounting
+from nondum.host.helper import privileged
 from nondum.host.workers import scratch
 from nondum.sdk.errors import ConfigRefused, Problem
 from nondum.wheelhouse import disk
@@ -136,7 +136,7 @@ def claim(folders: Folders) -> int:
 def sweep(folders: Folders, state: HostState) -> tuple[Path, ...]:
     """Delete every folder and undo every mount that a recovered state does not account for."""
     try:
-        mounting.unmount_all(folders.mounts)
+        privileged().unmount_all(folders.mounts)
     except OSError:
         log.exception("what is mounted below %s could not be undone", folders.mounts)
     orphans = tuple(_orphans(folders, state))
