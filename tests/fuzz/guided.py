@@ -15,7 +15,7 @@ from pathlib import Path
 
 import atheris
 
-with atheris.instrument_imports(include=["nondum"]):
+with atheris.instrument_imports(include=["nondum", "packaging"]):
     from tests.fuzz.targets import TARGETS
     from tests.fuzz.trial import MOST_BYTES, tried
 
@@ -64,7 +64,8 @@ def main(name: str, cases: int, folder: Path) -> None:
     corpus = folder / "corpus"
     corpus.mkdir(exist_ok=True)
     fuzzing = Fuzzing(name, folder / "report.json")
-    for number, seed in enumerate(fuzzing.target.seeds()):
+    seeds = [*fuzzing.target.seeds(), *fuzzing.target.refused()]
+    for number, seed in enumerate(seeds):
         (corpus / f"seed-{number}").write_bytes(seed)
     words = folder / "tokens"
     lines = ("".join(f"\\x{byte:02x}" for byte in token) for token in fuzzing.target.tokens)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+LONGEST = 8 * 1024
 Read = Callable[[bytes], object]
 
 
@@ -16,10 +17,12 @@ class Target:
     read: Read
     """Takes any bytes: gives a value, or raises an error of nondum's own tree and nothing else."""
     seeds: Callable[[], list[bytes]]
-    """Inputs that it accepts, or nearly: what mutation starts from."""
+    """Inputs that it accepts: what mutation starts from."""
+    refused: Callable[[], list[bytes]] = list
+    """Inputs that it does not accept, to start from as well."""
     tokens: tuple[bytes, ...] = ()
     """Pieces that mean something to it."""
     cases: int = 200_000
     """How many inputs the long run makes."""
-    longest: int = 8 * 1024
+    longest: int = LONGEST
     """Bytes of the longest input."""

@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from packaging.tags import sys_tags
-from tests.fuzz.target import Target
+from tests.fuzz.target import LONGEST, Target
 from tests.payloads import lock_text, make_wheel
+from tests.wheelhouse.hostile import WHEELS
 from tests.wheelhouse.hostile_wheels import NAME, WheelBuilder
 
 from nondum.host import config
@@ -26,7 +27,7 @@ from nondum.planning.contribution import Contribution
 from nondum.planning.parse import parse_formula
 from nondum.sdk import wire
 from nondum.sdk.description import Behaviour, Fragment, PluginDescription
-from nondum.sdk.errors import Problem
+from nondum.sdk.errors import FragmentRefused, PayloadRefused, Problem
 from nondum.transport.bridge import packets as bridge
 from nondum.transport.discovery import hint
 from nondum.transport.discovery import packets as discovery
@@ -172,15 +173,19 @@ def _read_wheel(data: bytes) -> object:
     """As `verify` and the store read it: laid out, what it needs told, every member unpacked."""
     view = memoryview(data)
     layout = wheel.lay_out(view, NAME)
-    if layout.problems:
-        return layout
+    wheel.refuse_if_any(layout.problems)
     for file in layout.files:
         try:
             for _ in archive.unpack(view, file.member):
                 pass
-        except ValueError:  # how a damaged member is told to `wheel`
-            return None
+        except ValueError as error:  # how a damaged member is told to `wheel`
+            raise PayloadRefused(wheel.damaged(file, NAME, str(error))) from error
     return layout.needs.requirements
+
+
+def _hostile_wheels() -> list[bytes]:
+    made = (case.build(Path("canary")) for case in WHEELS if case.filename == NAME)
+    return [data for data in made if len(data) <= LONGEST]
 
 
 def _described() -> PluginDescription:
@@ -196,9 +201,9 @@ def _indexes() -> list[bytes]:
 DOMAIN = b"""\
 (define (domain lamp)
   (:requirements :strips :typing)
-  (:types lamp - pointer)
+  (:types lamp - pointer colour - object)
   (:constants red - colour)
-  (:predicates (lit ?l - lamp ?c - colour))
+  (:predicates (lit ?l - lamp ?c - colour) (bright ?l - lamp))
   (:derived (bright ?l - lamp) (exists (?c - colour) (lit ?l ?c)))
   (:action light
     :parameters (?l - lamp ?c - colour)
@@ -207,7 +212,7 @@ DOMAIN = b"""\
                  (increase (total-cost) 3))))
 """
 PROBLEM = b"""\
-(define (problem p) (:domain d) (:objects a b - lamp) (:init (lit a red)) (:goal (lit b red)))
+(define (problem lamp) (:domain lamp) (:objects source - target) (:init (senses lamp source)))
 """
 GOAL = b"(and (lit a red) (not (lit b red)))"
 PDDL = (b"(and", b"(or", b"(not", b"(forall (?x - t)", b"(exists (?x)", b"(when", b"(either a b)")
@@ -216,7 +221,10 @@ PDDL = (b"(and", b"(or", b"(not", b"(forall (?x - t)", b"(exists (?x)", b"(when"
 def _read_fragment(text: str) -> object:
     """Parsed, and then checked as one component's claim."""
     said = Contribution("lamp", "spot", "lamp", "1.0", fragments=(Fragment(WHERE, text),))
-    return claims_of.__wrapped__(said)
+    claims = claims_of.__wrapped__(said)
+    if claims.problems:
+        raise FragmentRefused(*claims.problems)
+    return claims
 
 
 def _frames() -> list[bytes]:
@@ -362,48 +370,51 @@ TARGETS = (
         "signature",
         _read_signature,
         _signatures,
-        (sshsig.BEGIN.encode(), sshsig.END.encode(), b"U1NIU0lH", b"\n"),
+        tokens=(sshsig.BEGIN.encode(), sshsig.END.encode(), b"U1NIU0lH", b"\n"),
         cases=1_000_000,
     ),
-    Target("trust file", of_text(lambda t: trust_file.parse(t, WHERE)), _trust_files, TOML),
+    Target("trust file", of_text(lambda t: trust_file.parse(t, WHERE)), _trust_files, tokens=TOML),
     Target(
         "contents list",
         lambda data: contents.parse(data, WHERE),
         _contents,
-        (b"release: ", b"../", b"\n\n", b"  ", SHA256.encode()),
+        tokens=(b"release: ", b"../", b"\n\n", b"  ", SHA256.encode()),
         cases=1_000_000,
     ),
-    Target("manifest", of_text(lambda t: manifest.parse(t, WHERE)), lambda: [MANIFEST], TOML),
-    Target("lock", of_text(_read_lock), _locks, (*TOML, b"hashes", b"vcs", b"archive", b"url")),
+    Target(
+        "manifest", of_text(lambda t: manifest.parse(t, WHERE)), lambda: [MANIFEST], tokens=TOML
+    ),
+    Target(
+        "lock", of_text(_read_lock), _locks, tokens=(*TOML, b"hashes", b"vcs", b"archive", b"url")
+    ),
     Target(
         "wheel",
         _read_wheel,
         _wheels,
-        (b"PK\x01\x02", b"PK\x03\x04", b"PK\x05\x06", b"PK\x06\x06", b"\xff\xff\xff\xff"),
+        _hostile_wheels,
+        tokens=(b"PK\x01\x02", b"PK\x03\x04", b"PK\x05\x06", b"PK\x06\x06", b"\xff\xff\xff\xff"),
     ),
-    Target(
-        "index", lambda data: index.parse(data, WHERE), _indexes, (b"null", b"[[", b"{}", b"1e999")
-    ),
-    Target("fragment", of_text(_read_fragment), lambda: [DOMAIN, PROBLEM], PDDL),
+    Target("index", lambda data: index.parse(data, WHERE), _indexes, tokens=JSON),
+    Target("fragment", of_text(_read_fragment), lambda: [DOMAIN, PROBLEM], tokens=PDDL),
     Target(
         "goal",
         of_text(lambda t: parse_formula(t, WHERE)),
         lambda: [GOAL],
-        PDDL,
+        tokens=PDDL,
     ),
-    Target("worker frame", wire.decode, _frames, MSGPACK, cases=1_000_000),
-    Target("peer message", messages.decode, _peer_messages, MSGPACK),
-    Target("pairing message", pairing_messages.decode, _pairing_messages, MSGPACK),
-    Target("certificate", certificate.parse, _certificates, (b": ", b"\n", b"+0000")),
-    Target("datagram", _read_datagram, _answers, MSGPACK),
-    Target("TXT record", of_text(_read_txt), _txts, (b'"pk"', b'"proto"', b'"epoch"', b",")),
-    Target("stream, asked", bridge.read_asked, _asked, MSGPACK),
-    Target("stream, told", lambda data: bridge.read_told([data]), _told, MSGPACK),
-    Target("control request", control.decode_request, _requests, JSON),
+    Target("worker frame", wire.decode, _frames, tokens=MSGPACK, cases=1_000_000),
+    Target("peer message", messages.decode, _peer_messages, tokens=MSGPACK),
+    Target("pairing message", pairing_messages.decode, _pairing_messages, tokens=MSGPACK),
+    Target("certificate", certificate.parse, _certificates, tokens=(b": ", b"\n", b"+0000")),
+    Target("datagram", _read_datagram, _answers, tokens=MSGPACK),
+    Target("TXT record", of_text(_read_txt), _txts, tokens=(b'"pk"', b'"proto"', b'"epoch"', b",")),
+    Target("stream, asked", bridge.read_asked, _asked, tokens=MSGPACK),
+    Target("stream, told", lambda data: bridge.read_told([data]), _told, tokens=MSGPACK),
+    Target("control request", control.decode_request, _requests, tokens=JSON),
     Target(
         "configuration",
         of_text(_read_config),
         lambda: [CONFIG],
-        TOML,
+        tokens=TOML,
     ),
 )

@@ -20,7 +20,7 @@ each = pytest.mark.parametrize("target", TARGETS, ids=[target.name for target in
 
 @functools.cache
 def seeds_of(target: Target) -> list[bytes]:
-    return target.seeds()
+    return [*target.seeds(), *target.refused()]
 
 
 @each
