@@ -193,8 +193,10 @@ def misfits(
 ) -> Iterator[Problem]:
     """Why a sound wheel is not for this payload or host."""
     yield from wheel.hook_problems(layout.left_out, filename, manifest.startup_hooks)
+    if layout.problems:  # what it needs is not known then
+        return
     python = SpecifierSet(layout.needs.python)
-    if not layout.problems and not python.contains(facts.python, prereleases=True):
+    if not python.contains(facts.python, prereleases=True):
         yield Problem(
             "WHEEL_INCOMPATIBLE",
             "is not for this Python, whatever its name says",

@@ -17,7 +17,8 @@ MAX_BYTES = 64 * 1024
 MAX_DOTS = 8
 """Parts of a dotted key: tomllib takes quadratic time over them."""
 
-_MANY_DOTS = re.compile(r"(?:[\w\"'-]+\s*\.\s*){" + str(MAX_DOTS) + "}")
+# Begun only where a part begins: a long word would be read again from each of its letters.
+_MANY_DOTS = re.compile(r"(?<![\w\"'-])(?:[\w\"'-]+\s*\.\s*){" + str(MAX_DOTS) + "}")
 _HEADER = re.compile(r"\s*(\[\[?)\s*([\w.-]+)\s*\]")
 _ASSIGNMENT = re.compile(r"\s*[\"']?([\w-]+)[\"']?\s*=")
 

@@ -1,0 +1,103 @@
+"""One hostile drive: how it is made, and what it must come to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.faults.hostile.draft import Draft, Sign, draft, unsigned
+
+NO_PAYLOAD = "DRIVE_NOT_PAYLOAD"
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What a drive is made with."""
+
+    drive: Path
+    """An empty folder that is to become the drive."""
+    number: int
+    canary: Path
+    """Whatever could run makes this file, which must never be there."""
+    sign: Sign = unsigned
+
+    @property
+    def payload_id(self) -> str:
+        """The id of the one payload on it."""
+        return f"org.hostile.h{self.number}"
+
+    @property
+    def folder(self) -> Path:
+        """Where that payload lies."""
+        return self.drive / "nondum" / self.payload_id
+
+    def draft(self) -> Draft:
+        """A sound payload, to be spoilt."""
+        return draft(self.payload_id)
+
+    def python(self) -> bytes:
+        """Python that makes the canary."""
+        return f"import pathlib; pathlib.Path({str(self.canary)!r}).touch()\n".encode()
+
+    def shell(self) -> bytes:
+        """The same for a shell."""
+        return f"#!/bin/sh\n: > '{self.canary}'\n".encode()
+
+
+@dataclass(frozen=True)
+class HostileDrive:
+    """A drive that must be refused, or seen through."""
+
+    name: str
+    """What is wrong with it, in a word or two."""
+    code: str
+    """The one code that it is told with; empty: it is sound in spite of what lies around it."""
+    make: Callable[[Bench], None]
+    is_image: bool = False
+    """It is made as a file `<drive>.img`, for a block device."""
+    also: frozenset[str] = frozenset()
+    """Further codes that may be told, since that is wrong with it, too."""
+
+    def is_right(self, codes: Collection[str]) -> bool:
+        """Whether these codes, and no others, are what it is to be told with."""
+        told = set(codes)
+        return told - self.also == ({self.code} if self.code else set())
+
+
+Spoil = Callable[[Draft], Draft]
+Tamper = Callable[[Bench], None]
+
+
+def spoilt(name: str, code: str, spoil: Spoil) -> HostileDrive:
+    """A payload that was wrong already when it was sealed."""
+
+    def make(bench: Bench) -> None:
+        spoil(bench.draft()).write(bench.drive, bench.sign)
+
+    return HostileDrive(name, code, make)
+
+
+def tampered(name: str, code: str, tamper: Tamper) -> HostileDrive:
+    """A sound drive that something was done to afterwards."""
+
+    def make(bench: Bench) -> None:
+        bench.draft().write(bench.drive, bench.sign)
+        tamper(bench)
+
+    return HostileDrive(name, code, make)
+
+
+def edited(name: str, code: str, path: str, old: str, new: str) -> HostileDrive:
+    """A payload with other words in one of its files; `LOCK` is its lock."""
+
+    def spoil(made: Draft) -> Draft:
+        where = made.lock if path == LOCK else path
+        return made.edited(where, old.replace("ID", made.component), new)
+
+    return spoilt(name, code, spoil)
+
+
+LOCK = "pylock"
+MANIFEST = "payload.toml"
+INDEX = "index.json"
