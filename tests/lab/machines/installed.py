@@ -1,0 +1,109 @@
+"""nondum in a machine: installed, configured, started, and met as its operator meets it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from tests.lab.machines.machine import Machine
+
+PATIENCE_S = 240.0
+"""Emulated processors that others share are slow; nothing here is judged by its time."""
+CONFIGURATION = """
+[host]
+name = "spot"
+[drives]
+allow_unsigned = true
+[peers]
+enabled = false
+"""
+INSTALL = """
+set -eu
+mount -o ro /dev/vdb /opt/nondum
+ln -sf /opt/nondum/bin/nondum /usr/local/bin/nondum
+cp /opt/nondum/packaging/systemd/*.service /etc/systemd/system/
+cp /opt/nondum/packaging/systemd/*.s[!e]* /etc/systemd/system/ 2>/dev/null || true
+cp /opt/nondum/packaging/sysusers.d/*.conf /usr/lib/sysusers.d/ 2>/dev/null || true
+cp /opt/nondum/packaging/tmpfiles.d/*.conf /usr/lib/tmpfiles.d/ 2>/dev/null || true
+systemd-sysusers
+systemd-tmpfiles --create
+systemctl daemon-reload
+"""
+SERVICE = "nondum.service"
+T = TypeVar("T")
+View = dict[str, Any]
+
+
+class Installed:
+    """The nondum of one machine."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+
+    def install(self) -> None:
+        """Install it from the machine's first further disk; nothing is started."""
+        self.configure()
+        self.machine.run(INSTALL)
+
+    def configure(self, more: str = "") -> None:
+        """Write its configuration, with some lines more."""
+        self.machine.put("/etc/nondum/host.toml", CONFIGURATION + more)
+
+    def start(self) -> None:
+        """Start the service and wait until its command line is answered.
+
+        Raises `AssertionError`, with what it said, when systemd has to start it again.
+        """
+        self.machine.run(f"systemctl start {SERVICE}", timeout_s=PATIENCE_S)
+        self.machine.until("an answer", self._first_answer, PATIENCE_S)
+
+    def stop(self) -> None:
+        """Stop the service."""
+        self.machine.run(f"systemctl stop {SERVICE}", timeout_s=PATIENCE_S)
+
+    def forget(self) -> None:
+        """Stop the service, and delete all that it knows."""
+        self.stop()
+        self.machine.run("rm -rf /var/lib/nondum/* /var/lib/private/nondum/*")
+
+    def status(self) -> View | None:
+        """What `nondum status --json` shows; None while nobody answers."""
+        seen = self.machine.attempt("nondum status --json", timeout_s=PATIENCE_S)
+        return json.loads(seen.out) if seen.status == 0 else None
+
+    def until(self, what: str, look: Callable[[View], T | None]) -> T:
+        """Look at the status until there is something to see."""
+
+        def found() -> T | None:
+            view = self.status()
+            return look(view) if view is not None else None
+
+        return self.machine.until(what, found, PATIENCE_S)
+
+    def until_payload(self, payload: str, state: str) -> View:
+        """Wait until a payload is in a state, or shown no more for the state `gone`."""
+
+        def found(view: View) -> View | None:
+            rows = [row for row in view["payloads"] if row["payload"] == payload]
+            if not rows:
+                return {} if state == "gone" else None
+            if rows[0]["state"] in ("refused", "quarantined") and state not in rows[0]["state"]:
+                raise AssertionError(f"{payload} is {rows[0]['state']}: {rows[0]['problems']}")
+            return rows[0] if rows[0]["state"] == state else None
+
+        return self.until(f"{payload} {state}", found)
+
+    def _first_answer(self) -> View | None:
+        if self.property("NRestarts") != "0":
+            raise AssertionError(f"{SERVICE} does not start\n{self.journal[-4000:]}")
+        return self.status()
+
+    def property(self, name: str) -> str:
+        """What systemd says of the service: see org.freedesktop.systemd1(5)."""
+        return self.machine.run(f"systemctl show --value -p {name} {SERVICE}").strip()
+
+    @property
+    def journal(self) -> str:
+        """What systemd's journal has of the service."""
+        return self.machine.run(f"journalctl -o short-monotonic -u {SERVICE} --no-pager")

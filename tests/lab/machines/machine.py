@@ -1,0 +1,192 @@
+"""One machine under test: a whole computer, booted, acted upon from outside and from inside."""
+
+from __future__ import annotations
+
+import itertools
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+from tests.lab.machines.agent import Agent, CommandFailed, MachineSilent, Outcome
+from tests.lab.machines.building import Built
+from tests.lab.machines.cache import call
+from tests.lab.machines.qmp import Qmp, QmpError
+
+BOOT_S = 240.0
+"""Sixteen seconds on an idle machine; this one may be shared by many."""
+POLL_S = 0.2
+T = TypeVar("T")
+
+
+class Machine:
+    """A machine with a disk of its own, which outlives its boots. Call `close` at last."""
+
+    def __init__(
+        self, built: Built, work: Path, *, memory_mb: int = 2048, drives: tuple[Path, ...] = ()
+    ) -> None:
+        """`work` keeps its disk, console and sockets (a short path: see unix(7)); `drives` are
+        read-only disks that it has for good, `/dev/vdb` and on."""
+        self.built, self.work = built, work
+        self._memory_mb, self._drives = memory_mb, drives
+        self._qemu: subprocess.Popen[bytes] | None = None
+        self._plugged = itertools.count(1)
+        work.mkdir(parents=True, exist_ok=True)
+        self._disk = work / "disk.qcow2"
+        overlay = ("-q", "-f", "qcow2", "-F", "raw", "-b", built.disk)
+        call("qemu-img", "create", *overlay, self._disk)
+
+    # Its life
+
+    def boot(self, *, more: str = "") -> float:
+        """Switch it on and wait for the agent; answers how many seconds that took.
+
+        `more` goes on the kernel's command line. Raises `MachineSilent` with its console's end.
+        """
+        began = time.monotonic()
+        with (self.work / "qemu.log").open("ab") as log:
+            self._qemu = subprocess.Popen(
+                self._command(more), stdin=subprocess.DEVNULL, stdout=log, stderr=log
+            )
+        try:
+            self.qmp = self._connected(lambda: Qmp(self.work / "qmp"))
+            self.agent = self._connected(lambda: Agent(self.work / "agent"))
+            self.agent.wait_for_boot(BOOT_S)
+        except MachineSilent as error:
+            raise MachineSilent(f"{error}\n{self.last_words()}") from None
+        return time.monotonic() - began
+
+    def cut_power(self) -> None:
+        """End it at once: what its disk was not told to keep is lost."""
+        assert self._qemu is not None
+        self._qemu.send_signal(signal.SIGKILL)
+        self._see_end()
+
+    def shut_down(self, timeout_s: float = BOOT_S) -> None:
+        """Have it go down as from its power button's menu."""
+        assert self._qemu is not None
+        self.agent.run("systemctl", "--no-block", "poweroff")
+        self._qemu.wait(timeout_s)
+        self._see_end()
+
+    def close(self) -> None:
+        """End it, if it runs."""
+        if self._qemu is not None:
+            self.cut_power()
+
+    # What happens inside
+
+    def run(self, command: str, *, timeout_s: float = 60.0) -> str:
+        """Run a line of shell as root; answers its output. Raises `CommandFailed`."""
+        outcome = self.attempt(command, timeout_s=timeout_s)
+        if outcome.status != 0:
+            raise CommandFailed(str(outcome))
+        return outcome.out
+
+    def attempt(self, command: str, *, timeout_s: float = 60.0) -> Outcome:
+        """Run a line of shell as root, whatever comes of it."""
+        outcome = self.agent.run("/bin/sh", "-c", command, timeout_s=timeout_s)
+        with (self.work / "commands.log").open("a", encoding="utf-8") as log:
+            log.write(f"$ {command}\n{outcome.out}{outcome.err}[{outcome.status}]\n")
+        return outcome
+
+    def put(self, path: str, content: str | bytes, mode: int = 0o644) -> None:
+        """Write a file inside."""
+        data = content.encode() if isinstance(content, str) else content
+        self.agent.put(path, data, mode)
+
+    def until(self, what: str, look: Callable[[], T | None], timeout_s: float = BOOT_S) -> T:
+        """Look until there is something to see. Raises `AssertionError` when there is not."""
+        deadline = time.monotonic() + timeout_s
+        while (seen := look()) is None:
+            if time.monotonic() > deadline:
+                raise AssertionError(f"not seen in {timeout_s:.0f} s: {what}")
+            time.sleep(POLL_S)
+        return seen
+
+    def wait_for_system(self) -> str:
+        """Wait until systemd has started all that it starts; answers its verdict."""
+        return self.attempt("systemctl is-system-running --wait", timeout_s=BOOT_S).out.strip()
+
+    # What happens outside
+
+    def plug(self, image: Path) -> str:
+        """Plug a USB stick in; answers its name for `pull`."""
+        name = f"stick{next(self._plugged)}"
+        file = {"driver": "file", "filename": str(image)}
+        self.qmp.do("blockdev-add", driver="raw", node_name=name, file=file)
+        stick = {"drive": name, "id": name, "bus": "xhci.0", "removable": True}
+        self.qmp.do("device_add", driver="usb-storage", **stick)
+        return name
+
+    def pull(self, name: str) -> None:
+        """Pull a stick out, whatever it is doing."""
+        self.qmp.do("device_del", id=name)
+        self.until("the stick let go", lambda: True if self._let_go(name) else None)
+
+    # What is left to see
+
+    @property
+    def console(self) -> Path:
+        """All that its terminal showed, over all boots."""
+        return self.work / "console.log"
+
+    def last_words(self, lines: int = 30) -> str:
+        """The end of its console and of what QEMU said."""
+        texts = [self.work / "qemu.log", self.console]
+        said = [t.read_text(errors="replace").splitlines()[-lines:] for t in texts if t.exists()]
+        return "\n".join(line for part in said for line in part)
+
+    # Inside
+
+    def _command(self, more: str) -> list[str | Path]:
+        recipe = self.built.recipe
+        serial = f"file,id=console,path={self.console},append=on"
+        disks: list[str] = []
+        for image in self._drives:
+            disks += ["-drive", f"file={image},format=raw,if=virtio,readonly=on"]
+        return [
+            *("nice", "-n", "15", recipe.program, "-nodefaults", "-display", "none", "-no-reboot"),
+            *("-accel", "tcg,thread=multi,tb-size=512", *recipe.machine),
+            *("-smp", "2", "-m", str(self._memory_mb)),
+            *("-kernel", self.built.kernel, "-initrd", self.built.initramfs),
+            *("-append", f"console={recipe.terminal} panic=-1 quiet {more}".strip()),
+            *("-drive", f"file={self._disk},format=qcow2,if=virtio", *disks),
+            *("-chardev", serial, "-serial", "chardev:console"),
+            *("-qmp", f"unix:{self.work / 'qmp'},server=on,wait=off"),
+            *("-chardev", f"socket,id=agent,path={self.work / 'agent'},server=on,wait=off"),
+            *("-device", "virtio-serial"),
+            *("-device", "virtserialport,chardev=agent,name=org.nondum.lab"),
+            *("-device", "qemu-xhci,id=xhci,p2=8,p3=8"),
+            *("-device", "virtio-rng"),
+        ]
+
+    def _connected(self, connect: Callable[[], T]) -> T:
+        deadline = time.monotonic() + BOOT_S
+        while time.monotonic() < deadline:
+            assert self._qemu is not None
+            if self._qemu.poll() is not None:
+                raise MachineSilent(f"QEMU exited with {self._qemu.returncode}")
+            try:
+                return connect()
+            except OSError:
+                time.sleep(POLL_S)
+        raise MachineSilent("QEMU does not listen")
+
+    def _let_go(self, name: str) -> bool:
+        try:
+            self.qmp.do("blockdev-del", node_name=name)
+        except QmpError as error:
+            if "in use" in str(error):
+                return False
+            raise
+        return True
+
+    def _see_end(self) -> None:
+        assert self._qemu is not None
+        self._qemu.wait()
+        self._qemu = None
+        self.agent.close()
+        self.qmp.close()

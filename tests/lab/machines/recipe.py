@@ -1,0 +1,70 @@
+"""What a machine is made of: its architecture, its system's packages, and how QEMU runs it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+HERE = Path(__file__).parent
+INSIDE = HERE / "inside"
+"""Files that go into the root file system as they are."""
+
+PACKAGES = (
+    *("systemd", "systemd-sysv", "udev", "dbus", "kmod", "procps", "util-linux", "iproute2"),
+    *("python3", "python3-venv", "bubblewrap", "libseccomp2", "busybox-static"),
+    *("e2fsprogs", "dosfstools", "usbutils", "strace"),
+)
+WITHOUT = (
+    *("/usr/share/doc/*", "/usr/share/man/*", "/usr/share/locale/*", "/usr/share/info/*"),
+    *("/usr/share/lintian/*", "/usr/share/bug/*"),
+)
+"""What dpkg leaves out: nobody reads it there."""
+MODULES_WITHOUT = (
+    *("drivers/gpu", "drivers/infiniband", "drivers/net/ethernet", "drivers/net/wireless"),
+    *("drivers/isdn", "drivers/atm", "drivers/staging", "drivers/iio", "sound/soc", "sound/pci"),
+)
+"""Folders of kernel modules for hardware that QEMU does not have."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """One kind of machine. Two recipes that are equal make the same machine."""
+
+    name: str
+    debian: str
+    """Debian's name of the architecture."""
+    kernel: str
+    """The metapackage of its kernel."""
+    program: str
+    """The QEMU that runs it."""
+    machine: tuple[str, ...]
+    """Board and processor, as arguments of that."""
+    terminal: str
+    """The device of its first serial line."""
+    suite: str = "bookworm"
+    packages: tuple[str, ...] = PACKAGES
+    without: tuple[str, ...] = WITHOUT
+    modules_without: tuple[str, ...] = MODULES_WITHOUT
+    disk_mb: int = 3072
+    """Size of its disk, most of it free."""
+
+    @property
+    def key(self) -> str:
+        """A hash of all that its root file system is made of."""
+        parts = [json.dumps(asdict(self), sort_keys=True).encode()]
+        sources = [HERE / "building.py", HERE / "initramfs.py", *sorted(INSIDE.rglob("*"))]
+        parts += [f.read_bytes() for f in sources if f.is_file()]
+        return hashlib.sha256(b"\0".join(parts)).hexdigest()[:16]
+
+
+X86_64 = Recipe(
+    name="x86_64",
+    debian="amd64",
+    kernel="linux-image-amd64",
+    program="qemu-system-x86_64",
+    machine=("-machine", "q35", "-cpu", "max"),
+    terminal="ttyS0",
+)
+RECIPES = {recipe.name: recipe for recipe in (X86_64,)}

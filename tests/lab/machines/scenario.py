@@ -1,0 +1,98 @@
+"""Scenarios: one file each, found by their names, run one after the other."""
+
+from __future__ import annotations
+
+import importlib
+import shutil
+import time
+import traceback
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.lab.machines.agent import MachineSilent
+from tests.lab.machines.cache import cache_folder
+from tests.lab.machines.lab import Lab
+from tests.lab.machines.machine import Machine
+
+FOLDER = Path(__file__).parent / "scenarios"
+PACKAGE = "tests.lab.machines.scenarios"
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """Something that must hold on a real machine."""
+
+    name: str
+    sentence: str
+    """What holds."""
+    run: Callable[[Lab], str | None]
+    """Does it; answers what is worth saying of it, and raises when it does not hold."""
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """How one went."""
+
+    scenario: Scenario
+    seconds: float
+    note: str
+    """Of one that failed: why, in a line."""
+    failure: str = ""
+    kept: Path | None = None
+    """Where consoles and journals of a failed one are."""
+
+
+def scenarios() -> dict[str, Scenario]:
+    """All there are, by name."""
+    return {s.name: s for s in map(_loaded, sorted(FOLDER.glob("[a-z]*.py")))}
+
+
+def run_all(wanted: Iterable[Scenario], lab: Lab) -> Iterator[Result]:
+    """Run scenarios, each whatever became of the others."""
+    for scenario in wanted:
+        began = time.monotonic()
+        try:
+            with lab.scenario():
+                note, failure, kept = _run(scenario, lab)
+                if failure:
+                    raise _Failed
+        except _Failed:
+            pass
+        yield Result(scenario, time.monotonic() - began, note, failure, kept)
+
+
+class _Failed(Exception):
+    """Has the laboratory switch off what a failed scenario used."""
+
+
+def _run(scenario: Scenario, lab: Lab) -> tuple[str, str, Path | None]:
+    try:
+        return scenario.run(lab) or "", "", None
+    except Exception as error:
+        words = str(error).strip().splitlines() or [type(error).__name__]
+        kept = keep(scenario.name, lab.machines)
+        return words[0], "".join(traceback.format_exception(error)), kept
+
+
+def keep(name: str, machines: Iterable[Machine]) -> Path:
+    """Copy consoles, commands and journals to where they stay, in place of those of last time."""
+    folder = cache_folder() / "kept" / name
+    shutil.rmtree(folder, ignore_errors=True)
+    for number, machine in enumerate(machines):
+        target = folder / str(number)
+        target.mkdir(parents=True)
+        for log in machine.work.glob("*.log"):
+            shutil.copy(log, target)
+        try:
+            journal = machine.run("journalctl -b --no-pager -o short-monotonic")
+        except (MachineSilent, AssertionError, OSError) as error:
+            journal = f"{error}\n"
+        (target / "journal.log").write_text(journal, encoding="utf-8")
+    return folder
+
+
+def _loaded(path: Path) -> Scenario:
+    module = importlib.import_module(f"{PACKAGE}.{path.stem}")
+    sentence = (module.__doc__ or "").strip().splitlines()[0]
+    return Scenario(path.stem.replace("_", "-"), sentence, module.run)

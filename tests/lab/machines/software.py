@@ -1,0 +1,130 @@
+"""nondum itself, as a person installs it offline: wheels of this checkout in a venv at /opt/nondum.
+
+The venv is made by the machine's own Python, in its root file system before it is booted, and put
+on a disk of its own: a change of nondum does not cost a new root file system.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import sys
+from pathlib import Path
+
+from tests.lab.machines.building import Built, make_disk
+from tests.lab.machines.cache import call, kept
+from tests.lab.machines.recipe import HERE
+
+CHECKOUT = Path(__file__).parents[3]
+PLAIN = HERE / "plain"
+DISTRIBUTIONS = ("plugins/sdk", "plugins/planner-pyperplan", ".")
+SOURCES = (
+    *("pyproject.toml", "host", "planning", "transport", "wheelhouse", "plugins/sdk"),
+    *("plugins/planner-pyperplan", "packaging", "README.md", "LICENSE"),
+)
+PREFIX = "/opt/nondum"
+DISK_MB = 512
+PYTHON = "3.11"
+"""Debian 12's, as is its C library below."""
+PLATFORMS = (
+    "manylinux_2_36",
+    "manylinux_2_34",
+    "manylinux_2_28",
+    "manylinux_2_17",
+    "manylinux2014",
+)
+
+INSTALL = """
+set -eu
+mount --bind "$1" "$2/opt/nondum"
+mount --bind "$3" "$2/mnt"
+mount -t tmpfs tmpfs "$2/tmp"
+exec chroot "$2" /bin/sh -eu -c '
+    python3 -m venv /opt/nondum
+    /opt/nondum/bin/pip install -q --no-index --find-links /mnt --no-cache-dir \
+        "nondum[fast]" nondum-planner-pyperplan
+'
+"""
+
+
+def software(machine: Built, commit: str | None = None) -> Path:
+    """The image of /opt/nondum with what this checkout has now, or had at a commit; from the cache
+    or made now (ten seconds)."""
+    kind = f"nondum-{machine.recipe.name}"
+    key = f"{_commit_key(commit) if commit else _key()}{machine.folder.name[-6:]}"
+    return kept(f"{kind}-{key}", lambda folder: _make(machine, commit, folder)) / "disk.img"
+
+
+def _make(machine: Built, commit: str | None, folder: Path) -> None:
+    wheels, venv = folder / "wheels", folder / "venv"
+    source = _archived(commit, folder / "source") if commit else CHECKOUT
+    _own_wheels(source, wheels)
+    for wheel in _dependencies(machine, source, wheels).glob("*.whl"):
+        shutil.copy(wheel, wheels)
+    venv.mkdir()
+    call("unshare", "--mount", "sh", "-c", INSTALL, "sh", venv, machine.root, wheels)
+    shutil.copytree(_packaging(source), venv / "packaging")
+    make_disk(venv, folder / "disk.img", DISK_MB, label="nondum")
+    for done_with in (venv, wheels, folder / "source"):
+        shutil.rmtree(done_with, ignore_errors=True)
+
+
+def _archived(commit: str, folder: Path) -> Path:
+    folder.mkdir()
+    archive = folder / "source.tar"
+    call("git", "-C", CHECKOUT, "archive", "-o", archive, commit, "--", *_sources(commit))
+    call("tar", "-C", folder, "-xf", archive)
+    return folder
+
+
+def _sources(commit: str) -> list[str]:
+    """Of SOURCES, those that a commit has."""
+    return call("git", "-C", CHECKOUT, "ls-tree", "--name-only", commit, *SOURCES).split()
+
+
+def _commit_key(commit: str) -> str:
+    return call("git", "-C", CHECKOUT, "rev-parse", "--verify", f"{commit}^{{commit}}")[:16]
+
+
+def _packaging(source: Path) -> Path:
+    """The units that go with nondum; simple ones of the laboratory's while there are none."""
+    units = source / "packaging"
+    return units if (units / "systemd/nondum.service").exists() else PLAIN
+
+
+def _own_wheels(source: Path, folder: Path) -> None:
+    places = [source / path for path in DISTRIBUTIONS]
+    call(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", folder, *places)
+
+
+def _dependencies(machine: Built, source: Path, own: Path) -> Path:
+    """Wheels of everything that nondum needs, fetched again when what it needs has changed."""
+    declared = "".join((source / d / "pyproject.toml").read_text() for d in DISTRIBUTIONS)
+    key = hashlib.sha256(f"{PLATFORMS}{declared}".encode()).hexdigest()[:16]
+    return kept(f"wheels-{machine.recipe.name}-{key}", lambda folder: _fetch(machine, own, folder))
+
+
+def _fetch(machine: Built, own: Path, folder: Path) -> None:
+    call(
+        *(sys.executable, "-m", "pip", "download", "-q", "--only-binary", ":all:"),
+        *("--python-version", PYTHON, "--find-links", own, "-d", folder),
+        *(f"--platform={name}_{machine.recipe.name}" for name in PLATFORMS),
+        *(
+            f"{wheel}[fast]" if wheel.name.startswith("nondum-") else wheel
+            for wheel in own.iterdir()
+        ),
+    )
+    for wheel in own.iterdir():
+        (folder / wheel.name).unlink(missing_ok=True)
+
+
+def _key() -> str:
+    """A hash of all that nondum is made from."""
+    total = hashlib.sha256()
+    names = call("git", "-C", CHECKOUT, "ls-files", "-co", "--exclude-standard", "--", *SOURCES)
+    for name in sorted(set(names.split("\n"))):
+        path = CHECKOUT / name
+        if path.is_file():
+            total.update(name.encode() + b"\0" + path.read_bytes())
+    total.update(Path(__file__).read_bytes())
+    return total.hexdigest()[:16]
