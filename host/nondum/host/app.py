@@ -17,6 +17,7 @@ from nondum.host import verbs
 from nondum.host.announcements import announced
 from nondum.host.catalogue import backups, opening
 from nondum.host.catalogue.catalogue import Catalogue
+from nondum.host.cgroups import Cages
 from nondum.host.config import HostConfig
 from nondum.host.control.server import ControlServer
 from nondum.host.conversation import Conversation, Take
@@ -28,12 +29,14 @@ from nondum.host.drives.slots import SlotSource
 from nondum.host.drives.source import DriveSource
 from nondum.host.drives.steady import Steady
 from nondum.host.events import Event, HostStarted, Recomposed
+from nondum.host.helper import privileged
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.lifecycle.children import Children
 from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
 from nondum.host.lifecycle.folders import Folders, claim
 from nondum.host.lifecycle.installation import InstallOptions
+from nondum.host.lifecycle.lanes import in_thread
 from nondum.host.mind.frames import mounts_of_all
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.planners import Planners
@@ -41,10 +44,11 @@ from nondum.host.mind.system_tree import load_system_tree
 from nondum.host.news import News
 from nondum.host.orders import Orders
 from nondum.host.questions import Questions
+from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import Limits, Timing
 from nondum.host.workers.workers import Workers
 from nondum.planning.attempts import Patience
-from nondum.sdk.errors import ConfigRefused, Problem
+from nondum.sdk.errors import ConfigRefused, NondumError, Problem
 from nondum.wheelhouse.signatures import UnsignedAllowed
 
 if TYPE_CHECKING:
@@ -82,7 +86,9 @@ async def _run(
 ) -> None:
     bus = Bus()
     timing = Timing(startup_s=config.workers.startup_s)
-    workers = Workers(config.host.name, bus.emit, timing=timing)
+    cages = await in_thread(_cages, folders)
+    launcher = WorkerLauncher(cages=cages)
+    workers = Workers(config.host.name, bus.emit, launcher=launcher, timing=timing)
     executor = Executor(config.host.name, folders, workers, bus.emit, _install_options(config))
     manager = ComponentManager(catalogue, executor, bus)
     for source in (*drive_sources(config, folders), *more_drives):
@@ -110,7 +116,7 @@ async def _run(
 
     def warnings() -> tuple[str, ...]:
         of_peers = neighbours.warnings if neighbours else ()
-        return (*_warnings(config, catalogue), *of_peers)
+        return (*_warnings(config, catalogue), *map(str, cages.problems()), *of_peers)
 
     places = neighbours.placement.places if neighbours else dict
     questions = Questions(catalogue, mind, workers, news, listing, warnings, places)
@@ -140,6 +146,7 @@ async def _run(
         if neighbours is not None:
             await neighbours.close()
         await workers.close()
+        await in_thread(cages.close)
 
 
 async def _neighbours(
@@ -161,6 +168,18 @@ async def _neighbours(
     from nondum.host.peers.neighbourhood import Neighbourhood
 
     return await Neighbourhood.open(config, folders, workers, catalogue, bus.emit, mind, children)
+
+
+def _cages(folders: Folders) -> Cages:
+    """Where workers are caged: by this process, else by the helper. The last daemon's are ended."""
+    cages = Cages.open(folders.root)
+    if not cages.holds:
+        try:
+            cages = Cages(privileged().cages())
+        except NondumError as error:
+            log.warning("%s", error)
+    cages.sweep()
+    return cages
 
 
 def _take(neighbours: Neighbourhood | None) -> Take | None:
@@ -234,6 +253,8 @@ def _install_options(config: HostConfig) -> InstallOptions:
             memory_mb=config.workers.memory_mb,
             tasks=config.workers.tasks,
             descriptors=config.workers.descriptors,
+            processors=config.workers.cpu_percent / 100,
+            scratch_mb=config.workers.scratch_mb,
         ),
     )
 

@@ -90,13 +90,24 @@ class WorkersSection:
     """Limits of one worker, unless its payload asks for less."""
 
     memory_mb: int = 2048
-    """Data that it, and each process that it starts, may hold."""
+    """Memory of all its processes, where the machine has the memory cgroup; else the data of each.
+    """
     tasks: int = 256
     """Processes and threads."""
     descriptors: int = 1024
-    """Open files, sockets and streams."""
+    """Open files, sockets and streams, of each process."""
+    cpu_percent: int = 0
+    """Processor time of all its processes, in per cent of one processor; 0: no limit."""
+    scratch_mb: int = 256
+    """Disk that its scratch folder may take; more ends it, and the folder is emptied."""
     startup_s: float = 30.0
     """What a plugin has from its launch until it has started; then it counts as hung."""
+    confinement: str = "auto"
+    """Level at which workers are confined: `3` bubblewrap, `2` a systemd service, `1` Landlock and
+    filtered system calls, `0` resource limits only; `auto`: the highest that the machine has."""
+    minimum_confinement: int = 1
+    """Level below which this host does not start, where `auto` finds no better one; with `--user`
+    it is 0, and every status says so."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,6 +210,7 @@ def user_config() -> HostConfig:
         drives=DrivesSection(slots=(state / "slots",), block_devices=False),
         devices=DevicesSection(slots=(state / "device-slots",)),
         peers=PeersSection(enabled=False),
+        workers=WorkersSection(minimum_confinement=0),
     )
 
 
@@ -228,7 +240,9 @@ def parse(text: str, where: str, defaults: HostConfig) -> HostConfig:
             problems.append(_wrong(f"[{name}]", "a table", table, where))
         else:
             sections[name] = _section(name, sections[name], table, where, problems)
-    problems.extend(_contradictions(sections["host"], sections["install"], where))
+    problems.extend(_contradictions(
+            sections["host"], sections["install"], sections["workers"], where
+        ))
     if problems:
         raise ConfigRefused(*problems)
     return HostConfig(**sections)
@@ -294,10 +308,18 @@ def _typed(hint: Any, value: Any) -> Any:
     return value if type(value) is hint else None
 
 
-def _contradictions(host: HostSection, install: InstallSection, where: str) -> Iterator[Problem]:
+def _contradictions(
+    host: HostSection, install: InstallSection, workers: WorkersSection, where: str
+) -> Iterator[Problem]:
     yield from _name_problems(host.name, where, key="[host] name = ")
     if install.method not in ("store", "pip"):
         yield _wrong("[install] method", '"store" or "pip"', install.method, where)
+    if workers.confinement not in ("auto", "3", "2", "1", "0"):
+        expected = '"auto", "3", "2", "1" or "0"'
+        yield _wrong("[workers] confinement", expected, workers.confinement, where)
+    if workers.minimum_confinement > 3:
+        expected = "a level from 0 to 3"
+        yield _wrong("[workers] minimum_confinement", expected, workers.minimum_confinement, where)
     if not re.fullmatch(r"[\w.]+:\w+", host.system_tree):
         yield _wrong("[host] system_tree", '"package:function"', host.system_tree, where)
 
