@@ -131,7 +131,8 @@ class Cages:
 
     def problems(self) -> tuple[Problem, ...]:
         """What cannot be limited here, and what to do about it."""
-        return tuple(_problems(self._tree))
+        machine = known(Path("/proc/cgroups").read_text(encoding="ascii"))
+        return tuple(_problems(self._tree, machine))
 
 
 class NoTree:
@@ -176,7 +177,7 @@ def owner(state: Path) -> str:
     """The name of a daemon's part of a hierarchy.
 
     >>> owner(Path("/var/lib/nondum"))
-    'nondum-a56b8fb1'
+    'nondum-a90456a7'
     """
     return f"nondum-{hashlib.sha256(os.fsencode(state.absolute())).hexdigest()[:8]}"
 
@@ -200,34 +201,48 @@ def _descendants(pid: int) -> Iterator[int]:
                 yield from _descendants(int(child))
 
 
-def _problems(tree: Tree) -> Iterator[Problem]:
-    if not tree.kind:
+def _problems(tree: Tree, machine: Collection[str]) -> Iterator[Problem]:
+    missing = [name for name in _MISSING if name not in tree.controllers]
+    if withheld := [name for name in missing if name in machine]:
         yield Problem(
-            "CGROUPS_MISSING",
-            "workers' memory, tasks and processor time are not limited together",
-            fix="run nondum as the service that its package installs, or as root",
+            "CGROUPS_WITHHELD",
+            f"workers' {', '.join(_WHAT[name] for name in withheld)} are not limited together: "
+            "this daemon may not use the machine's cgroups",
+            need=", ".join(withheld),
+            have=tree.kind or "none",
+            fix="run nondum as the service that its package installs, or as root; by hand: "
+            "`systemd-run --user --scope -p Delegate=yes nondum host run --user`",
         )
-        return
-    for controller, (code, what, fix) in _MISSING.items():
-        if controller not in tree.controllers:
-            yield Problem(code, f"this machine has no {controller} cgroup: {what}", fix=fix)
+    for name in missing:
+        if name not in machine:
+            message, fix = _MISSING[name]
+            code = f"CGROUP_{name.upper()}_MISSING"
+            yield Problem(code, f"this machine has no {name} cgroup: {message}", fix=fix)
 
 
+def known(cgroups: str) -> frozenset[str]:
+    """The controllers that a kernel has and uses, by `/proc/cgroups`.
+
+    >>> sorted(known("#subsys_name hierarchy num_cgroups enabled\\nmemory 0 1 0\\npids 0 1 1"))
+    ['pids']
+    """
+    rows = (line.split() for line in cgroups.splitlines() if not line.startswith("#"))
+    return frozenset(row[0] for row in rows if len(row) == 4 and row[3] == "1")
+
+
+_WHAT = {"memory": "memory", "pids": "processes and threads", "cpu": "processor time"}
 _MISSING = {
     "memory": (
-        "CGROUP_MEMORY_MISSING",
         "a worker's memory is bounded process by process only",
         "add `cgroup_enable=memory cgroup_memory=1` to the one line of "
         "/boot/firmware/cmdline.txt (Raspberry Pi OS), or boot without cgroup_disable=memory",
     ),
     "pids": (
-        "CGROUP_PIDS_MISSING",
         "a worker may start any number of processes",
-        "use a kernel with CONFIG_CGROUP_PIDS, and lend the service its cgroup (Delegate=yes)",
+        "use a kernel with CONFIG_CGROUP_PIDS",
     ),
     "cpu": (
-        "CGROUP_CPU_MISSING",
         "a worker may take processor time from others",
-        "use a kernel with CONFIG_FAIR_GROUP_SCHED, and lend the service its cgroup (Delegate=yes)",
+        "use a kernel with CONFIG_FAIR_GROUP_SCHED",
     ),
 }

@@ -23,9 +23,9 @@ class Mounted:
 def mounted(mountinfo: str, cgroup: str) -> tuple[Mounted, ...]:
     """The hierarchies in `/proc/self/mountinfo`, by `/proc/self/cgroup`.
 
-    >>> mounted("30 24 0:26 / /sys/fs/cgroup rw - cgroup2 cgroup2 rw", "0::/nondum.service")
-    (Mounted(top=PosixPath('/sys/fs/cgroup'),
-             own=PosixPath('/sys/fs/cgroup/nondum.service'), controllers=frozenset()),)
+    >>> line = "30 24 0:26 / /sys/fs/cgroup rw - cgroup2 cgroup2 rw"
+    >>> print(mounted(line, "0::/nondum.service")[0].own)
+    /sys/fs/cgroup/nondum.service
     """
     places = dict(_places(cgroup))
     return tuple(_hierarchies(mountinfo, places))
