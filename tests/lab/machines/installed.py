@@ -95,11 +95,11 @@ class Installed:
         return self.until(f"{payload} {state}", found)
 
     def _first_answer(self) -> View | None:
-        if self.property("NRestarts") != "0":
+        if self.shown("NRestarts") != "0":
             raise AssertionError(f"{SERVICE} does not start\n{self.journal[-4000:]}")
         return self.status()
 
-    def property(self, name: str) -> str:
+    def shown(self, name: str) -> str:
         """What systemd says of the service: see org.freedesktop.systemd1(5)."""
         return self.machine.run(f"systemctl show --value -p {name} {SERVICE}").strip()
 
