@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from nondum.host.catalogue.records import Snapshot
+from nondum.host.catalogue.records import PayloadRecord, Snapshot, Step
 from nondum.host.events import (
+    BesideRefused,
     DriveFlapping,
     DriveRead,
     DriveUnreadable,
     Event,
+    PayloadActivated,
+    PayloadDistrusted,
+    PayloadDoubted,
     PayloadFailed,
     PayloadPlaced,
     PayloadRefused,
+    PayloadResumed,
     PayloadSentAway,
     PayloadTaken,
     PayloadWithdrawn,
@@ -21,6 +26,10 @@ from nondum.host.events import (
     PeerTurnedAway,
     PlaceLost,
     PlaceMissing,
+    RollbackAsked,
+    TrustChanged,
+    TrustFileRefused,
+    WheelsStored,
     WorkerStrained,
 )
 from nondum.sdk.errors import Problem
@@ -30,9 +39,23 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
     """What is said of an event once `snapshot` has taken it in; None: nothing."""
     match event:
         case PayloadRefused():
-            return f"{_name(event.payload, snapshot)} is refused: {_joined(event.problems)}"
+            told = f"{_name(event.payload, snapshot)} is refused: {_joined(event.problems)}"
+            return told + _stays(event.payload, snapshot)
         case PayloadFailed():
-            return f"{_name(event.payload, snapshot)} does not work: {_joined(event.problems)}"
+            told = f"{_name(event.payload, snapshot)} does not work: {_joined(event.problems)}"
+            return told + _stays(event.payload, snapshot)
+        case PayloadActivated():
+            return _took_over(event, snapshot)
+        case WheelsStored() | PayloadResumed():
+            return _brought_up(event, snapshot)
+        case BesideRefused():
+            name = _name(event.payload, snapshot)
+            return f"{name} takes the place of the release before it, not beside it: {event.reason}"
+        case RollbackAsked():
+            name = _name(event.payload, snapshot)
+            return (
+                f"a person goes back from release {event.from_release} of {name} to {event.release}"
+            )
         case PayloadWithdrawn():
             return f"{_name(event.payload, snapshot)} is withdrawn: {event.reason}"
         case PayloadSentAway():
@@ -53,6 +76,17 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return _joined(event.problems)
         case WorkerStrained():
             return _joined(event.problems)
+        case PayloadDistrusted():
+            name = _name(event.payload, snapshot)
+            return f"{name} is not trusted any more: {_joined(event.problems)}"
+        case PayloadDoubted(problems=problems) if problems:
+            name = _name(event.payload, snapshot)
+            return f"{name} goes on without trust: {_joined(problems)}"
+        case TrustChanged():
+            told = f"whom {event.owner} trusts has changed: version {event.version}"
+            return f"{told}, from {event.source}"
+        case TrustFileRefused():
+            return f"a trust file from {event.source} is not taken: {_joined(event.problems)}"
         case DriveUnreadable():
             return f"drive {event.drive} cannot be used: {_joined(event.problems)}"
         case PeerJoined():
@@ -61,14 +95,64 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return _joined(event.problems)
         case PeerLeft():
             return f"the host {event.host} is gone: {event.reason}"
-        case DriveRead(payloads=(), certificates=0):
+        case DriveRead(payloads=(), certificates=0, trust_files=0):
             return f"drive {event.drive} carries no payload"
     return None
 
 
+def _took_over(event: PayloadActivated, snapshot: Snapshot) -> str | None:
+    new = _record(event.payload, snapshot)
+    if new is None or not new.was:
+        return None
+    return (
+        f"{new.payload_id} {new.version} (release {new.release}) took over from release {new.was}"
+    )
+
+
+def _brought_up(event: WheelsStored | PayloadResumed, snapshot: Snapshot) -> str | None:
+    new, old = _record(event.payload, snapshot), _in_force(event.payload, snapshot)
+    if new is None or new.step not in (Step.STORED, Step.PROBED):
+        return None
+    if old is not None:
+        return f"{new.payload_id} {new.version} is being brought up beside {old.version}"
+    if isinstance(event, PayloadResumed):
+        return f"{new.payload_id} {new.version} comes back: {event.reason}"
+    return None
+
+
+def _stays(key: str, snapshot: Snapshot) -> str:
+    """What goes on instead of a release that fails."""
+    old = _in_force(key, snapshot)
+    return f"; {old.version} (release {old.release}) stays" if old is not None else ""
+
+
+def _in_force(key: str, snapshot: Snapshot) -> PayloadRecord | None:
+    """The release that is in force of the payload that another one is of."""
+    payload = _record(key, snapshot)
+    return next(
+        (
+            other
+            for other in snapshot.payloads
+            if payload is not None
+            and (other.fleet, other.payload_id) == (payload.fleet, payload.payload_id)
+            and other.step is Step.ACTIVE
+            and other.key != key
+        ),
+        None,
+    )
+
+
+def _record(key: str, snapshot: Snapshot) -> PayloadRecord | None:
+    return next((payload for payload in snapshot.payloads if payload.key == key), None)
+
+
 def _name(key: str, snapshot: Snapshot) -> str:
-    """A payload's id; its key once it is gone."""
-    return next((p.payload_id for p in snapshot.payloads if p.key == key), f"payload {key}")
+    """A payload's id, with its version where there are others; its key once it is gone."""
+    payload = _record(key, snapshot)
+    if payload is None:
+        return f"payload {key}"
+    is_one_of_many = sum(p.payload_id == payload.payload_id for p in snapshot.payloads) > 1
+    return f"{payload.payload_id} {payload.version}" if is_one_of_many else payload.payload_id
 
 
 def _joined(problems: Iterable[Problem]) -> str:

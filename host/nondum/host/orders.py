@@ -13,7 +13,7 @@ from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import MountPose, PayloadRecord, Snapshot, Step
 from nondum.host.control.arguments import Arguments, Triple
 from nondum.host.events import ForgetAsked, MountSet, RetryAsked
-from nondum.host.lifecycle import installed
+from nondum.host.lifecycle import going_back, installed
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.frames import implausible
@@ -21,7 +21,7 @@ from nondum.host.mind.goals import GivenGoal
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.translation import Understood, translated
 from nondum.host.news import News
-from nondum.host.rows import Row, payload_row, unknown
+from nondum.host.rows import Row, gone_back, is_at_rest, payload_row, unknown
 from nondum.host.workers.workers import Workers
 from nondum.planning.goal import GoalKind
 from nondum.sdk.errors import ConfigRefused, GoalRefused, InstallFailed, NondumError, Problem
@@ -160,19 +160,18 @@ class Orders:
         A client that leaves before has given it up: nothing of it stays. Raises `PayloadRefused`.
         """
         folder = Path(arguments.text("folder"))
-        installing = asyncio.create_task(installed.install(folder, self.catalogue, self.bus))
-        try:
-            version = self.news.version
-            while not installing.done():
-                yield {"done": False, "payload": self._payload(folder.name)}
-                news = asyncio.create_task(self.news.changed(version))
-                await asyncio.wait({news, installing}, return_when=asyncio.FIRST_COMPLETED)
-                news.cancel()
-                version = self.news.version
-            yield {"done": True, "payload": payload_row(installing.result(), None)}
-        finally:
-            installing.cancel()
-            await asyncio.gather(installing, return_exceptions=True)
+        installing = installed.install(folder, self.catalogue, self.bus)
+        async for row in self._told(asyncio.create_task(installing), folder.name):
+            yield row
+
+    async def rollback(self, arguments: Arguments) -> AsyncIterator[Row]:
+        """Go back to the release of a payload before: how far it is, and at last that it is `done`.
+
+        Raises `InstallFailed` (ROLLBACK_NOTHING, …, or why the earlier release does not work).
+        """
+        going = going_back.go_back(arguments.text("payload"), self.catalogue, self.bus)
+        async for row in self._told(asyncio.create_task(going), arguments.text("payload")):
+            yield row
 
     async def uninstall(self, arguments: Arguments) -> Row:
         """Remove an installed payload. Raises `PayloadRefused` (NOT_INSTALLED)."""
@@ -198,10 +197,25 @@ class Orders:
         is_over = self.mind.queue[given.id].state.is_final
         return is_over or any(goal.id == given.id for goal in snapshot.goals)
 
+    async def _told(self, work: asyncio.Task[PayloadRecord], payload_id: str) -> AsyncIterator[Row]:
+        """How far a payload is until work on it is done."""
+        try:
+            version = self.news.version
+            while not work.done():
+                yield {"done": False, "payload": self._payload(payload_id)}
+                news = asyncio.create_task(self.news.changed(version))
+                await asyncio.wait({news, work}, return_when=asyncio.FIRST_COMPLETED)
+                news.cancel()
+                version = self.news.version
+            yield {"done": True, "payload": payload_row(work.result(), None)}
+        finally:
+            work.cancel()
+            await asyncio.gather(work, return_exceptions=True)
+
     def _payload(self, payload_id: str) -> Row | None:
-        """The row of a payload that is known already."""
-        payloads = self.catalogue.snapshot().payloads
-        found = next((p for p in payloads if p.payload_id == payload_id), None)
+        """The row of a payload that is known already: of its release that is not at rest."""
+        payloads = [p for p in self.catalogue.snapshot().payloads if p.payload_id == payload_id]
+        found = min(payloads, key=lambda p: is_at_rest(p), default=None)
         return payload_row(found, self.news.progress(found.key)) if found else None
 
     async def _until(self, holds: Callable[[Snapshot], bool]) -> None:
@@ -222,6 +236,9 @@ class Orders:
 
 def _is_troubled(payload: PayloadRecord, snapshot: Snapshot) -> bool:
     if payload.step is not Step.ACTIVE:
-        return payload.step in (Step.REFUSED, Step.QUARANTINED)
+        was_left = payload.step is Step.SUPERSEDED and any(
+            other.payload_id == payload.payload_id for other in gone_back(snapshot)
+        )
+        return was_left or payload.step in (Step.REFUSED, Step.QUARANTINED)
     states = [c.state.value for c in snapshot.components if c.payload == payload.key]
     return "quarantined" in states

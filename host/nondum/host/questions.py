@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import cast
 
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.catalogue.records import Step
+from nondum.host.catalogue.records import PayloadRecord, Step
+from nondum.host.confinement.level import Standing
 from nondum.host.control.arguments import Arguments
 from nondum.host.mind.mind import Mind
 from nondum.host.news import News
@@ -18,6 +19,7 @@ from nondum.host.rows import (
     component_row,
     device_row,
     drive_row,
+    gone_back,
     host_state,
     journal_row,
     offered_row,
@@ -44,6 +46,8 @@ class Questions:
     catalogue: Catalogue
     mind: Mind
     workers: Workers
+    standing: Standing
+    """At which level workers are confined."""
     news: News
     stored: Callable[[], Awaitable[list[Row]]]
     """Lists the store: `wheel`, `bytes`, `used_by` (payload keys), `sha256`."""
@@ -59,9 +63,14 @@ class Questions:
             "host": snapshot.host,
             "revision": snapshot.revision,
             "state": host_state(snapshot, places),
-            "warnings": [*self.warnings(), *map(_kept_out, self.mind.views.kept_out())],
+            "warnings": [
+                *self.warnings(),
+                *map(_kept_out, self.mind.views.kept_out()),
+                *map(_gone_back, gone_back(snapshot)),
+            ],
+            "confinement": self.standing.to_dict(),
             "payloads": [
-                payload_row(p, self.news.progress(p.key), places.get(p.key, ""))
+                payload_row(p, self.news.progress(p.key), places.get(p.key, ""), snapshot.rollbacks)
                 for p in snapshot.payloads
             ],
             "drives": [drive_row(d, self.news.ahead(d.id)) for d in snapshot.drives],
@@ -74,7 +83,13 @@ class Questions:
         """What the robot is made of."""
         pids = self.workers.pids()
         snapshot = self.catalogue.snapshot()
-        own = [component_row(c, snapshot.host, pids.get(c.id)) for c in snapshot.components]
+        payloads = {payload.key: payload for payload in snapshot.payloads}
+        own = [
+            component_row(c, snapshot.host, pids.get(c.id), payloads.get(c.payload))
+            for c in snapshot.components
+        ]
+        for row in own:
+            row["confinement"] = self.workers.launcher.level if row["pid"] else None
         return own + [
             offered_row(offered, peer.name)
             for peer in snapshot.peers
@@ -143,7 +158,7 @@ class Questions:
                 "problems": [problem.to_dict() for problem in payload.problems],
             }
             for payload in snapshot.payloads
-            if payload.step is not Step.ACTIVE
+            if payload.step not in (Step.ACTIVE, Step.SUPERSEDED)
         ]
         return {**self.mind.views.composition(), "devices": devices, "waiting": waiting}
 
@@ -218,6 +233,13 @@ class Questions:
                 task.cancel()
             await asyncio.gather(*waiting, return_exceptions=True)
         return self.mind.version, self.news.version
+
+
+def _gone_back(payload: PayloadRecord) -> str:
+    return (
+        f"{payload.payload_id} is at release {payload.release}: a person went back to it; "
+        f"`nondum retry {payload.payload_id}` goes forward again"
+    )
 
 
 def _kept_out(row: Row) -> str:

@@ -23,7 +23,7 @@ from nondum.sdk.errors import Problem
 
 Row: TypeAlias = dict[str, Any]
 
-_AT_REST = frozenset({Step.GONE, Step.ACTIVE, Step.REFUSED, Step.QUARANTINED})
+_AT_REST = frozenset({Step.GONE, Step.ACTIVE, Step.SUPERSEDED, Step.REFUSED, Step.QUARANTINED})
 
 
 def host_state(snapshot: Snapshot, places: Mapping[str, str]) -> str:
@@ -31,9 +31,23 @@ def host_state(snapshot: Snapshot, places: Mapping[str, str]) -> str:
 
     Payloads that have a place on a peer are none.
     """
-    if any(payload.step not in _AT_REST for payload in snapshot.payloads):
+    if not all(map(is_at_rest, snapshot.payloads)):
         return "working"
     return "ready, with problems" if any(problems_of(snapshot, places)) else "ready"
+
+
+def is_at_rest(payload: PayloadRecord) -> bool:
+    """Whether nothing is being done for a payload."""
+    return payload.step in _AT_REST
+
+
+def gone_back(snapshot: Snapshot) -> Iterator[PayloadRecord]:
+    """The releases in force that people went back to."""
+    return (
+        payload
+        for payload in snapshot.payloads
+        if payload.digest in snapshot.rollbacks and payload.step is Step.ACTIVE
+    )
 
 
 def problems_of(snapshot: Snapshot, places: Collection[str] = ()) -> Iterator[Problem]:
@@ -48,14 +62,21 @@ def problems_of(snapshot: Snapshot, places: Collection[str] = ()) -> Iterator[Pr
         yield from drive.problems
 
 
-def payload_row(payload: PayloadRecord, progress: Progress | None, place: str = "") -> Row:
+def payload_row(
+    payload: PayloadRecord,
+    progress: Progress | None,
+    place: str = "",
+    rollbacks: Collection[str] = (),
+) -> Row:
     """A payload: how far it has come, where it is, what is wrong with it, and the peer that it runs
-    on, if it does."""
+    on, if it does. `rollbacks` are the digests of those that people went back to."""
     return {
         "payload": payload.payload_id,
         "key": payload.key,
         "version": payload.version,
         "release": payload.release,
+        "was": payload.was or None,
+        "gone_back": payload.digest in rollbacks,
         "state": payload.step.value,
         "progress": progress.to_dict() if progress else None,
         "place": place,
@@ -97,7 +118,9 @@ def peers_device_row(device: str, component: str) -> Row:
     return {**row, "contested_by": [], "properties": {}}
 
 
-def component_row(component: ComponentRecord, host: str, pid: int | None) -> Row:
+def component_row(
+    component: ComponentRecord, host: str, pid: int | None, payload: PayloadRecord | None
+) -> Row:
     """A component: how it is, and what it brings."""
     described = component.description
     return {
@@ -108,6 +131,8 @@ def component_row(component: ComponentRecord, host: str, pid: int | None) -> Row
         "plugin": component.distribution,
         "version": component.version,
         "payload": component.payload_id,
+        "release": payload.release if payload else None,
+        "was": payload.was or None if payload else None,
         "units": [unit.name for unit in described.units],
         "behaviours": [behaviour.name for behaviour in described.behaviours],
         "devices": {claim.name: claim.device for claim in component.devices},
@@ -128,6 +153,8 @@ def offered_row(component: PeerComponent, host: str) -> Row:
         "plugin": described.name,
         "version": component.version,
         "payload": component.payload_id,
+        "release": None,
+        "was": None,
         "units": [unit.name for unit in described.units],
         "behaviours": list(component.abilities),
         "devices": {},

@@ -73,6 +73,7 @@ def following(
         "follow_goal": questions.follow_goal,
         "follow_tree": questions.follow_tree,
         "install": orders.install,
+        "rollback": orders.rollback,
         "watch": questions.watch,
     }
     verbs |= neighbours.following() if neighbours else {"peers_pair": _no_peers_to_follow}

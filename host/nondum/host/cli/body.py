@@ -28,8 +28,12 @@ def components(session: Session) -> None:
 
     Example: nondum components
     """
-    columns = ["component", "state", "plugin", "version", "payload", "units", "problem"]
-    show(session, session.ask("components"), columns, "no components")
+    columns = ["component", "state", "plugin", "version", "payload", "units", "confinement", "problem"]
+    rows = session.ask("components")
+    if any(row["was"] for row in rows) and not session.as_json:
+        rows = [{**row, "release": render.release(row)} for row in rows]
+        columns.insert(columns.index("units"), "release")
+    show(session, rows, columns, "no components")
 
 
 @click.command()

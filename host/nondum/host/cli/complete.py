@@ -84,6 +84,15 @@ def installed(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[C
     return list(_items(pairs, incomplete))
 
 
+def upgraded(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Completes payloads that have an earlier release to go back to."""
+    payloads = _rows((_asked(ctx, "status") or {}).get("payloads"))
+    active = {p["payload"]: p for p in payloads if p["state"] == "active"}
+    ids = (p["payload"] for p in payloads if p["state"] in ("superseded", "refused"))
+    pairs = {id: active[id]["version"] for id in ids if id in active}
+    return list(_items(pairs.items(), incomplete))
+
+
 def trusted(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Completes hosts and fleets that are trusted."""
     view = _asked(ctx, "peers_trust") or {}

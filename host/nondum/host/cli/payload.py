@@ -139,10 +139,35 @@ def install(session: Session, drive: Path) -> None:
         render.as_json({"installed": done})
 
 
+@payload.command()
+@click.argument("payload_id", metavar="PAYLOAD", shell_complete=complete.upgraded)
+@json_option
+@click.pass_obj
+def rollback(session: Session, payload_id: str) -> None:
+    """Go back to the release of a payload before the one in force.
+
+    The earlier one must be plugged in, or installed, too; one that is refused only for being older
+    is let pass this once. The newer one waits; `nondum retry PAYLOAD` goes forward again.
+
+    Example: nondum payload rollback org.example.window-opener
+    """
+    with ProgressLine(payload_id, is_wanted=not session.as_json) as show:
+        row = _followed(session, show, "rollback", payload=payload_id)
+    if session.as_json:
+        render.as_json(row)
+    else:
+        click.echo(f"{row['payload']} {row['version']} is in force, release {render.release(row)}")
+
+
 def _installed(session: Session, folder: Path, show: ProgressLine) -> Any:
     """Install a payload, and give its row."""
+    return _followed(session, show, "install", folder=str(folder))
+
+
+def _followed(session: Session, show: ProgressLine, verb: str, **arguments: str) -> Any:
+    """Have something done for a payload, show how far it is, and give its row at last."""
     row: Any = None
-    with closing(session.follow("install", folder=str(folder))) as news:
+    with closing(session.follow(verb, **arguments)) as news:
         for told in news:
             row = told["payload"]
             if told["done"]:

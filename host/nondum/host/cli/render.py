@@ -65,6 +65,22 @@ def size(count: int) -> str:
     return f"{count} B" if unit == "B" else f"{amount:.1f} {unit}"
 
 
+def release(row: Mapping[str, Any]) -> str:
+    """A release, and what became of the one before.
+
+    >>> release({"release": 2, "was": 1}), release({"release": 1, "was": 2, "gone_back": True})
+    ('2 (was 1)', '1 (gone back from 2)')
+    >>> release({"release": 2, "was": None}), release({"release": None, "was": None})
+    ('2', '')
+    """
+    if row["release"] is None:
+        return ""
+    if not row["was"]:
+        return str(row["release"])
+    how = "gone back from" if row["was"] > row["release"] else "was"
+    return f"{row['release']} ({how} {row['was']})"
+
+
 def progress(made: Mapping[str, Any] | None) -> str:
     """How far something is.
 

@@ -44,6 +44,7 @@ def show(view: dict[str, Any]) -> None:
     click.echo(f"host {view['host']}  revision {view['revision']}  {view['state']}")
     for warning in view["warnings"]:
         render.sentence(warning, colour="yellow", mark="warning: ")
+    _show_confinement(view["confinement"])
     click.echo()
     _show_payloads(view["payloads"])
     for drive in view["drives"]:
@@ -61,19 +62,29 @@ def show(view: dict[str, Any]) -> None:
         render.sentence(told["text"], mark="> ")
 
 
+def _show_confinement(confinement: dict[str, Any]) -> None:
+    click.echo(f"workers are confined at level {confinement['level']}: {confinement['name']}")
+    for finding in confinement["missing"]:
+        mark = f"level {finding['level']} ({finding['name']}): "
+        render.sentence(f"{finding['reason']}; {finding['fix']}", mark=mark)
+
+
 def _show_payloads(payloads: list[dict[str, Any]]) -> None:
     rows = [
         {
             **row,
             "state": "placed" if row["place"] else row["state"],
             "on": row["place"],
+            "release": render.release(row),
             "progress": render.progress(row["progress"]),
         }
         for row in payloads
     ]
     columns = ["payload", "version", "state", "drive", "components"]
+    if any(row["was"] or row["state"] == "superseded" for row in rows):
+        columns.insert(2, "release")
     if any(row["on"] for row in rows):
-        columns.insert(3, "on")
+        columns.insert(columns.index("drive"), "on")
     if any(row["progress"] for row in rows):
         columns.append("progress")
     table(rows, columns, empty="no payloads")

@@ -1,92 +1,121 @@
 """Initial components: payloads that an integrator installs for good, before anything is plugged in.
 
-An installed payload is one on a drive that is never pulled; only `uninstall` takes it out.
+An installed payload is one on a drive that is never pulled; only `uninstall` takes it out. A newer
+release that is installed takes over like any other; the one before it is kept, to go back to, until
+the next one.
 """
 
 from __future__ import annotations
 
-import asyncio
+import itertools
+from collections.abc import Iterator
 from pathlib import Path
 
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import INSTALLED, PayloadRecord, Step
-from nondum.host.events import DriveInserted, DriveRemoved
+from nondum.host.catalogue.state import HostState
+from nondum.host.events import DriveInserted, DriveRemoved, RetryAsked
+from nondum.host.lifecycle import releases
 from nondum.host.lifecycle.bus import Bus
+from nondum.host.lifecycle.watch import Watch
 from nondum.sdk.errors import PayloadRefused, Problem
-
-_SETTLED = frozenset({Step.ACTIVE, Step.REFUSED, Step.QUARANTINED})
 
 
 async def install(folder: Path, catalogue: Catalogue, bus: Bus) -> PayloadRecord:
-    """Install a payload folder (an absolute path) and wait until it is active.
+    """Install a payload folder (an absolute path) and wait until it is active, or waits behind a
+    newer release.
 
     Raises `PayloadRefused` with what is wrong with it; then nothing of it stays.
     """
-    drive = _drive(folder.name)
-    if drive in catalogue.state.drives:
-        fix = f"`nondum payload uninstall {folder.name}` first"
-        problem = Problem("ALREADY_PRESENT", "is installed already", where=folder.name, fix=fix)
-        raise PayloadRefused(problem)
-    with_drive = _Watch(catalogue, bus, drive)
-    bus.emit(DriveInserted(drive, folder, INSTALLED))
-    try:
-        payload = await with_drive.settled()
-    except BaseException:
+    drive = _free_drive(catalogue.state, folder.name)
+    with Watch(catalogue, bus) as watch:
+        bus.emit(DriveInserted(drive, folder, INSTALLED))
+        try:
+            found = await watch.until(lambda state: _found(state, drive))
+            if len(_installed_as(catalogue.state, found)) == 1:
+                payload = await watch.until(lambda state: _settled(state, found.key))
+                _drop_older(catalogue.state, payload, bus)
+                return payload
+            await _go_forward(catalogue.state, found, bus)
+        except BaseException:
+            bus.emit(DriveRemoved(drive))
+            raise
         bus.emit(DriveRemoved(drive))
-        raise
-    finally:
-        with_drive.close()
-    return payload
+        return await watch.until(lambda state: _settled(state, found.key))
 
 
 async def uninstall(payload_id: str, catalogue: Catalogue, bus: Bus) -> None:
-    """Remove an installed payload and wait until nothing of it is left.
+    """Remove an installed payload, all its releases, and wait until nothing of it is left.
 
     Raises `PayloadRefused` (NOT_INSTALLED).
     """
-    drive = _drive(payload_id)
-    if drive not in catalogue.state.drives:
-        raise PayloadRefused(Problem("NOT_INSTALLED", "is not installed", where=payload_id))
-    watch = _Watch(catalogue, bus, drive)
-    keys = {p.key for p in catalogue.state.payloads.values() if set(p.sources) == {drive}}
-    bus.emit(DriveRemoved(drive))
-    try:
-        await watch.until_gone(keys)
-    finally:
-        watch.close()
+    state = catalogue.state
+    drives = set(_drives(state, payload_id))
+    if not drives:
+        fix = "see `nondum status` for what is here, and from which drive"
+        raise PayloadRefused(Problem("NOT_INSTALLED", "is not installed", payload_id, fix=fix))
+    gone = [p for p in state.payloads.values() if p.sources and set(p.sources) <= drives]
+    in_order = sorted(gone, key=lambda p: p.step is Step.ACTIVE)  # none is to come back for a while
+    ordered = dict.fromkeys(drive for payload in in_order for drive in payload.sources)
+    with Watch(catalogue, bus) as watch:
+        for drive in (*ordered, *(drives - ordered.keys())):
+            bus.emit(DriveRemoved(drive))
+        keys = {payload.key for payload in gone}
+        await watch.until(lambda state: not keys & state.payloads.keys() or None)
 
 
-def _drive(payload_id: str) -> str:
-    return f"{INSTALLED}/{payload_id}"
+def _drives(state: HostState, payload_id: str) -> Iterator[str]:
+    """The drives that stand for releases of a payload."""
+    name = f"{INSTALLED}/{payload_id}"
+    return (id for id in state.drives if id == name or id.startswith(f"{name}/"))
 
 
-class _Watch:
-    """Waits for the catalogue to say something of one drive."""
+def _free_drive(state: HostState, payload_id: str) -> str:
+    name = f"{INSTALLED}/{payload_id}"
+    names = itertools.chain((name,), (f"{name}/{number}" for number in itertools.count(2)))
+    return next(one for one in names if one not in state.drives)
 
-    def __init__(self, catalogue: Catalogue, bus: Bus, drive: str) -> None:
-        self._catalogue, self._drive = catalogue, drive
-        self._changed = asyncio.Event()
-        self.close = bus.subscribe(lambda event: self._changed.set())
 
-    async def settled(self) -> PayloadRecord:
-        """The drive's payload, once it is active. Raises `PayloadRefused`."""
-        while True:
-            state = self._catalogue.state
-            drive = state.drives.get(self._drive)
-            if drive is not None and drive.problems:
-                raise PayloadRefused(*drive.problems)
-            for payload in state.payloads.values():
-                if self._drive in payload.sources and payload.step in _SETTLED:
-                    if payload.problems:
-                        raise PayloadRefused(*payload.problems)
-                    return payload
-            await self._wait()
+def _found(state: HostState, drive: str) -> PayloadRecord | None:
+    """The payload on a drive, once it was read. Raises `PayloadRefused`."""
+    read = state.drives.get(drive)
+    if read is not None and read.problems:
+        raise PayloadRefused(*read.problems)
+    return next((p for p in state.payloads.values() if drive in p.sources), None)
 
-    async def until_gone(self, keys: set[str]) -> None:
-        """Wait until none of these payloads is left."""
-        while keys & self._catalogue.state.payloads.keys():
-            await self._wait()
 
-    async def _wait(self) -> None:
-        await self._changed.wait()
-        self._changed.clear()
+def _installed_as(state: HostState, payload: PayloadRecord) -> list[str]:
+    kinds = {name: state.drives[name].kind for name in payload.sources if name in state.drives}
+    return [name for name, kind in kinds.items() if kind == INSTALLED]
+
+
+def _settled(state: HostState, key: str) -> PayloadRecord | None:
+    """A payload that has come to its end. Raises `PayloadRefused`."""
+    payload = state.payloads.get(key)
+    if payload is None:
+        return None
+    if payload.step in (Step.REFUSED, Step.QUARANTINED):
+        raise PayloadRefused(*payload.problems)
+    other = releases.waits_behind(state, payload)
+    is_behind = payload.step is Step.SUPERSEDED and other is not None and other.step is Step.ACTIVE
+    return payload if is_behind or payload.step is Step.ACTIVE else None
+
+
+async def _go_forward(state: HostState, payload: PayloadRecord, bus: Bus) -> None:
+    """Install again what a person had gone back from. Raises `PayloadRefused`."""
+    if releases.key_of(payload) in state.rollbacks and payload.step is Step.SUPERSEDED:
+        bus.emit(RetryAsked(payload.key))
+        return
+    fix = f"`nondum payload uninstall {payload.payload_id}` first, or install a newer release"
+    problem = Problem("ALREADY_PRESENT", "is installed already", where=payload.payload_id, fix=fix)
+    raise PayloadRefused(problem)
+
+
+def _drop_older(state: HostState, payload: PayloadRecord, bus: Bus) -> None:
+    """Keep of the releases that were installed only the new one and the one before it."""
+    if payload.step is not Step.ACTIVE:
+        return
+    for other in releases.others(state, payload):
+        if other.release not in (payload.was, payload.release) and other.release < payload.release:
+            for drive in _installed_as(state, other):
+                bus.emit(DriveRemoved(drive))

@@ -80,8 +80,14 @@ def waits_behind(state: HostState, payload: PayloadRecord) -> PayloadRecord | No
 
 
 def waits_for_recovery(found: HostState, payload: PayloadRecord) -> bool:
-    """Whether a starting daemon brings up another release first: the one that was in force."""
-    return payload.step in STARTING and in_force(found, payload) is not None
+    """Whether a starting daemon brings up another release first: the one that was in force, or the
+    highest."""
+
+    def place(one: PayloadRecord) -> tuple[bool, tuple[int, bool]]:
+        return one.step is Step.ACTIVE, standing(found, one)
+
+    ahead = (o for o in others(found, payload) if o.step in STARTING or o.step is Step.ACTIVE)
+    return any(place(other) > place(payload) for other in ahead)
 
 
 def can_go_back_to(state: HostState, payload: PayloadRecord) -> PayloadRecord | None:

@@ -61,7 +61,9 @@ def recomposed(old: Composition | None, new: Composition) -> list[str]:
     sentences = [f"{id} is gone: {_offered(before[id])}" for id in before if id not in after]
     for id, component in after.items():
         earlier = before.get(id)
-        if earlier is None or earlier.payload != component.payload:
+        if earlier is not None and earlier.version != component.version:
+            sentences.append(f"{id} is now version {component.version}: {_offers(component)}")
+        elif earlier is None or earlier.payload != component.payload:
             sentences.append(f"{id} is here: {_offers(component)}")
         elif earlier.is_ready != component.is_ready:
             sentences.append(f"{id} is {_health(component)}")
