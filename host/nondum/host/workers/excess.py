@@ -16,7 +16,7 @@ from nondum.host.workers.spec import Limits
 from nondum.sdk.errors import Problem
 
 REFUSALS = 1000
-"""Processes and threads refused between two readings: it forks for its life."""
+"""Processes and threads refused without a reading at which none was: it forks for its life."""
 NEARLY = 0.9
 """Part of a limit at which people are told."""
 SPIN_S = 10.0
@@ -56,6 +56,8 @@ class Watch:
     limits: Limits
     _last: Reading | None = None
     _busy_since_s: float | None = None
+    _refused_before: int = 0
+    """Processes and threads that had been refused when last none was."""
     _told: set[str] = field(default_factory=set)
 
     def see(self, now: Reading) -> Excess:
@@ -73,7 +75,9 @@ class Watch:
     def _end(self, last: Reading, now: Reading) -> Problem | None:
         if now.usage.oom_kills > last.usage.oom_kills:
             return problems.out_of_memory(self.component, self.limits.memory_mb)
-        if now.usage.refused_tasks - last.usage.refused_tasks >= REFUSALS:
+        if now.usage.refused_tasks == last.usage.refused_tasks:
+            self._refused_before = now.usage.refused_tasks
+        if now.usage.refused_tasks - self._refused_before >= REFUSALS:
             return problems.too_many_tasks(self.component, self.limits.tasks)
         full = self.limits.descriptors - SPARED
         if now.descriptors >= full and last.descriptors >= full:

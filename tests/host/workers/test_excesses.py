@@ -1,0 +1,155 @@
+"""Workers that use too much: each ends itself only, with its code, and the others go on."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import AsyncIterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tests.host.workers.house import HOST, QUICK, House, is_alive
+
+from nondum.host.cgroups import Cages
+from nondum.host.events import WorkerExited, WorkerLogged, WorkerReady, WorkerStrained
+from nondum.host.workers import Limits, WorkerLauncher, excess, supervision
+from nondum.planning.running import RunState
+from nondum.sdk.description import Behaviour, Unit
+
+pytestmark = pytest.mark.anyio
+
+DO = Behaviour("do", "(do ?u - sensor)")
+PLUGIN = """
+import asyncio, os, subprocess, sys, threading, time
+from nondum.sdk import Unit, behaviour, hookimpl
+
+@hookimpl
+def units():
+    return (Unit("it", "sensor"),)
+
+@behaviour("do", action="(do ?u - sensor)")
+async def do(ctx, u):
+    {body}
+"""
+SMALL = Limits(memory_mb=128, tasks=24, descriptors=64, scratch_mb=8)
+
+
+@pytest.fixture
+async def caged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[House]:
+    """A house with cages, whose other worker is there before and after."""
+    monkeypatch.setattr(supervision, "BACKOFF_S", 0.02)
+    cages = Cages.open(tmp_path)
+    assert cages.holds == {"memory", "pids", "cpu"}, "tests run as root, with cgroups"
+    house = House(tmp_path, replace(QUICK, look_s=0.1))
+    house.workers.launcher = WorkerLauncher(cages=cages)
+    await begin(house, "other", "pass")
+    pid = house.workers.pids()["other"]
+    yield house
+    assert await done(house, "other") is RunState.SUCCEEDED
+    assert house.workers.pids()["other"] == pid
+    assert is_alive(pid)
+    await house.workers.close(grace_s=1.0)
+    assert cages.sweep() == 0, "cages are left"
+    cages.close()
+
+
+async def begin(house: House, name: str, body: str) -> None:
+    source = PLUGIN.replace("{body}", body.replace("\n", "\n    "))
+    await house.start(name, source, behaviours=(DO,), units=(Unit("it", "sensor"),), limits=SMALL)
+
+
+async def done(house: House, name: str) -> RunState:
+    return await house.behave(name, "do", u=f"{HOST}__{name}__it").ended()
+
+
+FORK = "while True:\n    try:\n        os.fork()\n    except OSError:\n        pass"
+HELD = (
+    "held = [open(f'f{n}', 'wb') for n in range(4)]\n"
+    "for file in held:\n    os.unlink(file.name)\n"
+    "while True:\n"
+    "    for file in held:\n        file.write(bytes(1 << 20)); file.flush()\n"
+    "    await asyncio.sleep(0.01)"
+)
+DEEP = "for _ in range(300):\n    os.mkdir('d' * 50); os.chdir('d' * 50)\nawait asyncio.sleep(60)"
+CHILD = "b = []\nwhile True: b.append(bytearray(1 << 20))"
+
+
+@pytest.mark.parametrize(
+    ("body", "code"),
+    [
+        pytest.param(
+            "import mmap\nheld = []\nwhile True:\n"
+            "    held.append(mmap.mmap(-1, 1 << 20)); held[-1].write(bytes(1 << 20))",
+            "WORKER_OOM",
+            id="shared memory",
+        ),
+        pytest.param(
+            f"await asyncio.to_thread(subprocess.run, [sys.executable, '-c', {CHILD!r}])\n"
+            "await asyncio.to_thread(subprocess.run, [sys.executable, '-c', "
+            "'import mmap; [m.write(bytes(1<<20)) for m in iter(lambda: mmap.mmap(-1,1<<20), 0) "
+            'for _ in [globals().setdefault("b", []).append(m)]]\'])\n'
+            "await asyncio.sleep(60)",
+            "WORKER_OOM",
+            id="memory of a child",
+        ),
+        pytest.param(FORK, "WORKER_TASKS", id="fork bomb"),
+        pytest.param(
+            "held = []\nwhile True:\n    try:\n        held.append(os.dup(1))\n"
+            "    except OSError:\n        await asyncio.sleep(0.01)",
+            "WORKER_FDS",
+            id="descriptors",
+        ),
+        pytest.param(
+            "with open('big', 'wb') as file:\n    while True:\n        file.write(bytes(1 << 20))\n"
+            "        await asyncio.sleep(0.01)",
+            "SCRATCH_FULL",
+            id="file",
+        ),
+        pytest.param(HELD, "SCRATCH_FULL", id="deleted files"),
+        pytest.param(DEEP, "SCRATCH_FULL", id="deep folders"),
+    ],
+)
+async def test_too_much_ends_that_worker_alone(caged: House, body: str, code: str) -> None:
+    await begin(caged, "guest", body)
+    call = caged.behave("guest", "do", u=f"{HOST}__guest__it")
+    exited = await caged.until(WorkerExited)
+    assert exited.component == "guest"
+    assert exited.reason.startswith(code), exited.reason
+    assert "→" in exited.reason, "it is told what to do"
+    assert await call.ended() is RunState.FAILED
+    await caged.until(WorkerReady, lambda _: len(caged.told(WorkerReady)) == 3)
+    if code == "SCRATCH_FULL":
+        assert os.listdir(caged.folder / "guest/scratch") == []  # noqa: PTH208
+
+
+async def test_worker_that_nobody_asks_and_spins_is_told_once(
+    caged: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(excess, "SPIN_S", 0.5)
+    monkeypatch.setattr(excess, "NEARLY", 0.2)  # another test may want the processors, too
+    spin = "def spin():\n    while True:\n        pass\n"
+    await begin(caged, "guest", f"{spin}threading.Thread(target=spin, daemon=True).start()")
+    assert await done(caged, "guest") is RunState.SUCCEEDED
+    strained = await caged.until(WorkerStrained)
+    assert strained.component == "guest"
+    assert [problem.code for problem in strained.problems] == ["WORKER_CPU"]
+    assert not caged.told(WorkerExited)
+
+
+async def test_what_left_the_group_and_cleared_its_marks_ends_with_the_cage(caged: House) -> None:
+    child = "import os,time; print('child', os.getpid(), flush=True); time.sleep(3600)"
+    body = (
+        "if os.fork() == 0:\n"
+        "    os.setsid()\n"
+        "    if os.fork() == 0:\n"
+        f"        os.execve(sys.executable, [sys.executable, '-c', {child!r}], {{}})\n"
+        "    os._exit(0)\n"
+        "await asyncio.Event().wait()"
+    )
+    await begin(caged, "guest", body)
+    caged.behave("guest", "do", u=f"{HOST}__guest__it")
+    said = await caged.until(WorkerLogged, lambda line: line.message.startswith("child"))
+    pid = int(said.message.split()[1])
+    assert is_alive(pid)
+    await caged.workers.stop("guest")
+    assert not is_alive(pid)
