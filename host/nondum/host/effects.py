@@ -35,6 +35,13 @@ class ReleaseDrive(Effect):
 
 
 @dataclass(frozen=True, slots=True)
+class JudgePayloads(Effect):
+    """Ask anew whether payloads that are here are trusted."""
+
+    payloads: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class PayloadEffect(Effect):
     """Something to be done for one payload; one at a time for each."""
 

@@ -16,6 +16,7 @@ from typing import Any, ClassVar, TypeAlias
 from nondum.host.catalogue.records import ComponentRecord, MountPose, PeerRecord
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
+from nondum.wheelhouse.signatures import NOTHING, Grant
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +118,8 @@ class DriveRead(Event):
     payloads: tuple[str, ...]
     certificates: int = 0
     """How many certificates of hosts it carries."""
+    trust_files: int = 0
+    """How many versions of trust files it carries."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +157,14 @@ class PayloadFound(Event):
     fleet: str = ""
     problems: tuple[Problem, ...] = ()
     """What is already known to be wrong with it."""
+    warnings: tuple[Problem, ...] = ()
+    """What is doubtful about it, and does not keep it out."""
+    signers: tuple[str, ...] = ()
+    """Names or fingerprints of those who signed it."""
+    grant: Grant = NOTHING
+    """What it may have, if it is believed."""
+    built: str = ""
+    """When, as whoever signed it says: UTC, ISO 8601."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,6 +218,8 @@ class PayloadActivated(Event):
     """Their ranks are given as they are entered."""
     mounts: tuple[MountPose, ...] = ()
     """Where their units sit, as the payload says."""
+    grant: Grant = NOTHING
+    """What it may have."""
 
     def to_dict(self) -> dict[str, Any]:
         """Only names: what the components are stands in the catalogue."""
@@ -226,6 +239,42 @@ class PayloadFailed(Event):
     """The payload's components could not be brought to life."""
 
     payload: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadDistrusted(Event):
+    """A payload that is here is not trusted any more: its key was revoked, say. It is withdrawn."""
+
+    payload: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadDoubted(Event):
+    """A payload that is here is not trusted any more, and stays all the same; or, without
+    `problems`, is trusted again."""
+
+    payload: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TrustChanged(Event):
+    """Another version of the trust file is in force, and safe on disk."""
+
+    owner: str
+    version: int
+    source: str
+    """The drive that brought it, or `person`."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrustFileRefused(Event):
+    """A trust file was not taken; the one in force stays."""
+
+    source: str
+    """The drive that brought it."""
     problems: tuple[Problem, ...]
 
 

@@ -60,6 +60,11 @@ TRANSITIONS: _Rows = {
         for step in _PRESENT
         if step is not Step.REFUSED
     },
+    **{
+        (step, events.PayloadDistrusted): Transition(Step.REFUSED, effects.ClearPayload)
+        for step in _PRESENT
+        if step is not Step.REFUSED
+    },
     (Step.REFUSED, events.RetryAsked): Transition(Step.REMOVING, effects.ClearPayload),
     (Step.REFUSED, events.RollbackAsked): Transition(Step.REMOVING, effects.ClearPayload),
     (Step.QUARANTINED, events.RetryAsked): Transition(Step.STORED, effects.ProbeComponents),

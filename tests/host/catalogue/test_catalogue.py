@@ -325,7 +325,7 @@ OF_4 = replace(FULL, tries={}, is_stopped=False, rollbacks={})
 THE_4 = (
     "DROP TABLE tries; DROP TABLE rollbacks; ALTER TABLE host DROP COLUMN stopped;"
     "ALTER TABLE payloads ADD COLUMN attempts INTEGER NOT NULL DEFAULT 0;"
-    "ALTER TABLE payloads DROP COLUMN was;"
+    "ALTER TABLE payloads DROP COLUMN was; ALTER TABLE highwater DROP COLUMN owner;"
 )
 OLDER = {
     1: (f"{THE_4} DROP TABLE goals; DROP TABLE former;", replace(OF_4, goals={}, former={})),

@@ -132,6 +132,7 @@ EVENTS: dict[type[Event], Event] = {
         events.PayloadRefused("k1", (PROBLEM,)),
         events.PayloadFailed("k1", (PROBLEM,)),
         events.PayloadSentAway("k1", "mule", (PROBLEM,)),
+        events.PayloadDistrusted("k1", (PROBLEM,)),
         events.PayloadWithdrawn("k1", "test"),
         events.PayloadCleared("k1"),
         events.PayloadSuperseded("k1", "k2", "test"),

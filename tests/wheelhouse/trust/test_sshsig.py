@@ -33,8 +33,8 @@ def refusal(data: bytes) -> str:
 
 def test_what_ssh_keygen_signs_holds(tmp_path: Path) -> None:
     key = tmp_path / "key"
-    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", key], check=True)
-    command = ["ssh-keygen", "-Y", "sign", "-q", "-n", PAYLOAD, "-f", key]
+    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(key)], check=True)
+    command = ["ssh-keygen", "-Y", "sign", "-q", "-n", PAYLOAD, "-f", str(key)]
     made = subprocess.run(command, input=DATA, capture_output=True, check=True).stdout
     (found,) = sshsig.parse(made, "CONTENTS.sig")
     assert found.namespace == PAYLOAD
@@ -53,7 +53,7 @@ def test_ssh_keygen_believes_what_the_tests_sign(tmp_path: Path, key: Key, hash:
     (tmp_path / "signature").write_bytes(key.sign(DATA, PAYLOAD, hash))
     command = [
         *("ssh-keygen", "-Y", "verify", "-n", PAYLOAD, "-I", "who"),
-        *("-f", tmp_path / "allowed", "-s", tmp_path / "signature"),
+        *("-f", str(tmp_path / "allowed"), "-s", str(tmp_path / "signature")),
     ]
     subprocess.run(command, input=DATA, check=True, capture_output=True)
     (found,) = sshsig.parse(key.sign(DATA, PAYLOAD, hash), "CONTENTS.sig")

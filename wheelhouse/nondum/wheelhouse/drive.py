@@ -75,7 +75,7 @@ def _crowded(where: Path, most: str) -> Problem:
 
 def read_contents(folder: Path) -> bytes:
     """The contents list's bytes, at most one more than allowed. Raises as `read_signature`."""
-    data = _read_small(folder, contents.NAME, contents.MAX_BYTES)
+    data = read_small(folder, contents.NAME, contents.MAX_BYTES)
     if data is None:
         raise PayloadRefused(
             Problem(
@@ -93,7 +93,7 @@ def read_signature(folder: Path) -> bytes | None:
 
     Raises `PayloadRefused` (PATH_UNSAFE, TOO_LARGE), `DriveGone`.
     """
-    return _read_small(folder, contents.SIGNATURE_NAME, MAX_SIGNATURE_BYTES)
+    return read_small(folder, contents.SIGNATURE_NAME, MAX_SIGNATURE_BYTES)
 
 
 def copy(
@@ -259,7 +259,8 @@ def _step(name: str, flags: int, folder: int) -> int:
         raise
 
 
-def _read_small(folder: Path, name: str, limit: int) -> bytes | None:
+def read_small(folder: Path, name: str, limit: int) -> bytes | None:
+    """A file's bytes, or None when it is not there. Raises as `read_signature`."""
     with _folder(folder) as source:
         try:
             descriptor = _open(source, name)

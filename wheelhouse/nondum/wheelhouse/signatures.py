@@ -6,8 +6,9 @@ bytes of the signature file.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol
 
 from nondum.sdk.errors import Problem
 from nondum.wheelhouse.manifest import PERMISSIONS, Manifest
@@ -28,6 +29,16 @@ class Grant:
     most_release: int | None = None
     """Newer releases are void, whatever came in before."""
 
+    def to_dict(self) -> dict[str, Any]:
+        """The grant as plain data."""
+        return asdict(self)
+
+    @classmethod
+    def parse(cls, said: Mapping[str, Any]) -> Grant:
+        """Read what `to_dict` gave, from our own child."""
+        permissions, owners = tuple(said["permissions"]), tuple(said["owners"])
+        return cls(permissions, said["role"], owners, said["most_release"])
+
     def problems(self, manifest: Manifest) -> tuple[Problem, ...]:
         """What a payload asks for and is not granted (PERMISSION_DENIED)."""
         by = f"the role {self.role}" if self.role else "whoever signed it"
@@ -46,6 +57,9 @@ class Grant:
         )
 
 
+NOTHING = Grant()
+"""What is granted where nobody is believed."""
+
 EVERYTHING = Grant(PERMISSIONS)
 """What is granted where nobody asks for signatures."""
 
@@ -61,7 +75,7 @@ class Verdict:
     """Why it is refused; empty: it is not."""
     warnings: tuple[Problem, ...] = ()
     """What is doubtful, and does not keep it out."""
-    grant: Grant = Grant()
+    grant: Grant = NOTHING
     """What it may have, if it is not refused."""
 
 

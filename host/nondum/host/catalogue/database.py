@@ -13,7 +13,7 @@ from typing import Any
 
 from nondum.host.catalogue import journal, rows
 from nondum.host.catalogue.records import ComponentRecord, JournalEntry, Rollback
-from nondum.host.catalogue.state import Highwater, HostState
+from nondum.host.catalogue.state import HostState
 from nondum.sdk.errors import ConfigRefused, Problem
 
 SCHEMA = 4
@@ -30,6 +30,7 @@ _UPGRADES = {
     "ALTER TABLE payloads ADD COLUMN was INTEGER NOT NULL DEFAULT 0;"
     "CREATE TABLE rollbacks (fleet TEXT NOT NULL, payload_id TEXT NOT NULL, digest TEXT NOT NULL,"
     " release INTEGER NOT NULL, below INTEGER NOT NULL, PRIMARY KEY (fleet, payload_id)) STRICT;"
+    "ALTER TABLE highwater ADD COLUMN owner TEXT NOT NULL DEFAULT '';"
     "DROP TRIGGER journal_is_never_deleted;"
     "CREATE TRIGGER journal_is_never_deleted BEFORE DELETE ON journal"
     " WHEN old.id > (SELECT max(id) FROM journal) - 1000"
@@ -130,8 +131,7 @@ def load(connection: sqlite3.Connection, host: str) -> HostState:
         goals={g.id: g for g in map(rows.goal, every("goals"))},
         former={f.key: f for f in map(rows.former, every("former")) if f is not None},
         highwater={
-            (row["fleet"], row["payload_id"]): Highwater(row["release"], row["digest"])
-            for row in every("highwater")
+            (row["fleet"], row["payload_id"]): rows.highwater(row) for row in every("highwater")
         },
         rollbacks={
             (row["fleet"], row["payload_id"]): Rollback(row["digest"], row["release"], row["below"])
@@ -188,8 +188,7 @@ def _write_state(connection: sqlite3.Connection, before: HostState, after: HostS
     for (fleet, payload_id), newest in after.highwater.items():
         if before.highwater.get((fleet, payload_id)) != newest:
             known = {"fleet": fleet, "payload_id": payload_id}
-            row = {**known, "release": newest.release, "digest": newest.digest}
-            _insert(connection, "highwater", row)
+            _insert(connection, "highwater", {**known, **rows.highwater_row(newest)})
     _write_rollbacks(connection, before, after)
     _difference(connection, "payloads", "key", before.payloads, after.payloads, rows.payload_row)
     for payload in _changed(before.payloads, after.payloads):

@@ -23,6 +23,7 @@ from nondum.host.catalogue.records import (
     PayloadRecord,
     Step,
 )
+from nondum.host.catalogue.state import Highwater
 from nondum.host.events import plain
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, Problem
@@ -222,6 +223,16 @@ def goal_row(goal: GoalRecord) -> Row:
 def goal(row: sqlite3.Row) -> GoalRecord:
     """A goal of its row."""
     return GoalRecord(row["id"], row["text"], row["pddl"], row["kind"], row["priority"])
+
+
+def highwater_row(newest: Highwater) -> Row:
+    """A row of `highwater`, but for whose it is."""
+    return {"release": newest.release, "digest": newest.digest, "owner": newest.owner}
+
+
+def highwater(row: sqlite3.Row) -> Highwater:
+    """The newest release of its row."""
+    return Highwater(row["release"], row["digest"], row["owner"])
 
 
 def former_row(former: FormerPayload) -> Row:

@@ -87,6 +87,7 @@ CREATE TABLE highwater (                 -- never pruned
     payload_id  TEXT NOT NULL,
     release     INTEGER NOT NULL,
     digest      TEXT NOT NULL,
+    owner       TEXT NOT NULL,           -- role by which it was the first to come in
     PRIMARY KEY (fleet, payload_id)
 ) STRICT;
 

@@ -25,6 +25,8 @@ class Highwater:
 
     release: int
     digest: str
+    owner: str = ""
+    """The role of the trust file by which it was the first to come in; empty: none was asked."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,8 @@ from packaging.version import Version
 
 from nondum.host.drives import trial
 from nondum.host.helper import privileged
+from nondum.host.trust.chain import packed
+from nondum.host.trust.on_drives import trust_files_on
 from nondum.host.trust.rules import Rules
 from nondum.sdk.errors import PayloadRefused, Problem
 from nondum.wheelhouse import contents, drive, payload, preflight
@@ -25,7 +27,7 @@ from nondum.wheelhouse.dist_info import Needs
 from nondum.wheelhouse.lock import LockedWheel
 from nondum.wheelhouse.payload import StagedPayload
 from nondum.wheelhouse.preflight import HostFacts
-from nondum.wheelhouse.signatures import Verifier
+from nondum.wheelhouse.signatures import Verdict, Verifier
 from nondum.wheelhouse.store import Store
 from nondum.wheelhouse.stored import StoredWheel
 from nondum.wheelhouse.wheel import Layout
@@ -41,7 +43,8 @@ KEY_DIGITS = 16
 
 
 def look(arguments: Arguments, report: Report) -> dict[str, list[Any]]:
-    """Mount the drive if it is a device, and tell the `payloads` and host `certificates` on it.
+    """Mount the drive if it is a device, and tell the `payloads`, host `certificates` and `trust`
+    files on it. Payloads are judged as they will be once those are taken.
 
     Raises `DriveGone`, `PayloadRefused` (FS_UNSUPPORTED, FS_ERROR).
     """
@@ -51,8 +54,12 @@ def look(arguments: Arguments, report: Report) -> dict[str, list[Any]]:
         root = privileged().mount(node, root, arguments["filesystem"], drive_name, "read")
     is_payload = arguments["kind"] == "installed"
     folders = (root,) if is_payload else drive.find_payloads(root)
-    verifier = Rules.of(arguments).verifier()
+    offered, flaws = ((), ()) if is_payload else trust_files_on(root)
+    rules = Rules.of(arguments).following(arguments.get("known_trust", ()), offered)
+    verifier = rules.verifier()
     return {
+        "trust": packed(offered),
+        "trust_problems": [problem.to_dict() for problem in flaws],
         "payloads": [_found(folder, verifier) for folder in folders],
         "certificates": [] if is_payload else list(_certificates(root)),
     }
@@ -78,12 +85,19 @@ def copy(arguments: Arguments, report: Report) -> dict[str, int]:
         text = "the contents list is not the one that was read before"
         fix = "pull the drive and plug it in again"
         raise PayloadRefused(Problem("HASH_MISMATCH", text, where=str(folder), fix=fix))
+    # Trust may have changed since, and what is copied must say for itself why it was let in.
+    signature = drive.read_signature(folder)
+    verdict = Rules.of(arguments).verifier().verify(data, signature)
+    _refuse_if_any(verdict.problems)
     listed = contents.parse(data, f"{folder.name}/{contents.NAME}")
     _refuse_if_any(tuple(payload.oversized(listed)))
     drive.copy(folder, listed, staging, wanted=lambda e: payload.is_metadata(e.path))
     (staging / contents.NAME).write_bytes(data)
+    if signature is not None:
+        (staging / contents.SIGNATURE_NAME).write_bytes(signature)
     trial.run(lambda: payload.load(staging, listed), listed.payload_id)
     staged = payload.load(staging, listed)
+    _refuse_if_any(verdict.grant.problems(staged.manifest))
     facts = facts_of(arguments)
     freed_mb = arguments["freed_memory_mb"]  # by the release that this one takes over from
     facts = replace(facts, free_memory_mb=facts.free_memory_mb + freed_mb)
@@ -152,6 +166,7 @@ def _found(folder: Path, verifier: Verifier) -> dict[str, Any]:
     digest = ""
     listed: Contents | None = None
     problems: tuple[Problem, ...] = ()
+    verdict = Verdict(())
     try:
         data = drive.read_contents(folder)
         digest = hashlib.sha256(data).hexdigest()
@@ -172,7 +187,11 @@ def _found(folder: Path, verifier: Verifier) -> dict[str, Any]:
         "version": listed.version if listed else "",
         "release": listed.release if listed else 0,
         "fleet": listed.fleet if listed else "",
+        "built": listed.built if listed else "",
         "problems": [problem.to_dict() for problem in problems],
+        "warnings": [problem.to_dict() for problem in verdict.warnings],
+        "signers": list(verdict.signers),
+        "grant": verdict.grant.to_dict(),
     }
 
 

@@ -19,7 +19,10 @@ from nondum.host.helper import privileged
 from nondum.host.lifecycle.children import Children
 from nondum.host.lifecycle.lanes import in_thread
 from nondum.host.lifecycle.queue import Queue
+from nondum.host.trust.chain import unpacked
+from nondum.host.trust.payload_trust import PayloadTrust
 from nondum.sdk.errors import DriveGone, InstallFailed, Problem
+from nondum.wheelhouse.signatures import Grant
 
 LOOK_S = 10.0
 """A drive that cannot be mounted and listed in this time hangs."""
@@ -48,15 +51,15 @@ def telling_stalls(drive: str, stall_s: float) -> Iterator[None]:
 class DriveReading:
     """Looks through drives in children, and unmounts them."""
 
-    def __init__(self, children: Children, emit: Emit, *, allow_unsigned: bool) -> None:
+    def __init__(self, children: Children, emit: Emit, trust: PayloadTrust) -> None:
         self._children, self._emit = children, emit
         self._queue = Queue(AT_ONCE)
-        self._allow_unsigned = allow_unsigned
+        self._trust = trust
         self._mounted: dict[str, Path] = {}
         """Drive → where it is, or may be, mounted."""
 
     async def read(self, effect: ReadDrive) -> tuple[Event, ...]:
-        """Tell the payloads and certificates of a drive.
+        """Tell the payloads and certificates of a drive; take the trust files on it first.
 
         Raises `DriveGone`, `PayloadRefused`, `InstallFailed`.
         """
@@ -66,7 +69,7 @@ class DriveReading:
             "root": str(effect.root),
             "node": str(effect.node) if effect.node else None,
             "filesystem": effect.filesystem,
-            "allow_unsigned": self._allow_unsigned,
+            **self._trust.arguments,
         }
 
         def tell(ahead: int) -> None:
@@ -90,13 +93,21 @@ class DriveReading:
                 release=said["release"],
                 fleet=said["fleet"],
                 problems=tuple(Problem(**problem) for problem in said["problems"]),
+                warnings=tuple(Problem(**problem) for problem in said["warnings"]),
+                signers=tuple(said["signers"]),
+                grant=Grant.parse(said["grant"]),
+                built=said["built"],
             )
             for said in found["payloads"]
         ]
         certificates = tuple(found["certificates"])
         brought = (CertificatesBrought(effect.drive, certificates),) if certificates else ()
         keys = tuple(found.payload for found in payloads)
-        return *brought, *payloads, DriveRead(effect.drive, keys, len(certificates))
+        files = unpacked(found["trust"])
+        flaws = tuple(Problem(**problem) for problem in found["trust_problems"])
+        changed = await self._trust.offer(effect.drive, files, flaws)
+        read = DriveRead(effect.drive, keys, len(certificates), len(files))
+        return *changed, *brought, *payloads, read
 
     async def release(self, effect: ReleaseDrive) -> tuple[Event, ...]:
         """Unmount a drive that was mounted for reading."""

@@ -40,6 +40,8 @@ RULES: Mapping[type[Event], _Rule] = {
     events.PayloadVerified: payload_rules.on_payload_verified,
     events.WheelsStored: payload_rules.on_wheels_stored,
     events.BesideRefused: releases.on_beside_refused,
+    events.PayloadDoubted: payload_rules.on_payload_doubted,
+    events.TrustChanged: payload_rules.on_trust_changed,
     events.RollbackAsked: payload_rules.on_rollback_asked,
     events.RetryAsked: component_rules.on_retry_asked,
     events.ForgetAsked: payload_rules.on_forget_asked,

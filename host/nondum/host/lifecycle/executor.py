@@ -26,11 +26,13 @@ from nondum.host.events import (
     PayloadFailed,
     PayloadRefused,
 )
+from nondum.host.lifecycle import payload_rules
 from nondum.host.lifecycle.children import Children
 from nondum.host.lifecycle.folders import Folders
 from nondum.host.lifecycle.installation import Installation, InstallOptions
 from nondum.host.lifecycle.lanes import Lanes
 from nondum.host.lifecycle.quiet import Quiet
+from nondum.host.trust.payload_trust import PayloadTrust
 from nondum.host.workers import Workers
 from nondum.sdk.errors import DriveGone, NondumError, Problem
 from nondum.wheelhouse import disk
@@ -63,11 +65,17 @@ class Executor:
         options = options or InstallOptions()
         self._workers, self._emit = workers, emit
         self.children = Children()
+        self.trust = PayloadTrust(
+            host, folders, self.children, options.trust, allow_unsigned=options.allow_unsigned
+        )
         self._lanes = Lanes()
         self._quiet = Quiet()
-        self._drives = DriveReading(self.children, emit, allow_unsigned=options.allow_unsigned)
-        self.installation = Installation(host, folders, workers, self.children, emit, options)
+        self._drives = DriveReading(self.children, emit, self.trust)
+        self.installation = Installation(
+            host, folders, workers, self.children, emit, options, self.trust
+        )
         self._hands: Mapping[type[Effect], _Hand] = {
+            effects.JudgePayloads: self.trust.judged,
             effects.ReadDrive: self._drives.read,
             effects.ReleaseDrive: self._drives.release,
             effects.CopyPayload: self.installation.copy,
@@ -96,7 +104,10 @@ class Executor:
 
     async def prepare(self, state: HostState) -> None:
         """Clear away what a recovered state does not account for; start a spare child."""
+        await self.trust.open()
         await self.installation.prepare(state)
+        if payloads := payload_rules.kept(state):
+            self.start(effects.JudgePayloads(payloads))
 
     def adopt(self, state: HostState) -> None:
         """Have the workers stand for components that the catalogue says."""
@@ -164,6 +175,8 @@ def _lane(effect: Effect) -> str:
     match effect:
         case effects.PayloadEffect():
             return f"payload {effect.payload}"
+        case effects.JudgePayloads():
+            return "trust"
         case effects.ReadDrive() | effects.ReleaseDrive():
             return f"drive {effect.drive}"
         case effects.RestartWorker() | effects.AttachDevice() | effects.DetachDevice():

@@ -55,6 +55,11 @@ class Folders:
         return self.root / "peers"
 
     @property
+    def trust(self) -> Path:
+        """The trust files that followed the first one."""
+        return self.root / "trust"
+
+    @property
     def handover(self) -> Path:
         """Payloads that other hosts are fetching, as far as they do."""
         return self.root / "handover"

@@ -38,9 +38,11 @@ from nondum.host.lifecycle.prepared import Prepared
 from nondum.host.lifecycle.queue import Queue
 from nondum.host.lifecycle.rebuilding import with_found, write_note
 from nondum.host.lifecycle.room import Needs, used_mb, why_not_beside
+from nondum.host.trust.payload_trust import PayloadTrust, TrustOptions
 from nondum.host.workers import Limits, Workers, base_interpreter, end_leftovers
 from nondum.sdk.errors import NondumError, WorkerFailed, problems_of
 from nondum.wheelhouse import preflight
+from nondum.wheelhouse.signatures import Grant
 
 AT_ONCE = 2
 """Payloads that are brought in at the same time, from the first byte copied until they are active
@@ -69,6 +71,7 @@ class InstallOptions:
     """Size that the store is pruned to."""
     limits: Limits = field(default_factory=Limits)
     """Of each worker."""
+    trust: TrustOptions = field(default_factory=TrustOptions)
 
 
 class Installation:
@@ -82,8 +85,11 @@ class Installation:
         children: Children,
         emit: Emit,
         options: InstallOptions,
+        trust: PayloadTrust,
     ) -> None:
         self._host, self._folders, self._options = host, folders, options
+        self._trust = trust
+        self._grants: dict[str, Grant] = {}
         self._workers, self._children, self._emit = workers, children, emit
         self._prepared: dict[str, tuple[Prepared, ...]] = {}
         self._needs: dict[str, Needs] = {}
@@ -190,6 +196,7 @@ class Installation:
                 effect.payload,
                 tuple(component.record(effect.payload) for component in prepared),
                 tuple(pose for component in prepared for pose in component.poses(self._host)),
+                self._grants[effect.payload],
             ),
         )
 
@@ -251,6 +258,7 @@ class Installation:
             for said in told["components"]
         )
         self._needs[key] = Needs.parse(told["needs"])
+        self._grants[key] = Grant.parse(told["grant"])
         return int(told["fresh"])
 
     async def _why_not_beside(self, effect: effects.ProbeComponents) -> str:
@@ -285,6 +293,7 @@ class Installation:
         self._drives.pop(effect.payload, None)
         self._prepared.pop(effect.payload, None)
         self._needs.pop(effect.payload, None)
+        self._grants.pop(effect.payload, None)
         self._uncompiled.discard(effect.payload)
         scratches = self._folders.scratches_of(effect.payload)
         await in_thread(end_leftovers, scratches)
@@ -301,6 +310,7 @@ class Installation:
             "reserve_mb": self._options.reserve_mb,
             "confinement": self._workers.launcher.level,
             "method": self._options.method,
+            **self._trust.arguments,
             **more,
         }
 

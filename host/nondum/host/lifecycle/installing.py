@@ -13,6 +13,7 @@ from typing import Any
 from nondum.host.drives import reader
 from nondum.host.drives.reader import Arguments, Report
 from nondum.host.events import plain
+from nondum.host.trust import chain
 from nondum.sdk.errors import InstallFailed, Problem
 from nondum.wheelhouse import build, venvs
 from nondum.wheelhouse.lock import LockedWheel
@@ -28,11 +29,13 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
     """Make a payload's venvs and tell what its workers are started from. Idempotent.
 
     Afterwards, whatever a starting daemon needs to make them again is safe on disk. Raises
-    `InstallFailed` (DISK_FULL, STORE_DAMAGED, …) and `PayloadRefused`.
+    `InstallFailed` (DISK_FULL, STORE_DAMAGED, …) and `PayloadRefused`, also when it is not trusted
+    any more.
     """
     folder, root = Path(arguments["folder"]), Path(arguments["venvs"])
     by_pip = arguments["method"] == "pip"
     staged = reader.load_staged(folder)
+    grant = chain.grant_of_kept(arguments, folder, staged.manifest)
     facts = reader.facts_of(arguments)
     root.mkdir(parents=True, exist_ok=True)
     with ThreadPoolExecutor(1) as pool:  # disks take their time; what is linked is not waited for
@@ -48,7 +51,13 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
     components = [_told(staged, component, root) for component in staged.manifest.components]
     requires = staged.manifest.requires
     needs = {"memory_mb": requires.memory_mb, "alone": requires.alone}
-    return {"fresh": fresh, "uncompiled": uncompiled, "components": components, "needs": needs}
+    return {
+        "fresh": fresh,
+        "uncompiled": uncompiled,
+        "components": components,
+        "needs": needs,
+        "grant": grant.to_dict(),
+    }
 
 
 def _make(

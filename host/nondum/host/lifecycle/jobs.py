@@ -8,6 +8,7 @@ from typing import Any
 from nondum.host.drives import parcel, reader
 from nondum.host.drives.reader import Arguments, Report
 from nondum.host.lifecycle import compiling, installing, rebuilding
+from nondum.host.trust import chain
 
 Job = Callable[[Arguments, Report], Any]
 
@@ -22,6 +23,9 @@ JOBS: Mapping[str, Job] = {
     "compile": compiling.compile_wheels,
     "prune": installing.prune,
     "listing": installing.listing,
+    "trust_load": chain.load,
+    "trust_extend": chain.extend,
+    "trust_judge_kept": chain.judge_kept,
     "sweep": installing.sweep,
     "found": rebuilding.found,
 }

@@ -7,12 +7,13 @@ from dataclasses import replace
 from typing import Any
 
 from nondum.host.catalogue.records import ComponentRecord, MountPose, PayloadRecord, Step
-from nondum.host.catalogue.state import Highwater, HostState
+from nondum.host.catalogue.state import HostState
 from nondum.host.effects import (
     ActivatePayload,
     AttachDevice,
     ClearPayload,
     CopyPayload,
+    JudgePayloads,
     PayloadEffect,
     ProbeComponents,
     RestPayload,
@@ -23,6 +24,8 @@ from nondum.host.events import (
     Event,
     ForgetAsked,
     PayloadActivated,
+    PayloadDistrusted,
+    PayloadDoubted,
     PayloadFailed,
     PayloadFound,
     PayloadRefused,
@@ -33,6 +36,7 @@ from nondum.host.events import (
     PayloadWithdrawn,
     RetryAsked,
     RollbackAsked,
+    TrustChanged,
     WheelsStored,
 )
 from nondum.host.lifecycle import admission, releases, tries
@@ -42,6 +46,8 @@ from nondum.host.transitions import TRANSITIONS, Transition
 
 PHASES = {Step.VERIFIED: "verified", Step.STORED: "installed", Step.ACTIVE: "ready"}
 """The steps whose moments people are shown."""
+
+_KEPT = frozenset({Step.STAGED, Step.STORED, Step.PROBED, Step.ACTIVE, Step.SUPERSEDED})
 
 GUEST_RANK = 1_000_000
 """Ranks of components that were not installed for good begin here."""
@@ -169,7 +175,7 @@ def _told(payload: PayloadRecord, event: Event) -> PayloadRecord:
     match event:
         case PayloadVerified():
             return replace(payload, components=event.components)
-        case PayloadRefused() | PayloadFailed() | PayloadSentAway():
+        case PayloadRefused() | PayloadFailed() | PayloadSentAway() | PayloadDistrusted():
             return replace(payload, problems=event.problems)
         case RetryAsked():
             return replace(payload, problems=())
@@ -177,6 +183,25 @@ def _told(payload: PayloadRecord, event: Event) -> PayloadRecord:
             return replace(payload, was=0)
         case _:
             return payload
+
+
+def on_trust_changed(turn: Turn, event: TrustChanged) -> None:
+    """Ask anew of all payloads that are here whether they are trusted."""
+    turn.events.append(event)
+    turn.effects.append(JudgePayloads(kept(turn.state)))
+
+
+def on_payload_doubted(turn: Turn, event: PayloadDoubted) -> None:
+    """Let a payload that is not trusted any more go on, and say so."""
+    payload = turn.state.payloads.get(event.payload)
+    if payload is not None and payload.problems != event.problems:
+        turn.events.append(event)
+        turn.put_payload(replace(payload, problems=event.problems))
+
+
+def kept(state: HostState) -> tuple[str, ...]:
+    """Payloads of which what they were judged by lies on this host's disk."""
+    return tuple(payload.key for payload in state.payloads.values() if payload.step in _KEPT)
 
 
 def on_forget_asked(turn: Turn, event: ForgetAsked) -> None:
@@ -205,10 +230,8 @@ def _activate(turn: Turn, payload: PayloadRecord, event: PayloadActivated) -> No
         turn.put_component(replace(component, payload_id=payload.payload_id))
     turn.forget(payload.payload_id)
     turn.change(mounts={**_by_unit(event.mounts), **turn.state.mounts})
-    newest = turn.state.highwater.get(releases.key_of(payload))
-    if newest is None or newest.release <= payload.release:
-        reached = Highwater(payload.release, payload.digest)
-        turn.change(highwater={**turn.state.highwater, releases.key_of(payload): reached})
+    reached = admission.reached(turn.state, payload, event)
+    turn.change(highwater={**turn.state.highwater, releases.key_of(payload): reached})
 
 
 def _entering(

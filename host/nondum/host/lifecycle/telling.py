@@ -10,7 +10,7 @@ from nondum.host.catalogue.state import HostState
 from nondum.host.events import Event, PayloadFound, RetryAsked, RollbackAsked
 from nondum.host.transitions import TRANSITIONS
 
-_SUBJECTS = ("component", "goal", "unit", "device", "drive", "kind", "host")
+_SUBJECTS = ("component", "goal", "unit", "device", "drive", "kind", "host", "source")
 
 _ASKED = (RetryAsked, RollbackAsked)
 _STEPS = {event: row.to.value for (_, event), row in TRANSITIONS.items() if event not in _ASKED}

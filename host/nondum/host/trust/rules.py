@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import lru_cache
 from typing import Any
 
 from nondum.wheelhouse.signatures import Verifier
-from nondum.wheelhouse.trust import trust_file
+from nondum.wheelhouse.trust import succession, trust_file
 from nondum.wheelhouse.trust.judging import Circumstances, Developing, Judging
+from nondum.wheelhouse.trust.succession import SignedFile
 from nondum.wheelhouse.trust.trust import Trust
 
 
@@ -30,12 +31,19 @@ class Rules:
     @classmethod
     def of(cls, arguments: Mapping[str, Any]) -> Rules:
         """The rules among a job's arguments."""
-        host, trust = arguments.get("host", ""), arguments.get("trust")
-        return cls(host, arguments["allow_unsigned"], trust)
+        allow_unsigned = arguments.get("allow_unsigned", False)
+        return cls(arguments.get("host", ""), allow_unsigned, arguments.get("trust"))
 
-    def verifier(self) -> Verifier:
-        """Who judges by them, now."""
-        at = Circumstances(self.host, datetime.now(UTC))
+    def following(self, known: Sequence[str], offered: Sequence[SignedFile]) -> Rules:
+        """The rules as they will be once the files that follow the one in force are taken."""
+        if self.trust is None or not offered:
+            return self
+        accepted = succession.extend(parsed(self.trust), known, offered).accepted
+        return replace(self, trust=accepted[-1].data.decode()) if accepted else self
+
+    def verifier(self, *, with_time: bool = True) -> Verifier:
+        """Who judges by them, now, or without asking what time it is."""
+        at = Circumstances(self.host, datetime.now(UTC) if with_time else None)
         trust = parsed(self.trust) if self.trust is not None else None
         return Developing(trust, at) if self.allow_unsigned else Judging(trust, at)
 

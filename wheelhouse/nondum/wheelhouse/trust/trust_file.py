@@ -55,7 +55,7 @@ from nondum.wheelhouse.trust.wire import Malformed
 NAME = "trust.toml"
 FORMAT = "nondum-trust 1"
 MAX_BYTES = tables.MAX_BYTES
-MAX_VERSION = 2**31
+MAX_VERSION = 99_999_999
 MAX_RELEASE = 2**53
 
 _FORMAT = Form(re.compile(re.escape(FORMAT)), f"{FORMAT!r}, which this nondum knows")

@@ -1,0 +1,192 @@
+"""The trust files of a host, from the first one to the one that is in force, as they lie on its
+disk; what child processes do with them.
+
+    /etc/nondum/trust.toml            the first one: whoever may write there vouches for it
+    <state>/trust/00000004.toml       each that followed, by its version
+    <state>/trust/00000004.toml.sig   what its roots have signed it with
+
+Nothing on disk is believed for lying there but the first one: the chain is verified at each start.
+"""
+
+from __future__ import annotations
+
+import base64
+import os
+import stat
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from nondum.host.trust.rules import Rules, parsed
+from nondum.sdk.errors import NondumError, PayloadRefused, Problem, TrustRefused
+from nondum.wheelhouse import contents, disk
+from nondum.wheelhouse.manifest import Manifest
+from nondum.wheelhouse.signatures import Grant, Verdict
+from nondum.wheelhouse.trust import sshsig, succession, trust_file
+from nondum.wheelhouse.trust.succession import SignedFile
+
+Report = Callable[[str, int, int], None]
+Arguments = Mapping[str, Any]
+
+SIGNATURE_SUFFIX = ".sig"
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+
+
+def load(arguments: Arguments, report: Report) -> dict[str, Any]:
+    """Follow the chain in `folder` from its first file, `anchor`: the `text` in force (None: nobody
+    is trusted), the digests `known` and the `problems` on the way."""
+    folder, anchor = Path(arguments["folder"]), Path(arguments["anchor"])
+    known: list[SignedFile] = []
+    try:
+        if not anchor.exists():
+            return _told([], ())
+        _check_own(anchor)
+        first = _read(anchor)
+        trust = succession.check_first(first)
+        known.append(first)
+        extended = succession.extend(trust, (first.digest,), tuple(_updates(folder, trust.version)))
+    except NondumError as refused:
+        return _told(known, refused.problems)
+    return _told([first, *extended.accepted], extended.problems)
+
+
+def extend(arguments: Arguments, report: Report) -> dict[str, Any]:
+    """Take from the files `offered` (see `packed`) those that follow the `trust` in force, and keep
+    them in `folder`: as `load`, with `taken`, the versions.
+
+    Raises `InstallFailed` (DISK_FULL, …); then the trust in force stays.
+    """
+    folder, known = Path(arguments["folder"]), list(arguments["known"])
+    offered = unpacked(arguments["offered"])
+    current = parsed(arguments["trust"])
+    extended = succession.extend(current, known, offered)
+    for version, file in enumerate(extended.accepted, start=current.version + 1):
+        _keep(folder, _name(version), file)
+    text = extended.accepted[-1].data.decode() if extended.accepted else arguments["trust"]
+    return {
+        "text": text,
+        "known": [*known, *(file.digest for file in extended.accepted)],
+        "problems": [problem.to_dict() for problem in extended.problems],
+        "taken": list(range(current.version + 1, extended.trust.version + 1)),
+    }
+
+
+def judge_kept(arguments: Arguments, report: Report) -> dict[str, list[dict[str, str]]]:
+    """Judge payloads by what is kept of them in `folders`: key → what is wrong with it."""
+    return {
+        folder.name: [problem.to_dict() for problem in _judged(arguments, folder).problems]
+        for folder in map(Path, arguments["folders"])
+        if (folder / contents.NAME).exists()
+    }
+
+
+def grant_of_kept(arguments: Arguments, folder: Path, manifest: Manifest) -> Grant:
+    """What a payload may have, judged by what is kept of it; whether its keys hold now was asked as
+    it came.
+
+    Raises `PayloadRefused`, but where what is here may go on without trust.
+    """
+    verdict = _judged(arguments, folder)
+    problems = verdict.problems or verdict.grant.problems(manifest)
+    if problems and arguments.get("demand_trust", True):
+        raise PayloadRefused(*problems)
+    return verdict.grant
+
+
+def _judged(arguments: Arguments, folder: Path) -> Verdict:
+    signature = folder / contents.SIGNATURE_NAME
+    return (
+        Rules.of(arguments)
+        .verifier(with_time=False)
+        .verify(
+            (folder / contents.NAME).read_bytes(),
+            signature.read_bytes() if signature.exists() else None,
+        )
+    )
+
+
+def packed(files: tuple[SignedFile, ...]) -> list[list[str | None]]:
+    """Files as they travel between processes."""
+    return [[_base64(f.data), _base64(f.signature), f.where] for f in files]
+
+
+def unpacked(rows: list[list[str | None]]) -> tuple[SignedFile, ...]:
+    """The same, back again."""
+    return tuple(
+        SignedFile(
+            base64.b64decode(data or ""),
+            base64.b64decode(signature) if signature is not None else None,
+            where or "",
+        )
+        for data, signature, where in rows
+    )
+
+
+def _base64(data: bytes | None) -> str | None:
+    return base64.b64encode(data).decode("ascii") if data is not None else None
+
+
+def _told(known: Sequence[SignedFile], problems: Sequence[Problem]) -> dict[str, Any]:
+    return {
+        "text": known[-1].data.decode() if known else None,
+        "known": [file.digest for file in known],
+        "problems": [problem.to_dict() for problem in problems],
+    }
+
+
+def _updates(folder: Path, after: int) -> Iterator[SignedFile]:
+    names = sorted(path.name for path in folder.glob("????????.toml")) if folder.is_dir() else []
+    for name in names:
+        if name > _name(after):
+            yield _read(folder / name)
+
+
+def _read(path: Path) -> SignedFile:
+    """A trust file on this host's disk. Raises `TrustRefused` (TOO_LARGE, IO_ERROR)."""
+    signature = path.with_name(path.name + SIGNATURE_SUFFIX)
+    try:
+        data = path.read_bytes()
+        signed = signature.read_bytes() if signature.exists() else None
+    except OSError as error:
+        raise TrustRefused(disk.problem_of(error, "cannot be read", path)) from error
+    if len(data) > trust_file.MAX_BYTES or len(signed or b"") > sshsig.MAX_BYTES:
+        told, fix = f"is longer than {trust_file.MAX_BYTES} bytes", "put the genuine file there"
+        raise TrustRefused(Problem("TOO_LARGE", told, where=str(path), fix=fix))
+    return SignedFile(data, signed, str(path))
+
+
+def _check_own(path: Path) -> None:
+    """See that only root, or whom this host runs as, can have written a file.
+
+    Raises `TrustRefused` (TRUST_OPEN_TO_OTHERS).
+    """
+    status = path.stat()
+    if status.st_mode & _OTHERS_WRITE or status.st_uid not in (0, os.geteuid()):
+        raise TrustRefused(
+            Problem(
+                "TRUST_OPEN_TO_OTHERS",
+                "others can change this file, so it says nothing about whom to trust",
+                where=str(path),
+                need="owner root, mode 0644",
+                have=f"user {status.st_uid}, mode {stat.S_IMODE(status.st_mode):04o}",
+                fix="put the genuine file there, then `chown root` and `chmod 644` it",
+            )
+        )
+
+
+def _keep(folder: Path, name: str, file: SignedFile) -> None:
+    """Write the signatures, then the file: one without the other is never found.
+
+    Raises `InstallFailed`.
+    """
+    try:
+        disk.make_folder(folder)
+        if file.signature is not None:
+            disk.write(folder / (name + SIGNATURE_SUFFIX), file.signature)
+        disk.write(folder / name, file.data)
+    except OSError as error:
+        raise disk.failed(error, "the trust file cannot be kept", folder / name) from error
+
+
+def _name(version: int) -> str:
+    return f"{version:08d}.toml"
