@@ -34,6 +34,12 @@ class Port:
     def fileno(self) -> int:
         return self._master
 
+    def hang_up(self) -> None:
+        """End the line: whoever has it open sees a hang-up, and nobody opens it again."""
+        for end in (self._master, self._terminal):
+            if end >= 0:
+                os.close(end)
+        self._master = self._terminal = -1
+
     def close(self) -> None:
-        os.close(self._master)
-        os.close(self._terminal)
+        self.hang_up()

@@ -75,8 +75,8 @@ def scribe(id: str = "scribe", **options: Any) -> Part:
     return Part(id, SCRIBE, **options)
 
 
-GAUGE = '''"""Reads a gauge for as long as it is there."""
-from pathlib import Path
+GAUGE = '''"""Listens to a gauge for as long as it is there."""
+import os, select
 
 from nondum.sdk import BehaviourFailed, DeviceNeed, Fragment, Unit, behaviour, hookimpl
 
@@ -103,12 +103,16 @@ def fragments():
 
 @behaviour("measure", action="(measure ?u - sensor ?h - host)", lasting=True)
 async def measure(ctx, u, h):
-    node = Path(ctx.device("gauge").node)
-    node.read_text()
-    await ctx.established()
-    while node.exists():
-        await ctx.sleep(0.05)
-    raise BehaviourFailed("nothing is read any more", code="GAUGE_GONE")
+    line = select.poll()
+    port = os.open(ctx.device("gauge").node, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    line.register(port, 0)
+    try:
+        await ctx.established()
+        while not line.poll(0):  # hang-ups are always told
+            await ctx.sleep(0.05)
+    finally:
+        os.close(port)
+    raise BehaviourFailed("nothing is heard any more", code="GAUGE_GONE")
 '''
 
 

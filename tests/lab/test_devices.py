@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import contextlib
+from collections.abc import Callable, Iterator
 
 import pytest
 from demo import slots
+from demo.emulators.port import Port
 from tests.lab.plugins import gauge
 from tests.lab.running_host import RunningHost
 
@@ -14,21 +16,30 @@ pytestmark = [pytest.mark.lab, pytest.mark.beside]
 WAITS = "waits for gauge"
 
 
-def plug_gauge(host: RunningHost, port: str = "port-1") -> Path:
-    """Plug a gauge in; returns its node."""
-    node = host.work / f"node-at-{port}"
-    node.write_text("1.5 bar\n")
-    slots.plug(host.devices, port, str(node), {"ID_MODEL": "Gauge"})
-    return node
+Plug = Callable[..., Port]
 
 
-def test_device_pulled_in_the_middle_of_a_behaviour(host: RunningHost) -> None:
-    node = plug_gauge(host)
+@pytest.fixture
+def plug_gauge(host: RunningHost) -> Iterator[Plug]:
+    """Plugs a gauge in at a port; gives its end of the line."""
+    with contextlib.ExitStack() as lines:
+
+        def plug(port: str = "port-1") -> Port:
+            line = Port()
+            lines.callback(line.close)
+            slots.plug(host.devices, port, line.path, {"ID_MODEL": "Gauge"})
+            return line
+
+        yield plug
+
+
+def test_device_pulled_in_the_middle_of_a_behaviour(host: RunningHost, plug_gauge: Plug) -> None:
+    line = plug_gauge()
     host.bring("gauge", gauge())
     before = host.until_component("gauge", "ready")
     goal = host.want("(measured spot)")
     host.until_goal(goal, "holds")
-    node.unlink()
+    line.hang_up()
     host.until_goal(goal, "active")
     slots.unplug(host.devices, "port-1")
     host.until_component("gauge", WAITS)
@@ -38,36 +49,42 @@ def test_device_pulled_in_the_middle_of_a_behaviour(host: RunningHost) -> None:
     ends = [e["detail"] for e in host.journal("gauge") if e["event"] == "BehaviourEnded"]
     assert ends[0]["outcome"] == "FAILED"
     assert ends[0]["reason"].startswith("GAUGE_GONE")
-    plug_gauge(host, "port-2")
+    plug_gauge("port-2")
     host.until_goal(goal, "holds")
     assert before["devices"] == {"gauge": "port-1"}
     assert host.component("gauge") == {**before, "devices": {"gauge": "port-2"}}
 
 
-def test_behaviour_that_does_not_notice_is_halted_when_its_device_goes(host: RunningHost) -> None:
-    plug_gauge(host)
+def test_behaviour_that_does_not_notice_is_halted_when_its_device_goes(
+    host: RunningHost, plug_gauge: Plug
+) -> None:
+    plug_gauge()
     host.bring("gauge", gauge())
     goal = host.want("(measured spot)")
     host.until_goal(goal, "holds")
-    slots.unplug(host.devices, "port-1")  # its node can still be read
+    slots.unplug(host.devices, "port-1")  # the line is still there
     host.until_goal(goal, "suspended")
     (end,) = (e["detail"] for e in host.journal("gauge") if e["event"] == "BehaviourEnded")
     assert end["outcome"] == "HALTED"
-    plug_gauge(host)
+    plug_gauge()
     host.until_goal(goal, "holds")
 
 
-def test_device_that_comes_after_its_component_is_as_good(host: RunningHost) -> None:
+def test_device_that_comes_after_its_component_is_as_good(
+    host: RunningHost, plug_gauge: Plug
+) -> None:
     host.bring("gauge", gauge())
     host.until_component("gauge", WAITS)
     goal = host.want("(measured spot)")
     host.until_goal(goal, "suspended")
-    plug_gauge(host)
+    plug_gauge()
     host.until_goal(goal, "holds")
 
 
-def test_one_device_for_two_stays_with_whoever_has_it_and_that_is_told(host: RunningHost) -> None:
-    plug_gauge(host)
+def test_one_device_for_two_stays_with_whoever_has_it_and_that_is_told(
+    host: RunningHost, plug_gauge: Plug
+) -> None:
+    plug_gauge()
     host.bring("second", gauge("second"))
     host.until_component("second", "ready")
     host.bring("first", gauge("first"))
@@ -78,7 +95,7 @@ def test_one_device_for_two_stays_with_whoever_has_it_and_that_is_told(host: Run
     assert (row["component"], row["contested_by"]) == ("second", ["first"])
     slots.unplug(host.devices, "port-1")
     host.until_component("second", WAITS)
-    plug_gauge(host)
+    plug_gauge()
     host.until_component("first", "ready")
     assert host.until_component("second", WAITS)
     host.pull("first")

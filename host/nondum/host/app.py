@@ -19,6 +19,7 @@ from nondum.host.catalogue import backups, opening
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.cgroups import Cages
 from nondum.host.config import HostConfig
+from nondum.host.confinement import choice
 from nondum.host.control.server import ControlServer
 from nondum.host.conversation import Conversation, Take
 from nondum.host.devices.slots import DeviceSlotSource
@@ -31,7 +32,6 @@ from nondum.host.drives.steady import Steady
 from nondum.host.events import Event, HostStarted, Recomposed
 from nondum.host.helper import privileged
 from nondum.host.lifecycle.bus import Bus
-from nondum.host.lifecycle.children import Children
 from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
 from nondum.host.lifecycle.folders import Folders, claim
@@ -44,12 +44,13 @@ from nondum.host.mind.system_tree import load_system_tree
 from nondum.host.news import News
 from nondum.host.orders import Orders
 from nondum.host.questions import Questions
+from nondum.host.trust.orders import TrustOrders
+from nondum.host.trust.payload_trust import TrustOptions
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import Limits, Timing
 from nondum.host.workers.workers import Workers
 from nondum.planning.attempts import Patience
 from nondum.sdk.errors import ConfigRefused, NondumError, Problem
-from nondum.wheelhouse.signatures import UnsignedAllowed
 
 if TYPE_CHECKING:
     from nondum.host.peers.neighbourhood import Neighbourhood
@@ -87,14 +88,21 @@ async def _run(
     bus = Bus()
     timing = Timing(startup_s=config.workers.startup_s)
     cages = await in_thread(_cages, folders)
-    launcher = WorkerLauncher(cages=cages)
+    standing = await in_thread(
+        choice.standing,
+        config.workers.confinement,
+        config.workers.minimum_confinement,
+        folders.confinement,
+    )
+    confinement = choice.confinement(standing.level, folders.of_workers)
+    launcher = WorkerLauncher(confinement, cages)
     workers = Workers(config.host.name, bus.emit, launcher=launcher, timing=timing)
     executor = Executor(config.host.name, folders, workers, bus.emit, _install_options(config))
     manager = ComponentManager(catalogue, executor, bus)
     for source in (*drive_sources(config, folders), *more_drives):
         manager.add_source(source)
     neighbours = await _neighbours(
-        config, folders, workers, catalogue, bus, lambda: mind, executor.children
+        config, folders, workers, catalogue, bus, lambda: mind, executor
     )
     mind = Mind(
         config.host.name,
@@ -116,14 +124,24 @@ async def _run(
 
     def warnings() -> tuple[str, ...]:
         of_peers = neighbours.warnings if neighbours else ()
-        return (*_warnings(config, catalogue), *map(str, cages.problems()), *of_peers)
+        return (
+            *executor.trust.warnings,
+            *_warnings(catalogue),
+            *standing.warnings(),
+            *map(str, cages.problems()),
+            *of_peers,
+        )
 
     places = neighbours.placement.places if neighbours else dict
-    questions = Questions(catalogue, mind, workers, news, listing, warnings, places)
+    vouched = executor.trust.vouched
+    questions = Questions(
+        catalogue, mind, workers, standing, news, listing, warnings, places, vouched
+    )
+    trust = TrustOrders(executor.trust, bus.emit)
     orders = Orders(catalogue, mind, workers, news, bus, config.planning.translate_s)
     control = ControlServer(
         config.host.control,
-        verbs.answering(questions, orders, neighbours),
+        verbs.answering(questions, orders, trust, neighbours),
         verbs.following(questions, orders, neighbours),
     )
     await control.open()
@@ -156,7 +174,7 @@ async def _neighbours(
     catalogue: Catalogue,
     bus: Bus,
     mind: Callable[[], Mind],
-    children: Children,
+    executor: Executor,
 ) -> Neighbourhood | None:
     """What this host has to do with others; None where it is to have nothing. Imported only where
     it is wanted: it needs some ten megabytes.
@@ -167,7 +185,16 @@ async def _neighbours(
         return None
     from nondum.host.peers.neighbourhood import Neighbourhood
 
-    return await Neighbourhood.open(config, folders, workers, catalogue, bus.emit, mind, children)
+    return await Neighbourhood.open(
+        config,
+        folders,
+        workers,
+        catalogue,
+        bus.emit,
+        mind,
+        executor.children,
+        lambda: executor.trust.arguments,
+    )
 
 
 def _cages(folders: Folders) -> Cages:
@@ -246,6 +273,7 @@ class _Listener:
 def _install_options(config: HostConfig) -> InstallOptions:
     return InstallOptions(
         allow_unsigned=config.drives.allow_unsigned,
+        trust=TrustOptions(config.trust.file, stop=config.trust.on_revoke == "stop"),
         method=config.install.method,
         reserve_mb=config.install.reserve_mb,
         quota_mb=config.install.quota_mb,
@@ -259,9 +287,7 @@ def _install_options(config: HostConfig) -> InstallOptions:
     )
 
 
-def _warnings(config: HostConfig, catalogue: Catalogue) -> Iterator[str]:
-    if config.drives.allow_unsigned:
-        yield UnsignedAllowed.warning
+def _warnings(catalogue: Catalogue) -> Iterator[str]:
     if catalogue.loss is not None:
         yield str(opening.problem_of(catalogue.loss, ()))
     if catalogue.why_unwritten:

@@ -28,7 +28,8 @@ def components(session: Session) -> None:
 
     Example: nondum components
     """
-    columns = ["component", "state", "plugin", "version", "payload", "units", "confinement", "problem"]
+    columns = ["component", "state", "plugin", "version", "payload", "units"]
+    columns += ["confinement", "problem"]
     rows = session.ask("components")
     if any(row["was"] for row in rows) and not session.as_json:
         rows = [{**row, "release": render.release(row)} for row in rows]

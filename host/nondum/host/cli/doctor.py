@@ -52,6 +52,30 @@ def network(session: Session, port: int) -> int:
     return 0 if is_well else EXIT_PROBLEMS
 
 
+@doctor.command()
+@json_option
+@click.pass_obj
+def confinement(session: Session) -> int:
+    """Try out how plugins can be confined here, as this user. Exits with 3 when they cannot.
+
+    Every level is tried by confining a process and having it look around.
+
+    Example: nondum doctor confinement
+    """
+    from nondum.host.confinement import probe
+
+    rows = [finding.to_dict() for finding in probe.all_findings()]
+    is_well = any(row["available"] for row in rows)
+    if session.as_json:
+        render.as_json({"ok": is_well, "levels": rows})
+    else:
+        table(rows, ["level", "name", "available", "reason"], empty="")
+        for row in rows:
+            if row["fix"]:
+                render.sentence(row["fix"], mark=f"→ level {row['level']}: ")
+    return 0 if is_well else EXIT_PROBLEMS
+
+
 def _row(finding: Finding) -> dict[str, Any]:
     return {
         "check": finding.check,

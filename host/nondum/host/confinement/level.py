@@ -90,14 +90,11 @@ class Standing:
             )
 
 
-def chosen(findings: tuple[Finding, ...], wanted: Level | None, minimum: Level) -> Standing:
-    """The highest level that is available, or the one that was asked for.
+def chosen(findings: tuple[Finding, ...], wanted: Level | None) -> Standing:
+    """The highest level that is available, or the one that was asked for if it is.
 
-    Answers with a standing below `minimum` never: then, and when what was asked for is not there,
-    see `refusals`.
-
-    >>> found = (Finding(Level.BOX, False, "no bwrap"), Finding(Level.KERNEL, True))
-    >>> chosen(found, None, Level.LIMITS).level
+    >>> box = Finding(Level.BOX, is_available=False, reason="no bwrap")
+    >>> chosen((box, Finding(Level.KERNEL, is_available=True)), None).level
     <Level.KERNEL: 1>
     """
     usable = [f.level for f in findings if f.is_available] + [Level.LIMITS]
@@ -111,7 +108,7 @@ def refusals(
     findings: tuple[Finding, ...], wanted: Level | None, minimum: Level
 ) -> Iterator[Problem]:
     """Why this host may not start as it is configured; nothing when it may."""
-    standing = chosen(findings, wanted, minimum)
+    standing = chosen(findings, wanted)
     if wanted is not None and standing.level != wanted:
         yield _too_low(findings, wanted, f'[workers] confinement = "{int(wanted)}"', standing)
     elif standing.level < minimum:

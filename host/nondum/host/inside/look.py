@@ -25,12 +25,12 @@ def around() -> dict[str, object]:
         if ":\t" in line
     )
     return {
-        "capabilities": int(status["CapEff"], 16) | int(status["CapBnd"], 16),
+        "capabilities": int(status["CapEff"], 16) | int(status["CapPrm"], 16),
         "no_new_privileges": status.get("NoNewPrivs") == "1",
         "filters": status.get("Seccomp") == "2",
         "processes": sum(entry.isdigit() for entry in os.listdir("/proc")),  # noqa: PTH208
         "interfaces": sorted(name for _, name in socket.if_nameindex()) if _has_network() else [],
-        "sees_state": os.path.exists("/etc/shadow"),  # noqa: PTH110
+        "sees_state": _can_list("/var/lib"),
         "writes_system": _can_write("/") or _can_write("/usr"),
         "makes_namespaces": kernel.LIBC.unshare(kernel.CLONE_NEWUSER) == 0,
         "signals_host": _can_signal(),
@@ -40,6 +40,14 @@ def around() -> dict[str, object]:
 def _has_network() -> bool:
     try:
         socket.socket(socket.AF_INET).close()
+    except OSError:
+        return False
+    return True
+
+
+def _can_list(folder: str) -> bool:
+    try:
+        os.listdir(folder)  # noqa: PTH208
     except OSError:
         return False
     return True

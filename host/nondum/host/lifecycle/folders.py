@@ -50,6 +50,16 @@ class Folders:
         return self.root / "scratch"
 
     @property
+    def confinement(self) -> Path:
+        """What was found out of confining workers here."""
+        return self.root / "confinement.json"
+
+    @property
+    def of_workers(self) -> tuple[Path, ...]:
+        """Where code and scratch of all workers are."""
+        return self.root / "venvs", self.scratches
+
+    @property
     def peers(self) -> Path:
         """Key, certificate and trust."""
         return self.root / "peers"

@@ -43,8 +43,8 @@ class Keeper:
             self._read()
         return self._worker
 
-    async def grant(self, need: str, node: str) -> str:
-        """Have a device appear in the room, and give its path there.
+    async def grant(self, need: str, node: str) -> None:
+        """Have a device appear in the room, at `node_of`.
 
         Raises `WorkerFailed` (DEVICE_REFUSED).
         """
@@ -58,7 +58,6 @@ class Keeper:
                     fix="see that it is a device below /dev that the host's user may open",
                 )
             )
-        return f"{DEVICES}/{need}"
 
     async def revoke(self, need: str) -> None:
         """Have it vanish."""
@@ -97,6 +96,11 @@ class Keeper:
                 self._worker = next(_CREDENTIALS.unpack(value)[0] for _, _, value in more)
             else:
                 self._answers.put_nowait(said)
+
+
+def node_of(need: str) -> str:
+    """Where a worker finds the device for a need in its room."""
+    return f"{DEVICES}/{need}"
 
 
 def _real(node: str) -> str:

@@ -62,22 +62,20 @@ class WorkerLauncher:
         self.level = int(self._confinement.level)
         self.name = NAMES[self._confinement.level]
 
-    def launch(
-        self, spec: WorkerSpec, sock: socket.socket, *, looks: bool = False
-    ) -> WorkerProcess:
-        """Start a worker (see `Launcher`); one that `looks` only tells what it sees."""
+    def launch(self, spec: WorkerSpec, sock: socket.socket) -> WorkerProcess:
+        """Start a worker (see `Launcher`), from the spare interpreter if there is one."""
         try:
             spec.scratch.mkdir(parents=True, exist_ok=True, mode=0o700)
             ground = self._confinement.ground(spec)
             with self._confinement.entry(spec, ground) as entry:
-                parameters = {**_parameters(spec, entry), "looks": looks}
+                told = parameters(spec, entry)
                 for started in (self._taken(), None):
                     if started is not None and started.ground != ground:
                         started.close()
                         continue
                     spare = started or Spare(self._confinement, ground, self._cages)
                     spare.limit(spec.limits)
-                    if spare.become(parameters, sock, entry.ruleset):
+                    if spare.become(told, sock, entry.ruleset):
                         return spare.process()
         except OSError as error:
             problem = Problem("LAUNCH_FAILED", str(error), where=spec.component)
@@ -104,8 +102,11 @@ class WorkerLauncher:
         return spare
 
 
-def _parameters(spec: WorkerSpec, entry: Entry) -> dict[str, Any]:
-    """What `bootstrap.py` is told. Raises `OSError` when the mark finds no room."""
+def parameters(spec: WorkerSpec, entry: Entry, *, looks: bool = False) -> dict[str, Any]:
+    """What `bootstrap.py` is told; who `looks` only tells what it sees, and ends.
+
+    Raises `OSError` when the mark finds no room.
+    """
     mark = f"{MARK}={spec.scratch}"
     if len(os.fsencode(mark)) >= ROOM_BYTES:
         raise OSError(f"the path of the scratch folder is too long: {spec.scratch}")
@@ -121,6 +122,7 @@ def _parameters(spec: WorkerSpec, entry: Entry) -> dict[str, Any]:
         "room_for_mark": ROOM,
         "room": entry.room,
         "walls": entry.walls,
+        "looks": looks,
     }
 
 

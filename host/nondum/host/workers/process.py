@@ -10,7 +10,7 @@ import subprocess
 from typing import IO
 
 from nondum.host.cgroups import Cage
-from nondum.host.workers.keeper import Keeper
+from nondum.host.workers.keeper import Keeper, node_of
 
 DETACH_S = 1.0
 """How long a process that was killed is waited for; one in the kernel's hands may never end."""
@@ -56,12 +56,14 @@ class WorkerProcess:
             if inner is None or number is signal.SIGKILL:
                 _signal_group(self._popen.pid, number)
 
-    async def grant(self, need: str, node: str) -> str:
-        """Let it have a device; gives the path at which it finds it.
+    def node(self, need: str, node: str) -> str:
+        """The path at which it finds a device that it was granted."""
+        return node if self._keeper is None else node_of(need)
 
-        Raises `WorkerFailed` (DEVICE_REFUSED).
-        """
-        return node if self._keeper is None else await self._keeper.grant(need, node)
+    async def grant(self, need: str, node: str) -> None:
+        """Let it have a device. Raises `WorkerFailed` (DEVICE_REFUSED)."""
+        if self._keeper is not None:
+            await self._keeper.grant(need, node)
 
     async def revoke(self, need: str) -> None:
         """Take a device away."""

@@ -81,13 +81,26 @@ class Worker:
         Raises `WorkerFailed`, `ProtocolViolation`, `LinkClosed`.
         """
         self._streams = frozenset(welcome["outputs"].values())
-        await self.link.meet(welcome)
+        devices = {need: await self._let_in(need, d) for need, d in welcome["devices"].items()}
+        await self.link.meet({**welcome, "devices": devices})
         said = await self.link.request("describe", {})
         description = PluginDescription.parse(said, where=self.spec.component)
         if differences := mismatches(self.spec.index, description, self.spec.component):
             raise WorkerFailed(*differences)
         await self.link.request("start", {})
         self._beat()
+
+    async def attach(self, need: str, device: Mapping[str, Any]) -> None:
+        """Grant it a device. Raises `WorkerFailed`, `LinkClosed`."""
+        found = await self._let_in(need, device)
+        await self.link.request("attach", {"device": need, **found})
+
+    async def detach(self, need: str) -> None:
+        """Withdraw a device. Raises `WorkerFailed`, `LinkClosed`."""
+        try:
+            await self.link.request("detach", {"device": need})
+        finally:
+            await self._process.revoke(need)
 
     async def look(self) -> tuple[Problem, ...]:
         """Look at what it uses: end it when that is too much, tell what is nearly."""
@@ -168,6 +181,14 @@ class Worker:
             await self._end(self._why_exited(self._process.exited.result()), 0.0)
         else:
             await self._end(problems.hung_up(self.spec.component), 0.0)
+
+    async def _let_in(self, need: str, device: Mapping[str, Any]) -> dict[str, Any]:
+        """Have a device where the worker can open it; what it is told of that."""
+        try:
+            await self._process.grant(need, device["node"])
+        except WorkerFailed as error:
+            self._emit(WorkerLogged(self.spec.component, "error", str(error)))
+        return {**device, "node": self._process.node(need, device["node"])}
 
     async def _reading(self) -> Reading:
         pids, folder = self._gauge.pids(), self.spec.scratch

@@ -6,7 +6,7 @@ import asyncio
 import itertools
 import logging
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import pluggy
@@ -224,12 +224,12 @@ class Workers:
         await self._others.released(node)
         device = {"node": node, "properties": dict(properties)}
         self._devices.setdefault(component, {})[need] = device
-        await self._ask_if_running(component, "attach", {"device": need, **device})
+        await self._tell_of_device(component, lambda worker: worker.attach(need, device))
 
     async def detach(self, component: str, need: str) -> None:
         """Withdraw a device."""
         self._devices.get(component, {}).pop(need, None)
-        await self._ask_if_running(component, "detach", {"device": need})
+        await self._tell_of_device(component, lambda worker: worker.detach(need))
 
     def claims(self, component: str) -> tuple[FactKnown | StreamFlowing, ...]:
         """What a component's worker says is so now: the news of it that still hold.
@@ -360,8 +360,10 @@ class Workers:
                 except errors.ProtocolViolation as error:
                     log.warning("%s cannot be told %s: %s", component, event, error)
 
-    async def _ask_if_running(self, component: str, verb: str, body: Mapping[str, Any]) -> None:
+    async def _tell_of_device(
+        self, component: str, tell: Callable[[Worker], Awaitable[None]]
+    ) -> None:
         try:
-            await self._worker(component).link.request(verb, body)
+            await tell(self._worker(component))
         except (errors.WorkerFailed, errors.LinkClosed):
             return  # the next worker is told in its welcome

@@ -1,0 +1,151 @@
+"""Finds out which levels of confinement this machine has, by confining a process and asking it
+what it can see and do. What was found is kept until something changes that it depends on.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import logging
+import os
+import platform
+import socket
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from nondum.host.confinement import bubblewrap, landlock, refusals, sight
+from nondum.host.confinement.level import Finding, Level
+from nondum.host.workers.confinements import Boxed, Confinement, Held
+from nondum.host.workers.launcher import parameters
+from nondum.host.workers.spare import Spare
+from nondum.host.workers.spec import WorkerSpec, base_interpreter
+from nondum.sdk.description import PluginDescription
+
+ANSWER_S = 10.0
+"""How long a process is waited for that is to look around."""
+_ANSWER_BYTES = 65_536
+log = logging.getLogger(__name__)
+
+
+def findings(kept_in: Path | None = None) -> tuple[Finding, ...]:
+    """The highest level that there is, above it those that there are not and why, highest first.
+
+    Takes a tenth of a second, or nothing if `kept_in`, a file, holds what still counts. Blocks; the
+    thread that calls must live until it returns. Raises nothing.
+    """
+    key = _conditions()
+    if kept_in is not None and (kept := _kept(kept_in, key)) is not None:
+        return kept
+    found = tuple(_until_available(_each()))
+    if kept_in is not None:
+        _keep(kept_in, key, found)
+    return found
+
+
+def all_findings() -> tuple[Finding, ...]:
+    """What trying out every level has shown, highest first. Blocks, see `findings`."""
+    return tuple(_each())
+
+
+def _until_available(each: Iterator[Finding]) -> Iterator[Finding]:
+    for finding in each:
+        yield finding
+        if finding.is_available:
+            return
+
+
+def _each() -> Iterator[Finding]:
+    if not refusals.is_known(refusals.machine()):
+        log.warning("system calls cannot be filtered on %s", refusals.machine())
+    bwrap = bubblewrap.program()
+    yield sight.MISSING if bwrap is None else _tried(Boxed(bwrap))
+    if not landlock.version():
+        yield sight.failed(Level.KERNEL, "the kernel has no Landlock")
+    else:
+        yield _tried(Held())
+
+
+def _tried(confinement: Confinement) -> Finding:
+    with tempfile.TemporaryDirectory(prefix="nondum-probe-") as folder:
+        try:
+            return sight.judged(confinement.level, _look(confinement, Path(folder)))
+        except (OSError, ValueError) as error:
+            return sight.failed(confinement.level, f"it could not be tried: {error}")
+
+
+def _look(confinement: Confinement, folder: Path) -> dict[str, Any]:
+    """What a process sees there. Raises `OSError` and `ValueError`."""
+    spec = _spec(folder)
+    spec.scratch.mkdir()
+    ground = confinement.ground(spec)
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    spare = Spare(confinement, ground)
+    try:
+        with ours, theirs:
+            with confinement.entry(spec, ground) as entry:
+                spare.become(parameters(spec, entry, looks=True), theirs, entry.ruleset)
+            theirs.close()
+            ours.settimeout(ANSWER_S)
+            seen = ours.recv(_ANSWER_BYTES)
+        if not seen:
+            raise OSError(_last_words(spare) or "it ended at once")
+        answer: dict[str, Any] = json.loads(seen)
+        return answer
+    finally:
+        spare.close()
+
+
+def _last_words(spare: Spare) -> str:
+    """The last line that a process said before it ended."""
+    if spare.popen.stderr is None:
+        return ""
+    spare.popen.kill()
+    said = spare.popen.stderr.read().decode("utf-8", "replace").strip()
+    return said.splitlines()[-1] if said else ""
+
+
+def _spec(folder: Path) -> WorkerSpec:
+    return WorkerSpec(
+        component="probe",
+        payload="",
+        distribution="",
+        entry_point="",
+        site_packages=(),
+        python=base_interpreter(),
+        scratch=folder / "scratch",
+        index=PluginDescription("probe", "0"),
+    )
+
+
+def _conditions() -> list[str]:
+    """What the findings depend on."""
+    boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+    bwrap = bubblewrap.program()
+    files = [Path(p) for p in (bwrap, base_interpreter(), *_own_code()) if p is not None]
+    stamps = [f"{file}:{file.stat().st_mtime_ns}" for file in files]
+    return [boot, platform.release(), sys.version, str(os.getuid()), *stamps]
+
+
+def _own_code() -> Sequence[Path]:
+    return sorted((*bubblewrap.INSIDE.glob("*.py"), *Path(__file__).parent.glob("*.py")))
+
+
+def _kept(file: Path, key: list[str]) -> tuple[Finding, ...] | None:
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+        if data["of"] == key:
+            return tuple(Finding.from_dict(row) for row in data["findings"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return None
+
+
+def _keep(file: Path, key: list[str], found: tuple[Finding, ...]) -> None:
+    unfinished = file.with_suffix(".part")
+    with contextlib.suppress(OSError):  # then it is tried again next time
+        text = json.dumps({"of": key, "findings": [finding.to_dict() for finding in found]})
+        unfinished.write_text(text, encoding="utf-8")
+        unfinished.replace(file)
