@@ -62,6 +62,10 @@ def versions(view: View) -> dict[str, str]:
     return {row["component"]: row["version"] for row in view["components"]}
 
 
+def ended_behaviours(host: RunningHost) -> int:
+    return [entry["event"] for entry in host.journal()].count("BehaviourEnded")
+
+
 def nondum(host: RunningHost, *arguments: str) -> Any:
     """What a person's command prints."""
     command = [*NONDUM, "--control", str(host.control), *arguments, "--json"]
@@ -87,17 +91,19 @@ def test_robot_goes_on_through_upgrades_and_back(host: RunningHost) -> None:
     (row,) = (row for row in host.ask("components") if row["component"] == "talker")
     assert (row["release"], row["was"]) == (2, 1)
 
+    ended = ended_behaviours(host)
     plug(host, 3, Part("talker", FALLS))
     view = until_states(host, r1="superseded", r2="active", r3="quarantined")
     (broken,) = (row for row in view["payloads"] if row["release"] == 3)
     assert broken["codes"] == ["WORKER_EXITED"]
     host.until_told("2.0 (release 2) stays")
-    assert any("its worker ended" in problem for problem in host.ask("why")["problems"])
+    assert ended_behaviours(host) == ended, "what ran never noticed"
+    assert any("exited with status 3" in problem for problem in host.ask("why")["problems"])
 
     back = nondum(host, "payload", "rollback", TALK)
     assert (back["version"], back["state"], back["was"]) == ("1.0", "active", 2)
     until_holds_with(host, "1.0", goal)
-    host.until_told(f"a person goes back from release 2 of {TALK} 1.0 to 1")
+    host.until_told(f"a person goes back to {TALK} 1.0 (release 1) from release 2")
     assert any("a person went back to it" in w for w in host.ask("status")["warnings"])
     assert [e["event"] for e in host.journal(TALK)].count("RollbackAsked") == 1
     assert nondum(host, "payload", "rollback", TALK)["problems"][0]["code"] == "ROLLBACK_NOTHING"

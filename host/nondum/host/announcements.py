@@ -53,9 +53,8 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return f"{name} takes the place of the release before it, not beside it: {event.reason}"
         case RollbackAsked():
             name = _name(event.payload, snapshot)
-            return (
-                f"a person goes back from release {event.from_release} of {name} to {event.release}"
-            )
+            was = event.from_release
+            return f"a person goes back to {name} (release {event.release}) from release {was}"
         case PayloadWithdrawn():
             return f"{_name(event.payload, snapshot)} is withdrawn: {event.reason}"
         case PayloadSentAway():

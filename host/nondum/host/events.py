@@ -503,6 +503,15 @@ class WorkerStrained(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class TrialFailed(Event):
+    """A worker ended that was tried beside the one in force: its release does not work."""
+
+    payload: str
+    component: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class BehaviourStarted(Event):
     """A behaviour was asked to run."""
 

@@ -129,8 +129,7 @@ def test_components_of_a_release_that_waits_are_held_for_it() -> None:
     "event",
     [
         events.PayloadFailed("k2", (PROBLEM,)),
-        events.WorkerFailed("eye", (PROBLEM,), "k2"),
-        events.WorkerExited("eye", "it crashed", "k2"),
+        events.TrialFailed("k2", "eye", (PROBLEM,)),
     ],
     ids=lambda event: event.name,
 )
@@ -148,6 +147,21 @@ def test_worker_of_the_one_in_force_may_restart_meanwhile() -> None:
     state, _ = after(events.WorkerExited("eye", "signal 9", "k1"), state=before)
     assert state.components["eye"].state is ComponentState.RESTARTING
     assert steps(state)["k2"] is Step.PROBED
+
+
+def test_release_that_fails_as_it_takes_over_gives_way() -> None:
+    failed = events.TrialFailed("k2", "eye", (PROBLEM,))
+    state, _ = after(failed, state=upgraded())
+    assert steps(state) == {"k1": Step.STORED, "k2": Step.QUARANTINED}
+
+
+def test_old_worker_that_ends_as_it_is_replaced_is_no_news() -> None:
+    state = upgraded()
+    for event in (
+        events.WorkerExited("eye", "signal 9", "k1"),
+        events.WorkerFailed("eye", (PROBLEM,), "k1"),
+    ):
+        assert after(event, state=state) == (state, [])
 
 
 def test_release_that_breaks_later_gives_way_to_the_one_before() -> None:
@@ -341,7 +355,10 @@ class Releases(RuleBasedStateMachine):
         """Supervision gives a worker up."""
         payload = self.state.payloads.get(key(release))
         if payload is not None and payload.step in (Step.PROBED, Step.ACTIVE):
-            self.happen(events.WorkerFailed("eye", (PROBLEM,), payload.key))
+            is_tried = payload.step is Step.PROBED
+            fell = events.TrialFailed(payload.key, "eye", (PROBLEM,))
+            gone = events.WorkerFailed("eye", (PROBLEM,), payload.key)
+            self.happen(fell if is_tried else gone)
 
     @rule(release=st.sampled_from(RELEASES))
     def mend(self, release: int) -> None:

@@ -45,6 +45,7 @@ RULES: Mapping[type[Event], _Rule] = {
     events.RollbackAsked: payload_rules.on_rollback_asked,
     events.RetryAsked: component_rules.on_retry_asked,
     events.ForgetAsked: payload_rules.on_forget_asked,
+    events.TrialFailed: component_rules.on_trial_failed,
     events.WorkerReady: component_rules.on_worker_news,
     events.WorkerExited: component_rules.on_worker_news,
     events.WorkerFailed: component_rules.on_worker_news,

@@ -12,6 +12,7 @@ from nondum.host.events import (
     MountSet,
     PayloadFailed,
     RetryAsked,
+    TrialFailed,
     WorkerExited,
     WorkerFailed,
     WorkerReady,
@@ -20,7 +21,6 @@ from nondum.host.lifecycle import releases
 from nondum.host.lifecycle.payload_rules import on_payload_tried
 from nondum.host.lifecycle.turn import Turn
 from nondum.host.transitions import COMPONENT_TRANSITIONS
-from nondum.sdk.errors import Problem
 
 
 def on_worker_news(turn: Turn, event: WorkerReady | WorkerExited | WorkerFailed) -> None:
@@ -81,25 +81,23 @@ def on_device_removed(turn: Turn, event: DeviceRemoved) -> None:
     turn.change(devices=kept)
 
 
+def on_trial_failed(turn: Turn, event: TrialFailed) -> None:
+    """Fail a release that was tried. If it took over at that moment, its component is given up."""
+    payload = turn.state.payloads.get(event.payload)
+    if payload is None:
+        return
+    turn.events.append(event)
+    if payload.step is Step.PROBED:
+        turn.pending.append(PayloadFailed(payload.key, event.problems))
+    elif payload.step is Step.ACTIVE:
+        turn.pending.append(WorkerFailed(event.component, event.problems, event.payload))
+
+
 def _fail_probed(turn: Turn, event: WorkerReady | WorkerExited | WorkerFailed) -> None:
-    """A worker that was given up fails its payload, and one that as much as ended does that to a
-    release that is to take over from another one."""
+    if not isinstance(event, WorkerFailed):
+        return
     for payload in turn.state.payloads.values():
         is_its = event.payload in ("", payload.key) and event.component in payload.components
         if payload.step is Step.PROBED and is_its:
-            problems = _problems_of(event, is_watched=bool(releases.in_force(turn.state, payload)))
-            if problems:
-                turn.events.append(event)
-                turn.pending.append(PayloadFailed(payload.key, problems))
-
-
-def _problems_of(
-    event: WorkerReady | WorkerExited | WorkerFailed, *, is_watched: bool
-) -> tuple[Problem, ...]:
-    if isinstance(event, WorkerFailed):
-        return event.problems
-    if isinstance(event, WorkerExited) and is_watched:
-        text = f"its worker ended while it was watched: {event.reason}"
-        fix = "see `nondum logs`; plug in a release that works"
-        return (Problem("WORKER_EXITED", text, where=event.component, fix=fix),)
-    return ()
+            turn.events.append(event)
+            turn.pending.append(PayloadFailed(payload.key, event.problems))

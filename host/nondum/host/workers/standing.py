@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import Enum
 
-from nondum.host.events import Event, WorkerExited, WorkerFailed, WorkerLogged, WorkerReady
+from nondum.host.events import Event, TrialFailed, WorkerLogged
 
 
 class Standing(Enum):
@@ -24,7 +24,7 @@ class Standing(Enum):
 
 
 HEARD: Mapping[Standing, tuple[type[Event], ...]] = {
-    Standing.BESIDE: (WorkerReady, WorkerExited, WorkerFailed, WorkerLogged),
+    Standing.BESIDE: (TrialFailed, WorkerLogged),
     Standing.IN_FORCE: (Event,),
     Standing.LEAVING: (WorkerLogged,),
 }

@@ -117,6 +117,9 @@ class Supervisor:
             problem = await self._work()
             if self.is_stopping:
                 return
+            if self.standing is Standing.BESIDE:
+                self._emit(events.TrialFailed(self.spec.payload, self.spec.component, (problem,)))
+                return
             self._emit(events.WorkerExited(self.spec.component, str(problem), self.spec.payload))
             if not await self._restart(problem):
                 return
