@@ -196,3 +196,34 @@ async def test_uninvited_descriptor_is_closed(pair: tuple[WorkerLink, Ends]) -> 
     assert ends.violations == ["PACKET_DESCRIPTORS"]
     assert os.read(read, 1) == b"", "the host holds no copy"
     os.close(read)
+
+
+@pytest.mark.anyio
+async def test_worker_that_never_reads_is_given_up_before_much_waits(
+    pair: tuple[WorkerLink, Ends],
+) -> None:
+    link, ends = pair
+    sent = 0
+    while not link.is_closed:
+        link.tell("values", {"set": ["x" * 60_000], "unset": []})
+        sent += 60_000
+    assert ends.violations == ["LINK_CONGESTED"]
+    assert sent < 6 << 20
+
+
+@pytest.mark.anyio
+async def test_flood_of_bytes_ends_the_link_as_one_of_packets_does(
+    pair: tuple[WorkerLink, Ends],
+) -> None:
+    _, ends = pair
+    packet = encode(Event("log", None, {"message": "x" * 60_000}))
+    while not ends.closed.is_set():
+        try:
+            ends.sock.send(packet)
+        except BlockingIOError:
+            await asyncio.sleep(0)
+        except (BrokenPipeError, ConnectionResetError):
+            break
+    await ends.closed.wait()
+    assert ends.violations == ["BACKPRESSURE"]
+    assert len(ends.events) < 2000

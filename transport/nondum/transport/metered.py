@@ -1,4 +1,6 @@
-"""Packets of which only so many a second are taken in: a flood ends its own connection."""
+"""Packets of which only so many, and so many bytes, a second are taken in: a flood ends its own
+connection.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +15,9 @@ RATE_HZ = 1000.0
 """Packets a second that a worker may send for long."""
 BURST = 5000.0
 """Packets that it may send at once."""
+BYTES_S = 1024 * 1024
+"""Bytes a second that a worker may send for long: what is bulky travels as a stream."""
+BURST_BYTES = 16 * 1024 * 1024
 
 
 class MeteredPackets:
@@ -22,18 +27,24 @@ class MeteredPackets:
         self._packets = packets
         self._rate_hz = rate_hz
         self._bucket = TokenBucket(rate_hz, burst, time.monotonic())
+        self._bytes = TokenBucket(BYTES_S, BURST_BYTES, time.monotonic())
         self.shares_memory = packets.shares_memory
 
     def open(self, on_packet: OnPacket, on_closed: OnClosed) -> None:
         """Begin to read (see `Packets`)."""
 
         def count(data: bytes, handles: tuple[Handle, ...]) -> None:
-            if self._bucket.take(1, time.monotonic()):
+            now_s = time.monotonic()
+            if not self._bucket.take(1, now_s):
+                flood = f"{self._rate_hz:.0f} packets"
+            elif not self._bytes.take(len(data), now_s):
+                flood = f"{BYTES_S // 1024} KiB"
+            else:
                 on_packet(data, handles)
                 return
             discard(handles)
             self._packets.close()
-            on_closed(ProtocolViolation(self._flooded()))
+            on_closed(ProtocolViolation(_flooded(flood)))
 
         self._packets.open(count, on_closed)
 
@@ -49,7 +60,6 @@ class MeteredPackets:
         """Stop and let go."""
         self._packets.close()
 
-    def _flooded(self) -> Problem:
-        return Problem(
-            "BACKPRESSURE", f"more than {self._rate_hz:.0f} packets a second came, for long"
-        )
+
+def _flooded(what: str) -> Problem:
+    return Problem("BACKPRESSURE", f"more than {what} a second came, for long")

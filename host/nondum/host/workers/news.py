@@ -9,13 +9,18 @@ from nondum.host.events import FactForgotten, FactKnown, StreamFlowing, WorkerLo
 from nondum.host.printable import printable, printable_text
 from nondum.sdk.errors import MessageInvalid, Problem, ProtocolViolation
 from nondum.sdk.messages import value_from_wire
+from nondum.sdk.wire import pack
 
 MAX_WORD = 256
 """Characters in a predicate, an object or a log level."""
 
 
+MAX_TEXT = 16 * 1024
+"""Characters of one message that are kept."""
 MAX_CLAIMS = 4096
 """Facts that one worker may say at once."""
+MAX_CLAIMED_BYTES = 4 * 1024 * 1024
+"""Size of their values altogether, as they travel."""
 
 News: TypeAlias = FactKnown | FactForgotten | StreamFlowing | WorkerLogged
 
@@ -26,6 +31,7 @@ class Claims:
     def __init__(self) -> None:
         self._facts: dict[tuple[str, ...], FactKnown] = {}
         self._flows: dict[str, StreamFlowing] = {}
+        self._bytes = 0
 
     def __iter__(self) -> Iterator[FactKnown | StreamFlowing]:
         """The news that still hold."""
@@ -36,15 +42,29 @@ class Claims:
         """Take in one more. Raises `ProtocolViolation` (EVENT_INVALID) when there are too many."""
         match news:
             case FactKnown(_, predicate, arguments):
+                self._forget(predicate, *arguments)
                 self._facts[predicate, *arguments] = news
+                self._bytes += _size(news)
             case FactForgotten(_, predicate, arguments):
-                self._facts.pop((predicate, *arguments), None)
+                self._forget(predicate, *arguments)
             case StreamFlowing(_, stream, True):
                 self._flows[stream] = news
             case StreamFlowing(_, stream, False):
                 self._flows.pop(stream, None)
         if len(self._facts) + len(self._flows) > MAX_CLAIMS:
             raise _violation("EVENT_INVALID", f"a worker says more than {MAX_CLAIMS} facts")
+        if self._bytes > MAX_CLAIMED_BYTES:
+            told = f"the values of a worker's facts take more than {MAX_CLAIMED_BYTES} bytes"
+            raise _violation("EVENT_INVALID", told)
+
+    def _forget(self, *fact: str) -> None:
+        known = self._facts.pop(fact, None)
+        if known is not None:
+            self._bytes -= _size(known)
+
+
+def _size(news: FactKnown) -> int:
+    return sum(map(len, news.arguments)) + (len(pack(news.value)) if news.value else 0)
 
 
 def parse_news(
@@ -66,7 +86,7 @@ def parse_news(
                 raise _violation("RESULT_INVALID", f"{stream!r:.80} is no stream of its own")
             return StreamFlowing(component, stream, flowing)
         case "log", {"level": str(level), "message": str(message)}:
-            return WorkerLogged(component, _word(level), printable_text(message))
+            return WorkerLogged(component, _word(level), printable_text(message[:MAX_TEXT]))
         case (("know" | "forget" | "flow" | "log"), _):
             raise _violation("EVENT_INVALID", f"event {name!r} lacks what it tells")
     raise _violation("EVENT_UNKNOWN", f"no event of a worker is called {name!r}")

@@ -26,14 +26,34 @@ OnLine: TypeAlias = Callable[[str, str], None]
 """Takes the source (`stdout` or `stderr`) and a line."""
 
 
+class Valve:
+    """Lets 64 KiB a second through, and counts what it does not."""
+
+    def __init__(self) -> None:
+        self._bucket = TokenBucket(RATE_BYTES_S, BURST_BYTES, time.monotonic())
+        self.dropped = 0
+        """Bytes that did not pass, since they were last told."""
+
+    def passes(self, size: int) -> bool:
+        """Whether so much may pass now; it is counted otherwise."""
+        if self._bucket.take(size, time.monotonic()):
+            return True
+        self.dropped += size
+        return False
+
+    def told(self) -> str:
+        """What there is to tell of what did not pass, once; empty: nothing."""
+        dropped, self.dropped = self.dropped, 0
+        return f"LOG_DROPPED {dropped} bytes were too many" if dropped else ""
+
+
 class Output:
     """One pipe of a worker, which it owns."""
 
     def __init__(self, source: str, pipe: IO[bytes], on_line: OnLine) -> None:
         self._source, self._pipe, self._on_line = source, pipe, on_line
-        self._bucket = TokenBucket(RATE_BYTES_S, BURST_BYTES, time.monotonic())
+        self._valve = Valve()
         self._unfinished = b""
-        self._dropped = 0
         self._resume: asyncio.TimerHandle | None = None
         self._loop = asyncio.get_running_loop()
         os.set_blocking(pipe.fileno(), False)
@@ -43,14 +63,14 @@ class Output:
         """Take what is there now and let go; a child that still writes gets SIGPIPE."""
         if self._pipe.closed:
             return
-        while self._read() and not self._dropped:
+        while self._read() and not self._valve.dropped:
             pass
         self._stop()
 
     def _on_readable(self) -> None:
         if not self._read():
             self._stop()
-        elif self._dropped:
+        elif self._valve.dropped:
             self._loop.remove_reader(self._pipe.fileno())
             self._resume = self._loop.call_later(PAUSE_S, self._read_on)
 
@@ -64,8 +84,7 @@ class Output:
             data = os.read(self._pipe.fileno(), CHUNK)
         except BlockingIOError:
             return False
-        if data and not self._bucket.take(len(data), time.monotonic()):
-            self._dropped += len(data)
+        if data and not self._valve.passes(len(data)):
             return True
         self._tell_dropped()
         self._split(data)
@@ -80,9 +99,8 @@ class Output:
             self._unfinished = self._unfinished[MAX_LINE:]
 
     def _tell_dropped(self) -> None:
-        if self._dropped:
-            self._on_line(self._source, f"LOG_DROPPED {self._dropped} bytes were too many")
-            self._dropped = 0
+        if told := self._valve.told():
+            self._on_line(self._source, told)
 
     def _say(self, line: bytes) -> None:
         self._on_line(self._source, line.decode("utf-8", "replace"))

@@ -19,7 +19,7 @@ from nondum.host.workers.index import mismatches
 from nondum.host.workers.launcher import Launcher
 from nondum.host.workers.leftovers import end_leftovers
 from nondum.host.workers.news import Claims, parse_news, parse_progress
-from nondum.host.workers.output import Output
+from nondum.host.workers.output import Output, Valve
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spec import Timing, WorkerSpec
 from nondum.planning.running import RunState
@@ -30,6 +30,8 @@ from nondum.transport import WorkerLink, link_sockets
 
 TAIL_LINES = 12
 """Lines of standard error that are told with an exit."""
+LINE_COST = 64
+"""Bytes that each logged line counts for beside its own."""
 
 
 class Worker:
@@ -52,6 +54,7 @@ class Worker:
         self._watchdog: asyncio.TimerHandle | None = None
         self.gone: asyncio.Future[Problem] = self._loop.create_future()
         """Why the worker ended, once nothing of it is left."""
+        self._log_valve = Valve()
         self._watch = Watch(spec.component, spec.limits)
         ours, theirs = link_sockets()
         try:
@@ -260,6 +263,9 @@ class Worker:
                     self._emit(event)
             case _:
                 news = parse_news(self.spec.component, self._streams, name, body)
+                if isinstance(news, WorkerLogged):
+                    self._on_log(news)
+                    return
                 self.claims.take(news)
                 self._emit(news)
 
@@ -268,6 +274,12 @@ class Worker:
         if source == "stderr":
             self._tail.append(text)
         self._emit(WorkerLogged(self.spec.component, source, text))
+
+    def _on_log(self, line: WorkerLogged) -> None:
+        if self._log_valve.passes(len(line.message) + LINE_COST):
+            if told := self._log_valve.told():
+                self._emit(WorkerLogged(self.spec.component, "log", told))
+            self._emit(line)
 
     def _on_foul(self, violation: ProtocolViolation) -> None:
         self.end(problems.foul(self.spec.component, violation))

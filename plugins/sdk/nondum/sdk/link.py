@@ -36,6 +36,7 @@ CREDIT = 64
 """Requests that may be unanswered, in each direction."""
 MAX_WAITING = 4096
 """Packets that wait for a slow other end before the link is given up."""
+MAX_WAITING_BYTES = 4 * 1024 * 1024
 
 OnRequest: TypeAlias = Callable[
     [str, dict[str, Any], tuple[Handle, ...], int], Awaitable[dict[str, Any]]
@@ -103,6 +104,7 @@ class Link:
         self._pending: dict[int, Pending] = {}
         self._running: dict[int, asyncio.Task[None]] = {}
         self._waiting: deque[tuple[bytes, tuple[Handle, ...]]] = deque()
+        self._waiting_bytes = 0
         self._greeting: asyncio.Future[Hello | Welcome] = asyncio.get_running_loop().create_future()
         self.is_closed = False
         is_socket = isinstance(sock, socket.socket)
@@ -197,8 +199,10 @@ class Link:
         data = encode(message)
         if not self._waiting and self._packets.send(data, handles):
             return
-        if len(self._waiting) >= MAX_WAITING:
-            self._violate(Problem("LINK_CONGESTED", f"{MAX_WAITING} packets wait to be read"))
+        self._waiting_bytes += len(data)
+        if len(self._waiting) >= MAX_WAITING or self._waiting_bytes > MAX_WAITING_BYTES:
+            told = f"{len(self._waiting)} packets wait to be read"
+            self._violate(Problem("LINK_CONGESTED", told))
             return
         kept = tuple(os.dup(h) if isinstance(h, int) else h for h in handles)
         self._waiting.append((data, kept))
@@ -212,6 +216,7 @@ class Link:
                 self._packets.when_writable(self._flush)
                 return
             self._waiting.popleft()
+            self._waiting_bytes -= len(data)
             for handle in handles:
                 if isinstance(handle, int):
                     os.close(handle)  # the duplicate that waited; the other end has its own

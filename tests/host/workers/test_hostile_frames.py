@@ -1,0 +1,194 @@
+"""Workers that speak the link's language badly or too well, each a process with the bare socket:
+each ends itself only, with a code of the protocol, and the host keeps nothing of it."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import AsyncIterator, Mapping
+from pathlib import Path
+
+import pytest
+from tests.host.workers.house import HOST, House
+
+from nondum.host.events import WorkerReady
+from nondum.host.workers import Timing, Workers, WorkerSpec
+from nondum.host.workers.process import WorkerProcess
+from nondum.planning.running import RunState
+from nondum.sdk.description import Behaviour, Unit
+from nondum.sdk.errors import WorkerFailed
+from nondum.sdk.wire import PROTOCOL_VERSIONS
+
+pytestmark = pytest.mark.anyio
+
+SDK = Path(__file__).parents[3] / "plugins/sdk"
+QUICK = Timing(startup_s=2.0, heartbeat_s=0.8, missed=4, halt_s=0.4, term_s=0.1)
+PROLOGUE = f"""
+import os, socket, sys, time
+sys.path[:0] = {[str(SDK), *(p for p in sys.path if p.endswith("site-packages"))]!r}
+import msgpack
+link = socket.socket(fileno=int(sys.argv[1]))
+def send(*fields, fds=()):
+    socket.send_fds(link, [msgpack.packb(list(fields))], list(fds))
+def hear():
+    return msgpack.unpackb(link.recv(1 << 17))
+def greet():
+    send(0, {list(PROTOCOL_VERSIONS)!r}, '0.1', os.getpid()); hear()
+HELLO, WELCOME, REQUEST, REPLY, FAILURE, EVENT, CANCEL = range(7)
+"""
+EVERY = "while True: send(EVENT, 'log', None, {'level': 'info', 'message': "
+
+
+class RawLauncher:
+    """Launches what was never a plugin."""
+
+    level, name = 0, "raw"
+
+    def __init__(self, script: str) -> None:
+        self._script = script
+
+    def launch(self, spec: WorkerSpec, sock: socket.socket) -> WorkerProcess:
+        spec.scratch.mkdir(parents=True, exist_ok=True)
+        arguments = [sys.executable, "-I", "-S", "-c", PROLOGUE + self._script, str(sock.fileno())]
+        popen = subprocess.Popen(
+            arguments,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            bufsize=0,
+            pass_fds=(sock.fileno(),),
+            start_new_session=True,
+        )
+        return WorkerProcess(popen)
+
+    def warm(self) -> None:
+        """Nothing is prepared."""
+
+    def close(self) -> None:
+        """Nothing was prepared."""
+
+
+HOSTILE: Mapping[str, tuple[str, str]] = {
+    "garbage first": ("link.send(os.urandom(100))", "PROTO_VIOLATION"),
+    "empty table": ("link.send(b'\\x80')", "PROTO_VIOLATION"),
+    "unknown kind": ("send(99, 1, 2)", "PROTO_VIOLATION"),
+    "too few fields": ("send(HELLO)", "PROTO_VIOLATION"),
+    "welcome instead of hello": ("send(WELCOME, 1, {})", "PROTO_VIOLATION"),
+    "version of the future": ("send(HELLO, [99], '9.9', 1)", "PROTO_VERSION"),
+    "hello twice": ("greet(); send(HELLO, [1], 'x', 1)", "PROTO_VIOLATION"),
+    "deep": (
+        "greet()\nlink.send(b'\\x94\\x05\\xa1x\\xc0' + b'\\x81\\xa1a' * 900 + b'\\xc0')",
+        "PROTO_VIOLATION",
+    ),
+    "long": (
+        "link.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 20)\n"
+        "link.send(b'\\x00' * 100_000)",
+        "PROTO_VIOLATION",
+    ),
+    "lying lengths": (
+        "greet(); link.send(b'\\x94\\x05\\xdd\\xff\\xff\\xff\\xff')",
+        "PROTO_VIOLATION",
+    ),
+    "nan": (
+        "greet(); send(EVENT, 'progress', 1, {'fraction': float('nan'), 'text': ''})",
+        "PROTO_VIOLATION",
+    ),
+    "same key twice": (
+        "greet(); link.send(b'\\x94\\x05\\xa1x\\xc0\\x82\\xa1a\\x01\\xa1a\\x02')",
+        "PROTO_VIOLATION",
+    ),
+    "extension": (
+        "greet(); link.send(b'\\x94\\x05\\xa1x\\xc0\\x81\\xa1a\\xd4\\x01\\x00')",
+        "PROTO_VIOLATION",
+    ),
+    "answer nobody waits for": ("greet(); send(REPLY, 4711, {})", "PROTO_VIOLATION"),
+    "request": ("greet(); send(REQUEST, 1, 'mount', {'node': '/dev/sda'})", "PROTO_VIOLATION"),
+    "unasked descriptor": (
+        "greet(); send(EVENT, 'heartbeat', None, {}, fds=[0])",
+        "PROTO_VIOLATION",
+    ),
+    "two hundred descriptors": ("send(HELLO, [1], 'x', 1, fds=[0] * 200)", "PROTO_VIOLATION"),
+    "unknown event": ("greet(); send(EVENT, 'boast', None, {})", "PROTO_VIOLATION"),
+    "half closed": ("link.shutdown(socket.SHUT_WR)", "WORKER_HUNG"),
+    "says nothing": ("", "WORKER_HUNG"),
+    "never reads": ("send(HELLO, [1], 'x', 1)", "WORKER_HUNG"),
+    "flood of heartbeats": (
+        "greet()\nwhile True: send(EVENT, 'heartbeat', None, {})",
+        "BACKPRESSURE",
+    ),
+    "flood of logs": (f"greet()\n{EVERY}'x' * 60_000}})", "BACKPRESSURE"),
+    "flood of cancellations": ("greet()\nwhile True: send(CANCEL, 1)", "BACKPRESSURE"),
+    "flood of descriptors": (
+        "while True: send(HELLO, [1], 'x', 1, fds=[0, 0, 0, 0])",
+        "PROTO_VIOLATION",
+    ),
+    "facts without end": (
+        "greet()\nn = 0\nwhile True:\n    n += 1\n    send(EVENT, 'know', None, "
+        "{'predicate': 'p', 'arguments': [f'{n:0250}'] * 100})",
+        "PROTO_VIOLATION",
+    ),
+}
+
+
+@pytest.fixture
+async def other(tmp_path: Path) -> AsyncIterator[House]:
+    """A house with a good worker, which answers before and after."""
+    house = House(tmp_path)
+    source = (
+        "from nondum.sdk import Unit, behaviour, hookimpl\n"
+        "@hookimpl\ndef units():\n    return (Unit('it', 'sensor'),)\n"
+        "@behaviour('do', action='(do ?u - sensor)')\nasync def do(ctx, u):\n    pass\n"
+    )
+    await house.start(
+        "good",
+        source,
+        behaviours=(Behaviour("do", "(do ?u - sensor)"),),
+        units=(Unit("it", "sensor"),),
+    )
+    yield house
+    assert await house.behave("good", "do", u=f"{HOST}__good__it").ended() is RunState.SUCCEEDED
+    assert len(house.told(WorkerReady)) == 1
+    await house.workers.close(grace_s=1.0)
+
+
+async def meet(house: House, name: str, script: str) -> str:
+    """Start a hostile worker, which fails; give the code."""
+    launcher = RawLauncher(f"{script}\ntime.sleep(60)")
+    workers = Workers(HOST, house.events.append, launcher=launcher, timing=QUICK)
+    try:
+        with pytest.raises(WorkerFailed) as failed:
+            await workers.start(house.spec(name, ""))
+    finally:
+        await workers.close(grace_s=0.5)
+    return failed.value.code
+
+
+@pytest.mark.parametrize("name", list(HOSTILE))
+async def test_it_ends_itself_only(other: House, name: str) -> None:
+    script, code = HOSTILE[name]
+    assert await meet(other, "bad", script) == code
+
+
+async def test_the_host_keeps_nothing_of_them(other: House) -> None:
+    """Descriptors and memory after many rounds are what they were after one."""
+    quick = [script for script, code in HOSTILE.values() if code == "PROTO_VIOLATION"]
+    await asyncio.gather(*(meet(other, f"warm-{n}", script) for n, script in enumerate(quick)))
+    descriptors, memory = held()
+    for turn in range(3):
+        await asyncio.gather(
+            *(meet(other, f"bad-{turn}-{n}", script) for n, script in enumerate(quick))
+        )
+    after_descriptors, after_memory = held()
+    assert after_descriptors == descriptors
+    assert after_memory - memory < 8 << 20
+
+
+def held() -> tuple[int, int]:
+    """Open descriptors, and resident bytes, of this process."""
+    gc.collect()
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return len(os.listdir("/proc/self/fd")), pages * os.sysconf("SC_PAGE_SIZE")  # noqa: PTH208
