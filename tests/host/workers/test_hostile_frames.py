@@ -158,7 +158,7 @@ async def other(tmp_path: Path) -> AsyncIterator[House]:
 async def meet(house: House, name: str, script: str) -> str:
     """Start a hostile worker, which fails; give the code."""
     launcher = RawLauncher(f"{script}\ntime.sleep(60)")
-    workers = Workers(HOST, house.events.append, launcher=launcher, timing=QUICK)
+    workers = Workers(HOST, lambda event: None, launcher=launcher, timing=QUICK)
     try:
         with pytest.raises(WorkerFailed) as failed:
             await workers.start(house.spec(name, ""))
