@@ -85,7 +85,9 @@ class Draft:
             "minimum-nondum": "0.1",
             "built": "2026-01-01T00:00:00Z",
         }
-        header = [f"{k}: {v}".rstrip() for k, v in {**usual, **self.header}.items() if v != LEFT_OUT]
+        header = [
+            f"{k}: {v}".rstrip() for k, v in {**usual, **self.header}.items() if v != LEFT_OUT
+        ]
         entries = [f"{sha256(data)}  {len(data)}  {p}" for p, data in sorted(self.files.items())]
         lines = [contents.FORMAT, *header, "", *self.relist(entries)]
         return self.rewrite(("\n".join(lines) + "\n").encode("utf-8", "surrogateescape"))

@@ -11,7 +11,7 @@ import textwrap
 import pytest
 
 from nondum.host.lifecycle.allowance import ALLOWANCES, DESCRIPTORS, FILE_BYTES, allowed
-from nondum.host.lifecycle.jobs import JOBS
+from nondum.host.lifecycle.jobs import JOBS, find
 
 
 def in_a_process(code: str) -> subprocess.CompletedProcess[str]:
@@ -68,3 +68,8 @@ def test_limits_of_a_job_end_with_it(job: str) -> None:
 def test_every_job_that_reads_drives_is_limited() -> None:
     assert ALLOWANCES.keys() <= JOBS.keys()
     assert ALLOWANCES.keys() >= {"look", "copy", "verify", "hand_over", "outline", "judge"}
+
+
+@pytest.mark.parametrize("job", JOBS)
+def test_every_job_is_there(job: str) -> None:
+    assert find(job).__doc__

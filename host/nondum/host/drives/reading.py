@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from nondum.host.effects import ReadDrive, ReleaseDrive
 from nondum.host.events import (
@@ -78,10 +79,9 @@ class DriveReading:
         async with self._queue.turn(effect.drive, tell):
             if effect.node is not None:
                 self._mounted[effect.drive] = effect.root
-            with telling_stalls(effect.drive, LOOK_S):
-                found = await self._children.run(
-                    "look", arguments, owner=effect.drive, stall_s=LOOK_S
-                )
+            found = await self._look(effect.drive, arguments)
+        for said in found["payloads"]:
+            self._trust.note(said["payload"], said)
         payloads = [
             PayloadFound(
                 payload=said["payload"],
@@ -108,6 +108,17 @@ class DriveReading:
         changed = await self._trust.offer(effect.drive, files, flaws)
         read = DriveRead(effect.drive, keys, len(certificates), len(files))
         return *changed, *brought, *payloads, read
+
+    async def _look(self, drive: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
+        """What is on a drive. Its child stays as long as there is something to copy."""
+        found: dict[str, Any] = {"payloads": ()}
+        try:
+            with telling_stalls(drive, LOOK_S):
+                found = await self._children.run("look", arguments, owner=drive, stall_s=LOOK_S)
+        finally:
+            if all(said["problems"] for said in found["payloads"]):
+                await self._children.release(drive)
+        return found
 
     async def release(self, effect: ReleaseDrive) -> tuple[Event, ...]:
         """Unmount a drive that was mounted for reading."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 import json
 import os
+import select
 import signal
 import sys
 import time
@@ -16,13 +17,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
 
+from nondum.host.lifecycle import jobs
 from nondum.host.lifecycle.allowance import allowed, confine_process
-from nondum.host.lifecycle.jobs import JOBS
 from nondum.sdk.errors import NondumError, Problem
-from nondum.wheelhouse import preflight
 
 PROGRESS_S = 0.1
 """Between two reports of one phase."""
+
+IDLE_S = 0.1
+"""A child that has nothing to do for so long makes ready for whatever comes."""
 
 PR_SET_PDEATHSIG = 1
 
@@ -31,8 +34,8 @@ def main(daemon: int) -> None:
     """Do jobs from stdin until it ends."""
     _bind_to(daemon)
     confine_process()
-    # What is found and imported now is there when somebody waits for a job.
-    preflight.probe(Path.cwd(), reserve_mb=0, confinement=0)
+    if not select.select([sys.stdin], [], [], IDLE_S)[0]:
+        _warm()
     # Whatever prints goes to stderr: stdout belongs to the conversation.
     with os.fdopen(os.dup(1), "w", buffering=1) as answers:
         os.dup2(2, 1)
@@ -47,10 +50,19 @@ def _bind_to(daemon: int) -> None:
         sys.exit(1)
 
 
+def _warm() -> None:
+    """Find and import what is then there when somebody waits for a job."""
+    from nondum.wheelhouse import preflight
+
+    for job in jobs.AT_ONCE:
+        jobs.find(job)
+    preflight.probe(Path.cwd(), reserve_mb=0, confinement=0)
+
+
 def _do(job: str, arguments: dict[str, Any], answers: TextIO) -> dict[str, Any]:
     try:
         with allowed(job):
-            return {"result": JOBS[job](arguments, _reporter(answers))}
+            return {"result": jobs.find(job)(arguments, _reporter(answers))}
     except NondumError as error:
         return _failure(type(error).__name__, *error.problems)
     except MemoryError:

@@ -24,7 +24,7 @@ from nondum.sdk.errors import InstallFailed, NondumError, Problem
 LINE_LIMIT = 16 * 1024 * 1024
 """Bytes of one answer: it may hold the descriptions of many components."""
 
-KEPT = 2
+KEPT = 4
 """Children that wait for more work of their owners; those that worked last are kept."""
 
 WARM_S = 0.3
@@ -110,6 +110,12 @@ class Children:
         finally:
             await self._end(child)
         return _result(answer)
+
+    async def release(self, owner: str) -> None:
+        """End the child that is kept for an owner whose work is done."""
+        child = self._kept.pop(owner, None)
+        if child is not None:
+            await self._end(child)
 
     def warm(self) -> None:
         """Have a spare, soon, if there is none."""

@@ -290,7 +290,7 @@ class Installation:
         self, effect: effects.ClearPayload | effects.SuspendPayload, *folders: Path
     ) -> None:
         self._queue.leave(effect.payload)
-        self._drives.pop(effect.payload, None)
+        await self._children.release(self._drives.pop(effect.payload, effect.payload))
         self._prepared.pop(effect.payload, None)
         self._needs.pop(effect.payload, None)
         self._grants.pop(effect.payload, None)

@@ -1,31 +1,45 @@
-"""What a child process can be asked to do: name → blocking function of plain data."""
+"""What a child process can be asked to do: name → blocking function of plain data.
+
+Functions are named by module, and imported when they are wanted: a child that is started for one
+job need not wait for what others import.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from importlib import import_module
 from typing import Any
 
-from nondum.host.drives import parcel, reader
-from nondum.host.drives.reader import Arguments, Report
-from nondum.host.lifecycle import compiling, installing, rebuilding
-from nondum.host.trust import chain
-
+Arguments = Mapping[str, Any]
+Report = Callable[[str, int, int], None]
+"""Phase, done, total."""
 Job = Callable[[Arguments, Report], Any]
 
-JOBS: Mapping[str, Job] = {
-    "look": reader.look,
-    "copy": reader.copy,
-    "verify": reader.verify,
-    "hand_over": parcel.hand_over,
-    "outline": parcel.outline,
-    "judge": parcel.judge,
-    "install": installing.install,
-    "compile": compiling.compile_wheels,
-    "prune": installing.prune,
-    "listing": installing.listing,
-    "trust_load": chain.load,
-    "trust_extend": chain.extend,
-    "trust_judge_kept": chain.judge_kept,
-    "sweep": installing.sweep,
-    "found": rebuilding.found,
+JOBS: Mapping[str, str] = {
+    "look": "nondum.host.drives.reader:look",
+    "copy": "nondum.host.drives.reader:copy",
+    "verify": "nondum.host.drives.reader:verify",
+    "hand_over": "nondum.host.drives.parcel:hand_over",
+    "outline": "nondum.host.drives.parcel:outline",
+    "judge": "nondum.host.drives.parcel:judge",
+    "install": "nondum.host.lifecycle.installing:install",
+    "compile": "nondum.host.lifecycle.compiling:compile_wheels",
+    "prune": "nondum.host.lifecycle.installing:prune",
+    "listing": "nondum.host.lifecycle.installing:listing",
+    "sweep": "nondum.host.lifecycle.installing:sweep",
+    "found": "nondum.host.lifecycle.rebuilding:found",
+    "trust_load": "nondum.host.trust.chain:load",
+    "trust_extend": "nondum.host.trust.chain:extend",
+    "trust_judge_kept": "nondum.host.trust.chain:judge_kept",
 }
+"""`module:function`."""
+
+AT_ONCE = ("look", "copy", "verify", "install")
+"""What people wait for: a child that has time imports these before it is asked."""
+
+
+def find(name: str) -> Job:
+    """The function that does a job. Raises `KeyError`."""
+    module, _, function = JOBS[name].partition(":")
+    job: Job = getattr(import_module(module), function)
+    return job

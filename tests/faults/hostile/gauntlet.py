@@ -1,0 +1,206 @@
+"""All hostile drives through one daemon's life, beside payloads that nobody may disturb."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tests.faults.hostile.case import Bench, HostileDrive
+from tests.faults.hostile.draft import Sign, unsigned
+from tests.lab.plugins import scribe, talker
+from tests.lab.running_host import Row, RunningHost, running
+from tests.lab.traces import Traces
+
+HEALTHY = ("talker", "scribe")
+GOAL = "(written spot)"
+JUDGED_S = 60.0
+PLANNERS = "/nondum-fast-downward-"
+"""Where planners write down what they search."""
+OVER = ("refused", "quarantined", "active")
+MORE = "[workers]\nstartup_s = 5.0\n"
+
+
+@dataclass(frozen=True)
+class Plugged:
+    """A drive on its way through the daemon."""
+
+    case: HostileDrive
+    folder: Path
+    node: Path | None = None
+
+    @property
+    def is_block(self) -> bool:
+        """Whether it is a block device."""
+        return self.node is not None
+
+    def is_called(self, drive: str) -> bool:
+        """Whether the daemon means this one."""
+        if self.node is not None:
+            return drive.split("-")[0] == self.node.name
+        return drive == self.folder.name
+
+
+@dataclass
+class Outcome:
+    """What it came to."""
+
+    drives: int = 0
+    wrong: list[str] = field(default_factory=list)
+    """Drives that were told with another code, and with which."""
+    seconds: list[float] = field(default_factory=list)
+    """From plugging in until told, of those that were plugged in alone."""
+    pids: set[int] = field(default_factory=set)
+    memory_mb: list[float] = field(default_factory=list)
+    """Of the daemon, at rest: before, and after each round."""
+    descriptors: list[int] = field(default_factory=list)
+    canaries: int = 0
+    strays: list[str] = field(default_factory=list)
+    """What lies outside the state folder and was not there before."""
+
+
+class Gauntlet:
+    """One daemon. Made by `gauntlet`."""
+
+    def __init__(self, host: RunningHost, work: Path, elsewhere: Sequence[Path]) -> None:
+        self.host, self.outcome = host, Outcome()
+        self._work, self._elsewhere = work, elsewhere
+        self._canary = work / "canary"
+        self._goal = ""
+        self._healthy: list[Row] = []
+        self._traces: Traces | None = None
+
+    def begin(self) -> None:
+        """Have the benign payloads at work."""
+        self.host.bring("talk", talker())
+        self.host.bring("write", scribe())
+        self._goal = self.host.want(GOAL)
+        self.host.until_goal(self._goal, "holds")
+        self._healthy = self._at_work()
+        self._traces = self.host.traces()
+        self._measure()
+
+    def make(self, cases: Sequence[HostileDrive], sign: Sign = unsigned) -> list[Plugged]:
+        """Write the drives, once."""
+        made = []
+        for number, case in enumerate(cases):
+            drive = self._work / f"h{number}"
+            drive.mkdir()
+            case.make(Bench(drive, number, self._canary, sign))
+            made.append(Plugged(case, drive))
+        return made
+
+    def round(self, drives: Sequence[Plugged], *, at_once: int) -> None:
+        """Send every drive through, some at a time; alone, it is timed."""
+        for first in range(0, len(drives), at_once):
+            began = time.monotonic()
+            batch = [self._plug(drive) for drive in drives[first : first + at_once]]
+            told = [self._judged(drive) for drive in batch]
+            if at_once == 1:
+                self.outcome.seconds.append(time.monotonic() - began)
+            for drive, codes in zip(batch, told, strict=True):
+                self.outcome.drives += 1
+                if not drive.case.is_right(codes):
+                    self.outcome.wrong.append(f"{drive.case.name}: {', '.join(codes) or 'nothing'}")
+            for drive in batch:
+                self._pull(drive)
+            for drive in batch:
+                self._gone(drive)
+            self._check_others()
+        assert self.host.traces() == self._traces, "something stayed"
+        self._measure()
+
+    def _plug(self, drive: Plugged) -> Plugged:
+        if not drive.case.is_image:
+            self.host.plug(drive.folder)
+            return drive
+        image = drive.folder.with_suffix(".img")
+        return Plugged(drive.case, drive.folder, attach(image))
+
+    def _pull(self, drive: Plugged) -> None:
+        if drive.node is None:
+            self.host.pull(drive.folder.name)
+        else:
+            detach(drive.node)
+
+    def _judged(self, drive: Plugged) -> tuple[str, ...]:
+        """The codes that it is told with, once there is nothing more to be told."""
+
+        def found(view: Row) -> tuple[str, ...] | None:
+            rows = [row for row in view["drives"] if drive.is_called(row["drive"])]
+            if not rows or any(row["state"] != "idle" for row in rows):
+                return None
+            names = {row["drive"] for row in rows}
+            payloads = [p for p in view["payloads"] if names & set(p["drive"].split(", "))]
+            if any(row["state"] not in OVER for row in payloads):
+                return None
+            codes = [problem.split(" ")[0] for row in rows for problem in row["problems"]]
+            codes += [code for row in payloads for code in row["codes"]]
+            return tuple(codes) if codes or payloads else None
+
+        return self.host.until(f"{drive.case.name} judged", found, timeout_s=JUDGED_S)
+
+    def _gone(self, drive: Plugged) -> None:
+        def is_gone(view: Row) -> bool:
+            there = [row["drive"] for row in (*view["drives"], *view["payloads"])]
+            return not any(drive.is_called(name) for names in there for name in names.split(", "))
+
+        self.host.until(f"{drive.case.name} gone", is_gone, timeout_s=JUDGED_S)
+
+    def _check_others(self) -> None:
+        """Whoever is healthy works on, and nothing ran that should not."""
+        assert self._at_work() == self._healthy
+        self.host.until_goal(self._goal, "holds")
+        self.outcome.canaries += self._canary.exists()
+
+    def _at_work(self) -> list[Row]:
+        return [row for row in self.host.ask("components") if row["component"] in HEALTHY]
+
+    def _measure(self) -> None:
+        pid = self.host.pid
+        status = Path(f"/proc/{pid}/status").read_text()
+        kilobytes = next(line.split()[1] for line in status.splitlines() if "VmRSS" in line)
+        self.outcome.pids.add(pid)
+        self.outcome.memory_mb.append(int(kilobytes) / 1024)
+        self.outcome.descriptors.append(len(list(Path(f"/proc/{pid}/fd").iterdir())))
+        found = [str(p) for folder in self._elsewhere for p in folder.iterdir()]
+        self.outcome.strays = [path for path in found if PLANNERS not in path]
+
+
+@contextmanager
+def gauntlet(root: Path) -> Iterator[Gauntlet]:
+    """A daemon with benign payloads at work, whose home and temporary folder are empty ones."""
+    work = root / "drives"
+    elsewhere = [root / name for name in ("home", "tmp", "config")]
+    for folder in (work, *elsewhere):
+        folder.mkdir(parents=True)
+    home, temporary, config = elsewhere
+    surroundings = (f"HOME={home}", f"TMPDIR={temporary}", f"XDG_CONFIG_HOME={config}")
+    daemon = (sys.executable, "-m", "tests.lab.loop_daemon", str(work))
+    program = ("env", *surroundings, *daemon)
+    with running(root / "host", more=MORE, program=program) as host:
+        run = Gauntlet(host, work, elsewhere)
+        run.begin()
+        yield run
+
+
+def attach(image: Path) -> Path:
+    """A loop device on an image."""
+    command = ["losetup", "--find", "--show", str(image)]
+    return Path(subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip())
+
+
+def detach(node: Path) -> None:
+    """Pull it; that it was read-only goes with a stick, and stays with a loop device."""
+    subprocess.run(["losetup", "--detach", str(node)], check=False, capture_output=True)
+    subprocess.run(["blockdev", "--setrw", str(node)], check=False, capture_output=True)
+
+
+def can_have_devices() -> bool:
+    """Whether loop devices can be made here."""
+    return os.geteuid() == 0 and Path("/dev/loop-control").exists()

@@ -1,0 +1,48 @@
+"""Hostile drives, once through one daemon: each is told with its code, and nobody else notices.
+
+Ten times through is `python -m tests.faults.hostile`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from tests.faults.hostile import DRIVES, FAMILIES
+from tests.faults.hostile.gauntlet import Gauntlet, can_have_devices, gauntlet
+
+pytestmark = [pytest.mark.lab, pytest.mark.beside, pytest.mark.timeout(300)]
+
+AT_ONCE = 16
+MOST_GROWTH_MB = 10.0
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Iterator[Gauntlet]:
+    with gauntlet(tmp_path) as run:
+        yield run
+
+
+def test_corpus_is_as_big_as_it_is_meant_to_be() -> None:
+    names = [drive.name for drive in DRIVES]
+    assert len(names) == len(set(names))
+    own = [drive for family, drives in FAMILIES.items() for drive in drives if family != "wheels"]
+    assert len(own) >= 150
+    assert len(FAMILIES["wheels"]) >= 60
+
+
+def test_hostile_drives_are_told_with_their_codes(run: Gauntlet) -> None:
+    # Wheels have tests of their own; here, one in six of them goes the whole way.
+    wheels = FAMILIES["wheels"][::6]
+    others = [drive for drives in FAMILIES.values() for drive in drives if drive not in wheels]
+    chosen = [drive for drive in others if drive not in FAMILIES["wheels"]]
+    drives = run.make([d for d in (*chosen, *wheels) if can_have_devices() or not d.is_image])
+    run.round(drives, at_once=AT_ONCE)
+    told = run.outcome
+    assert not told.wrong
+    assert not told.canaries
+    assert not told.strays
+    assert len(told.pids) == 1
+    assert told.descriptors[0] == told.descriptors[-1]
+    assert told.memory_mb[-1] - told.memory_mb[0] <= MOST_GROWTH_MB
