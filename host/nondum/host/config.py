@@ -48,6 +48,18 @@ class DrivesSection:
 
 
 @dataclass(frozen=True, slots=True)
+class TrustSection:
+    """Whose payloads are run."""
+
+    file: Path | None = Path("/etc/nondum/trust.toml")
+    """The first trust file: whoever may write it vouches for it; with `--user`, `trust.toml` in the
+    state folder."""
+    on_revoke: str = "stop"
+    """What becomes of payloads that are here and not trusted any more. `stop`: they are withdrawn.
+    `flag`: it is told only."""
+
+
+@dataclass(frozen=True, slots=True)
 class DevicesSection:
     """Where devices come from."""
 
@@ -175,6 +187,7 @@ class HostConfig:
 
     host: HostSection = field(default_factory=HostSection)
     drives: DrivesSection = field(default_factory=DrivesSection)
+    trust: TrustSection = field(default_factory=TrustSection)
     devices: DevicesSection = field(default_factory=DevicesSection)
     install: InstallSection = field(default_factory=InstallSection)
     journal: JournalSection = field(default_factory=JournalSection)
@@ -208,6 +221,7 @@ def user_config() -> HostConfig:
     return HostConfig(
         host=HostSection(state=state, control=control),
         drives=DrivesSection(slots=(state / "slots",), block_devices=False),
+        trust=TrustSection(file=None),
         devices=DevicesSection(slots=(state / "device-slots",)),
         peers=PeersSection(enabled=False),
         workers=WorkersSection(minimum_confinement=0),
@@ -240,6 +254,9 @@ def parse(text: str, where: str, defaults: HostConfig) -> HostConfig:
             problems.append(_wrong(f"[{name}]", "a table", table, where))
         else:
             sections[name] = _section(name, sections[name], table, where, problems)
+    if sections["trust"].on_revoke not in ("stop", "flag"):
+        on_revoke = sections["trust"].on_revoke
+        problems.append(_wrong("[trust] on_revoke", '"stop" or "flag"', on_revoke, where))
     problems.extend(_contradictions(
             sections["host"], sections["install"], sections["workers"], where
         ))

@@ -29,6 +29,7 @@ from nondum.host.rows import (
     stream_row,
     unknown,
 )
+from nondum.host.trust.vouched import NOBODY, Vouched
 from nondum.host.workers.workers import Workers
 from nondum.sdk.errors import GoalRefused, NondumError, Problem
 
@@ -55,6 +56,8 @@ class Questions:
     """What every status says of this host."""
     places: Callable[[], Mapping[str, str]] = dict
     """Payload key → the peer that runs it, for those that run elsewhere."""
+    vouched: Callable[[str], Vouched] = lambda _: NOBODY
+    """Payload key → who vouches for it."""
 
     async def status(self, arguments: Arguments) -> Row:
         """The host, its payloads and its goals at a glance."""
@@ -70,7 +73,13 @@ class Questions:
             ],
             "confinement": self.standing.to_dict(),
             "payloads": [
-                payload_row(p, self.news.progress(p.key), places.get(p.key, ""), snapshot.rollbacks)
+                payload_row(
+                    p,
+                    self.news.progress(p.key),
+                    places.get(p.key, ""),
+                    snapshot.rollbacks,
+                    self.vouched(p.key),
+                )
                 for p in snapshot.payloads
             ],
             "drives": [drive_row(d, self.news.ahead(d.id)) for d in snapshot.drives],

@@ -19,6 +19,7 @@ from nondum.host.catalogue.records import (
 )
 from nondum.host.news import Progress
 from nondum.host.streams import StreamStatus
+from nondum.host.trust.vouched import NOBODY, Vouched
 from nondum.sdk.errors import Problem
 
 Row: TypeAlias = dict[str, Any]
@@ -67,6 +68,7 @@ def payload_row(
     progress: Progress | None,
     place: str = "",
     rollbacks: Collection[str] = (),
+    vouched: Vouched = NOBODY,
 ) -> Row:
     """A payload: how far it has come, where it is, what is wrong with it, and the peer that it runs
     on, if it does. `rollbacks` are the digests of those that people went back to."""
@@ -80,6 +82,8 @@ def payload_row(
         "state": payload.step.value,
         "progress": progress.to_dict() if progress else None,
         "place": place,
+        "signers": list(vouched.signers),
+        "built": vouched.built,
         "drive": ", ".join(payload.drives),
         "components": list(payload.components),
         "problems": [str(problem) for problem in payload.problems],

@@ -10,6 +10,7 @@ from nondum.host.control.server import Follow, Verb
 from nondum.host.orders import Orders
 from nondum.host.questions import Questions
 from nondum.host.rows import Row
+from nondum.host.trust.orders import TrustOrders
 from nondum.sdk.errors import ConfigRefused, Problem
 
 if TYPE_CHECKING:  # its import costs ten megabytes, which hosts without peers need not pay
@@ -33,7 +34,7 @@ PEER_VERBS = (
 
 
 def answering(
-    questions: Questions, orders: Orders, neighbours: Neighbourhood | None
+    questions: Questions, orders: Orders, trust: TrustOrders, neighbours: Neighbourhood | None
 ) -> dict[str, Verb]:
     """Verbs that answer once."""
     verbs: dict[str, Callable[[Arguments], Awaitable[Any]]] = {
@@ -60,6 +61,7 @@ def answering(
         "uninstall": orders.uninstall,
         "units": questions.units,
         "why": questions.why,
+        **trust.answering(),
     }
     verbs |= neighbours.answering() if neighbours else dict.fromkeys(PEER_VERBS, _no_peers)
     return {name: _parsing(verb) for name, verb in verbs.items()}

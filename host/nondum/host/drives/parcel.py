@@ -13,6 +13,7 @@ from typing import Any
 from nondum.host.drives import reader, trial
 from nondum.host.drives.reader import Arguments, Report
 from nondum.host.helper import privileged
+from nondum.host.trust import chain
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
 from nondum.wheelhouse import contents, drive, payload, preflight
 from nondum.wheelhouse.contents import Contents, Entry
@@ -72,6 +73,7 @@ def judge(arguments: Arguments, report: Report) -> dict[str, Any]:
     listed = _listed(folder)
     trial.run(lambda: payload.load(folder, listed), listed.payload_id)
     staged = payload.load(folder, listed)
+    chain.grant_of_kept({**arguments, "demand_trust": True}, folder, staged.manifest)
     facts = reader.facts_of(arguments)
     problems = preflight.preflight(
         staged.manifest, staged.locks, facts, minimum_nondum=listed.minimum_nondum

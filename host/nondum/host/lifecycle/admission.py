@@ -29,6 +29,8 @@ _HOLDS_NOTHING = frozenset({Step.RECEIVED, Step.COPIED, Step.REFUSED, Step.GONE}
 
 def release_problems(state: HostState, found: PayloadFound, at: Moment) -> Iterator[Problem]:
     """What the releases that were active here have against this one."""
+    if not found.version:  # its list is not believed, so its release is not known
+        return
     where, newest = found.payload_id, _newest(state, found)
     limit = max(newest.release, int(at.wall_s), _date_s(found)) + RELEASE_JUMP
     if newest.owner in found.grant.owners and found.grant.role != newest.owner:

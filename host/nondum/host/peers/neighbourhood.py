@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Mapping
 from typing import Any
 
 from nondum.host.bridge.bridge import Bridge, with_port
@@ -147,8 +147,10 @@ class Neighbourhood:
         emit: Emit,
         mind: Callable[[], Mind],
         children: Children,
+        judged_by: Callable[[], Mapping[str, Any]],
     ) -> Neighbourhood:
-        """Read keys and trust, and look at this machine. Raises `PeerRefused`."""
+        """Read keys and trust, and look at this machine; `judged_by` is what payloads are judged by
+        now. Raises `PeerRefused`."""
         keeper = await TrustKeeper.open(
             folders.peers,
             config.host.name,
@@ -169,6 +171,7 @@ class Neighbourhood:
             pins=await Pins.open(folders.root / "places.json"),
             compute=compute,
             confinement=workers.launcher.level,
+            judged_by=judged_by,
             known=lambda: made.view.known().values(),
         )
         made = cls(config, keeper, workers, catalogue, emit, compute, mind, placement)

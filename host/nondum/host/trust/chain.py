@@ -71,12 +71,22 @@ def extend(arguments: Arguments, report: Report) -> dict[str, Any]:
     }
 
 
-def judge_kept(arguments: Arguments, report: Report) -> dict[str, list[dict[str, str]]]:
-    """Judge payloads by what is kept of them in `folders`: key → what is wrong with it."""
+def judge_kept(arguments: Arguments, report: Report) -> dict[str, dict[str, Any]]:
+    """Judge payloads by what is kept of them in `folders`: key → its `signers`, when it was `built`
+    and its `problems`."""
     return {
-        folder.name: [problem.to_dict() for problem in _judged(arguments, folder).problems]
+        folder.name: _told_of(arguments, folder)
         for folder in map(Path, arguments["folders"])
         if (folder / contents.NAME).exists()
+    }
+
+
+def _told_of(arguments: Arguments, folder: Path) -> dict[str, Any]:
+    verdict = _judged(arguments, folder)
+    return {
+        "signers": list(verdict.signers),
+        "built": contents.parse((folder / contents.NAME).read_bytes(), contents.NAME).built,
+        "problems": [problem.to_dict() for problem in verdict.problems],
     }
 
 

@@ -25,6 +25,7 @@ from nondum.host.lifecycle.children import Children
 from nondum.host.lifecycle.folders import Folders
 from nondum.host.trust import chain
 from nondum.host.trust.rules import Rules, parsed
+from nondum.host.trust.vouched import NOBODY, Vouched
 from nondum.sdk.errors import NondumError, Problem, TrustRefused
 from nondum.wheelhouse.signatures import UnsignedAllowed
 from nondum.wheelhouse.trust.judging import clock_floor
@@ -66,6 +67,7 @@ class PayloadTrust:
         self._known: list[str] = []
         self._problems: tuple[Problem, ...] = ()
         self._changing = asyncio.Lock()
+        self._vouched: dict[str, Vouched] = {}
 
     @property
     def trust(self) -> Trust | None:
@@ -144,10 +146,20 @@ class PayloadTrust:
         folders = [str(self._folders.payload(key)) for key in effect.payloads]
         arguments = {**self.arguments, "folders": folders}
         told = await self._children.run("trust_judge_kept", arguments)
-        found = {key: tuple(Problem(**said) for said in rows) for key, rows in told.items()}
+        for key, said in told.items():
+            self.note(key, said)
+        found = {key: _problems(said) for key, said in told.items()}
         if self._stop:
             return tuple(PayloadDistrusted(key, wrong) for key, wrong in found.items() if wrong)
         return tuple(PayloadDoubted(key, wrong) for key, wrong in found.items())
+
+    def note(self, payload: str, said: Mapping[str, Any]) -> None:
+        """Keep who vouches for a payload, for those who ask."""
+        self._vouched[payload] = Vouched(tuple(said["signers"]), said["built"])
+
+    def vouched(self, payload: str) -> Vouched:
+        """Who vouches for a payload, by its key."""
+        return self._vouched.get(payload, NOBODY)
 
     def row(self) -> dict[str, Any]:
         """What people's tools are shown."""

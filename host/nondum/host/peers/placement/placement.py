@@ -3,7 +3,7 @@ into, made and tied together."""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from typing import Any
 
 from nondum.host.catalogue.catalogue import Catalogue
@@ -36,9 +36,11 @@ class Placement:
         pins: Pins,
         compute: Compute,
         confinement: int,
+        judged_by: Callable[[], Mapping[str, Any]],
         known: Callable[[], Iterable[str]],
     ) -> None:
-        """`confinement` is the level at which workers run; `known` are names of other hosts."""
+        """`confinement` is the level at which workers run; `judged_by` what payloads are judged
+        by now, for child processes; `known` are names of other hosts."""
         reserve_mb, is_open = config.install.reserve_mb, config.peers.place
 
         def state() -> Any:
@@ -66,8 +68,8 @@ class Placement:
                 "reserve_mb": reserve_mb,
                 "confinement": confinement,
                 "method": config.install.method,
-                "allow_unsigned": config.drives.allow_unsigned,
             },
+            judged_by=judged_by,
             is_open=is_open,
         )
         self._orders = PlaceOrders(catalogue, self.placing, self.taking, pins, emit, known)

@@ -36,6 +36,7 @@ from nondum.sdk.wire import Body
 from nondum.transport.fleet.seam import Fleet
 from nondum.transport.peers import Call, CallFailed, Errand, PeerKey
 from nondum.wheelhouse import contents
+from nondum.wheelhouse.signatures import Grant
 
 AT_ONCE = 2
 """Payloads that are fetched from one peer at the same time; others wait."""
@@ -61,13 +62,15 @@ class Taking:
         emit: Emit,
         *,
         rules: Mapping[str, Any],
+        judged_by: Callable[[], Mapping[str, Any]],
         is_open: bool,
     ) -> None:
-        """`rules` are what the children go by: where the store is, whether payloads may be
-        unsigned, what is left free. `is_open`: whether any payload of others is taken."""
+        """`rules` are what the children go by: where the store is, what is left free; `judged_by`,
+        whose payloads are let in now: peers bring nothing in that drives may not. `is_open`:
+        whether any payload of others is taken."""
         self._fleet, self._state, self._folders = fleet, state, folders
         self._children, self._emit = children, emit
-        self._rules, self._is_open = rules, is_open
+        self._rules, self._judged_by, self._is_open = rules, judged_by, is_open
         self._turns: dict[PeerKey, asyncio.Semaphore] = {}
         """By peer: one that stalls keeps nobody else waiting."""
         self._numbers = itertools.count(1)
@@ -130,7 +133,7 @@ class Taking:
             await self._fetch_contents(guest, fetching)
             for row in await self._run(guest, "outline", {}):
                 await fetching.fetch(Listed(*row))
-            judged = await self._run(guest, "judge", self._rules)
+            judged = await self._run(guest, "judge", {**self._rules, **self._judged_by()})
             self._check_components(guest, tuple(judged["components"]))
             await self._fetch_wheels(guest, fetching, [Listed(*row) for row in judged["needed"]])
         except OSError as error:
@@ -149,7 +152,8 @@ class Taking:
         if offer.signature is not None:
             signature = guest.folder / contents.SIGNATURE_NAME
             await in_thread(signature.write_bytes, offer.signature)
-        arguments = {"kind": PLACED, "root": str(guest.root), "node": None, **self._rules}
+        arguments = {"kind": PLACED, "root": str(guest.root), "node": None}
+        arguments |= {**self._rules, **self._judged_by()}
         (said,) = (await self._run(guest, "look", arguments))["payloads"]
         found = PayloadFound(
             said["payload"],
@@ -160,6 +164,9 @@ class Taking:
             said["version"],
             said["release"],
             said["fleet"],
+            signers=tuple(said["signers"]),
+            grant=Grant.parse(said["grant"]),
+            built=said["built"],
         )
         problems = [Problem(**problem) for problem in said["problems"]]
         problems += admission.release_problems(self._state(), found, now())
