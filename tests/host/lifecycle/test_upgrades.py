@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -11,8 +12,11 @@ from tests.payloads import Part, make_payload
 
 from nondum.host import events
 from nondum.host.catalogue.records import PayloadRecord, Step
+from nondum.host.lifecycle.going_back import go_back
+from nondum.host.lifecycle.installed import install, uninstall
 from nondum.host.workers import Timing
 from nondum.sdk.description import PluginDescription
+from nondum.sdk.errors import InstallFailed, PayloadRefused
 
 pytestmark = pytest.mark.anyio
 
@@ -47,12 +51,12 @@ def start(ctx):
 UNIT = "spot__lamp__lamp"
 
 
-def lamp(root: Path, release: int, source: str = LAMP, **about: str) -> Path:
+def lamp(root: Path, release: int) -> Path:
     """A drive with a release of the lamp."""
     drive = root / f"drive-{release}"
-    part = Part("lamp", source, version=f"{release}.0")
     version = f"{release}.0"
-    make_payload(drive, part, payload_id=LAMP_ID, version=version, release=release, **about)
+    part = Part("lamp", LAMP, version=version)
+    make_payload(drive, part, payload_id=LAMP_ID, version=version, release=release)
     return drive
 
 
@@ -146,8 +150,9 @@ async def test_release_that_runs_alone_takes_the_place_first(tmp_path: Path, sou
     first = lamp(tmp_path, 1)
     described = None if source == LAMP else PluginDescription("test-lamp", "2.0")
     part = Part("lamp", source, described, version="2.0")
-    about = {"version": "2.0", "requires": "alone = true"}
-    make_payload(tmp_path / "drive-2", part, payload_id=LAMP_ID, release=2, **about)
+    folder = tmp_path / "drive-2"
+    alone = "alone = true"
+    make_payload(folder, part, payload_id=LAMP_ID, version="2.0", release=2, requires=alone)
     async with living(tmp_path, timing=QUICK) as host:
         host.plug(first, "a")
         await until(host, r1=Step.ACTIVE)
@@ -173,16 +178,17 @@ async def test_new_drive_pulled_during_the_bring_up(tmp_path: Path) -> None:
         host.pull("b")
         await until(host, r1=Step.ACTIVE, r2=None)
         assert host.workers.pids() == old
-        processes = [int(p.name) for p in Path("/proc").iterdir() if p.name.isdigit()]
-        mine = [pid for pid in processes if _is_of(pid, host.folders.scratches)]
-        assert set(mine) == set(old.values())
+        assert _processes_of(host.folders.scratches) == set(old.values())
 
 
-def _is_of(pid: int, folder: Path) -> bool:
-    try:
-        return os.fsencode(folder) in Path(f"/proc/{pid}/environ").read_bytes()
-    except OSError:
-        return False
+def _processes_of(folder: Path) -> set[int]:
+    """Processes whose environment names a folder."""
+    found = set()
+    for process in Path("/proc").iterdir():
+        with contextlib.suppress(OSError):
+            if process.name.isdigit() and os.fsencode(folder) in (process / "environ").read_bytes():
+                found.add(int(process.name))
+    return found
 
 
 async def test_old_drive_pulled_during_the_bring_up(tmp_path: Path) -> None:
@@ -218,3 +224,52 @@ async def test_a_person_goes_back_and_forward(tmp_path: Path) -> None:
         assert second is not None
         host.bus.emit(events.RetryAsked(second.key))
         await until(host, r1=Step.SUPERSEDED, r2=Step.ACTIVE)
+
+
+async def test_installed_payload_is_upgraded_and_the_one_before_is_kept(tmp_path: Path) -> None:
+    folders = {n: lamp(tmp_path, n) / "nondum" / LAMP_ID for n in (1, 2, 3)}
+    async with living(tmp_path, timing=QUICK) as host:
+        for number, folder in folders.items():
+            installed = await install(folder, host.catalogue, host.bus)
+            assert (installed.release, installed.step) == (number, Step.ACTIVE)
+        await until(host, r1=None, r2=Step.SUPERSEDED, r3=Step.ACTIVE)
+        with pytest.raises(PayloadRefused) as refused:
+            await install(folders[3], host.catalogue, host.bus)
+        assert refused.value.code == "ALREADY_PRESENT"
+        back = await go_back(LAMP_ID, host.catalogue, host.bus)
+        assert (back.release, version(host)) == (2, "2.0")
+        forward = await install(folders[3], host.catalogue, host.bus)
+        assert (forward.release, version(host)) == (3, "3.0")
+        await uninstall(LAMP_ID, host.catalogue, host.bus)
+        assert not left_over(host.folders)
+        assert not host.snapshot.drives
+
+
+async def test_install_that_fails_leaves_the_one_before(tmp_path: Path) -> None:
+    first = lamp(tmp_path, 1) / "nondum" / LAMP_ID
+    part = Part("lamp", "import no_such_module", PluginDescription("test-lamp", "2.0"))
+    broken = make_payload(tmp_path / "drive-2", part, payload_id=LAMP_ID, release=2)
+    async with living(tmp_path, timing=QUICK) as host:
+        await install(first, host.catalogue, host.bus)
+        with pytest.raises(PayloadRefused):
+            await install(broken, host.catalogue, host.bus)
+        await until(host, r1=Step.ACTIVE, r2=None)
+        with pytest.raises(InstallFailed) as refused:
+            await go_back(LAMP_ID, host.catalogue, host.bus)
+        assert refused.value.code == "ROLLBACK_NOTHING"
+
+
+async def test_older_drive_is_let_pass_once(tmp_path: Path) -> None:
+    older, newer = lamp(tmp_path, 1), lamp(tmp_path, 2)
+    async with living(tmp_path, timing=QUICK) as host:
+        host.plug(newer, "b")
+        await until(host, r2=Step.ACTIVE)
+        host.plug(older, "a")
+        await until(host, r1=Step.REFUSED, r2=Step.ACTIVE)
+        back = await go_back(LAMP_ID, host.catalogue, host.bus)
+        assert (back.release, version(host)) == (1, "1.0")
+        await until(host, r1=Step.ACTIVE, r2=Step.SUPERSEDED)
+        host.pull("a")
+        await until(host, r1=None, r2=Step.ACTIVE)
+        host.plug(older, "a")
+        await until(host, r1=Step.REFUSED, r2=Step.ACTIVE)

@@ -36,7 +36,9 @@ async def install(folder: Path, catalogue: Catalogue, bus: Bus) -> PayloadRecord
                 payload = await watch.until(lambda state: _settled(state, found.key))
                 _drop_older(catalogue.state, payload, bus)
                 return payload
-            await _go_forward(catalogue.state, found, bus)
+            _go_forward(catalogue.state, found, bus)
+            group = releases.key_of(found)
+            await watch.until(lambda state: group not in state.rollbacks or None)
         except BaseException:
             bus.emit(DriveRemoved(drive))
             raise
@@ -101,7 +103,7 @@ def _settled(state: HostState, key: str) -> PayloadRecord | None:
     return payload if is_behind or payload.step is Step.ACTIVE else None
 
 
-async def _go_forward(state: HostState, payload: PayloadRecord, bus: Bus) -> None:
+def _go_forward(state: HostState, payload: PayloadRecord, bus: Bus) -> None:
     """Install again what a person had gone back from. Raises `PayloadRefused`."""
     if releases.key_of(payload) in state.rollbacks and payload.step is Step.SUPERSEDED:
         bus.emit(RetryAsked(payload.key))
