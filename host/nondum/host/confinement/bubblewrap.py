@@ -109,13 +109,15 @@ def _system(permissions: Collection[str]) -> Iterator[str]:
             yield from ("--symlink", os.readlink(path), name)  # noqa: PTH115
         elif path.is_dir():
             yield from ("--ro-bind", name, name)
-    more = (
-        *_SETTINGS,
-        *(_OF_THE_NETWORK if "network" in permissions else ()),
-        *(_OF_THE_GPU if "gpu" in permissions else ()),
-    )
-    for name in more:
+    for name in settings(permissions):
         yield from ("--ro-bind-try", name, name)
+
+
+def settings(permissions: Collection[str]) -> Iterator[str]:
+    """Files of the system that libraries look for, where they are there."""
+    yield from _SETTINGS
+    yield from _OF_THE_NETWORK if "network" in permissions else ()
+    yield from _OF_THE_GPU if "gpu" in permissions else ()
 
 
 def prefixes() -> tuple[Path, ...]:

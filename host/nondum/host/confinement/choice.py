@@ -6,6 +6,7 @@ from pathlib import Path
 
 from nondum.host.confinement import bubblewrap, level, probe
 from nondum.host.confinement.level import Level, Standing
+from nondum.host.confinement.systemd_service import Served
 from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined
 from nondum.sdk.errors import ConfigRefused
 
@@ -36,6 +37,8 @@ def confinement(at: Level, places: tuple[Path, ...]) -> Confinement:
             for place in places:  # what is not there cannot be shown to a spare
                 place.mkdir(parents=True, exist_ok=True)
             return Boxed(bwrap, places)
+        case Level.SERVICE:
+            return Served()
         case Level.KERNEL:
             return Held()
         case _:

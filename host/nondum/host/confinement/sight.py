@@ -12,6 +12,7 @@ MOST_PROCESSES = 3
 _FIXES: Mapping[Level, str] = {
     Level.BOX: "allow bubblewrap user namespaces (`sysctl kernel.unprivileged_userns_clone=1`; with"
     " AppArmor, a profile for bwrap), or run the service as nondum's package sets it up",
+    Level.SERVICE: "run nondum as the service that its package sets up, on a system with systemd",
     Level.KERNEL: "use a kernel with Landlock (5.13, `lsm=landlock,…` among its parameters)",
 }
 MISSING = Finding(

@@ -124,7 +124,7 @@ class Held:
         walls = {
             "user": user,
             "keeps_capabilities": "capabilities" in self._without,
-            "filter": _filter(groups, self._without),
+            "filter": calls_refused(groups, self._without),
         }
         if "landlock" in self._without or not self._abi:
             yield Entry(walls)
@@ -187,12 +187,12 @@ class Boxed:
             "protected": [*(() if "system" in kept else ("/", "/dev")), room.DEVICES],
             "is_last": "user namespaces" not in kept,
             "changes_user": "user" not in kept,
-            "keeper_filter": _filter(refusals.GROUPS, mounts_too),
+            "keeper_filter": calls_refused(refusals.GROUPS, mounts_too),
         }
         walls = {
             "user": None,
             "keeps_capabilities": "capabilities" in kept,
-            "filter": _filter(refusals.GROUPS, kept),
+            "filter": calls_refused(refusals.GROUPS, kept),
         }
         yield Entry(walls, room=given)
 
@@ -224,7 +224,8 @@ def _interpreter(ground: Ground, orders: int) -> list[str]:
     return [python, "-I", "-S", "-B", "-u", str(BOOTSTRAP), str(orders), str(os.getpid())]
 
 
-def _filter(groups: Mapping[str, tuple[Rule, ...]], without: Collection[str]) -> str | None:
+def calls_refused(groups: Mapping[str, tuple[Rule, ...]], without: Collection[str]) -> str | None:
+    """The filter for `walls`; None where there is none to be had, or it is left out."""
     machine = refusals.machine()
     if "filter" in without or not refusals.is_known(machine):
         return None
