@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import functools
 import os
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,6 +14,7 @@ from typing import Any, TypeVar
 
 import pluggy
 
+from nondum.host.confinement import Level, choice
 from nondum.host.events import BehaviourEnded, Event
 from nondum.host.workers import (
     Call,
@@ -22,6 +26,7 @@ from nondum.host.workers import (
     base_interpreter,
 )
 from nondum.host.workers.confinements import Confinement
+from nondum.host.workers.launcher import MARK
 from nondum.sdk.description import Behaviour, Input, Output, PluginDescription, Unit
 
 SDK = Path(__file__).parents[3] / "plugins/sdk"
@@ -30,7 +35,16 @@ HOST = "rover"
 QUICK = Timing(startup_s=5.0, heartbeat_s=0.8, missed=4, halt_s=0.4, term_s=0.3)
 """Impatient, so that tests of hanging workers are short; the SDK beats every 2 s."""
 
+LEVEL = os.environ.get("NONDUM_TEST_LEVEL", choice.AUTO)
+"""Level of confinement at which workers are tested; `auto`: the best of this machine."""
+
 _E = TypeVar("_E", bound=Event)
+
+
+@functools.cache
+def level() -> Level:
+    """The level at which workers are tested."""
+    return choice.standing(LEVEL, 0).level
 
 
 @dataclass
@@ -40,15 +54,13 @@ class House:
     folder: Path
     timing: Timing = QUICK
     confinement: Confinement | None = None
-        Boxed("bwrap")
-        if os.environ.get("H4") == "3"
-        else (Held() if os.environ.get("H4") == "1" else None)
-    )
+    """What holds the workers; the machine's best, if not given."""
     events: list[Event] = field(default_factory=list)
     _arrived: asyncio.Event = field(default_factory=asyncio.Event)
 
     def __post_init__(self) -> None:
-        launcher = WorkerLauncher(self.confinement)
+        places = (self.folder, SDK, LIBRARIES)
+        launcher = WorkerLauncher(self.confinement or choice.confinement(level(), places))
         self.workers = Workers(HOST, self._on_event, launcher=launcher, timing=self.timing)
 
     def spec(
@@ -115,6 +127,18 @@ class House:
     def lines(self, component: str) -> list[str]:
         """What a component wrote and logged."""
         return [line.text for line in self.workers.logs.of(component)]
+
+    def pid(self, component: str, told: str) -> int:
+        """A process of a component's worker, as this host counts, by what its own `getpid()` is."""
+        mark = f"{MARK}={self.folder / component / 'scratch'}".encode()
+        for entry in Path("/proc").iterdir():
+            with contextlib.suppress(OSError):
+                if entry.name.isdigit() and mark in (entry / "environ").read_bytes():
+                    status = (entry / "status").read_text(encoding="ascii")
+                    (inner,) = re.findall(r"^NSpid:.*\s(\d+)$", status, re.MULTILINE)
+                    if inner == told:
+                        return int(entry.name)
+        raise LookupError(f"{component} has no process {told}")
 
     def _on_event(self, event: Event) -> None:
         self.events.append(event)

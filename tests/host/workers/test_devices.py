@@ -8,6 +8,7 @@ import signal
 import pytest
 from tests.host.workers.house import HOST, House
 
+from nondum.host.confinement import Level
 from nondum.host.events import FactKnown, WorkerReady
 from nondum.host.workers import supervision
 from nondum.planning.running import RunState
@@ -56,28 +57,33 @@ async def node(house: House) -> str:
     return house.told(FactKnown)[seen].arguments[0]
 
 
+def seen(house: House) -> str:
+    """Where a worker finds the device for its need `line`."""
+    return "/dev/nondum/line" if house.workers.launcher.level == Level.BOX else "/dev/zero"
+
+
 async def test_device_is_granted_and_withdrawn(house: House) -> None:
     await guest(house)
     assert await node(house) == "none"
-    await house.workers.attach("guest", "line", "/dev/ttyUSB0", {"ID_BUS": "usb"})
-    assert await node(house) == "/dev/ttyUSB0"
+    await house.workers.attach("guest", "line", "/dev/zero", {"ID_BUS": "usb"})
+    assert await node(house) == seen(house)
     await house.workers.detach("guest", "line")
     assert await node(house) == "none"
 
 
 async def test_device_granted_before_the_start_is_there(house: House) -> None:
-    await house.workers.attach("guest", "line", "/dev/ttyUSB0", {})
+    await house.workers.attach("guest", "line", "/dev/zero", {})
     await guest(house)
-    assert await node(house) == "/dev/ttyUSB0"
+    assert await node(house) == seen(house)
 
 
 async def test_device_outlives_a_crash(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(supervision, "BACKOFF_S", 0.02)
     await guest(house)
-    await house.workers.attach("guest", "line", "/dev/ttyUSB0", {})
+    await house.workers.attach("guest", "line", "/dev/zero", {})
     os.kill(house.workers.pids()["guest"], signal.SIGKILL)
     await house.until(WorkerReady, lambda _: len(house.told(WorkerReady)) == 2)
-    assert await node(house) == "/dev/ttyUSB0"
+    assert await node(house) == seen(house)
 
 
 async def test_values_mounts_and_settings_reach_behaviours(house: House) -> None:

@@ -198,7 +198,7 @@ async def test_children_go_with_their_worker(house: House, body: str, end: str) 
     pid = house.workers.pids()["guest"]
     house.behave("guest", "do", u=UNIT)
     said = await house.until(WorkerLogged, lambda line: line.message.startswith("child"))
-    child = int(said.message.split()[1])
+    child = house.pid("guest", said.message.split()[1])
     assert is_alive(child)
     if end == "stop":
         await house.workers.stop("guest")
