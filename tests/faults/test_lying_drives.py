@@ -1,0 +1,172 @@
+"""Drives whose devices answer otherwise each time, fail, fall silent or never end."""
+
+from __future__ import annotations
+
+import errno
+import os
+import threading
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+from tests.faults.fuse import Answer, FuseDrive, served
+from tests.host.lifecycle.living import LAMP, Living, left_over, living
+from tests.payloads import Part, make_payload, make_wheel
+
+from nondum.host.catalogue.records import PayloadRecord, Step
+from nondum.host.drives import reading
+from nondum.host.lifecycle import installation
+
+pytestmark = [
+    pytest.mark.anyio,
+    pytest.mark.skipif(
+        os.geteuid() != 0 or not Path("/dev/fuse").exists(), reason="FUSE needs root"
+    ),
+]
+
+LAMP_ID = "org.example.lamp"
+FOLDER = f"nondum/{LAMP_ID}"
+LIST, MANIFEST = f"{FOLDER}/CONTENTS", f"{FOLDER}/payload.toml"
+
+
+@asynccontextmanager
+async def lying(
+    tmp_path: Path, *, answers: dict[str, Answer]
+) -> AsyncIterator[tuple[Living, FuseDrive]]:
+    """A host, and a drive with a sound payload on a device that gives these answers."""
+    root = tmp_path / "root"
+    ballast = make_wheel(tmp_path, "ballast", "1.0", {"ballast.bin": os.urandom(2**20)})
+    make_payload(root, Part("lamp", LAMP, wheels=[ballast]), payload_id=LAMP_ID)
+    async with living(tmp_path) as host:
+        with served(root, tmp_path / "fuse") as drive:
+            drive.answers |= answers
+            host.plug(drive.mount)
+            yield host, drive
+            host.pull()
+            await host.until(lambda: not host.snapshot.drives)
+        await host.until_gone(LAMP_ID)
+        assert not left_over(host.folders)
+
+
+def wheel(tmp_path: Path) -> str:
+    return f"{FOLDER}/wheels/ballast-1.0-py3-none-any.whl"
+
+
+def bytes_of(tmp_path: Path, path: str) -> bytes:
+    return (tmp_path / "root" / path).read_bytes()
+
+
+def changing(tmp_path: Path, path: str) -> Answer:
+    """The truth at first, then something of the same length."""
+
+    def answer(opening: int, offset: int, size: int) -> bytes:
+        data = bytes_of(tmp_path, path)
+        shown = data if opening == 0 else data.replace(b"1", b"2")
+        return shown[offset : offset + size]
+
+    return answer
+
+
+def endless(opening: int, offset: int, size: int) -> bytes:
+    return b"x" * size
+
+
+async def refused(host: Living) -> PayloadRecord:
+    return await host.until_step(LAMP_ID, Step.REFUSED)
+
+
+async def unreadable(host: Living, code: str) -> None:
+    """The drive is told with a code, and nothing of its payload stays."""
+    await host.until(lambda: any(drive.problems for drive in host.snapshot.drives))
+    (drive,) = host.snapshot.drives
+    assert [problem.code for problem in drive.problems] == [code]
+    assert all(problem.fix for problem in drive.problems)
+    await host.until_gone(LAMP_ID)
+
+
+async def test_nothing_is_read_twice(tmp_path: Path) -> None:
+    """Whoever answers otherwise at the second reading is never asked; but for the list, which is
+    compared."""
+    paths = [MANIFEST, f"{FOLDER}/index.json", f"{FOLDER}/pylock.lamp.toml", wheel(tmp_path)]
+    answers = {path: changing(tmp_path, path) for path in paths}
+    async with lying(tmp_path, answers=answers) as (host, drive):
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+        assert {path: count for path, count in drive.reads.items() if path != LIST} == {
+            path: 1 for path in drive.reads if path != LIST
+        }
+        assert set(paths) <= drive.reads.keys()
+
+
+async def test_list_that_is_another_one_now_is_refused(tmp_path: Path) -> None:
+    async with lying(tmp_path, answers={LIST: changing(tmp_path, LIST)}) as (host, _):
+        record = await refused(host)
+        assert [problem.code for problem in record.problems] == ["HASH_MISMATCH"]
+
+
+async def test_other_bytes_than_listed_are_refused(tmp_path: Path) -> None:
+    path = wheel(tmp_path)
+    answers = {path: lambda opening, offset, size: bytes_of(tmp_path, path)[offset + 1 :][:size]}
+    async with lying(tmp_path, answers=answers) as (host, _):
+        record = await refused(host)
+        assert [problem.code for problem in record.problems] == ["HASH_MISMATCH"]
+
+
+async def test_list_without_end_is_refused(tmp_path: Path) -> None:
+    async with lying(tmp_path, answers={LIST: endless}) as (host, _):
+        (problem,) = (await refused(host)).problems
+        assert problem.code == "TOO_LARGE"
+
+
+async def test_file_without_end_is_read_no_further_than_listed(tmp_path: Path) -> None:
+    told: list[int] = []
+
+    def answer(opening: int, offset: int, size: int) -> bytes:
+        told.append(offset + size)
+        return b"x" * size
+
+    async with lying(tmp_path, answers={wheel(tmp_path): answer}) as (host, _):
+        record = await refused(host)
+        assert [problem.code for problem in record.problems] == ["HASH_MISMATCH"]
+        listed = len(bytes_of(tmp_path, wheel(tmp_path)))
+        assert max(told) <= listed + 2 * 2**20  # the kernel asks for what one read may take
+
+
+@pytest.mark.parametrize("path", ["list", "wheel"])
+@pytest.mark.parametrize("number", [errno.EIO, errno.ENODEV, errno.ESTALE])
+async def test_device_that_fails_is_gone(tmp_path: Path, path: str, number: int) -> None:
+    def answer(opening: int, offset: int, size: int) -> bytes:
+        raise OSError(number, "the device fails")
+
+    where = LIST if path == "list" else wheel(tmp_path)
+    async with lying(tmp_path, answers={where: answer}) as (host, _):
+        await unreadable(host, "DRIVE_GONE")
+
+
+@pytest.mark.parametrize("path", ["list", "wheel"])
+async def test_device_that_is_silent_is_given_up(
+    tmp_path: Path, path: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its child hangs in the kernel; nobody else waits for it."""
+    monkeypatch.setattr(reading, "LOOK_S", 1.0)
+    monkeypatch.setattr(installation, "COPY_SILENCE_S", 1.0)
+    heard = threading.Event()
+
+    def answer(opening: int, offset: int, size: int) -> bytes:
+        heard.wait(60.0)
+        return b""
+
+    where = LIST if path == "list" else wheel(tmp_path)
+    try:
+        async with lying(tmp_path, answers={where: answer}) as (host, _):
+            make_payload(tmp_path / "good", Part("good", LAMP), payload_id="org.example.good")
+            host.plug(tmp_path / "good", "good")
+            await host.until_step("org.example.good", Step.ACTIVE)
+            await host.until(lambda: any(drive.problems for drive in host.snapshot.drives))
+            (problem,) = (p for drive in host.snapshot.drives for p in drive.problems)
+            assert problem.code == "DRIVE_STALLED"
+            await host.until_gone(LAMP_ID)
+            host.pull("good")
+            await host.until_gone("org.example.good")
+    finally:
+        heard.set()
