@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 import os
 import pwd
+import signal
 import socket
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -34,9 +36,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         nodes=Nodes(told.run / "devices", uid, frozenset(told.allow_subsystem)),
         tree=tree(mounts.here(), f"{OWNER}-{uid}"),
     )
-    with _handed_over() as listening:
-        Server(listening, service, told.idle_s).run()
-    service.tree.close()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    try:
+        with _handed_over() as listening:
+            Server(listening, service, told.idle_s).run()
+    finally:
+        service.tree.close()
 
 
 def _parser() -> argparse.ArgumentParser:

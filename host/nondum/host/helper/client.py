@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import logging
 import os
 import re
 import socket
 import stat
+import time
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,7 @@ from nondum.sdk.errors import InstallFailed, NondumError, Problem
 SOCKET = Path("/run/nondum/helper.sock")
 WAIT_S = 15.0
 """Longer than the helper waits for a drive."""
+PAUSE_S = 0.02
 
 log = logging.getLogger(__name__)
 
@@ -77,9 +80,11 @@ class HelperClient:
         try:
             with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as asked:
                 asked.settimeout(WAIT_S)
-                asked.connect(str(self._path))
-                asked.send(requests.encode(request))
-                answer = asked.recv(requests.ANSWER_BYTES)
+                _connect(asked, self._path)
+                # Who is turned away is answered before the question is heard.
+                with contextlib.suppress(BrokenPipeError):
+                    asked.send(requests.encode(request))
+                answer = _heard(asked)
         except OSError as error:
             raise _silent(str(error)) from error
         if not answer:
@@ -146,6 +151,25 @@ class HelperTree:
             return self._helper.ask(request)
         except NondumError as error:
             raise OSError(str(error)) from error
+
+
+def _connect(asked: socket.socket, path: Path) -> None:
+    """Connect, once there is room among those who wait."""
+    until_s = time.monotonic() + WAIT_S
+    while True:
+        try:
+            return asked.connect(str(path))
+        except BlockingIOError:
+            if time.monotonic() >= until_s:
+                raise
+            time.sleep(PAUSE_S)
+
+
+def _heard(asked: socket.socket) -> bytes:
+    try:
+        return asked.recv(requests.ANSWER_BYTES)
+    except ConnectionResetError:  # the question was not read, which is told first
+        return asked.recv(requests.ANSWER_BYTES)
 
 
 def _word(need: str) -> str:

@@ -1,0 +1,103 @@
+"""Components get nodes of what was plugged in for them, and of nothing else."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from nondum.host.helper.nodes import Nodes
+from nondum.sdk.errors import NondumError
+
+pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="making device nodes needs root")
+NOBODY = 65534
+INTERFACE = "devices/pci0000:00/usb1/1-2/1-2:1.0"
+
+
+def plug(sys: Path, place: str, number: str, subsystem: str, *, interface: str = "ff 00") -> None:
+    """Have a device in sysfs."""
+    device = sys / place
+    device.mkdir(parents=True)
+    kind, protocol = interface.split()
+    if "1-2:1.0" in place:
+        (sys / INTERFACE / "bInterfaceClass").write_text(f"{kind}\n")
+        (sys / INTERFACE / "bInterfaceProtocol").write_text(f"{protocol}\n")
+    (sys / "class" / subsystem).mkdir(parents=True)
+    (device / "subsystem").symlink_to(sys / "class" / subsystem)
+    (sys / "dev/char").mkdir(parents=True)
+    (sys / "dev/char" / number).symlink_to(device)
+
+
+def nodes(tmp_path: Path, *subsystems: str) -> Nodes:
+    return Nodes(tmp_path / "run", NOBODY, frozenset(subsystems), tmp_path / "sys")
+
+
+def refused(nodes: Nodes, number: tuple[int, int]) -> str:
+    with pytest.raises(NondumError) as error:
+        nodes.put("eye", "line", *number)
+    assert error.value.code == "HELPER_REFUSED"
+    assert not (nodes.base / "eye").exists()
+    return error.value.problems[0].message
+
+
+def test_node_is_made_for_its_user_alone_and_removed(tmp_path: Path) -> None:
+    plug(tmp_path / "sys", f"{INTERFACE}/ttyUSB0/tty/ttyUSB0", "188:0", "tty")
+    made = nodes(tmp_path)
+    node = made.put("eye", "line", 188, 0)
+    found = node.lstat()
+    assert stat.S_ISCHR(found.st_mode)
+    assert (os.major(found.st_rdev), os.minor(found.st_rdev)) == (188, 0)
+    assert (stat.S_IMODE(found.st_mode), found.st_uid) == (0o600, NOBODY)
+    assert node == made.put("eye", "line", 188, 0)
+    made.take("eye", "line")
+    made.take("eye", "line")
+    assert not node.exists()
+    made.put("eye", "line", 188, 0)
+    made.clear("eye")
+    assert not (made.base / "eye").exists()
+    made.clear("")
+
+
+@pytest.mark.parametrize(
+    ("place", "subsystem", "interface"),
+    [
+        pytest.param("devices/pci0000:00/nvme/nvme0", "nvme", "ff 00", id="disk controller"),
+        pytest.param(f"{INTERFACE}/host6/sg1", "scsi_generic", "08 50", id="raw SCSI of a stick"),
+        pytest.param(f"{INTERFACE}/0003:1/input/event3", "input", "03 01", id="keyboard"),
+        pytest.param(f"{INTERFACE}/0003:1/hidraw/hidraw0", "hidraw", "03 01", id="raw keyboard"),
+        pytest.param("devices/virtual/mem/mem", "mem", "ff 00", id="memory"),
+        pytest.param("devices/virtual/misc/kvm", "misc", "ff 00", id="kernel's own"),
+        pytest.param("devices/platform/serial8250/tty/ttyS0", "tty", "ff 00", id="console"),
+    ],
+)
+def test_what_is_not_a_guest_s_is_refused(
+    tmp_path: Path, place: str, subsystem: str, interface: str
+) -> None:
+    plug(tmp_path / "sys", place, "21:1", subsystem, interface=interface)
+    refused(nodes(tmp_path), (21, 1))
+
+
+def test_raw_usb_node_of_a_keyboard_or_hub_is_refused(tmp_path: Path) -> None:
+    sys = tmp_path / "sys"
+    plug(sys, "devices/pci0000:00/usb1/1-2", "189:1", "usb")
+    interface = sys / INTERFACE
+    interface.mkdir()
+    (interface / "bInterfaceClass").write_text("03")
+    (interface / "bInterfaceProtocol").write_text("01")
+    assert "keyboards" in refused(nodes(tmp_path), (189, 1))
+    (interface / "bInterfaceProtocol").write_text("02")
+    (sys / "devices/pci0000:00/usb1/1-2/bDeviceClass").write_text("09")
+    assert "hubs" in refused(nodes(tmp_path), (189, 1))
+
+
+def test_integrator_may_grant_what_does_not_hang_on_usb(tmp_path: Path) -> None:
+    plug(tmp_path / "sys", "devices/platform/csi/video4linux/video0", "81:0", "video4linux")
+    assert "USB" in refused(nodes(tmp_path), (81, 0))
+    assert nodes(tmp_path, "video4linux").put("eye", "line", 81, 0).exists()
+
+
+def test_number_without_a_device_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "sys/dev/char").mkdir(parents=True)
+    assert "no such device" in refused(nodes(tmp_path), (188, 0))

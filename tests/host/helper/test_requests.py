@@ -1,0 +1,102 @@
+"""What the helper understands, and that nothing else gets past its door."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields
+from typing import Any, get_args
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nondum.host.cgroups.cage import NAME
+from nondum.host.helper import requests
+from nondum.host.helper.requests import MAX_BYTES, Request, encode, parse
+from nondum.sdk.errors import NondumError
+
+NUMBERS = st.integers(0, 2**63 - 1)
+DRIVES = st.from_regex(requests.DRIVE, fullmatch=True)
+WORDS: dict[str, st.SearchStrategy[Any]] = {
+    "device": st.from_regex(requests.DEVICE, fullmatch=True),
+    "diskseq": st.none() | NUMBERS,
+    "filesystem": st.from_regex(requests.FILESYSTEM, fullmatch=True),
+    "use": st.sampled_from(["read", "handover"]),
+    "drive": DRIVES,
+    "component": st.from_regex(requests.COMPONENT, fullmatch=True),
+    "need": st.from_regex(requests.NEED, fullmatch=True),
+    "cage": st.from_regex(NAME, fullmatch=True),
+    "memory_mb": st.integers(1, 2**30),
+    "tasks": st.integers(1, 2**22),
+    "cpu_weight": st.integers(1, 10_000),
+    "processors": st.floats(0, 10_000),
+}
+REQUESTS: st.SearchStrategy[Request] = st.sampled_from(get_args(Request)).flatmap(
+    lambda kind: st.builds(kind, **{f.name: WORDS.get(f.name, NUMBERS) for f in fields(kind)})
+)
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+)
+
+
+@given(REQUESTS)
+def test_requests_come_as_they_went(request: Request) -> None:
+    data = encode(request)
+    assert len(data) <= MAX_BYTES
+    assert parse(data) == request
+
+
+@given(st.binary(max_size=2 * MAX_BYTES) | JSON.map(lambda value: json.dumps(value).encode()))
+def test_whatever_comes_is_a_request_or_refused(data: bytes) -> None:
+    try:
+        parse(data)
+    except NondumError as error:
+        assert error.code == "HELPER_REFUSED"
+
+
+@given(REQUESTS, st.data())
+def test_no_field_takes_another_kind_of_value(request: Request, data: st.DataObject) -> None:
+    body = json.loads(encode(request))
+    name = data.draw(st.sampled_from(sorted(body)))
+    body[name] = data.draw(JSON | st.text(alphabet="./\\\0-\n", min_size=1))
+    try:
+        parsed = parse(json.dumps(body).encode())
+    except NondumError as error:
+        assert error.code == "HELPER_REFUSED"
+        return
+    for field in fields(parsed):
+        value = getattr(parsed, field.name)
+        assert not isinstance(value, str) or not {*"/\\\0\n"} & set(value)
+        assert value not in (".", "..")
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        {},
+        {"verb": "mount"},
+        {"verb": "Request"},
+        {"verb": "Mount", "device": "../sda", "diskseq": 1, "filesystem": "vfat", "use": "read"},
+        {"verb": "Mount", "device": "sdb1", "diskseq": True, "filesystem": "", "use": "read"},
+        {"verb": "Mount", "device": "sdb1", "diskseq": 1, "filesystem": "vfat", "use": "boot"},
+        {"verb": "Mount", "device": "sdb1", "diskseq": 1, "filesystem": "vfat"},
+        {"verb": "Unmount", "drive": "..", "use": "read"},
+        {"verb": "Unmount", "drive": "sdb1-1", "use": "read", "path": "/"},
+        {"verb": "PutNode", "component": "a/b", "need": "x", "major": 1, "minor": 1},
+        {"verb": "PutNode", "component": "a", "need": "..", "major": 1, "minor": 1},
+        {"verb": "PutNode", "component": "a", "need": "x", "major": -1, "minor": 1},
+        {"verb": "FillCage", "cage": "../x.1", "pid": 1},
+        {"verb": "FillCage", "cage": "a.1", "pid": 1.0},
+        {"verb": "LimitCage", "cage": "a.1", "memory_mb": 0, "tasks": 1, "cpu_weight": 1,
+         "processors": 0.0},
+        {"verb": "LimitCage", "cage": "a.1", "memory_mb": 1, "tasks": 1, "cpu_weight": 1,
+         "processors": float("nan")},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_what_is_nearly_a_request_is_refused(body: dict[str, Any]) -> None:
+    with pytest.raises(NondumError) as refused:
+        parse(json.dumps(body).encode())
+    assert refused.value.code == "HELPER_REFUSED"
+    assert refused.value.problems[0].fix

@@ -1,0 +1,320 @@
+"""The helper as a process of root, asked by a user: the one whom it serves, and hostile ones."""
+
+from __future__ import annotations
+
+import encodings.ascii  # noqa: F401  # the users of these tests may not look where it is
+import json
+import os
+import pickle
+import pwd
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import pytest
+from tests.host.drives.test_blocks import attached, make_ext4
+
+from nondum.host.cgroups import CageLimits, Cages
+from nondum.host.drives import nodes
+from nondum.host.helper import HelperClient, requests
+from nondum.host.helper.server import MOST_CHILDREN
+from nondum.sdk.errors import NondumError
+
+pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="the helper is root's")
+SERVED = pwd.getpwnam("daemon")
+STRANGER = pwd.getpwnam("nobody")
+_R = TypeVar("_R")
+
+START = 'export LISTEN_PID=$$ LISTEN_FDS=1; exec "$@"'
+
+
+@dataclass
+class Helper:
+    """A running one, and how its users reach it."""
+
+    socket: Path
+    run: Path
+    process: subprocess.Popen[bytes]
+
+    @property
+    def client(self) -> HelperClient:
+        return HelperClient(self.socket)
+
+    def is_well(self) -> bool:
+        """Whether it still answers the one whom it serves."""
+        return isinstance(served(lambda: self.client.ask(requests.ListCages())), dict)
+
+
+@pytest.fixture
+def place() -> Iterator[Path]:
+    """A folder that every user can look into, as /run/nondum is."""
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder).chmod(0o755)
+        yield Path(folder)
+
+
+@pytest.fixture
+def helper(place: Path) -> Iterator[Helper]:
+    """A helper as systemd would start it, which also takes loop devices."""
+    path = place / "helper.sock"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening:
+        listening.bind(str(path))
+        path.chmod(0o666)
+        listening.listen(64)
+        command = [sys.executable, "-m", "nondum.host.helper", "--user", SERVED.pw_name]
+        command += ["--run", str(place / "run"), "--allow-loop", "--idle-s", "600"]
+        process = subprocess.Popen(
+            ["sh", "-c", START, "sh", *command],
+            preexec_fn=lambda: os.dup2(listening.fileno(), 3),
+            pass_fds=(3,),
+        )
+    running = Helper(path, place / "run", process)
+    yield running
+    assert process.poll() is None, "it has ended"
+    assert running.is_well()
+    process.terminate()
+    process.wait()
+
+
+def served(work: Callable[[], _R]) -> _R:
+    """Do something as the user who is served."""
+    return as_user(SERVED.pw_uid, work)
+
+
+def as_user(uid: int, work: Callable[[], _R]) -> _R:
+    """Do something in a process of a user; give or raise what it did."""
+    read, write = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        try:
+            os.setgroups([])
+            os.setresgid(uid, uid, uid)
+            os.setresuid(uid, uid, uid)
+            try:
+                said: Any = work()
+            except Exception as error:
+                said = error
+            os.write(write, pickle.dumps(said))
+        finally:
+            os._exit(0)
+    os.close(write)
+    with os.fdopen(read, "rb") as answers:
+        said = pickle.loads(answers.read())
+    os.waitpid(pid, 0)
+    if isinstance(said, Exception):
+        raise said
+    result: _R = said
+    return result
+
+
+def raw(helper: Helper, *packets: bytes, fds: tuple[int, ...] = ()) -> dict[str, Any]:
+    """Send packets as the served user, with descriptors; the answer, if any."""
+
+    def ask() -> dict[str, Any]:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as asked:
+            asked.settimeout(10)
+            asked.connect(str(helper.socket))
+            for packet in packets:
+                socket.send_fds(asked, [packet], list(fds))
+            answer = asked.recv(requests.ANSWER_BYTES)
+            return dict(json.loads(answer)) if answer else {}
+
+    return served(ask)
+
+
+def code(answer: dict[str, Any]) -> str:
+    return str(answer["problems"][0]["code"]) if "problems" in answer else ""
+
+
+def test_strangers_are_not_served(helper: Helper) -> None:
+    with pytest.raises(NondumError) as refused:
+        as_user(STRANGER.pw_uid, lambda: helper.client.ask(requests.ListCages()))
+    assert refused.value.code == "HELPER_REFUSED"
+
+
+@pytest.mark.parametrize(
+    "packet",
+    [
+        pytest.param(b"\xff" * 300, id="garbage"),
+        pytest.param(b"[" * 1000, id="deep"),
+        pytest.param(b"x" * 60_000, id="long"),
+        pytest.param(b'{"verb":"Unmount","drive":"../..","use":"read"}', id="path"),
+        pytest.param(b'{"verb":"Mount","device":"sda","diskseq":1}', id="short"),
+    ],
+)
+def test_nonsense_is_refused_in_words(helper: Helper, packet: bytes) -> None:
+    assert code(raw(helper, packet)) == "HELPER_REFUSED"
+
+
+def test_descriptors_are_refused_and_not_kept(helper: Helper) -> None:
+    read, write = os.pipe()
+    answer = raw(helper, requests.encode(requests.ListCages()), fds=(write,))
+    assert code(answer) == "HELPER_REFUSED"
+    os.close(write)
+    assert os.read(read, 1) == b"", "the helper holds no copy"
+    os.close(read)
+
+
+def test_who_connects_and_says_nothing_keeps_nobody_out(helper: Helper) -> None:
+    idle = []
+    for _ in range(MOST_CHILDREN // 2):
+        silent = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        silent.connect(str(helper.socket))
+        idle.append(silent)
+    assert helper.is_well()
+    for silent in idle:
+        silent.close()
+
+
+def test_flood_is_answered_or_turned_away(helper: Helper) -> None:
+    def flood() -> list[str]:
+        asked = []
+        for _ in range(3 * MOST_CHILDREN):
+            one = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+            one.settimeout(10)
+            try:
+                one.connect(str(helper.socket))
+            except BlockingIOError:  # as many wait as may
+                one.close()
+                continue
+            asked.append(one)
+        said = []
+        for one in asked:
+            try:
+                one.send(requests.encode(requests.ListCages()))
+                said.append(code(json.loads(one.recv(requests.ANSWER_BYTES))))
+            except OSError:
+                said.append("hung up")
+        return said
+
+    assert set(served(flood)) <= {"", "HELPER_BUSY", "hung up"}
+    deadline_s = time.monotonic() + 10
+    while time.monotonic() < deadline_s:
+        try:
+            assert helper.is_well()
+            return
+        except NondumError:  # the last of them are still being served
+            time.sleep(0.05)
+    raise AssertionError("it serves nobody any more")
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> Iterator[Path]:
+    """The node of a loop device with a file on it."""
+    content = tmp_path / "content"
+    content.mkdir()
+    (content / "word").write_text("hello")
+    make_ext4(content, tmp_path / "drive.img")
+    with attached(tmp_path / "drive.img") as node:
+        yield node
+
+
+def name_of(node: Path) -> str:
+    with node.open("rb") as device:
+        return nodes.drive_name(node.name, nodes.diskseq(device.fileno()))
+
+
+def test_drive_is_mounted_where_the_helper_says_and_let_go(helper: Helper, drive: Path) -> None:
+    name, nowhere = name_of(drive), Path("/etc")
+    at = served(lambda: helper.client.mount(drive, nowhere, "ext4", name, "read"))
+    assert at == helper.run / f"mounts/{name}.read"
+    assert served(lambda: (at / "word").read_text()) == "hello"
+    flags = os.statvfs(at).f_flag
+    assert all(flags & f for f in (os.ST_RDONLY, os.ST_NOSUID, os.ST_NODEV, os.ST_NOEXEC))
+    other = served(lambda: helper.client.mount(drive, nowhere, "", name, "handover"))
+    assert other.is_mount()
+    with pytest.raises(NondumError) as refused:
+        served(lambda: helper.client.mount(drive, nowhere, "ext4", name, "read"))
+    assert "mounted already" in str(refused.value)
+    served(lambda: helper.client.unmount(nowhere, name, "read"))
+    assert not at.exists()
+    served(lambda: helper.client.unmount_all(nowhere))
+    assert not other.exists()
+
+
+def test_other_insertion_and_fixed_disks_are_not_mounted(helper: Helper, drive: Path) -> None:
+    for device, number in ((drive.name, 1), ("vda", None), ("sda1", 3)):
+        request = requests.Mount(device, number, "ext4", "read")
+        assert code(raw(helper, requests.encode(request))) == "HELPER_REFUSED"
+    assert not (helper.run / "mounts").exists() or not os.listdir(helper.run / "mounts")  # noqa: PTH208
+
+
+def test_file_system_that_is_none_leaves_no_folder(helper: Helper, drive: Path) -> None:
+    name = name_of(drive)
+    for filesystem in ("vfat", "proc", "overlay"):
+        with pytest.raises(NondumError) as refused:
+            served(lambda fs=filesystem: helper.client.mount(drive, drive, fs, name, "read"))  # type: ignore[misc]  # bound early
+        assert refused.value.code in ("FS_ERROR", "FS_UNSUPPORTED")
+    assert not os.listdir(helper.run / "mounts")  # noqa: PTH208
+
+
+def test_folder_that_became_a_link_is_not_followed(helper: Helper, drive: Path) -> None:
+    """Only root could put one there; should it, nothing is mounted elsewhere."""
+    name, elsewhere = name_of(drive), helper.run.parent / "elsewhere"
+    elsewhere.mkdir()
+    (helper.run / "mounts").mkdir(parents=True)
+    (helper.run / f"mounts/{name}.read").symlink_to(elsewhere)
+    with pytest.raises(NondumError):
+        served(lambda: helper.client.mount(drive, drive, "ext4", name, "read"))
+    assert not elsewhere.is_mount()
+
+
+def test_cages_hold_processes_of_the_served_user_only(helper: Helper) -> None:
+    sleeper = subprocess.Popen(["sleep", "60"], user=SERVED.pw_uid)
+    somebody = subprocess.Popen(["sleep", "60"], user=STRANGER.pw_uid)
+
+    def cage() -> tuple[int, ...]:
+        cages = Cages(helper.client.cages())
+        assert cages.holds
+        made = cages.make("lamp", CageLimits(memory_mb=64, tasks=8))
+        made.add(sleeper.pid)
+        for pid in (somebody.pid, os.getppid(), 1):
+            with pytest.raises(OSError, match="HELPER_REFUSED"):
+                made.add(pid)
+        held = made.pids()
+        assert made.usage().tasks in (0, 1)
+        assert made.end()
+        cages.sweep()
+        return held
+
+    assert served(cage) == (sleeper.pid,)
+    assert sleeper.wait(5) == -signal.SIGKILL
+    assert somebody.poll() is None
+    somebody.kill()
+    somebody.wait()
+
+
+def test_helper_ends_when_nobody_asks(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening:
+        listening.bind(str(tmp_path / "s"))
+        listening.listen()
+        command = [sys.executable, "-m", "nondum.host.helper", "--user", SERVED.pw_name]
+        done = subprocess.run(
+            ["sh", "-c", START, "sh", *command, "--idle-s", "0.1", "--run", str(tmp_path)],
+            preexec_fn=lambda: os.dup2(listening.fileno(), 3),
+            pass_fds=(3,),
+            timeout=20,
+            check=False,
+        )
+    assert done.returncode == 0
+
+
+def test_helper_is_started_by_its_socket_only() -> None:
+    command = [sys.executable, "-m", "nondum.host.helper"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env={})
+    assert done.returncode == 1
+    assert "nondum-helper.socket" in done.stderr or "nondum" in done.stderr
+
+
+def test_missing_helper_is_told(tmp_path: Path) -> None:
+    with pytest.raises(NondumError) as silent:
+        HelperClient(tmp_path / "none").ask(requests.ListCages())
+    assert silent.value.code == "HELPER_SILENT"
+    assert "systemctl" in silent.value.problems[0].fix
