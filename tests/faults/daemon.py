@@ -1,25 +1,35 @@
-"""A host's lifecycle in a process of its own, to be killed at a chosen commit.
+"""A host's lifecycle in a process of its own, to be killed or to be given errors.
 
-The orders are one JSON object: `root`, and optionally `kill` ([when, step, event]: SIGKILL `BEFORE`
-or `AFTER` the commit of that transition) and `nudge` ([step, what]: `pull` the drive, `retry` the
-payload or report its worker `lost` as soon as that step was committed). The catalogue handed in at
-the composition root does it; nothing that is shipped knows of it.
+The orders are one JSON object: `root`, and optionally
+
+- `kill` ([when, step, event]): SIGKILL itself `BEFORE` or `AFTER` the commit of that transition, of
+  a payload or (step is then a component's state) of a component,
+- `nudge` ([[step, what], …]): `pull` the drive, `retry` the payload, report its worker `lost`, … as
+  soon as that step was committed, one after the other,
+- `kill_while` (a drive's state): SIGKILL itself once a drive was committed to be in it,
+- `script`: things to do one after the other, each when all that came before has settled: `plug`
+  and `pull` slots, `go` (wait for SIGUSR1), `steady` (wait until nothing is on trial), `end`; or
+  `end now`.
+
+Each commit is told in the file `told` under the root once it is acknowledged. The catalogue handed
+in at the composition root does all this; nothing that is shipped knows of it.
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import os
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from nondum.host import events
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.catalogue.records import JournalEntry, Step
+from nondum.host.catalogue.records import DriveState, JournalEntry, Step
 from nondum.host.catalogue.state import HostState
 from nondum.host.drives.slots import SlotSource
 from nondum.host.lifecycle.bus import Bus
@@ -27,7 +37,7 @@ from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
 from nondum.host.lifecycle.folders import Folders, claim
 from nondum.host.lifecycle.installation import InstallOptions
-from nondum.host.transitions import TRANSITIONS
+from nondum.host.transitions import COMPONENT_TRANSITIONS, TRANSITIONS
 from nondum.host.workers import Timing, Workers
 from nondum.sdk.errors import Problem
 
@@ -35,6 +45,17 @@ HOST = "spot"
 SLOT = "a"
 COMPONENT = "lamp"
 ROWS = {(step, event.__name__): row for (step, event), row in TRANSITIONS.items()}
+COMPONENT_ROWS = {
+    (state, event.__name__): to for (state, event), to in COMPONENT_TRANSITIONS.items()
+}
+MARK = "NONDUM_FAULTS"
+"""Environment variable of all that belongs to such a daemon: its root."""
+
+OPTIONS = InstallOptions(allow_unsigned=True, reserve_mb=0)
+"""Some of the disks that it lives on are small."""
+QUICK = Timing(startup_s=2.0, settle_beats=1)
+
+_AT_REST = frozenset({Step.ACTIVE, Step.SUPERSEDED, Step.REFUSED, Step.QUARANTINED})
 
 
 class DeadlyCatalogue(Catalogue):
@@ -42,18 +63,34 @@ class DeadlyCatalogue(Catalogue):
 
     orders: dict[str, Any]
     bus: Bus
+    told: int
+    """Descriptor of the file `told`: it was opened before anything could fail."""
+    entries = 0
 
     async def commit(self, after: HostState, entries: Sequence[JournalEntry]) -> None:
         passed = list(self._passed(entries))
         when, *row = self.orders.get("kill", ("", "", ""))
-        is_deadly = any([step.name, event] == row for step, event, _ in passed)
+        names = [[step.name, event] for step, event, _ in passed]
+        is_deadly = row in [*names, *self._component_rows(entries)]
         if is_deadly and when == "BEFORE":
             os.kill(os.getpid(), signal.SIGKILL)
         await super().commit(after, entries)
-        if is_deadly:
+        self.entries += len(entries)
+        self.tell(f"committed {self.boot} {self.entries} {after.revision}")
+        states = {drive.state.name for drive in after.drives.values()}
+        if is_deadly or self.orders.get("kill_while") in states:
             os.kill(os.getpid(), signal.SIGKILL)
         for step, event, payload in passed:
-            self._nudge(ROWS[step, event].to, payload)
+            self._nudge(ROWS[step, event].to.name, payload)
+        for _, event, to in self._components_passed(entries):
+            self._nudge(f"{to}-{event}", "")
+
+    def tell(self, line: str) -> None:
+        """Put a line into `told`, with the length of the disk's log, if there is one."""
+        log = self.orders.get("log")
+        length = Path(log).stat().st_size if log else 0
+        with contextlib.suppress(OSError):  # the same as if it had died before it could
+            os.write(self.told, f"{line} {length}\n".encode())
 
     def _passed(self, entries: Sequence[JournalEntry]) -> Iterator[tuple[Step, str, str]]:
         """Every transition that a commit is made of: (step, event, payload)."""
@@ -65,39 +102,122 @@ class DeadlyCatalogue(Catalogue):
                 yield step, entry.event, payload
                 steps[payload] = ROWS[step, entry.event].to
 
-    def _nudge(self, step: Step, payload: str) -> None:
-        at, what = self.orders.get("nudge", ("", ""))
-        if at != step.name:
+    def _component_rows(self, entries: Sequence[JournalEntry]) -> list[list[str]]:
+        return [[state, event] for state, event, _ in self._components_passed(entries)]
+
+    def _components_passed(self, entries: Sequence[JournalEntry]) -> Iterator[tuple[str, str, str]]:
+        """Every transition of the component: (state, event, next state)."""
+        component = self.state.components.get(COMPONENT)
+        state = component.state if component is not None else None
+        for entry in entries:
+            if state is not None and (state, entry.event) in COMPONENT_ROWS:
+                to = COMPONENT_ROWS[state, entry.event]
+                yield state.name, entry.event, to.name
+                state = to
+
+    def _nudge(self, at: str, payload: str) -> None:
+        nudges = self.orders.get("nudge", [])
+        what = nudges[0][1] if nudges and nudges[0][0] == at else None
+        if what is None:
             return
-        del self.orders["nudge"]
+        nudges.pop(0)
+        problem = Problem("TEST", "made up by a test")
+        lost = (Problem("WORKER_CRASH_LOOP", "made up by a test"),)
+        key = payload or next(iter(self.state.payloads), "")
         match what:
             case "pull":
                 (Path(self.orders["root"]) / "slots" / SLOT).unlink()
                 self.bus.emit(events.DriveRemoved(SLOT))
             case "send":
-                problem = Problem("PLACED_ELSEWHERE", "made up by a test")
-                self.bus.emit(events.PayloadSentAway(payload, "mule", (problem,)))
+                self.bus.emit(events.PayloadSentAway(key, "mule", (problem,)))
             case "retry":
-                self.bus.emit(events.RetryAsked(payload))
+                self.bus.emit(events.RetryAsked(key))
+            case "rollback":
+                self.bus.emit(events.RollbackAsked(key, 1, 2))
             case "lost":
-                problem = Problem("WORKER_CRASH_LOOP", "made up by a test")
-                self.bus.emit(events.WorkerFailed(COMPONENT, (problem,)))
+                self.bus.emit(events.WorkerFailed(COMPONENT, lost))
+            case "exited":
+                self.bus.emit(events.WorkerExited(COMPONENT, "made up by a test"))
+            case "ready":
+                described = self.state.components[COMPONENT].description
+                self.bus.emit(events.WorkerReady(COMPONENT, described))
+
+
+class Script:
+    """Does one thing after the other."""
+
+    def __init__(self, catalogue: DeadlyCatalogue, slots: Path, bus: Bus) -> None:
+        self._catalogue, self._slots = catalogue, slots
+        self._changed = asyncio.Event()
+        bus.subscribe(lambda event: self._changed.set())
+        self._go = asyncio.Event()
+        asyncio.get_running_loop().add_signal_handler(signal.SIGUSR1, self._go.set)
+
+    async def run(self, script: Sequence[str]) -> None:
+        for line in script:
+            if line == "end now":
+                return
+            await self._until(self._is_settled)
+            self._catalogue.tell(f"at {line}")
+            what, *slots = line.split()
+            match what:
+                case "plug":
+                    for slot in slots:
+                        (self._slots / slot).symlink_to(self._slots.parent / "drives" / slot)
+                case "pull":
+                    for slot in slots:
+                        (self._slots / slot).unlink(missing_ok=True)
+                case "go":
+                    await self._go.wait()
+                case "steady":
+                    await self._until(lambda: not self._catalogue.state.tries)
+                case "end":
+                    return
+        await asyncio.Event().wait()  # for whoever kills it
+
+    async def _until(self, holds: Callable[[], bool]) -> None:
+        while not holds():
+            self._changed.clear()
+            await self._changed.wait()
+
+    def _is_settled(self) -> bool:
+        state = self._catalogue.state
+        return (
+            bool(self._catalogue.entries)
+            and {path.name for path in self._slots.iterdir()} == set(state.drives)
+            and all(drive.state is DriveState.IDLE for drive in state.drives.values())
+            and all(payload.step in _AT_REST for payload in state.payloads.values())
+        )
 
 
 async def main(orders: dict[str, Any]) -> None:
     root = Path(orders["root"])
+    os.environ[MARK] = str(root)
+    told = os.open(root / "told", os.O_CREAT | os.O_APPEND | os.O_WRONLY | os.O_CLOEXEC)
     folders = Folders(root / "state")
     claim(folders)
     bus = Bus()
     catalogue = await DeadlyCatalogue.open(folders.catalogue, HOST)
     assert isinstance(catalogue, DeadlyCatalogue)
-    catalogue.orders, catalogue.bus = orders, bus
-    workers = Workers(HOST, bus.emit, timing=Timing(startup_s=2.0))
-    options = InstallOptions(allow_unsigned=True)
-    executor = Executor(HOST, folders, workers, bus.emit, options)
+    catalogue.orders, catalogue.bus, catalogue.told = orders, bus, told
+    workers = Workers(HOST, bus.emit, timing=QUICK)
+    executor = Executor(HOST, folders, workers, bus.emit, OPTIONS)
     manager = ComponentManager(catalogue, executor, bus)
     manager.add_source(SlotSource([root / "slots"]))
-    await manager.run()
+    running = asyncio.create_task(manager.run())
+    ended = asyncio.Event()
+    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
+    waited: list[asyncio.Task[Any]] = [running, asyncio.create_task(ended.wait())]
+    if "script" in orders:
+        script = Script(catalogue, root / "slots", bus)
+        waited.append(asyncio.create_task(script.run(orders["script"])))
+    done, _ = await asyncio.wait(waited, return_when=asyncio.FIRST_COMPLETED)
+    for task in done:
+        task.result()
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
+    await workers.close()
+    await catalogue.close()
 
 
 if __name__ == "__main__":

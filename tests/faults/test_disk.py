@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from tests.faults.test_kill import LAMP_ID, sound
+from tests.faults.ways import LAMP_ID, sound
 from tests.host.lifecycle.living import LAMP, left_over, living
 from tests.payloads import Part, make_payload, make_wheel
 

@@ -8,7 +8,8 @@ import time
 from pathlib import Path
 
 import pytest
-from tests.faults.test_kill import LAMP_ID, processes_of, sound
+from tests.faults.model import processes_of
+from tests.faults.ways import LAMP_ID, sound
 from tests.host.lifecycle.living import LAMP, Living, left_over, living
 from tests.payloads import Part, make_payload
 

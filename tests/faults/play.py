@@ -1,0 +1,131 @@
+"""A daemon is played with from outside: plugged, pulled, stopped, and traced meanwhile.
+
+What it has come to is read from its catalogue, so that nothing of the player is hit by what is done
+to the daemon.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sqlite3
+import subprocess
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+PATIENCE_S = 25.0
+POLL_S = 0.02
+
+_AT_REST = ("active", "superseded", "refused", "quarantined")
+
+
+class Stuck(Exception):
+    """The daemon lives and does not come to rest."""
+
+
+@dataclass
+class Player:
+    """Has its hands on one daemon; give `play` to `Nursery.run`."""
+
+    root: Path
+    script: Sequence[str] = ("plug a", "pull a")
+    before: Callable[[int], None] = lambda pid: None
+    """Called with its pid once it is up, and before anything is plugged in."""
+    late_s: float | None = None
+    """When it is killed after that; None: it may go on to the end."""
+    stuck: str = ""
+    """What it did not come to rest at."""
+
+    def play(self, pid: int) -> None:
+        try:
+            self._until(pid, "start", self._is_up)
+            self.before(pid)
+            begun = time.monotonic()
+            for line in (*self.script, "end"):
+                what, *slots = line.split()
+                for slot in slots:
+                    place = self.root / "slots" / slot
+                    if what == "plug":
+                        place.symlink_to(self.root / "drives" / slot)
+                    else:
+                        place.unlink()
+                self._until(pid, line, self._is_settled, begun)
+            os.kill(pid, signal.SIGTERM)
+            self._until(pid, "SIGTERM", lambda: False)
+        except ProcessLookupError:
+            pass
+        except Stuck as stuck:
+            self.stuck = str(stuck)
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+
+    def _until(
+        self, pid: int, what: str, holds: Callable[[], bool], begun: float | None = None
+    ) -> None:
+        """Wait for something. Raises `ProcessLookupError` once the daemon is dead, and `Stuck`."""
+        patience = time.monotonic() + PATIENCE_S
+        while not holds():
+            if _is_dead(pid):
+                raise ProcessLookupError
+            if self.late_s is not None and begun and time.monotonic() - begun > self.late_s:
+                os.kill(pid, signal.SIGKILL)
+                raise ProcessLookupError
+            if time.monotonic() > patience:
+                raise Stuck(what)
+            time.sleep(POLL_S)
+
+    def _is_up(self) -> bool:
+        return bool(self._ask("SELECT 1 FROM journal WHERE event = 'HostStarted'"))
+
+    def _is_settled(self) -> bool:
+        drives = {row[0]: row[1] for row in self._ask("SELECT id, state FROM drives")}
+        steps = [step for (step,) in self._ask("SELECT step FROM payloads")]
+        return (
+            {path.name for path in (self.root / "slots").iterdir()} == set(drives)
+            and set(drives.values()) <= {"idle"}
+            and set(steps) <= set(_AT_REST)
+        )
+
+    def _ask(self, query: str) -> list[tuple[str, ...]]:
+        file = self.root / "state/catalogue.sqlite"
+        if not file.exists():
+            return []
+        with contextlib.closing(sqlite3.connect(file, timeout=5.0)) as connection:
+            try:
+                return connection.execute(query).fetchall()
+            except sqlite3.OperationalError:  # its tables are not made yet
+                return []
+
+
+def _is_dead(pid: int) -> bool:
+    try:
+        return "\nState:\tZ" in Path(f"/proc/{pid}/status").read_text()
+    except FileNotFoundError:
+        return True
+
+
+def trace(pid: int, *options: str) -> subprocess.Popen[bytes]:
+    """Have strace(1) at a daemon and all that it starts; it goes when they do. Wait for it."""
+    command = ["strace", "-f", "-qq", "-p", str(pid), *options]
+    strace = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+    while strace.poll() is None and not _is_traced(pid):
+        time.sleep(0.002)
+    return strace
+
+
+def _is_traced(pid: int) -> bool:
+    try:
+        tasks = list(Path(f"/proc/{pid}/task").iterdir())
+        return all("TracerPid:\t0" not in (task / "status").read_text() for task in tasks)
+    except OSError:
+        return True
+
+
+def codes_of(root: Path) -> list[str]:
+    """Codes of all problems in the journal."""
+    with contextlib.closing(sqlite3.connect(root / "state/catalogue.sqlite")) as connection:
+        query = "SELECT p.value ->> 'code' FROM journal, json_each(journal.problems) AS p"
+        return [code for (code,) in connection.execute(query)]
