@@ -1,4 +1,4 @@
-"""Every code that a refusal may carry, with its words, as the sources have them."""
+"""The table of codes, `nondum.sdk.codes`, beside the places in the sources where they are told."""
 
 from __future__ import annotations
 
@@ -7,20 +7,47 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
+from nondum.sdk import codes
+from nondum.sdk.codes import Code
+
 ROOT = Path(__file__).parents[2]
-ROOMS = {
-    "Payloads and drives": ("wheelhouse/nondum", "host/nondum/host/drives"),
-    "The host": ("host/nondum/host",),
-    "Workers, links and streams": (
-        "plugins/sdk/nondum",
-        "transport/nondum",
-        "host/nondum/host/workers",
-    ),
-}
-"""Heading → folders. Planning's codes stand in fragments.md."""
-CODE = re.compile(r"[A-Z][A-Z0-9]+(_[A-Z0-9]+)*")
+TABLE = "plugins/sdk/nondum/sdk/codes"
+FOLDERS = (
+    "host/nondum",
+    "planning/nondum",
+    "plugins/sdk/nondum",
+    "transport/nondum",
+    "wheelhouse/nondum",
+)
+CODE = re.compile(r"[A-Z][A-Z0-9]+(_[A-Z0-9]+)*|E-[A-Z]+(-[A-Z]+)*")
+LIKELY = re.compile(r"(?:[A-Z][A-Z0-9]+(?:_[A-Z0-9]+)+|E-[A-Z]+(?:-[A-Z]+)*)(?= |$)")
+"""What a string in the sources begins with when it is most probably a code."""
+NO_CODES = frozenset(
+    {
+        *("ID_BUS", "ID_FS_TYPE", "SYNTH_UUID", "USEC_INITIALIZED"),
+        *("LC_ALL", "LISTEN_FDS", "LISTEN_PID", "NO_COLOR", "SOURCE_DATE_EPOCH"),
+        *("MALLOC_ARENA_MAX", "SCHED_IDLE", "VECLIB_MAXIMUM"),
+        *("NONDUM_CONTROL", "NONDUM_ROOM", "NONDUM_WORKER"),
+        *("SC_AVPHYS_PAGES", "SC_CLK_TCK", "SC_PAGE_SIZE"),
+        *("XDG_CACHE_HOME", "XDG_RUNTIME_DIR", "XDG_STATE_HOME"),
+    }
+)
+"""Strings that only look like codes: variables of the environment, properties of devices."""
+PUT_TOGETHER = frozenset(
+    {
+        *(
+            f"{file}_{kind}"
+            for file in ("MANIFEST", "TRUST")
+            for kind in ("KEY", "TOML", "TWICE", "VALUE")
+        ),
+        *(f"{kind}_UNKNOWN" for kind in ("COMPONENT", "PAYLOAD", "STREAM", "UNIT")),
+        *(f"CGROUP_{kind}_MISSING" for kind in ("CPU", "MEMORY", "PIDS")),
+    }
+)
+"""Codes that no source has in one piece."""
 TELLERS = re.compile(r"Problem|problem|_(refuse|refused|flaw|short|violation|told|failure)")
 """What makes a problem: the class itself, or a function of the module that fills it in."""
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
@@ -30,7 +57,8 @@ FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 class Told:
     """One place where a code is given."""
 
-    room: str
+    path: str
+    """The file, from the root of the repository."""
     code: str
     words: str
     """The message, `…` for what differs; empty where it is put together elsewhere."""
@@ -38,21 +66,46 @@ class Told:
 
 
 def references() -> str:
-    """A section a room, a row a code."""
-    rows: dict[str, dict[str, list[Told]]] = {room: defaultdict(list) for room in ROOMS}
-    for told in all_told():
-        rows[told.room][told.code].append(told)
-    return "\n".join(_section(room, found) for room, found in rows.items())
+    """A section an area, a row a code."""
+    told: dict[str, list[Told]] = defaultdict(list)
+    for found in all_told():
+        told[found.code].append(found)
+    sections = (_section(area, declared, told) for area, declared in codes.areas().items())
+    return "\n".join(sections)
 
 
-def all_told() -> Iterator[Told]:
-    """Every place, by file; a file belongs to the room with the nearest folder."""
-    for path in sorted({p for folders in ROOMS.values() for f in folders for p in _modules(f)}):
-        said = path.relative_to(ROOT).as_posix()
-        room = max(ROOMS, key=lambda room: max(_nearness(said, f) for f in ROOMS[room]))
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        for scope in [tree, *(node for node in ast.walk(tree) if isinstance(node, FUNCTIONS))]:
-            yield from _told_in(list(_inside(scope)), room)
+@cache
+def all_told() -> tuple[Told, ...]:
+    """Every place, by file."""
+    return tuple(
+        told
+        for path, tree in _trees().items()
+        for scope in [tree, *(node for node in ast.walk(tree) if isinstance(node, FUNCTIONS))]
+        for told in _told_in(list(_inside(scope)), path)
+    )
+
+
+@cache
+def mentioned() -> Mapping[str, str]:
+    """Every string of the sources that looks like a code, and a file that has it."""
+    return {
+        likely[0]: path
+        for path, tree in _trees().items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        if (likely := LIKELY.match(node.value))
+    }
+
+
+@cache
+def _trees() -> Mapping[str, ast.Module]:
+    """The sources, by their place in the repository."""
+    paths = (p for folder in FOLDERS for p in sorted((ROOT / folder).rglob("*.py")))
+    sources = (p for p in paths if "template" not in p.parts and ROOT / TABLE not in p.parents)
+    return {
+        path.relative_to(ROOT).as_posix(): ast.parse(path.read_text(encoding="utf-8"))
+        for path in sources
+    }
 
 
 def _inside(scope: ast.AST) -> Iterator[ast.AST]:
@@ -63,15 +116,7 @@ def _inside(scope: ast.AST) -> Iterator[ast.AST]:
             yield from _inside(node)
 
 
-def _modules(folder: str) -> Iterator[Path]:
-    return (p for p in (ROOT / folder).rglob("*.py") if "template" not in p.parts)
-
-
-def _nearness(path: str, folder: str) -> int:
-    return len(folder) if path.startswith(f"{folder}/") else 0
-
-
-def _told_in(nodes: Sequence[ast.AST], room: str) -> Iterator[Told]:
+def _told_in(nodes: Sequence[ast.AST], path: str) -> Iterator[Told]:
     named: dict[str, str] = {}
     for node in nodes:
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
@@ -83,7 +128,7 @@ def _told_in(nodes: Sequence[ast.AST], room: str) -> Iterator[Told]:
             said = (_words(argument, named) for argument in node.args[1:])
             fixes = [k.value for k in node.keywords if k.arg == "fix"]
             remedy = _words(fixes[0], named) if fixes else ""
-            yield Told(room, code, next((w for w in said if " " in w), ""), remedy)
+            yield Told(path, code, next((w for w in said if " " in w), ""), remedy)
 
 
 def _name(function: ast.expr) -> str:
@@ -102,12 +147,18 @@ def _words(node: ast.expr, named: Mapping[str, str]) -> str:
     return ""
 
 
-def _section(room: str, found: Mapping[str, list[Told]]) -> str:
-    heads = [f"## {room}\n", "| code | what is said | what to do |", "|---|---|---|"]
-    return "\n".join([*heads, *(_row(code, found[code]) for code in sorted(found)), ""])
+def _section(area: str, declared: Sequence[Code], told: Mapping[str, Sequence[Told]]) -> str:
+    heads = [f"## {area}\n", "| code | what it means | what to do |", "|---|---|---|"]
+    rows = (_row(code, told[code.name]) for code in sorted(declared, key=lambda code: code.name))
+    return "\n".join([*heads, *rows, ""])
 
 
-def _row(code: str, places: list[Told]) -> str:
-    words, remedies = ({getattr(p, name): None for p in places} for name in ("words", "remedy"))
-    cells = ("; or: ".join(filter(None, said)).replace("|", r"\|") for said in (words, remedies))
-    return f"| `{code}` | {' | '.join(cells)} |"
+def _row(code: Code, places: Sequence[Told]) -> str:
+    words = "; ".join(dict.fromkeys(place.words for place in places if place.words))
+    meaning = f"{code.meaning} Said: {words}" if words else code.meaning
+    remedy = f"{code.remedy} (usual causes: {code.causes})" if code.causes else code.remedy
+    return f"| `{code.name}` | {_cell(meaning)} | {_cell(remedy)} |"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", r"\|").replace("<", "&lt;")

@@ -64,7 +64,7 @@ def test_words_that_ask_for_nothing_are_refused_with_the_nearest(daemon: Daemon)
 
 def test_pddl_amiss_is_refused_with_a_caret(daemon: Daemon) -> None:
     ran = daemon.run("goal", "--pddl", "(lit nobody)").refused(1, "(lit nobody)\n")
-    assert ran.err.rstrip().endswith("^")
+    assert ran.err.rstrip().endswith("^\n→ declare it, or correct its spelling")
 
 
 def test_a_goal_without_a_plan_says_what_is_missing(daemon: Daemon) -> None:

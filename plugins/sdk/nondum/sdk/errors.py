@@ -31,6 +31,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 
+from nondum.sdk import codes
+
 
 @dataclass(frozen=True, slots=True)
 class Problem:
@@ -47,19 +49,24 @@ class Problem:
     have: str = ""
     """What is there."""
     fix: str = ""
-    """What a person can do about it."""
+    """What a person can do about it; what is known of the code, if nothing better is said."""
+
+    def __post_init__(self) -> None:
+        if not self.fix:
+            object.__setattr__(self, "fix", codes.remedy(self.code))
 
     def __str__(self) -> str:
         place = f"{self.where}: " if self.where else ""
         measured = f" (needs {self.need}, there is {self.have})" if self.need else ""
-        remedy = f" → {self.fix}" if self.fix else ""
+        apart = "\n" if "\n" in self.message else " "
+        remedy = f"{apart}→ {self.fix}" if self.fix else ""
         return f"{self.code} {place}{self.message}{measured}{remedy}"
 
     def to_dict(self) -> dict[str, str]:
         """The problem as plain data, empty fields left out.
 
-        >>> Problem("DISK_FULL", "no room", need="3 MB", have="1 MB").to_dict()
-        {'code': 'DISK_FULL', 'message': 'no room', 'need': '3 MB', 'have': '1 MB'}
+        >>> Problem("GOAL_TOO_EARLY", "not yet").to_dict()
+        {'code': 'GOAL_TOO_EARLY', 'message': 'not yet', 'fix': 'ask again in a second'}
         """
         return {key: value for key, value in asdict(self).items() if value}
 

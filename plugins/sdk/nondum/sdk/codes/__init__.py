@@ -1,0 +1,63 @@
+"""Every code that a refusal may carry: what it means, and what a person can do about it.
+
+    find("WHEEL_BOMB").remedy
+
+Each is declared once, in the module of its area, whichever room of nondum tells it; a test compares
+them with the sources. They are read only when somebody is told of a problem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from importlib import import_module
+
+from nondum.sdk.codes.code import Code
+
+AREAS = (
+    "drives",
+    "payloads",
+    "trust",
+    "wheels",
+    "installing",
+    "confinement",
+    "workers",
+    "messages",
+    "peers",
+    "pairing",
+    "host",
+    "goals",
+    "reasons",
+    "pddl",
+)
+"""The modules, in the order in which people are shown them."""
+
+__all__ = ["AREAS", "Code", "areas", "every", "find", "remedy"]
+
+
+@cache
+def areas() -> Mapping[str, tuple[Code, ...]]:
+    """The codes of each area, by its name for people."""
+    modules = (import_module(f"nondum.sdk.codes.{name}") for name in AREAS)
+    return {module.AREA: module.CODES for module in modules}
+
+
+@cache
+def every() -> Mapping[str, Code]:
+    """Every code by its name."""
+    return {code.name: code for codes in areas().values() for code in codes}
+
+
+def find(name: str) -> Code | None:
+    """What is known of a code; None when nobody knows it.
+
+    >>> find("DISK_FULL").meaning
+    'There is too little disk.'
+    """
+    return every().get(name)
+
+
+def remedy(name: str) -> str:
+    """What a problem of a code tells to do when it says nothing itself; may be empty."""
+    code = every().get(name)
+    return code.remedy if code and code.is_told else ""

@@ -1,0 +1,117 @@
+"""Codes of refusals: goals and plans."""
+
+from nondum.sdk.codes.code import Code
+
+AREA = "Goals and plans"
+CODES = (
+    Code(
+        "GOAL_AMISS",
+        "A goal is given neither in words nor in PDDL.",
+        "say what is wanted: `nondum goal WORDS`, or --pddl",
+    ),
+    Code(
+        "GOAL_TOO_EARLY",
+        "The host does not know itself yet.",
+        "ask again in a second",
+    ),
+    Code(
+        "GOAL_UNKNOWN",
+        "There is no goal of that number.",
+        "see `nondum goals` for those there are",
+    ),
+    Code(
+        "NO_ANSWER",
+        "It is not known whether there is a plan: time ran out.",
+        "ask again with a longer planning.deadline_s, or for less",
+    ),
+    Code(
+        "NO_OTHER_WAY",
+        "There is no way without what failed again and again.",
+        "it is tried again after a while; see `nondum why` for what failed",
+    ),
+    Code(
+        "PLANNER_ANSWER",
+        "A planner gave something that is no answer.",
+        "use another planner (`planners` under [planning]); tell its author",
+    ),
+    Code(
+        "PLANNER_DIED",
+        "A planner ended without an answer.",
+        "it is started again; if it happens often, use another one (`planners` under [planning])",
+    ),
+    Code(
+        "PLANNER_RAISED",
+        "A planner ended with an error.",
+        "use another planner (`planners` under [planning]); tell its author",
+    ),
+    Code(
+        "PLANNER_START",
+        "A planner does not start.",
+        "see that it is installed; else leave it out of `planners` under [planning]",
+    ),
+    Code(
+        "PLANNING_FAULT",
+        "Planning itself failed.",
+        "see the daemon's log, and report it with the goal",
+    ),
+    Code(
+        "PLAN_COST",
+        "A planner tells another cost than its steps have.",
+        "nothing: the plan is used; tell the planner's author",
+    ),
+    Code(
+        "PLAN_CUT_SHORT",
+        "One lasting behaviour would end another whose effect is still needed.",
+        "nothing: another plan is looked for; tell the plugins' authors if there is none",
+    ),
+    Code(
+        "PLAN_GOAL_MISSED",
+        "A planner's plan does not reach the goal.",
+        "nothing: it is not used; tell the planner's author",
+    ),
+    Code(
+        "PLAN_STEP_IMPOSSIBLE",
+        "A step of a planner's plan is not possible.",
+        "nothing: it is not used; tell the planner's author",
+    ),
+    Code(
+        "PLAN_STEP_UNKNOWN",
+        "A planner's plan has a step that nobody offers.",
+        "nothing: it is not used; tell the planner's author",
+    ),
+    Code(
+        "PLAN_STUCK",
+        "A plan is under way, and none of its steps can begin.",
+        "see `nondum why`; give the goal again",
+    ),
+    Code(
+        "TRANSLATION_AMBIGUOUS",
+        "The words can mean several things.",
+        "say it in other words, or give the goal with --pddl",
+    ),
+    Code(
+        "TRANSLATION_INVALID",
+        "What the language plugin made of the words is no goal.",
+        "say it in other words, or give the goal with --pddl",
+    ),
+    Code(
+        "TRANSLATION_OVERDUE",
+        "The language plugin did not answer in time.",
+        "say it in words that are listed by `nondum goals`, or try again",
+    ),
+    Code(
+        "TRANSLATION_REFUSED",
+        "The words were understood, but mean nothing here.",
+        "plug in what is needed for it; see `nondum goals` for what can be asked",
+    ),
+    Code(
+        "TRANSLATION_UNCONFIRMED",
+        "Nobody said that the words were understood rightly.",
+        "give --yes to take it so, or the goal with --pddl",
+    ),
+    Code(
+        "WHOSE_GOAL",
+        "Several robots could do that.",
+        "say which one, as the message shows",
+    ),
+)
