@@ -16,6 +16,7 @@ import os
 import pwd
 import secrets
 import select
+import signal
 import socket
 import struct
 import subprocess
@@ -39,6 +40,7 @@ _DESCRIPTORS = 3
 def main(arguments: Sequence[str] | None = None) -> None:
     """Serve the connection that is standard input."""
     told = _parser().parse_args(arguments)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it ends with its service, which it ends first
     with socket.socket(fileno=os.dup(0)) as connection:
         user = pwd.getpwnam(told.user).pw_uid if told.user else os.getuid()
         if _peer(connection) != user:
