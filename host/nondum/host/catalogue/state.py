@@ -47,7 +47,7 @@ class HostState:
     goals: Mapping[str, GoalRecord] = field(default_factory=dict)
     """Those that are not over."""
     former: Mapping[str, FormerPayload] = field(default_factory=dict)
-    """Key → what is remembered of a payload; none of them is active."""
+    """Key → what is remembered of a payload, those that left first first; none is active."""
     tries: Mapping[str, int] = field(default_factory=dict)
     """Drive or payload key → how many daemons in a row died while they were at it."""
     is_stopped: bool = False
@@ -67,6 +67,6 @@ class HostState:
             mounts=tuple(self.mounts.values()),
             rollbacks=tuple(rollback.digest for rollback in self.rollbacks.values()),
             goals=tuple(self.goals.values()),
-            former=tuple(sorted(self.former.values(), key=lambda f: f.left_wall_s)),
+            former=tuple(self.former.values()),
             peers=tuple(sorted(self.peers.values(), key=lambda p: p.name)),
         )

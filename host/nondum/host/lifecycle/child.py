@@ -20,6 +20,7 @@ from typing import Any, TextIO
 from nondum.host.lifecycle import jobs
 from nondum.host.lifecycle.allowance import allowed, confine_process
 from nondum.sdk.errors import NondumError, Problem
+from nondum.wheelhouse import disk
 
 PROGRESS_S = 0.1
 """Between two reports of one phase."""
@@ -68,8 +69,8 @@ def _do(job: str, arguments: dict[str, Any], answers: TextIO) -> dict[str, Any]:
     except MemoryError:
         return _failure("InstallFailed", _too_much(job))
     except OSError as error:
-        message = f"{job}: {error.strerror} ({error.filename})"
-        return _failure("InstallFailed", Problem("IO_ERROR", message))
+        where = Path(error.filename or arguments.get("store", ""))
+        return _failure("InstallFailed", disk.problem_of(error, job, where))
     except Exception as error:
         traceback.print_exc()
         message = f"{job}: {type(error).__name__}: {error}"

@@ -29,7 +29,7 @@ def remembering(
     left first are forgotten."""
     described = {component.id: component.description for component in components}
     new = _former(payload.payload_id, payload.version, described, wall_s)
-    return _within_limits({**former, new.key: new})
+    return _within_limits(former, [new])
 
 
 def remembering_peer(
@@ -47,7 +47,7 @@ def remembering_peer(
         _former(payload_id, version, described, wall_s, host)
         for (payload_id, version), described in payloads.items()
     )
-    return _within_limits({**former, **{one.key: one for one in new}})
+    return _within_limits(former, list(new))
 
 
 def _former(
@@ -60,12 +60,19 @@ def _former(
     return FormerPayload(payload_id, version, described, wall_s, len(as_json(described)), host)
 
 
-def _within_limits(former: Mapping[str, FormerPayload]) -> dict[str, FormerPayload]:
-    """As many of the last as there is room for; one for which there is none costs no others."""
-    kept: dict[str, FormerPayload] = {}
+def _within_limits(
+    former: Mapping[str, FormerPayload], new: list[FormerPayload]
+) -> dict[str, FormerPayload]:
+    """As many of the last as there is room for; one for which there is none costs no others.
+
+    Who left last comes last: clocks jump, and say nothing of that.
+    """
+    gone = {one.key for one in new}
+    ordered = [*(one for key, one in former.items() if key not in gone), *new]
+    kept: list[FormerPayload] = []
     room = SIZE_LIMIT
-    for payload in sorted(former.values(), key=lambda f: f.left_wall_s, reverse=True):
+    for payload in reversed(ordered):
         if payload.size <= room and len(kept) < PAYLOADS_LIMIT:
-            kept[payload.key] = payload
+            kept.append(payload)
             room -= payload.size
-    return kept
+    return {one.key: one for one in reversed(kept)}

@@ -41,7 +41,7 @@ from nondum.host.lifecycle.room import Needs, used_mb, why_not_beside
 from nondum.host.trust.payload_trust import PayloadTrust, TrustOptions
 from nondum.host.workers import Limits, Workers, base_interpreter, end_leftovers
 from nondum.sdk.errors import NondumError, WorkerFailed, problems_of
-from nondum.wheelhouse import preflight
+from nondum.wheelhouse import disk, preflight
 from nondum.wheelhouse.signatures import Grant
 
 AT_ONCE = 2
@@ -318,7 +318,7 @@ class Installation:
 def _move(staging: Path, lasting: Path) -> None:
     """Rename a folder. Whoever says that its payload is stored sees to it that it is on disk."""
     remove(lasting)
-    lasting.parent.mkdir(parents=True, exist_ok=True)
+    disk.make_folder(lasting.parent)
     staging.rename(lasting)
 
 
