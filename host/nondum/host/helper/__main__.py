@@ -9,16 +9,19 @@ import signal
 import socket
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from nondum.host.cgroups import mounts
+from nondum.host.cgroups.cage import Tree
 from nondum.host.cgroups.cages import tree
 from nondum.host.helper.disks import Disks
 from nondum.host.helper.nodes import Nodes
 from nondum.host.helper.server import IDLE_S, Server
 from nondum.host.helper.service import Service
 
-RUN = Path("/run/nondum")
+RUN = Path("/run/nondum-helper")
+"""Root's own: who could replace a folder in it would choose where drives are mounted."""
 FIRST = 3
 """SD_LISTEN_FDS_START."""
 OWNER = "nondum-helper"
@@ -34,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         mounts=told.run / "mounts",
         disks=Disks(allow_loop=told.allow_loop),
         nodes=Nodes(told.run / "devices", uid, frozenset(told.allow_subsystem)),
-        tree=tree(mounts.here(), f"{OWNER}-{uid}"),
+        tree=_tree(f"{OWNER}-{uid}"),
     )
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     try:
@@ -42,6 +45,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
             Server(listening, service, told.idle_s).run()
     finally:
         service.tree.close()
+
+
+def _tree(owner: str) -> Tree:
+    """Cages outlive the helper, so they are not below its own cgroup, which ends with it."""
+    return tree([replace(hierarchy, own=hierarchy.top) for hierarchy in mounts.here()], owner)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -19,7 +19,7 @@ from nondum.host.helper.requests import Request
 from nondum.sdk import errors
 from nondum.sdk.errors import InstallFailed, NondumError, Problem
 
-SOCKET = Path("/run/nondum/helper.sock")
+SOCKET = Path("/run/nondum-helper/helper.sock")
 WAIT_S = 15.0
 """Longer than the helper waits for a drive."""
 PAUSE_S = 0.02
