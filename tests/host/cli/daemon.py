@@ -233,7 +233,7 @@ def quiet_environment() -> dict[str, str]:
     return {key: value for key, value in os.environ.items() if key not in changing}
 
 
-def write_config(root: Path, more: str = "") -> Path:
+def write_config(root: Path, more: str = "", *, allow_unsigned: bool = True) -> Path:
     """A host that needs nothing of the machine."""
     root.mkdir(parents=True, exist_ok=True)
     for folder in ("slots", "devices"):
@@ -241,7 +241,7 @@ def write_config(root: Path, more: str = "") -> Path:
     config = root / "host.toml"
     config.write_text(
         f'[host]\nname = "{HOST}"\nstate = "{root}/state"\ncontrol = "{root}/control.sock"\n'
-        f'[drives]\nslots = ["{root}/slots"]\nallow_unsigned = true\n'
+        f'[drives]\nslots = ["{root}/slots"]\nallow_unsigned = {str(allow_unsigned).lower()}\n'
         f'[devices]\nslots = ["{root}/devices"]\nudev = false\n{more}',
         encoding="utf-8",
     )
@@ -249,9 +249,9 @@ def write_config(root: Path, more: str = "") -> Path:
 
 
 @contextmanager
-def running(root: Path, more: str = "") -> Iterator[Daemon]:
+def running(root: Path, more: str = "", *, allow_unsigned: bool = True) -> Iterator[Daemon]:
     """Run a daemon; it must end well when it is told to."""
-    with killed(root, more) as daemon:
+    with killed(root, more, allow_unsigned=allow_unsigned) as daemon:
         yield daemon
         daemon.process.terminate()
         _, err = daemon.process.communicate(timeout=PATIENCE_S)
@@ -260,9 +260,9 @@ def running(root: Path, more: str = "") -> Iterator[Daemon]:
 
 
 @contextmanager
-def killed(root: Path, more: str = "") -> Iterator[Daemon]:
+def killed(root: Path, more: str = "", *, allow_unsigned: bool = True) -> Iterator[Daemon]:
     """Run a daemon, `more` in its configuration, and end it without a warning (SIGKILL)."""
-    config = write_config(root, more)
+    config = write_config(root, more, allow_unsigned=allow_unsigned)
     process = subprocess.Popen(
         command("host", "run", "--user", "--config", config),
         stderr=subprocess.PIPE,

@@ -200,7 +200,9 @@ async def test_a_payload_whose_key_is_revoked_ends(tmp_path: Path) -> None:
         host.plug(with_trust(tmp_path / "news", signed(REVOKED, ROOT)), "b")
         assert await refusal(host) == ["SIG_REVOKED"]
         assert not host.snapshot.components
-        await host.until(lambda: not host.workers.pids())
+        host.pull()
+        await host.until_gone(LAMP_ID)
+        assert not host.workers.pids()
 
 
 async def test_a_payload_whose_key_is_revoked_may_go_on_and_says_so(tmp_path: Path) -> None:

@@ -50,6 +50,8 @@ class Options:
     release: int | None = None
     """None: the time of building, in seconds."""
     fleet: str = ""
+    hosts: tuple[str, ...] = ()
+    """Names of the only hosts that it is meant for; empty: any."""
 
 
 def build(package: Path, drive: Path, options: Options, progress: Progress) -> Path:
@@ -243,7 +245,9 @@ def _seal(folder: Path, payload_id: str, version: str, options: Options) -> None
         entries=tuple(
             Entry(locking.sha256(folder / p), (folder / p).stat().st_size, p) for p in paths
         ),
+        hosts=options.hosts,
     )
+    contents.parse(listed.to_bytes(), contents.NAME)  # refuses fleets and hosts that are no names
     (folder / contents.NAME).write_bytes(listed.to_bytes())
 
 

@@ -21,6 +21,7 @@ import hashlib
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import datetime
 from typing import NoReturn
 
 from packaging.version import InvalidVersion, Version
@@ -85,7 +86,7 @@ class Contents:
         )
         lines = [FORMAT, *(f"{key}: {value}".rstrip() for key, value in header), ""]
         lines += [f"{e.sha256}  {e.size}  {e.path}" for e in self.entries]
-        return ("\n".join(lines) + "\n").encode("ascii")
+        return ("\n".join(lines) + "\n").encode("utf-8")  # ASCII, or it is refused when read
 
     @property
     def digest(self) -> str:
@@ -170,7 +171,7 @@ def _header_flaw(key: str, value: str) -> str | None:
             _HOST.fullmatch(host) for host in value.split()
         ):
             return f"{value[:60]!r} is not one to {MAX_HOSTS} names of hosts"
-        case "built" if not _BUILT.fullmatch(value):
+        case "built" if not _is_moment(value):
             return f"{value[:60]!r} is not a time like 2026-01-01T00:00:00Z"
     return None
 
@@ -208,6 +209,13 @@ def _collisions(entries: tuple[Entry, ...], where: str) -> Iterator[Problem]:
             yield _flaw("PATH_UNSAFE", f"{path!r} and {other!r} are one file on some drives", where)
         if path in (NAME, SIGNATURE_NAME):
             yield _flaw("CONTENTS_ENTRY", f"{path} may not list itself", where)
+
+
+def _is_moment(value: str) -> bool:
+    try:
+        return bool(_BUILT.fullmatch(value)) and datetime.fromisoformat(value) is not None
+    except ValueError:
+        return False
 
 
 def _is_version(value: str) -> bool:

@@ -149,7 +149,9 @@ def verify_folder(
         with tempfile.TemporaryDirectory(prefix="nondum-check-") as staging:
             copied = Path(staging) / "payload"
             drive.copy(folder, listed, copied, progress)
-            return tuple(_verify_staged(load(copied, listed), facts))
+            staged = load(copied, listed)
+            denied = verdict.grant.problems(staged.manifest)
+            return (*denied, *_verify_staged(staged, facts))
     except NondumError as error:
         return error.problems
 

@@ -36,6 +36,8 @@ def inspect(session: Session, drive: Path) -> None:
     for view in views:
         about = f"{view['id']} {view['version']} (release {view['release']}): {view['summary']}"
         render.sentence(f"{about}  {render.size(view['bytes'])}")
+        by = f"signed by {', '.join(view['signers'])}" if view["signers"] else view["unsigned"]
+        render.sentence(f"  built {view['built']}, {by}")
         for component in view["components"]:
             can = ", ".join(component["behaviours"]) or "no behaviours"
             render.sentence(f"  component {component['id']}: {can}")
@@ -124,6 +126,17 @@ def loaded_payload(folder: Path) -> StagedPayload:
     return load(folder, listed)
 
 
+def _signed(folder: Path) -> dict[str, Any]:
+    """The fingerprints of those whose signatures hold; else, why there is none."""
+    from nondum.wheelhouse import drive
+    from nondum.wheelhouse.trust.judging import Circumstances, judge
+
+    data, signature = drive.read_contents(folder), drive.read_signature(folder)
+    verdict = judge(None, data, signature, Circumstances())
+    why = "not signed" if signature is None else str(verdict.problems[0])
+    return {"signers": list(verdict.signers), "unsigned": "" if verdict.signers else why}
+
+
 def _view(payload: StagedPayload) -> dict[str, Any]:
     listed = payload.contents
     return {
@@ -132,6 +145,7 @@ def _view(payload: StagedPayload) -> dict[str, Any]:
         "release": listed.release,
         "fleet": listed.fleet,
         "built": listed.built,
+        **_signed(payload.folder),
         "summary": payload.manifest.summary,
         "bytes": listed.total_bytes,
         "components": [

@@ -34,7 +34,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "halt": ("act", "Halt what the robot is doing."),
     "host": ("host", "Run the daemon."),
     "journal": ("past", "What happened on this host, oldest first."),
-    "keys": ("keys", "Make the keys of a fleet, and certify its hosts."),
+    "keys": ("keys", "Whose payloads robots run, and which hosts a fleet certifies."),
     "logs": ("past", "What components have written."),
     "mount": ("act", "Tell where on the body a unit is mounted."),
     "payload": ("payload", "Make, judge and install payloads."),

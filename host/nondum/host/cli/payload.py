@@ -14,6 +14,7 @@ from nondum.host.cli.judge import FOLDER, check, inspect, payloads
 from nondum.host.cli.progress import ProgressLine
 
 INSTALL_TIMEOUT_S = 600.0
+KEY = click.Path(path_type=Path, exists=True, dir_okay=False)
 
 
 @click.group()
@@ -73,6 +74,8 @@ def new(session: Session, name: str, output: Path | None, payload_id: str | None
 @click.option("--offline", is_flag=True, help="Use those folders only, no index.")
 @click.option("--release", type=int, help="Number that orders releases [default: the time].")
 @click.option("--fleet", default="", help="Robots that it is meant for [default: any].")
+@click.option("--host", "hosts", multiple=True, help="The only hosts it is for [default: any].")
+@click.option("--sign", "keys", multiple=True, type=KEY, help="Key to sign it with.")
 @click.option("--quiet", "-q", is_flag=True, help="No progress.")
 @json_option
 @click.pass_obj
@@ -87,6 +90,8 @@ def build(
     offline: bool,
     release: int | None,
     fleet: str,
+    hosts: tuple[str, ...],
+    keys: tuple[Path, ...],
     quiet: bool,
 ) -> None:
     """Build one payload a package, with wheels for every architecture and Python.
@@ -98,6 +103,7 @@ def build(
     from nondum.wheelhouse import build as building
     from nondum.wheelhouse.resolve import Sources
     from nondum.wheelhouse.target import PYTHONS, Target, targets
+    from nondum.wheelhouse.trust import owners_folder
 
     options = building.Options(
         targets=targets(architectures or (Target.here().architecture,), pythons or PYTHONS),
@@ -105,17 +111,53 @@ def build(
         libraries=libraries,
         release=release,
         fleet=fleet,
+        hosts=hosts,
     )
     made = []
     for package in packages:
         is_wanted = not (quiet or session.as_json)
         with ProgressLine(package.resolve().name, is_wanted=is_wanted) as show:
             made.append(building.build(package, output, options, show))
+        for key in keys:
+            owners_folder.sign_payload(made[-1], key)
     if session.as_json:
         render.as_json({"payloads": [str(folder) for folder in made]})
     elif not quiet:
         for folder in made:
             click.echo(f"{folder}  {_size(folder)}")
+
+
+@payload.command()
+@click.argument("drive", type=FOLDER)
+@click.option(
+    "--key",
+    "keys",
+    multiple=True,
+    required=True,
+    type=KEY,
+    help="An Ed25519 key of ssh-keygen: its file, or its .pub for the agent's.",
+)
+@json_option
+@click.pass_obj
+def sign(session: Session, drive: Path, keys: tuple[Path, ...]) -> None:
+    """Sign a drive's payloads, or a payload folder; signatures of other keys stay.
+
+    
+    Examples: nondum payload sign /media/usb --key alice
+              nondum payload sign drive --key a.pub --key b.pub
+    """
+    from nondum.wheelhouse.trust import owners_folder
+
+    rows = []
+    for folder in payloads(drive):
+        for key in keys:
+            signers = owners_folder.sign_payload(folder, key)
+        rows.append({"payload": folder.name, "signers": list(signers)})
+    if session.as_json:
+        render.as_json({"signed": rows})
+        return
+    for row in rows:
+        click.echo(f"signed {row['payload']}: {', '.join(row['signers'])}")
 
 
 @payload.command()
