@@ -6,7 +6,10 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.faults.hostile.draft import Draft, Sign, draft, unsigned
+from tests.faults.hostile.draft import Draft, Sign, draft, plain, unsigned
+from tests.payloads import make_payload
+
+from nondum.wheelhouse import contents
 
 NO_PAYLOAD = "DRIVE_NOT_PAYLOAD"
 
@@ -35,6 +38,14 @@ class Bench:
     def draft(self) -> Draft:
         """A sound payload, to be spoilt."""
         return draft(self.payload_id)
+
+    def sound(self) -> None:
+        """A payload that works."""
+        part = plain(self.payload_id.rpartition(".")[2], with_sdk=True)
+        folder = make_payload(self.drive, part, payload_id=self.payload_id)
+        signature = self.sign((folder / contents.NAME).read_bytes())
+        if signature is not None:
+            (folder / contents.SIGNATURE_NAME).write_bytes(signature)
 
     def python(self) -> bytes:
         """Python that makes the canary."""

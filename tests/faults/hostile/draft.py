@@ -134,7 +134,7 @@ def draft(payload_id: str, part: Part | None = None) -> Draft:
 def plain(component: str, **more: Any) -> Part:
     """A component that says nothing and brings nothing."""
     said = PluginDescription(name=f"test-{component}", version="1.0")
-    return Part(component, "", description=said, with_sdk=False, **more)
+    return Part(component, "", description=said, **{"with_sdk": False, **more})
 
 
 def locked(wheel: str, data: bytes, *, name: str, version: str) -> str:

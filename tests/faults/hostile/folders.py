@@ -101,6 +101,16 @@ def deep(bench: Bench) -> None:
     os.close(here)
 
 
+def sound_beside(tamper: Callable[[Bench], None]) -> Callable[[Bench], None]:
+    """Beside a payload that works."""
+
+    def make(bench: Bench) -> None:
+        bench.sound()
+        tamper(bench)
+
+    return make
+
+
 def only(path: str) -> Callable[[Bench], None]:
     return lambda bench: (bench.drive / path).mkdir(parents=True)
 
@@ -136,6 +146,6 @@ DRIVES: tuple[HostileDrive, ...] = (
     bare("names-without-number", MANY, names_without_number),
     tampered("payload-too-deep", NO_PAYLOAD, moved("nondum/more/org.example.lamp")),
     tampered("payload-beside", NO_PAYLOAD, moved("payloads/org.example.lamp")),
-    tampered("litter-beside", "", litter),
-    tampered("bait-beside", "", bait),
+    bare("litter-beside", "", sound_beside(litter)),
+    bare("bait-beside", "", sound_beside(bait)),
 )

@@ -10,7 +10,7 @@ from pathlib import Path
 from tests.faults.hostile.case import NO_PAYLOAD, Bench, HostileDrive
 
 UNSUPPORTED, ERROR = "FS_UNSUPPORTED", "FS_ERROR"
-SIZE = 4 * 2**20
+SIZE = 8 * 2**20
 SUPERBLOCK = 1024
 
 Change = Callable[[bytearray], None]
@@ -37,7 +37,7 @@ def ext4(name: str, code: str, change: Change, *, payload: bool = False) -> Host
 
     def make(bench: Bench) -> None:
         if payload:
-            bench.draft().write(bench.drive, bench.sign)
+            bench.sound()
         image = image_of(bench)
         image.write_bytes(bytes(SIZE))
         command = ["mkfs.ext4", "-q", "-F", "-d", str(bench.drive), str(image)]
@@ -85,7 +85,7 @@ DRIVES: tuple[HostileDrive, ...] = (
     ext4("ext4-without-inodes", ERROR, patch(SUPERBLOCK, bytes(4))),
     ext4("ext4-of-giant-blocks", ERROR, patch(SUPERBLOCK + 24, b"\xff\xff\xff\xff")),
     ext4("ext4-of-features-of-tomorrow", ERROR, patch(SUPERBLOCK + 96, b"\xff\xff\xff\xff")),
-    ext4("ext4-without-groups", ERROR, patch(4096, bytes(4096))),
+    ext4("ext4-without-groups", ERROR, patch(2048, bytes(1024))),
     ext4("ext4-cut", ERROR, cut(64 * 1024)),
     ext4("ext4-empty", NO_PAYLOAD, nothing),
     ext4("ext4-sound", "", nothing, payload=True),
