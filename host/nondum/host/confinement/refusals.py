@@ -66,7 +66,12 @@ GROUPS: Mapping[str, tuple[Rule, ...]] = {
 }
 """What every worker is refused from level 1 on."""
 
-WITHOUT_NAMESPACES: Mapping[bool, tuple[Rule, ...]] = {
+WITHOUT_NAMESPACES: Mapping[str, tuple[Rule, ...]] = {
+    "messages": _all("shmget", "shmat", "shmctl", "semget", "msgget", "mq_open"),
+}
+"""What workers are refused beside where they share the host's namespaces."""
+
+SOCKETS_OF_THE_HOST: Mapping[bool, tuple[Rule, ...]] = {
     False: _sockets(-1 & 0xFFFFFFFF),
     True: _sockets(_AF_INET, _AF_INET6, _AF_NETLINK),
 }

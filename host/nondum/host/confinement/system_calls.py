@@ -31,6 +31,12 @@ _SAME = {
 """Since Linux 5.1 all architectures count alike."""
 
 _X86_64 = {
+    "shmget": 29,
+    "shmat": 30,
+    "shmctl": 31,
+    "semget": 64,
+    "msgget": 68,
+    "mq_open": 240,
     "socket": 41,
     "clone": 56,
     "ptrace": 101,
@@ -82,6 +88,12 @@ _X86_64 = {
 }
 
 _AARCH64 = {
+    "mq_open": 180,
+    "msgget": 186,
+    "semget": 190,
+    "shmget": 194,
+    "shmctl": 195,
+    "shmat": 196,
     "lookup_dcookie": 18,
     "ioctl": 29,
     "umount2": 39,

@@ -47,13 +47,18 @@ def furnish(room: Mapping[str, Any]) -> None:
 def move_in(room: Mapping[str, Any]) -> None:
     """Leave the keeper's view for the worker's, and its user for one that owns nothing of it.
 
-    Raises `OSError`.
+    `sealed`: what may be read only, though it could be written by the user's own right; `protected`:
+    mounts likewise. Raises `OSError`.
     """
     kernel.unshare(kernel.CLONE_NEWNS)
     kernel.mount(None, DEVICES, None, kernel.MS_SLAVE)
     if room["hides_outside"]:
         for folder in reversed(room["seen_outside"]):
             kernel.unmount(room["outside"] + folder)
+    for folder in room["sealed"]:
+        with contextlib.suppress(FileNotFoundError):
+            kernel.mount(folder, folder, None, kernel.MS_BIND)
+            kernel.mount(None, folder, None, _BOUND | kernel.MS_RDONLY | _flags_of(folder))
     for folder in room["protected"]:
         kernel.mount(None, folder, None, _BOUND | kernel.MS_RDONLY | _flags_of(folder))
     user, group = os.geteuid(), os.getegid()

@@ -38,6 +38,8 @@ INSTRUMENTS = (
     *("/dev/hidraw*", "/dev/i2c-*", "/dev/spidev*", "/dev/gpiochip*", "/dev/media*"),
 )
 """Where no room can be made for a worker, what one that declares devices may open."""
+SETTINGS = tuple(f"/proc/{name}" for name in ("sys", "sysrq-trigger", "irq", "bus", "fs", "acpi"))
+"""What root may write by being root, capabilities or not: `core_pattern` runs programs."""
 FIRST_USER, USERS = 61184, 4336
 """Ids of users that no account has: those that systemd gives out likewise (DynamicUser=)."""
 
@@ -117,7 +119,11 @@ class Held:
     def entry(self, spec: WorkerSpec, ground: Ground) -> Iterator[Entry]:
         """Files by Landlock, calls by a filter, and a user of its own if the host is root."""
         has_network = "network" in spec.permissions
-        groups = {**refusals.GROUPS, "sockets": refusals.WITHOUT_NAMESPACES[has_network]}
+        groups = {
+            **refusals.GROUPS,
+            **refusals.WITHOUT_NAMESPACES,
+            "sockets": refusals.SOCKETS_OF_THE_HOST[has_network],
+        }
         user = None if "user" in self._without else user_for(spec)
         if user is not None:
             os.chown(spec.scratch, user, user)
@@ -184,6 +190,7 @@ class Boxed:
             "scratch": str(spec.scratch),
             "nodes": list(_nodes(spec)),
             "shared_mb": SHARED_MB,
+            "sealed": [] if "settings" in kept else SETTINGS,
             "protected": [*(() if "system" in kept else ("/", "/dev")), room.DEVICES],
             "is_last": "user namespaces" not in kept,
             "changes_user": "user" not in kept,
