@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+TOO_LONG = 124
+"""Status of a program that ran too long (see `inside/agent.py`)."""
 SLACK_S = 60.0
 """How much longer than the program may run its answer is waited for."""
 

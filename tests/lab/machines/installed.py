@@ -20,7 +20,9 @@ enabled = false
 """
 INSTALL = """
 set -eu
-mount -o ro /dev/vdb /opt/nondum
+grep -q nondum /etc/fstab || echo 'LABEL=nondum /opt/nondum ext4 ro,nofail 0 0' >>/etc/fstab
+systemctl daemon-reload
+mount /opt/nondum
 ln -sf /opt/nondum/bin/nondum /usr/local/bin/nondum
 cp /opt/nondum/packaging/systemd/*.service /etc/systemd/system/
 cp /opt/nondum/packaging/systemd/*.s[!e]* /etc/systemd/system/ 2>/dev/null || true
@@ -29,6 +31,7 @@ cp /opt/nondum/packaging/tmpfiles.d/*.conf /usr/lib/tmpfiles.d/ 2>/dev/null || t
 systemd-sysusers
 systemd-tmpfiles --create
 systemctl daemon-reload
+systemctl -q enable nondum.service
 """
 SERVICE = "nondum.service"
 T = TypeVar("T")
@@ -57,6 +60,10 @@ class Installed:
         """
         self.machine.run(f"systemctl start {SERVICE}", timeout_s=PATIENCE_S)
         self.machine.until("an answer", self._first_answer, PATIENCE_S)
+
+    def wait_until_started(self) -> None:
+        """Wait until somebody answers, whoever started the service."""
+        self.until("an answer", lambda view: view)
 
     def stop(self) -> None:
         """Stop the service."""

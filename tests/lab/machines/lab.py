@@ -34,13 +34,18 @@ class Lab:
 
     def host(self, *, more: str = "") -> Installed:
         """A host that has just started and knows nothing; `more` are lines of its configuration."""
+        host = self.booted_once()
+        host.forget()
+        host.configure(more)
+        host.start()
+        return host
+
+    def booted_once(self) -> Installed:
+        """The machine that scenarios share; nothing is started."""
         if self._shared is None:
             self._shared = self.booted()
-        else:
-            self._shared.forget()
-        self.machines = [self._shared.machine]
-        self._shared.configure(more)
-        self._shared.start()
+        elif self._shared.machine not in self.machines:
+            self.machines.append(self._shared.machine)
         return self._shared
 
     def booted(self) -> Installed:

@@ -62,8 +62,11 @@ def attend(connection: socket.socket, places: Sequence[Path]) -> None:
         for descriptor in descriptors:
             os.close(descriptor)
     _until_ended(running, connection, unit)
+    ended = _ended(unit, running.returncode)
+    if ended["Result"] == "oom-kill":  # who reads the worker's last words knows these
+        sys.stderr.write("MemoryError: the service has used up its memory\n")
     with contextlib.suppress(OSError):  # nobody waits for it
-        connection.send(json.dumps(_ended(unit, running.returncode)).encode())
+        connection.send(json.dumps(ended).encode())
     _systemctl("reset-failed", unit)
 
 

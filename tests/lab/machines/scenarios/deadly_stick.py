@@ -1,0 +1,33 @@
+"""A stick whose reading kills the daemon time and again is left alone, and the daemon says so."""
+
+from __future__ import annotations
+
+from tests.lab.machines.agent import TOO_LONG
+from tests.lab.machines.lab import Lab
+from tests.lab.plugins import talker
+
+MOST = 8
+"""Kills that are tried; five must do."""
+KILL = """
+until ls -d /var/lib/nondum/staging/* /var/lib/nondum/venvs/* >/dev/null 2>&1; do sleep 0.02; done
+kill -KILL $(systemctl show --value -p MainPID nondum.service)
+"""
+
+
+def run(lab: Lab) -> str:
+    """Kill the daemon whenever it begins to install."""
+    host = lab.host()
+    stick = host.machine.plug(lab.stick("talker", talker()))
+    kills = 0
+    while kills < MOST:
+        if host.machine.attempt(KILL, timeout_s=60).status == TOO_LONG:
+            break
+        kills += 1
+        host.wait_until_started()
+    view = host.until("a status", lambda view: view)
+    states = [row["state"] for row in view["payloads"]]
+    problems = [p["code"] for d in view["drives"] for p in d["problems"]]
+    host.machine.pull(stick)
+    assert kills <= 5, f"killed {kills} times"
+    assert "active" not in states, states
+    return f"left alone after {kills}: {', '.join([*states, *problems])}"
