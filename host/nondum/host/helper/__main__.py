@@ -39,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         nodes=Nodes(told.run / "devices", uid, frozenset(told.allow_subsystem)),
         tree=_tree(f"{OWNER}-{uid}"),
     )
+    service.nodes.prepare()  # workers' rooms, which are made early, show what is below it
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     try:
         with _handed_over() as listening:

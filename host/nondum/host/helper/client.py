@@ -20,6 +20,8 @@ from nondum.sdk import errors
 from nondum.sdk.errors import InstallFailed, NondumError, Problem
 
 SOCKET = Path("/run/nondum-helper/helper.sock")
+DEVICES = Path("/run/nondum-helper/devices")
+"""Below it, component by component, are the nodes that the helper makes."""
 WAIT_S = 15.0
 """Longer than the helper waits for a drive."""
 PAUSE_S = 0.02

@@ -37,7 +37,7 @@ class Nodes:
     def put(self, component: str, need: str, major: int, minor: int) -> Path:
         """Make a node for a device that was plugged in. Raises `NondumError` (HELPER_REFUSED)."""
         self._check(major, minor)
-        self._mount()
+        self.prepare()
         folder = self.base / component
         folder.mkdir(mode=0o755, exist_ok=True)
         node, fresh = folder / need, folder / f".{need}"
@@ -72,7 +72,8 @@ class Nodes:
         if not _usb(device) and subsystem not in self.subsystems:
             raise refused("it does not hang on USB", f"{major}:{minor}")
 
-    def _mount(self) -> None:
+    def prepare(self) -> None:
+        """Have the folder that the others are in, on a file system that may hold nodes."""
         self.base.mkdir(mode=0o755, parents=True, exist_ok=True)
         if not os.statvfs(self.base).f_flag & os.ST_NODEV:
             return

@@ -10,6 +10,7 @@ from typing import Any
 
 from nondum.host.cgroups import Usage
 from nondum.host.events import BehaviourProgressed, Event, StreamFlowing, WorkerLogged
+from nondum.host.helper.grants import reachable, withdrawn
 from nondum.host.printable import printable
 from nondum.host.workers import problems, scratch
 from nondum.host.workers.call import Call
@@ -104,6 +105,7 @@ class Worker:
             await self.link.request("detach", {"device": need})
         finally:
             await self._process.revoke(need)
+            await asyncio.to_thread(withdrawn, self.spec.component, need)
 
     async def look(self) -> tuple[Problem, ...]:
         """Look at what it uses: end it when that is too much, tell what is nearly."""
@@ -187,11 +189,12 @@ class Worker:
 
     async def _let_in(self, need: str, device: Mapping[str, Any]) -> dict[str, Any]:
         """Have a device where the worker can open it; what it is told of that."""
+        node = await asyncio.to_thread(reachable, self.spec.component, need, device["node"])
         try:
-            await self._process.grant(need, device["node"])
+            await self._process.grant(need, node)
         except WorkerFailed as error:
             self._emit(WorkerLogged(self.spec.component, "error", str(error)))
-        return {**device, "node": self._process.node(need, device["node"])}
+        return {**device, "node": self._process.node(need, node)}
 
     async def _reading(self) -> Reading:
         pids, folder = self._gauge.pids(), self.spec.scratch
