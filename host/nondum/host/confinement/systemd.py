@@ -40,6 +40,7 @@ _ALWAYS = (
 )
 _SEEN = ("usr", "bin", "sbin", "lib", "lib32", "lib64", "libx32", "proc", "dev", "sys", "tmp")
 """Of the folders at the top, those that are not hidden whole."""
+_SYSTEM = frozenset(_SEEN) - {"tmp"}
 _CLASSES: Mapping[str, tuple[str, ...]] = {
     "audio": ("char-alsa",),
     "gpu": ("char-drm", "char-nvidia*", "char-kfd"),
@@ -91,7 +92,7 @@ class Machine:
 
 
 def parse(data: bytes, places: Collection[Path]) -> Request:
-    """Read a request from a daemon whose folders all lie in `places`. Raises `ValueError`."""
+    """Read a request from a daemon whose workers' code lies in `places`. Raises `ValueError`."""
     body = json.loads(data[:MAX_BYTES])
     if not isinstance(body, dict) or body.keys() != {each.name for each in fields(Request)}:
         raise ValueError("a request has other parts")
@@ -100,8 +101,12 @@ def parse(data: bytes, places: Collection[Path]) -> Request:
     if not COMPONENT.fullmatch(_text(request.component)):
         raise ValueError("that is no component")
     for folder in (*request.code, request.scratch):
-        if not FOLDER.fullmatch(_text(folder)) or not _is_within(Path(folder), places):
+        if not FOLDER.fullmatch(_text(folder)):
             raise ValueError(f"not a folder of a worker: {folder}")
+    if not all(_is_within(Path(folder), places) for folder in request.code):
+        raise ValueError("code from elsewhere")
+    if Path(request.scratch).parts[1] in _SYSTEM:  # any other place will do: nothing is there
+        raise ValueError("no scratch folder may hide the system")
     if not PERMISSIONS.issuperset(map(_text, request.permissions)):
         raise ValueError("there is no such permission")
     if type(request.has_devices) is not bool:

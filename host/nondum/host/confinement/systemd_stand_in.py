@@ -22,7 +22,7 @@ from nondum.host.confinement.systemd import Request
 from nondum.host.confinement.systemd_warden import ORPHANED, TERM
 from nondum.host.inside import kernel
 
-SOCKET = Path("/run/nondum/warden.sock")
+SOCKET = Path("/run/nondum-warden/warden.sock")
 ORDER_BYTES = 128 * 1024
 ANSWER_BYTES = 4096
 EXITED = "1"
@@ -89,7 +89,7 @@ def _warden(asked: Request) -> socket.socket:
 def _own_warden(asked: Request) -> socket.socket:
     """Root's own, out of reach of what ends this process."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    folders = {str(Path(folder).parent) for folder in (*asked.code, asked.scratch)}
+    folders = {str(Path(folder).parent) for folder in asked.code}
     places = [part for folder in sorted(folders) for part in ("--place", folder)]
     words = [sys.executable, "-I", "-m", "nondum.host.confinement.systemd_warden", *places]
     with theirs:

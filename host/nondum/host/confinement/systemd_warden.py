@@ -45,8 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         user = pwd.getpwnam(told.user).pw_uid if told.user else os.getuid()
         if _peer(connection) != user:
             raise SystemExit("this user is not served")
-        places = [(told.state / name).resolve() for name in ("venvs", "scratch")]
-        attend(connection, [*places, *(path.resolve() for path in told.place)])
+        places = (told.state / "venvs", *told.place)
+        attend(connection, [place.resolve() for place in places])
 
 
 def attend(connection: socket.socket, places: Sequence[Path]) -> None:
@@ -147,7 +147,7 @@ def _parser() -> argparse.ArgumentParser:
         "--state", type=Path, default=Path("/var/lib/nondum"), help="that user's state folder"
     )
     parser.add_argument(
-        "--place", type=Path, action="append", default=[], help="where else workers' folders are"
+        "--place", type=Path, action="append", default=[], help="where else workers' code is"
     )
     return parser
 
