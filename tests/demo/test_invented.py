@@ -21,9 +21,9 @@ from nondum.sdk.bench import WorkerFactory
 from nondum.sdk.planner import Plan, Unsolvable
 from nondum.sdk.plugin import describe, load
 from nondum.wheelhouse.build import Options, build
-from nondum.wheelhouse.payload import verify_folder
 from nondum.wheelhouse.signatures import UnsignedAllowed
 from nondum.wheelhouse.target import Target
+from nondum.wheelhouse.verification import verify
 
 ROOT = Path(__file__).parents[2]
 HOST = "rover"
@@ -136,7 +136,7 @@ def test_a_payload_is_built(strangers: list[Invented], tmp_path: Path) -> None:
     mouth = strangers[0]
     folder = build(mouth.folder, tmp_path / "drive", options, lambda *_: None)
     assert folder == tmp_path / "drive/nondum" / mouth.payload_id
-    assert not verify_folder(folder, UnsignedAllowed())
+    assert not verify(folder, UnsignedAllowed()).problems
     index = json.loads((folder / "index.json").read_text(encoding="utf-8"))
     said = describe(load(mouth.entry_point, mouth["distribution"])).to_dict()
     assert index["components"][mouth["component"]] == said | {"version": "1.0"}

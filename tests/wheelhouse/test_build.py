@@ -14,10 +14,10 @@ from tests.wheelhouse.test_lock import host
 from nondum.sdk.errors import ConfigRefused, InstallFailed, NondumError, PayloadRefused
 from nondum.wheelhouse import build, contents, drive, index, lock, preflight
 from nondum.wheelhouse.library_wheels import library_wheel
-from nondum.wheelhouse.payload import verify_folder
 from nondum.wheelhouse.resolve import Sources
 from nondum.wheelhouse.signatures import UnsignedAllowed
 from nondum.wheelhouse.target import Target, targets
+from nondum.wheelhouse.verification import verify
 
 HERE = Target.here()
 OTHER = Target("aarch64" if HERE.architecture != "aarch64" else "x86_64", HERE.python)
@@ -57,7 +57,7 @@ def refused(act: Callable[[], object], kind: type[NondumError]) -> list[str]:
 def test_a_source_becomes_a_payload_that_hosts_take(built: Build, tmp_path: Path) -> None:
     folder = built(make_source(tmp_path / "src"))
     facts = preflight.probe(tmp_path, reserve_mb=0, confinement=0)
-    assert verify_folder(folder, UnsignedAllowed(), facts) == ()
+    assert verify(folder, UnsignedAllowed(), facts).problems == ()
     assert drive.find_payloads(tmp_path / "drive") == (folder,)
     listed = contents.parse(drive.read_contents(folder), "CONTENTS")
     assert (listed.payload_id, listed.version, listed.release) == ("org.example.blinker", "1.0", 1)
@@ -106,7 +106,7 @@ def test_two_components_of_one_distribution_share_its_wheels(built: Build, tmp_p
     folder = built(source)
     assert {p.name for p in folder.glob("pylock.*")} == {"pylock.left.toml", "pylock.right.toml"}
     assert set(index.parse((folder / "index.json").read_bytes(), "i")) == {"left", "right"}
-    assert verify_folder(folder, UnsignedAllowed()) == ()
+    assert verify(folder, UnsignedAllowed()).problems == ()
 
 
 def test_a_payload_is_replaced_whole(built: Build, tmp_path: Path) -> None:

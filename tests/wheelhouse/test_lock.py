@@ -154,7 +154,8 @@ REFUSED = {
     "editable": (
         "LOCK_NOT_WHEEL",
         HEAD
-        + '[[packages]]\nname = "a"\nversion = "1.0"\ndirectory = { path = ".", editable = true }\n',
+        + '[[packages]]\nname = "a"\nversion = "1.0"\n'
+        + 'directory = { path = ".", editable = true }\n',
     ),
     "sdist": (
         "LOCK_NOT_WHEEL",

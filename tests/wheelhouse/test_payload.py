@@ -20,10 +20,10 @@ from nondum.wheelhouse.payload import (
     check_wheels,
     is_metadata,
     load,
-    verify_folder,
 )
 from nondum.wheelhouse.preflight import HostFacts
-from nondum.wheelhouse.signatures import SignatureDemanded, UnsignedAllowed
+from nondum.wheelhouse.signatures import UnsignedAllowed
+from nondum.wheelhouse.verification import verify
 
 PLAIN = Part("blinker", "X = 1\n", with_sdk=False)
 ID = "org.example.test"
@@ -40,7 +40,7 @@ def facts(tmp_path: Path) -> HostFacts:
 
 
 def check(folder: Path, facts: HostFacts | None = None) -> tuple[Problem, ...]:
-    return verify_folder(folder, UnsignedAllowed(), facts)
+    return verify(folder, UnsignedAllowed(), facts).problems
 
 
 def staged(folder: Path, tmp_path: Path) -> StagedPayload:
@@ -60,17 +60,6 @@ def test_a_whole_payload_passes(tmp_path: Path, facts: HostFacts) -> None:
         "pluggy",
         "msgpack",
     }
-
-
-def test_unsigned_payloads_are_refused_where_signatures_are_demanded(folder: Path) -> None:
-    assert [p.code for p in verify_folder(folder, SignatureDemanded())] == ["SIG_MISSING"]
-    (folder / "CONTENTS.sig").write_text("signed")
-    assert [p.code for p in verify_folder(folder, SignatureDemanded())] == ["SIG_UNTRUSTED"]
-
-
-def test_nothing_is_parsed_before_the_signature_is_judged(folder: Path) -> None:
-    (folder / "CONTENTS").write_bytes(b"\xff not a list")
-    assert [p.code for p in verify_folder(folder, SignatureDemanded())] == ["SIG_MISSING"]
 
 
 def resealed(folder: Path, change: Callable[[Path], None]) -> tuple[str, ...]:

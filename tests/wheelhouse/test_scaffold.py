@@ -12,10 +12,10 @@ from tests.payloads import SDK
 
 from nondum.sdk.errors import ConfigRefused
 from nondum.wheelhouse import build, manifest, preflight
-from nondum.wheelhouse.payload import verify_folder
 from nondum.wheelhouse.scaffold import NewPackage, new_package
 from nondum.wheelhouse.signatures import UnsignedAllowed
 from nondum.wheelhouse.target import Target
+from nondum.wheelhouse.verification import verify
 
 
 @pytest.fixture
@@ -98,7 +98,7 @@ def test_it_becomes_a_payload_that_hosts_take(made: NewPackage, tmp_path: Path) 
     folder = build.build(made.folder, tmp_path / "drive", options, lambda *s: told.append(s))
     facts = preflight.probe(tmp_path, reserve_mb=0, confinement=0)
     assert folder == tmp_path / "drive/nondum/org.example.window-opener"
-    assert verify_folder(folder, UnsignedAllowed(), facts) == ()
+    assert verify(folder, UnsignedAllowed(), facts).problems == ()
     assert [done for _, done, _ in told] == sorted(done for _, done, _ in told)
     assert told[-1][1] == told[-1][2]
 

@@ -1,12 +1,10 @@
-"""A payload folder as a whole: its parts parsed, and everything wrong with it.
+"""A payload as a whole: its parts parsed and held against one another, and its wheels judged.
 
-`load` is for a staged copy, whose files are what its contents list says. `verify_folder` is what
-`nondum payload check` and the host both run on a folder as it is.
+`load` is for a staged copy, whose files are what its contents list says.
 """
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -15,21 +13,18 @@ from types import MappingProxyType
 from typing import TypeVar
 
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem
-from nondum.wheelhouse import contents, drive, index, lock, manifest, tables, wheel
+from nondum.wheelhouse import index, lock, manifest, tables, wheel
 from nondum.wheelhouse.contents import Contents
-from nondum.wheelhouse.drive import Progress
 from nondum.wheelhouse.index import Index
 from nondum.wheelhouse.lock import Lock, LockedWheel
 from nondum.wheelhouse.manifest import Manifest
 from nondum.wheelhouse.preflight import (
     HostFacts,
     misfits,
-    preflight,
     select,
     unmet,
     unpacked_problems,
 )
-from nondum.wheelhouse.signatures import Verifier
 from nondum.wheelhouse.wheel import Layout
 
 _T = TypeVar("_T")
@@ -129,42 +124,6 @@ def _layout(path: Path, stored: Layout | None) -> Layout:
         return stored
     with wheel.opened(path) as data:
         return wheel.lay_out(data, path.name)
-
-
-def verify_folder(
-    folder: Path,
-    verifier: Verifier,
-    facts: HostFacts | None = None,
-    progress: Progress | None = None,
-) -> tuple[Problem, ...]:
-    """Everything wrong with a payload folder; with `facts`, also what keeps it from that host."""
-    try:
-        data = drive.read_contents(folder)
-        verdict = verifier.verify(data, drive.read_signature(folder))
-        if verdict.problems:
-            return verdict.problems
-        listed = contents.parse(data, f"{folder.name}/{contents.NAME}")
-        if problems := tuple(oversized(listed)):
-            return problems
-        with tempfile.TemporaryDirectory(prefix="nondum-check-") as staging:
-            copied = Path(staging) / "payload"
-            drive.copy(folder, listed, copied, progress)
-            staged = load(copied, listed)
-            denied = verdict.grant.problems(staged.manifest)
-            return (*denied, *_verify_staged(staged, facts))
-    except NondumError as error:
-        return error.problems
-
-
-def _verify_staged(payload: StagedPayload, facts: HostFacts | None) -> Iterator[Problem]:
-    for path in sorted((payload.folder / "wheels").glob("*.whl")):
-        yield from wheel.check(path, payload.manifest.startup_hooks)
-    if facts is not None:
-        minimum = payload.contents.minimum_nondum
-        problems = preflight(payload.manifest, payload.locks, facts, minimum_nondum=minimum)
-        yield from problems
-        if not problems:
-            yield from check_wheels(payload, facts)
 
 
 def _disagreements(

@@ -27,12 +27,14 @@ from nondum.sdk.errors import NondumError, PayloadRefused, Problem
 from nondum.wheelhouse import gpu, wheel
 from nondum.wheelhouse import lock as locks_module
 from nondum.wheelhouse.lock import Lock, LockedWheel
-from nondum.wheelhouse.manifest import Manifest
+from nondum.wheelhouse.manifest import MAX_CONFINEMENT, Manifest
+from nondum.wheelhouse.target import Target
 from nondum.wheelhouse.wheel import Layout
 
 GROWTH = 4
 """Unpacked wheels are at most about so many times their size; measured: 2.8 to 2.9."""
 _MB = 1024 * 1024
+_PLENTY_MB = 2**40
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +72,38 @@ def probe(state: Path, *, reserve_mb: int, confinement: int) -> HostFacts:
         free_memory_mb=free_memory_mb(),
         gpu_memory_mb=gpu.free_memory_mb(free_memory_mb),
         confinement=confinement,
+        nondum=nondum_version(),
+    )
+
+
+def of_target(target: Target) -> HostFacts:
+    """A host of some kind, as payloads are built for; what it has is not known, and enough."""
+    version = tuple(int(part) for part in target.python.split("."))
+    platforms = list(target.platforms())
+    interpreter = "cp" + "".join(map(str, version))
+    return HostFacts(
+        architecture=target.architecture,
+        python=f"{target.python}.0",
+        environment={
+            **_environment(),
+            "implementation_name": "cpython",
+            "implementation_version": f"{target.python}.0",
+            "os_name": "posix",
+            "platform_machine": target.architecture,
+            "platform_python_implementation": "CPython",
+            "platform_system": "Linux",
+            "python_full_version": f"{target.python}.0",
+            "python_version": target.python,
+            "sys_platform": "linux",
+        },
+        tags=(
+            *tags.cpython_tags(version, platforms=platforms),
+            *tags.compatible_tags(version, interpreter, platforms),
+        ),
+        free_disk_mb=_PLENTY_MB,
+        free_memory_mb=_PLENTY_MB,
+        gpu_memory_mb=_PLENTY_MB,
+        confinement=MAX_CONFINEMENT,
         nondum=nondum_version(),
     )
 

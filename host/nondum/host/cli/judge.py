@@ -1,4 +1,4 @@
-"""Commands that judge payloads; none needs a host."""
+"""What a payload says of itself; nothing is asked of a host."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ import click
 
 from nondum.host.cli import render
 from nondum.host.cli.connection import Session, json_option
-from nondum.host.cli.failure import EXIT_PROBLEMS
-from nondum.host.cli.progress import ProgressLine
 from nondum.sdk.errors import PayloadRefused, Problem
 
 if TYPE_CHECKING:
@@ -45,42 +43,6 @@ def inspect(session: Session, drive: Path) -> None:
                 render.sentence(f"    {wheel}")
 
 
-@click.command()
-@click.argument("drive", type=FOLDER)
-@click.option("--anywhere", is_flag=True, help="Do not ask whether it fits this machine.")
-@json_option
-@click.pass_obj
-def check(session: Session, drive: Path, anywhere: bool) -> int:
-    """Judge a drive or payload folder by the rules that hosts go by. Exits with 3 on problems.
-
-    \b
-    Examples: nondum payload check /media/usb
-              nondum payload check drive --anywhere --json
-    """
-    problems: list[Problem] = []
-    warnings: list[Problem] = []
-    for folder in payloads(drive):
-        with ProgressLine(folder.name, is_wanted=not session.as_json) as show:
-            found, doubts = _judged(folder, show, anywhere=anywhere)
-        problems.extend(found)
-        warnings.extend(doubts)
-    if session.as_json:
-        render.as_json(
-            {
-                "ok": not problems,
-                "problems": [problem.to_dict() for problem in problems],
-                "warnings": [warning.to_dict() for warning in warnings],
-            }
-        )
-    else:
-        for problem in problems:
-            render.sentence(str(problem), colour="red")
-        for warning in warnings:
-            render.sentence(str(warning), colour="yellow", mark="warning: ")
-        click.echo("refused" if problems else "accepted")
-    return EXIT_PROBLEMS if problems else 0
-
-
 def payloads(drive: Path) -> Iterator[Path]:
     """The payload folders of a drive, or the folder itself when it is one.
 
@@ -98,23 +60,6 @@ def payloads(drive: Path) -> Iterator[Path]:
         fix = "a drive has folders nondum/<payload-id>/ with a file CONTENTS"
         raise PayloadRefused(Problem("DRIVE_NOT_PAYLOAD", text, where=str(drive), fix=fix))
     yield from found
-
-
-def _judged(
-    folder: Path, show: ProgressLine, *, anywhere: bool
-) -> tuple[tuple[Problem, ...], tuple[Problem, ...]]:
-    """The problems of a payload, and its warnings."""
-    from nondum.host import vocabulary_check
-    from nondum.wheelhouse import preflight
-    from nondum.wheelhouse.payload import verify_folder
-    from nondum.wheelhouse.signatures import UnsignedAllowed
-
-    facts = None if anywhere else preflight.probe(Path.cwd(), reserve_mb=0, confinement=0)
-    problems = verify_folder(folder, UnsignedAllowed(), facts, show)
-    if problems:
-        return problems, ()
-    judged = vocabulary_check.judge(loaded_payload(folder).index)
-    return judged.problems, judged.warnings
 
 
 def loaded_payload(folder: Path) -> StagedPayload:

@@ -10,8 +10,9 @@ import click
 
 from nondum.host.cli import complete, render
 from nondum.host.cli.connection import Session, json_option
-from nondum.host.cli.judge import FOLDER, check, inspect, payloads
+from nondum.host.cli.judge import FOLDER, inspect, payloads
 from nondum.host.cli.progress import ProgressLine
+from nondum.host.cli.verify import check, verify
 
 INSTALL_TIMEOUT_S = 600.0
 KEY = click.Path(path_type=Path, exists=True, dir_okay=False)
@@ -260,3 +261,4 @@ def _size(folder: Path) -> str:
 
 payload.add_command(inspect)
 payload.add_command(check)
+payload.add_command(verify)

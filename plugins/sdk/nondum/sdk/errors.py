@@ -57,7 +57,8 @@ class Problem:
 
     def __str__(self) -> str:
         place = f"{self.where}: " if self.where else ""
-        measured = f" (needs {self.need}, there is {self.have})" if self.need else ""
+        there = f", there is {self.have}" if self.have else ""
+        measured = f" (needs {self.need}{there})" if self.need else ""
         apart = "\n" if "\n" in self.message else " "
         remedy = f"{apart}→ {self.fix}" if self.fix else ""
         return f"{self.code} {place}{self.message}{measured}{remedy}"
