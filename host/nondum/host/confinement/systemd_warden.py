@@ -23,11 +23,14 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import IO
 
 from nondum.host.confinement import bubblewrap, systemd
 from nondum.host.confinement.systemd import Machine, Request
 
 TERM, ORPHANED = b"TERM", b"ORPHANED"
+LAST_WORDS = b"MemoryError: the service has used up its memory\n"
+"""Said for a worker that could not say so itself; its daemon knows these words."""
 ORPHAN_S = 2.0
 """What a worker has, once its daemon is gone, to leave everything safe."""
 _POLL_MS = 200
@@ -51,22 +54,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def attend(connection: socket.socket, places: Sequence[Path]) -> None:
     """Have one service as long as it is wanted. Raises `ValueError` for a request like no other."""
-    data, descriptors, _, _ = socket.recv_fds(connection, systemd.MAX_BYTES + 1, _DESCRIPTORS)
-    try:
+    data, given, _, _ = socket.recv_fds(connection, systemd.MAX_BYTES + 1, _DESCRIPTORS)
+    with contextlib.ExitStack() as held:
+        descriptors = [held.enter_context(os.fdopen(each, "wb", 0)) for each in given]
         request = systemd.parse(data, places)
         if len(descriptors) != _DESCRIPTORS:
             raise ValueError("a request brings three descriptors")
         unit = f"nondum-worker-{request.component}-{secrets.token_hex(4)}.service"
-        running = _started(request, unit, descriptors)
-    finally:
-        for descriptor in descriptors:
-            os.close(descriptor)
-    _until_ended(running, connection, unit)
-    ended = _ended(unit, running.returncode)
-    if ended["Result"] == "oom-kill":  # who reads the worker's last words knows these
-        sys.stderr.write("MemoryError: the service has used up its memory\n")
-    with contextlib.suppress(OSError):  # nobody waits for it
-        connection.send(json.dumps(ended).encode())
+        orders, output, errors = descriptors
+        running = _started(request, unit, orders, output, errors)
+        orders.close()
+        output.close()
+        _until_ended(running, connection, unit)
+        ended = _ended(unit, running.returncode)
+        with contextlib.suppress(OSError):  # nobody waits for it
+            if ended["Result"] == "oom-kill":
+                errors.write(LAST_WORDS)
+            connection.send(json.dumps(ended).encode())
     _systemctl("reset-failed", unit)
 
 
@@ -82,8 +86,9 @@ def machine() -> Machine:
     )
 
 
-def _started(request: Request, unit: str, descriptors: Sequence[int]) -> subprocess.Popen[bytes]:
-    orders, output, errors = descriptors
+def _started(
+    request: Request, unit: str, orders: IO[bytes], output: IO[bytes], errors: IO[bytes]
+) -> subprocess.Popen[bytes]:
     words = systemd.command(request, unit, machine())
     return subprocess.Popen(words, stdin=orders, stdout=output, stderr=errors, cwd="/")
 
