@@ -148,7 +148,19 @@ class Machine:
         for image in self._drives:
             disks += ["-drive", f"file={image},format=raw,if=virtio,readonly=on"]
         return [
-            *("nice", "-n", "15", recipe.program, "-nodefaults", "-display", "none", "-no-reboot"),
+            *(
+                "setpriv",
+                "--pdeathsig",
+                "KILL",
+                "nice",
+                "-n",
+                "15",
+                recipe.program,
+                "-nodefaults",
+                "-display",
+                "none",
+                "-no-reboot",
+            ),
             *("-accel", "tcg,thread=multi,tb-size=512", *recipe.machine),
             *("-smp", "2", "-m", str(self._memory_mb)),
             *("-kernel", self.built.kernel, "-initrd", self.built.initramfs),
