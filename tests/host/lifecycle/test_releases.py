@@ -209,6 +209,14 @@ def test_release_that_comes_during_a_bring_up_waits_for_its_turn() -> None:
     assert effects.ProbeComponents("k3", beside="k2") in done
 
 
+def test_same_release_with_other_content_never_waits_beside() -> None:
+    """Both are plugged in before one of them was active."""
+    both = drive("a"), drive("b"), found("k1", "a"), found("k2", "b")
+    state, _ = after(*both, *way_to_active()[1:])
+    assert steps(state) == {"k1": Step.ACTIVE, "k2": Step.REFUSED}
+    assert codes(state, "k2") == ["RELEASE_CONFLICT"]
+
+
 # Going back
 
 

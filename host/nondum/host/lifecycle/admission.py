@@ -58,6 +58,14 @@ def release_problems(state: HostState, found: PayloadFound, at: Moment) -> Itera
             where=where,
             fix="find out which is genuine; a changed payload needs a higher release",
         )
+    elif (twin := releases.twin(state, found)) is not None:
+        yield Problem(
+            "RELEASE_CONFLICT",
+            f"release {found.release} is here already, with other content",
+            where=where,
+            have=f"another one on {', '.join(twin.drives)}",
+            fix="find out which is genuine; a changed payload needs a higher release",
+        )
     elif found.release > limit:
         yield Problem(
             "RELEASE_JUMP",

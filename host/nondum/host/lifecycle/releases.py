@@ -90,6 +90,21 @@ def waits_for_recovery(found: HostState, payload: PayloadRecord) -> bool:
     return any(place(other) > place(payload) for other in ahead)
 
 
+def twin(state: HostState, found: PayloadFound) -> PayloadRecord | None:
+    """A payload that is here with the same release number and other content: one is not genuine."""
+    return next(
+        (
+            other
+            for other in state.payloads.values()
+            if key_of(other) == key_of(found)
+            and other.release == found.release
+            and other.digest != found.digest
+            and other.step not in (Step.REFUSED, Step.REMOVING)
+        ),
+        None,
+    )
+
+
 def can_go_back_to(state: HostState, payload: PayloadRecord) -> PayloadRecord | None:
     """The newest release before one, of those that wait or are refused only for being older."""
     earlier = [

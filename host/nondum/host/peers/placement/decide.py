@@ -37,7 +37,13 @@ ELSEWHERE = "PLACED_ELSEWHERE"
 """Refused here because a person wants it to run on another host."""
 
 INSTALLING = frozenset({Step.RECEIVED, Step.COPIED, Step.VERIFIED, Step.STAGED})
-_HERE = INSTALLING | {Step.STORED, Step.PROBED, Step.ACTIVE, Step.QUARANTINED}
+_HERE = INSTALLING | {
+    Step.STORED,
+    Step.PROBED,
+    Step.ACTIVE,
+    Step.SUPERSEDED,
+    Step.QUARANTINED,
+}
 
 Compute: TypeAlias = Mapping[str, Any]
 
