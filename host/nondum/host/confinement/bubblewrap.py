@@ -14,6 +14,8 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from nondum.host.helper.client import DEVICES
+
 OUTSIDE = "/.host"
 """Where the host's folders are seen, until the worker moves in."""
 INSIDE = Path(__file__).parents[1] / "inside"
@@ -79,12 +81,12 @@ def command(bwrap: str, ground: Ground, orders: int, *, without: Collection[str]
         *("--unshare-user", "--uid", "0", "--gid", "0", "--cap-add", "ALL"),
         *_namespaces(ground.permissions, without),
         *("--proc", "/proc", "--dev", "/dev"),
-        *("--size", str(TEMPORARY_BYTES), "--tmpfs", "/tmp"),  # inside
+        *_temporary(without),
         *_system(ground.permissions),
         *_interpreter(),
         *("--ro-bind", str(INSIDE), str(PLACE_OF_INSIDE)),
         *(part for folder in ground.seen for part in ("--bind", str(folder), f"{OUTSIDE}{folder}")),
-        *("--dev-bind", "/dev", f"{OUTSIDE}/dev"),
+        *(part for at in _nodes() for part in ("--dev-bind", at, f"{OUTSIDE}{at}")),
         *("--chdir", "/", "--"),
         *(str(ground.python), "-I", "-S", "-B", "-u", str(BOOTSTRAP), str(orders)),
         "0",
@@ -93,13 +95,24 @@ def command(bwrap: str, ground: Ground, orders: int, *, without: Collection[str]
 
 def seen_outside(ground: Ground) -> list[str]:
     """The host's folders that are seen below `OUTSIDE`."""
-    return [*map(str, ground.seen), "/dev"]
+    return [*map(str, ground.seen), *_nodes()]
+
+
+def _nodes() -> list[str]:
+    """Where device nodes are: the machine's, and, for one who is not root, the helper's."""
+    return ["/dev", *([str(DEVICES)] if os.geteuid() != 0 and DEVICES.is_dir() else ())]
 
 
 def _namespaces(permissions: Collection[str], without: Collection[str]) -> Iterator[str]:
     for wall, flags in NAMESPACES.items():
         if wall not in without and not (wall == "network" and "network" in permissions):
             yield from flags
+
+
+def _temporary(without: Collection[str]) -> Iterator[str]:
+    if "size of tmp" not in without:
+        yield from ("--size", str(TEMPORARY_BYTES))
+    yield from ("--tmpfs", "/tmp")
 
 
 def _system(permissions: Collection[str]) -> Iterator[str]:

@@ -50,7 +50,7 @@ GROUPS: Mapping[str, tuple[Rule, ...]] = {
     "userfaultfd": _all("userfaultfd"),
     "io_uring": _all("io_uring_setup", "io_uring_enter", "io_uring_register", error=errno.ENOSYS),
     "handles": _all("open_by_handle_at", "name_to_handle_at", "fanotify_init", "lookup_dcookie"),
-    "system": (
+    "kernel": (
         *_all("init_module", "finit_module", "delete_module", "kexec_load", "kexec_file_load"),
         *_all("reboot", "syslog", "acct", "quotactl", "quotactl_fd", "uselib", "iopl", "ioperm"),
         *_all("settimeofday", "clock_settime", "clock_adjtime", "adjtimex"),

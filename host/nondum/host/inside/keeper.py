@@ -80,7 +80,6 @@ class _Keeper:
         for standard in (1, 2):  # the worker's alone: the host waits for their end
             os.dup2(nothing, standard)
         kernel.prctl(kernel.PR_SET_NAME, kernel.text("keeper"))
-        kernel.prctl(kernel.PR_SET_DUMPABLE, 0)
         kernel.keep_capabilities(kernel.CAP_SYS_ADMIN)
         if self._given["keeper_filter"] is not None:
             kernel.filter_calls(base64.b64decode(self._given["keeper_filter"]))

@@ -1,0 +1,128 @@
+"""What there is on the host for a hostile plugin to reach, and a run of that plugin."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import pty
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tests.host.workers.house import House
+
+from nondum.host.cgroups import Cages
+from nondum.host.events import WorkerLogged
+from nondum.host.workers import Limits, WorkerLauncher
+from nondum.host.workers.confinements import Confinement
+
+ESCAPE = Path(__file__).with_name("escape.py")
+SMALL = Limits(memory_mb=256, tasks=100, descriptors=64, file_mb=16)
+TOKEN = "nondum-bait"  # a word to look for
+SHARED_KEY = 0x6E6F6E64
+
+
+@dataclass(frozen=True)
+class Result:
+    """What one attempt came to."""
+
+    could: bool
+    what: str
+
+
+@contextmanager
+def laid(folder: Path, cgroup: str = "") -> Iterator[dict[str, Any]]:
+    """Baits: files, sockets, a process, shared memory, a terminal."""
+    with ExitStack() as stack:
+        secret, other = folder / "secret", folder / "other"
+        secret.write_text("of the host")
+        (other / "site-packages").mkdir(parents=True)
+        (other / "scratch").mkdir()
+        code, scratch = other / "site-packages/secret.py", other / "scratch/notes"
+        code.write_text("# of another payload")
+        scratch.write_text("of another worker")
+        listener = stack.enter_context(socket.create_server(("127.0.0.1", 0)))
+        by_path = stack.enter_context(socket.socket(socket.AF_UNIX))
+        by_path.bind(str(folder / "socket"))
+        by_path.listen(16)
+        by_name = stack.enter_context(socket.socket(socket.AF_UNIX))
+        by_name.bind(f"\0{TOKEN}-{os.getpid()}")
+        by_name.listen(16)
+        process = subprocess.Popen(
+            [sys.executable, "-c", "import time; time.sleep(600)", TOKEN],
+            env={"TOKEN": TOKEN},
+        )
+        stack.callback(process.wait)
+        stack.callback(process.kill)
+        master, terminal = pty.openpty()
+        stack.callback(os.close, master)
+        stack.callback(os.close, terminal)
+        stack.enter_context(_shared_memory())
+        tmp = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="nondum-bait-")))
+        yield {
+            "secret": str(secret),
+            "folder": str(folder),
+            "other_code": str(code),
+            "other_scratch": str(scratch),
+            "port": listener.getsockname()[1],
+            "path_socket": str(folder / "socket"),
+            "abstract_socket": f"{TOKEN}-{os.getpid()}",
+            "pid": process.pid,
+            "token": TOKEN,
+            "terminal": os.ttyname(terminal),
+            "host_name": socket.gethostname(),
+            "shared_key": SHARED_KEY,
+            "tmp": str(tmp),
+            "cgroup": cgroup,
+        }
+
+
+@contextmanager
+def _shared_memory() -> Iterator[None]:
+    """A segment of System V shared memory that everybody may attach (shmget(2))."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    identifier = libc.shmget(SHARED_KEY, 4096, 0o1000 | 0o666)
+    assert identifier >= 0, os.strerror(ctypes.get_errno())
+    try:
+        yield
+    finally:
+        libc.shmctl(identifier, 0, None)
+
+
+async def attempted(
+    folder: Path,
+    bait: dict[str, Any],
+    confinement: Confinement,
+    attempts: Sequence[str] = (),
+    limits: Limits = SMALL,
+) -> dict[str, Result]:
+    """What the hostile plugin can do, or some of it, so confined."""
+    house = House(folder, confinement=confinement)
+    cages = Cages.open(folder)
+    house.workers.launcher = WorkerLauncher(confinement, cages)
+    house.workers.timing = house.timing.__class__(startup_s=120.0)
+    source = ESCAPE.read_text(encoding="utf-8")
+    summary = source.removeprefix('"""').partition("\n")[0]
+    settings = {"bait": json.dumps({**bait, "attempts": list(attempts)})}
+    try:
+        await house.start("escape", source, summary=summary, settings=settings, limits=limits)
+        await house.until(WorkerLogged, lambda line: line.message == "tried all", timeout_s=120)
+    finally:
+        await house.workers.close(grace_s=1.0)
+        cages.close()
+    said = [line.message for line in house.told(WorkerLogged)]
+    rows = [json.loads(s.removeprefix("tried ")) for s in said if s.startswith("tried {")]
+    return {row["name"]: _result(row) for row in rows}
+
+
+def _result(row: dict[str, Any]) -> Result:
+    if "must exist" in row and not Path(row["must exist"]).exists():
+        return Result(could=False, what="written where nobody but the worker sees it")
+    return Result(row["could"], row["what"])

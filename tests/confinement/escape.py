@@ -1,0 +1,492 @@
+"""A hostile plugin: tries what a worker must not be able to do, and reports what it could.
+
+Each attempt is made by a child of its own, and succeeded if it returns anything but None: what was
+reached. `bait` (a setting) says what there is to be reached on the host. It stands by itself: its
+text is the only module of a wheel.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import fcntl
+import json
+import os
+import pty
+import resource
+import signal
+import socket
+import struct
+import termios
+import time
+from collections.abc import Callable
+from typing import Any
+
+from nondum.sdk import Context, hookimpl
+
+Bait = dict[str, Any]
+Attempt = Callable[[Bait], Any]
+
+LIBC = ctypes.CDLL(None, use_errno=True)
+ATTEMPT_S = 10
+MEGABYTE = 1024 * 1024
+IS_ARM = os.uname().machine == "aarch64"
+ATTEMPTS: dict[str, Attempt] = {}
+
+
+def attempt(function: Attempt) -> Attempt:
+    ATTEMPTS[function.__name__.replace("_", " ")] = function
+    return function
+
+
+def call(x86_64: int, aarch64: int, *arguments: Any) -> int:
+    """A system call; raises what it fails with: EPERM or ENOSYS, if it is refused altogether."""
+    ctypes.set_errno(0)
+    given = [ctypes.c_long(a) if isinstance(a, int) else a for a in arguments]
+    result: int = LIBC.syscall(ctypes.c_long(aarch64 if IS_ARM else x86_64), *given)
+    if result < 0:
+        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+    return result
+
+
+def reaches_kernel(x86_64: int, aarch64: int, *arguments: Any) -> str:
+    """Whether a call with useless arguments gets past who may make it."""
+    try:
+        return f"returned {call(x86_64, aarch64, *arguments)}"
+    except OSError as error:
+        if error.errno in (1, 13, 28, 38):  # the last but one: a limit of namespaces
+            raise
+        return f"judged by the kernel: {error.strerror}"
+
+
+@attempt
+def read_a_file_of_the_host(bait: Bait) -> Any:
+    return open(bait["secret"]).read()
+
+
+@attempt
+def write_a_file_of_the_host(bait: Bait) -> Any:
+    path = os.path.join(bait["folder"], "written")
+    open(path, "w").close()
+    return {"must exist": path}
+
+
+@attempt
+def read_another_payload(bait: Bait) -> Any:
+    return open(bait["other_code"]).read()
+
+
+@attempt
+def read_the_scratch_of_another(bait: Bait) -> Any:
+    return open(bait["other_scratch"]).read()
+
+
+@attempt
+def see_what_the_keeper_sees(bait: Bait) -> Any:
+    return os.listdir("/.host/dev") or None
+
+
+@attempt
+def write_to_the_system(bait: Bait) -> Any:
+    return written("/usr/nondum-escape")
+
+
+@attempt
+def write_to_the_root(bait: Bait) -> Any:
+    return written("/nondum-escape")
+
+
+@attempt
+def write_to_dev(bait: Bait) -> Any:
+    return written("/dev/nondum-escape")
+
+
+@attempt
+def change_its_own_code(bait: Bait) -> Any:
+    return written(os.path.join(os.path.dirname(os.path.abspath(__file__)), "escape"))
+
+
+@attempt
+def leave_something_in_tmp(bait: Bait) -> Any:
+    path = os.path.join(bait["tmp"], "left")
+    open(path, "w").close()
+    return {"must exist": path}
+
+
+@attempt
+def make_a_device_node(bait: Bait) -> Any:
+    path = os.path.join(os.getcwd(), "node")
+    os.mknod(path, 0o600 | 0o020000, os.makedev(1, 3))
+    os.close(os.open(path, os.O_RDWR))
+    os.unlink(path)
+    return "a node of its own that opens"
+
+
+def written(path: str) -> str:
+    os.close(os.open(path, os.O_CREAT | os.O_WRONLY))
+    os.unlink(path)
+    return path
+
+
+@attempt
+def connect_by_tcp(bait: Bait) -> Any:
+    socket.create_connection(("127.0.0.1", bait["port"]), 2).close()
+    return f"port {bait['port']}"
+
+
+@attempt
+def see_network_interfaces(bait: Bait) -> Any:
+    found = [name for _, name in socket.if_nameindex() if name != "lo"]
+    return found or None
+
+
+@attempt
+def connect_to_a_path(bait: Bait) -> Any:
+    with socket.socket(socket.AF_UNIX) as s:
+        s.connect(bait["path_socket"])
+    return bait["path_socket"]
+
+
+@attempt
+def connect_to_an_abstract_name(bait: Bait) -> Any:
+    with socket.socket(socket.AF_UNIX) as s:
+        s.connect("\0" + bait["abstract_socket"])
+    return bait["abstract_socket"]
+
+
+@attempt
+def make_an_exotic_socket(bait: Bait) -> Any:
+    for family in (38, 40, 41, 29, 30, 43):  # alg, vsock, kcm, can, tipc, smc
+        for kind in (socket.SOCK_SEQPACKET, socket.SOCK_STREAM, socket.SOCK_DGRAM):
+            try:
+                socket.socket(family, kind).close()
+                return f"family {family}"
+            except OSError as error:
+                last = error
+    raise last
+
+
+@attempt
+def see_a_process_of_the_host(bait: Bait) -> Any:
+    return open(f"/proc/{bait['pid']}/cmdline").read()[:40] if is_bait(bait) else None
+
+
+@attempt
+def read_the_environment_of_the_host(bait: Bait) -> Any:
+    found = open(f"/proc/{bait['pid']}/environ").read()
+    return "environ" if bait["token"] in found else None
+
+
+@attempt
+def read_the_memory_of_the_host(bait: Bait) -> Any:
+    if not is_bait(bait):
+        return None
+    with open(f"/proc/{bait['pid']}/mem", "rb") as memory:
+        return str(memory)
+
+
+@attempt
+def signal_the_host(bait: Bait) -> Any:
+    if not is_bait(bait):
+        return None
+    os.kill(bait["pid"], 0)
+    return bait["pid"]
+
+
+@attempt
+def look_into_the_keeper(bait: Bait) -> Any:
+    if bait["pid"] and os.path.exists(f"/proc/{bait['pid']}"):
+        return None  # it is not in a room
+    return open("/proc/1/environ").read()[:20]
+
+
+@attempt
+def trace_a_child(bait: Bait) -> Any:
+    child = os.fork()
+    if child == 0:
+        time.sleep(ATTEMPT_S)
+        os._exit(0)
+    try:
+        return reaches_kernel(101, 117, 16, child, 0, 0)  # PTRACE_ATTACH
+    finally:
+        os.kill(child, signal.SIGKILL)
+
+
+@attempt
+def read_memory_of_another_process(bait: Bait) -> Any:
+    buffer = ctypes.create_string_buffer(8)
+    vector = struct.pack("PN", ctypes.addressof(buffer), 8)
+    call(310, 270, os.getppid(), vector, 1, vector, 1, 0)
+    return "process_vm_readv"
+
+
+@attempt
+def limit_another_process(bait: Bait) -> Any:
+    call(302, 261, os.getppid(), 7, None, ctypes.create_string_buffer(16))
+    return "prlimit"
+
+
+def is_bait(bait: Bait) -> bool:
+    found = f"/proc/{bait['pid']}/cmdline"
+    return os.path.exists(found) and bait["token"] in open(found).read()
+
+
+@attempt
+def attach_to_shared_memory(bait: Bait) -> Any:
+    LIBC.shmat.restype = ctypes.c_void_p
+    identifier = LIBC.shmget(bait["shared_key"], 0, 0)
+    if identifier < 0:
+        raise OSError(ctypes.get_errno(), "shmget")
+    return f"segment {identifier}"
+
+
+@attempt
+def know_the_host_name(bait: Bait) -> Any:
+    return socket.gethostname() if socket.gethostname() == bait["host_name"] else None
+
+
+@attempt
+def know_its_control_group(bait: Bait) -> Any:
+    found = [line for line in open("/proc/self/cgroup").read().split() if bait["cgroup"] in line]
+    return found if bait["cgroup"] and found else None
+
+
+@attempt
+def make_a_user_namespace(bait: Bait) -> Any:
+    return reaches_kernel(272, 97, 0x10000000)
+
+
+@attempt
+def call_unshare_at_all(bait: Bait) -> Any:
+    return reaches_kernel(272, 97, 0x400)  # CLONE_FILES needs no privilege
+
+
+@attempt
+def clone_into_a_namespace(bait: Bait) -> Any:
+    pid = call(56, 220, 0x10000000 | signal.SIGCHLD, 0, 0, 0, 0)
+    if pid == 0:
+        os._exit(0)
+    return "clone"
+
+
+@attempt
+def mount_something(bait: Bait) -> Any:
+    os.makedirs("mounted", exist_ok=True)
+    call(165, 40, b"tmpfs", b"mounted", b"tmpfs", 0, b"size=4k")
+    call(166, 39, b"mounted", 2)
+    return "tmpfs"
+
+
+@attempt
+def open_a_mount_tree(bait: Bait) -> Any:
+    return reaches_kernel(428, 428, -100, b"/", 0)
+
+
+@attempt
+def hold_capabilities(bait: Bait) -> Any:
+    lines = dict(line.split(":\t", 1) for line in open("/proc/self/status") if ":\t" in line)
+    held = int(lines["CapEff"], 16) | int(lines["CapPrm"], 16)
+    return hex(held) if held else None
+
+
+@attempt
+def gain_privileges(bait: Bait) -> Any:
+    lines = dict(line.split(":\t", 1) for line in open("/proc/self/status") if ":\t" in line)
+    return None if lines["NoNewPrivs"].strip() == "1" else "no_new_privs is not set"
+
+
+@attempt
+def be_root(bait: Bait) -> Any:
+    return "user 0" if os.getuid() == 0 else os.setuid(0)
+
+
+@attempt
+def rename_the_host(bait: Bait) -> Any:
+    socket.sethostname(socket.gethostname())
+    return "sethostname"
+
+
+@attempt
+def use_keyrings(bait: Bait) -> Any:
+    return reaches_kernel(250, 219, 0, -3, 0)  # KEYCTL_GET_KEYRING_ID
+
+
+@attempt
+def load_a_bpf_program(bait: Bait) -> Any:
+    return reaches_kernel(321, 280, 9999, None, 0)
+
+
+@attempt
+def measure_performance(bait: Bait) -> Any:
+    attributes = struct.pack("=IIQQQQQ", 1, 112, 0, 0, 0, 0, 0b1100001) + bytes(64)
+    return reaches_kernel(298, 241, attributes[:112].ljust(112, b"\0"), 0, -1, -1, 0)
+
+
+@attempt
+def handle_page_faults(bait: Bait) -> Any:
+    return reaches_kernel(323, 282, 1)  # UFFD_USER_MODE_ONLY
+
+
+@attempt
+def use_io_uring(bait: Bait) -> Any:
+    return reaches_kernel(425, 425, 1, ctypes.create_string_buffer(120))
+
+
+@attempt
+def name_files_by_handle(bait: Bait) -> Any:
+    handle = struct.pack("=II", 128, 0) + bytes(128)
+    return reaches_kernel(303, 264, -100, b"/", handle, ctypes.create_string_buffer(8), 0)
+
+
+@attempt
+def change_personality(bait: Bait) -> Any:
+    return reaches_kernel(135, 92, 0x0040000)  # ADDR_NO_RANDOMIZE
+
+
+@attempt
+def load_a_kernel_module(bait: Bait) -> Any:
+    return reaches_kernel(175, 105, None, 0, b"")
+
+
+@attempt
+def read_the_kernel_log(bait: Bait) -> Any:
+    return reaches_kernel(103, 116, 3, ctypes.create_string_buffer(512), 512)
+
+
+@attempt
+def type_into_a_terminal(bait: Bait) -> Any:
+    _, terminal = pty.openpty()
+    os.setsid()
+    fcntl.ioctl(terminal, termios.TIOCSCTTY, 0)
+    fcntl.ioctl(terminal, termios.TIOCSTI, b"x")
+    return "TIOCSTI"
+
+
+@attempt
+def write_a_setting_of_the_kernel(bait: Bait) -> Any:
+    for setting in ("/proc/sys/kernel/core_pattern", "/proc/sys/vm/overcommit_memory"):
+        with open(setting, "r+") as file:
+            return str(file.name)
+
+
+@attempt
+def open_a_disk(bait: Bait) -> Any:
+    for name in ("vda", "sda", "nvme0n1", "loop0", "loop1"):
+        try:
+            os.close(os.open(f"/dev/{name}", os.O_RDONLY))
+            return name
+        except OSError as error:
+            last = error
+    raise last
+
+
+@attempt
+def open_the_memory_device(bait: Bait) -> Any:
+    os.close(os.open("/dev/kmsg", os.O_RDONLY))
+    return "kmsg"
+
+
+@attempt
+def open_a_device_of_another(bait: Bait) -> Any:
+    os.close(os.open(bait["terminal"], os.O_RDWR | os.O_NOCTTY))
+    return bait["terminal"]
+
+
+@attempt
+def fork_without_end(bait: Bait) -> Any:
+    children = []
+    try:
+        for _ in range(300):
+            pid = os.fork()
+            if pid == 0:
+                time.sleep(ATTEMPT_S)
+                os._exit(0)
+            children.append(pid)
+        return f"{len(children)} processes"
+    finally:
+        for pid in children:
+            os.kill(pid, signal.SIGKILL)
+            os.waitpid(pid, 0)
+
+
+@attempt
+def take_all_memory(bait: Bait) -> Any:
+    try:
+        return f"{len(bytearray(512 * MEGABYTE)) // MEGABYTE} MB"
+    except MemoryError as error:
+        raise OSError(12, "out of memory") from error
+
+
+@attempt
+def open_files_without_end(bait: Bait) -> Any:
+    kept = [os.open("/dev/null", os.O_RDONLY) for _ in range(200)]
+    return f"{len(kept)} descriptors"
+
+
+@attempt
+def write_a_huge_file(bait: Bait) -> Any:
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    return filled("huge", 24, 24)
+
+
+@attempt
+def fill_tmp(bait: Bait) -> Any:
+    return filled("/tmp/nondum-escape-fill", 80)
+
+
+@attempt
+def fill_shared_memory(bait: Bait) -> Any:
+    return filled("/dev/shm/nondum-escape-fill", 80)
+
+
+@attempt
+def dump_core(bait: Bait) -> Any:
+    return "a limit above 0" if resource.getrlimit(resource.RLIMIT_CORE)[1] else None
+
+
+def filled(path: str, megabytes: int, per_file: int = 8) -> str:
+    paths = [f"{path}-{number}" for number in range(-(-megabytes // per_file))]
+    try:
+        for each in paths:
+            with open(each, "wb", buffering=0) as file:
+                for _ in range(per_file):
+                    if file.write(bytes(MEGABYTE)) < MEGABYTE:
+                        raise OSError(28, "no space left")
+        return f"{megabytes} MB"
+    finally:
+        for each in filter(os.path.exists, paths):
+            os.unlink(each)
+
+
+def tried(name: str, bait: Bait) -> dict[str, Any]:
+    """What one attempt, made by a child, came to."""
+    read_end, write_end = os.pipe()
+    child = os.fork()
+    if child == 0:
+        signal.alarm(ATTEMPT_S)
+        try:
+            found = ATTEMPTS[name](bait)
+            said = {"could": found is not None, "what": str(found or "nothing there")}
+            if isinstance(found, dict):  # the host's word counts
+                said.update(found)
+        except BaseException as error:
+            said = {"could": False, "what": f"{type(error).__name__}: {error}"}
+        os.write(write_end, json.dumps(said).encode()[:4000])
+        os._exit(0)
+    os.close(write_end)
+    heard = b""
+    while part := os.read(read_end, 4096):
+        heard += part
+    os.close(read_end)
+    _, status = os.waitpid(child, 0)
+    if not heard:
+        return {"could": False, "what": f"ended with status {status}"}
+    answer: dict[str, Any] = json.loads(heard)
+    return answer
+
+
+@hookimpl
+def start(ctx: Context) -> None:
+    bait = json.loads(ctx.settings["bait"])
+    for name in bait["attempts"] or list(ATTEMPTS):
+        print("tried", json.dumps({"name": name, **tried(name, bait)}), flush=True)
+    print("tried all", flush=True)

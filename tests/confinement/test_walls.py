@@ -1,0 +1,190 @@
+"""Each wall matters: without it, and only without it, a hostile plugin gets somewhere."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import shutil
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.confinement.baits import SMALL, attempted, laid
+from tests.host.workers.house import until_gone
+
+from nondum.host.confinement import bubblewrap, refusals
+from nondum.host.workers.confinements import Boxed, Held
+
+pytestmark = pytest.mark.anyio
+
+BWRAP = shutil.which("bwrap") or "bwrap"
+
+IN_A_ROOM = {
+    "processes": ("see a process of the host", ()),
+    "messages": ("attach to shared memory", ()),
+    "host name": ("know the host name", ()),
+    "network": ("connect by tcp", ()),
+    "cgroups": ("know its control group", ()),
+    "size of tmp": ("fill tmp", ()),
+    "outside": ("see what the keeper sees", ()),
+    "system": ("write to the root", ()),
+    "code": ("change its own code", ()),
+    "settings": ("write a setting of the kernel", ()),
+    "user": ("be root", ()),
+    "user namespaces": ("make a user namespace", ("namespaces",)),
+    "capabilities": ("hold capabilities", ()),
+    "filter": ("use keyrings", ()),
+    "mounts": ("open a mount tree", ()),
+    "namespaces": ("call unshare at all", ()),
+    "spying": ("trace a child", ()),
+    "keys": ("use keyrings", ()),
+    "bpf": ("load a bpf program", ()),
+    "perf": ("measure performance", ()),
+    "userfaultfd": ("handle page faults", ()),
+    "io_uring": ("use io uring", ()),
+    "handles": ("name files by handle", ()),
+    "kernel": ("change personality", ()),
+    "terminal": ("type into a terminal", ()),
+    "sockets": ("make an exotic socket", ()),
+}
+"""Wall → what succeeds without it, and walls that must be away too, being in front of it."""
+
+ON_THE_HOST = {
+    "landlock": ("read a file of the host", ("user",)),
+    "capabilities": ("hold capabilities", ("user",)),
+    "filter": ("trace a child", ("user",)),
+    "messages": ("attach to shared memory", ("user",)),
+    "sockets": ("connect to a path", ("user",)),
+    "spying": ("trace a child", ("user",)),
+}
+"""The same of level 1."""
+
+LIMITS = {
+    "memory_mb": ("take all memory", 2048),
+    "tasks": ("fork without end", 1000),
+    "descriptors": ("open files without end", 1024),
+    "file_mb": ("write a huge file", 100),
+}
+"""Limit → what succeeds with more of it."""
+
+
+@pytest.fixture(scope="module")
+def cgroup() -> Iterator[str]:
+    """Where this process, and so whatever it starts, is in the hierarchy of control groups."""
+    with moved() as name:
+        yield name
+
+
+@pytest.fixture(scope="module")
+def bait(tmp_path_factory: pytest.TempPathFactory, cgroup: str) -> Iterator[dict[str, Any]]:
+    with laid(tmp_path_factory.mktemp("bait"), cgroup) as bait:
+        yield bait
+
+
+@contextlib.contextmanager
+def moved() -> Iterator[str]:
+    """A control group of this process's own, in whichever hierarchy lets it have one."""
+    for line in Path("/proc/self/cgroup").read_text(encoding="ascii").split():
+        _, controllers, before = line.split(":", 2)
+        root = Path("/sys/fs/cgroup") / (controllers.removeprefix("name=") or ".")
+        own = root / before.lstrip("/") / "nondum-walls"
+        with contextlib.suppress(OSError):
+            own.mkdir(exist_ok=True)
+            (own / "cgroup.procs").write_text(str(os.getpid()))
+            try:
+                yield own.name
+                return
+            finally:
+                (own.parent / "cgroup.procs").write_text(str(os.getpid()))
+                own.rmdir()
+    yield ""
+
+
+@pytest.mark.parametrize("wall", IN_A_ROOM)
+async def test_wall_of_a_room_matters(tmp_path: Path, bait: dict[str, Any], wall: str) -> None:
+    name, away = IN_A_ROOM[wall]
+    whole = Boxed(BWRAP, without=away)
+    broken = Boxed(BWRAP, without=(*away, wall))
+    assert not (await attempted(tmp_path / "whole", bait, whole, [name]))[name].could
+    result = (await attempted(tmp_path / "broken", bait, broken, [name]))[name]
+    assert result.could, f"without {wall}: {result.what}"
+
+
+@pytest.mark.parametrize("wall", ON_THE_HOST)
+async def test_wall_of_level_1_matters(tmp_path: Path, bait: dict[str, Any], wall: str) -> None:
+    name, away = ON_THE_HOST[wall]
+    whole, broken = Held(without=away), Held(without=(*away, wall))
+    assert not (await attempted(tmp_path / "whole", bait, whole, [name]))[name].could
+    result = (await attempted(tmp_path / "broken", bait, broken, [name]))[name]
+    assert result.could, f"without {wall}: {result.what}"
+
+
+@pytest.mark.parametrize("limit", LIMITS)
+async def test_limit_matters(tmp_path: Path, bait: dict[str, Any], limit: str) -> None:
+    name, more = LIMITS[limit]
+    room = Boxed(BWRAP)
+    assert not (await attempted(tmp_path / "little", bait, room, [name]))[name].could
+    much = replace(SMALL, **{"memory_mb": 1024, limit: more})  # forks need some, too
+    result = (await attempted(tmp_path / "much", bait, room, [name], much))[name]
+    assert result.could, result.what
+
+
+def test_every_wall_is_shown_to_matter() -> None:
+    assert set(bubblewrap.NAMESPACES) - {"daemon's end"} <= set(IN_A_ROOM)
+    assert set(refusals.GROUPS) <= set(IN_A_ROOM)
+    assert set(refusals.WITHOUT_NAMESPACES) <= set(ON_THE_HOST)
+
+
+DAEMON = """
+import sys, time
+from nondum.host.workers.confinements import Boxed
+from nondum.host.workers.spare import Spare
+
+room = Boxed(sys.argv[1], without=sys.argv[2:])
+print(Spare(room, room.ground(None)).popen.pid, flush=True)
+time.sleep(600)
+"""
+
+
+async def spare_of_a_daemon_that_dies(*without: str) -> tuple[int, int]:
+    """What made the room of a spare that does not listen, and its keeper; the daemon is dead."""
+    daemon = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-c", DAEMON, BWRAP, *without), stdout=asyncio.subprocess.PIPE
+    )
+    assert daemon.stdout is not None
+    outer = int(await daemon.stdout.readline())
+    keeper = await asyncio.to_thread(child_of, outer)
+    os.kill(keeper, signal.SIGSTOP)
+    daemon.kill()
+    await daemon.communicate()
+    return outer, keeper
+
+
+def child_of(pid: int) -> int:
+    """The only child of a process, as soon as it has one."""
+    children = Path(f"/proc/{pid}/task/{pid}/children")
+    while not (found := children.read_text(encoding="ascii").split()):
+        time.sleep(0.01)
+    return int(found[0])
+
+
+async def test_spare_that_hangs_ends_with_its_daemon() -> None:
+    outer, keeper = await spare_of_a_daemon_that_dies()
+    await until_gone(outer)
+    await until_gone(keeper)
+
+
+async def test_without_that_wall_it_would_not() -> None:
+    outer, keeper = await spare_of_a_daemon_that_dies("daemon's end")
+    try:
+        with pytest.raises(TimeoutError):
+            await until_gone(keeper, timeout_s=0.5)
+    finally:
+        os.kill(outer, signal.SIGKILL)
+        os.kill(keeper, signal.SIGKILL)
