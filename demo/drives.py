@@ -9,20 +9,27 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from demo.maker import Maker
 from demo.robot import nondum
 
 PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
 
 
-def build(plugins: Sequence[Path], *, libraries: Sequence[Path], cache: Path) -> dict[str, Path]:
+def build(
+    plugins: Sequence[Path],
+    *,
+    libraries: Sequence[Path],
+    cache: Path,
+    maker: Maker | None = None,
+) -> dict[str, Path]:
     """Build one drive per plugin folder, or take it from the cache while its sources are the same.
 
-    `libraries` are folders of distributions that plugins depend on and no index has. Returns the
-    drive of each plugin by the folder's name.
+    `libraries` are folders of distributions that plugins depend on and no index has; `maker` signs,
+    if there is one. Returns the drive of each plugin by the folder's name.
     """
     drives = {}
     for plugin in plugins:
-        digest = _digest([plugin, *libraries])
+        digest = _digest([plugin, *libraries], maker)
         drive = cache / f"{plugin.name}-{digest[:12]}"
         if not drive.exists():
             unfinished = drive.with_suffix(".part")
@@ -38,6 +45,8 @@ def build(plugins: Sequence[Path], *, libraries: Sequence[Path], cache: Path) ->
             ]
             for library in libraries:
                 command += ["--library", library]
+            if maker is not None:
+                command += ["--sign", maker.key]
             nondum(*command, "--quiet")
             unfinished.rename(drive)
         drives[plugin.name] = drive
@@ -50,8 +59,9 @@ def payload_id(drive: Path) -> str:
     return str(payload["id"])
 
 
-def _digest(folders: Sequence[Path]) -> str:
+def _digest(folders: Sequence[Path], maker: Maker | None) -> str:
     total = hashlib.sha256(PYTHON.encode())
+    total.update(maker.public if maker is not None else b"")
     for folder in folders:
         for path in sorted(folder.rglob("*")):
             inside = path.relative_to(folder)

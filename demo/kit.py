@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from demo.drives import build, payload_id
+from demo.maker import Maker
 
 ROOT = Path(__file__).parent.parent
 PLUGINS = ROOT / "plugins"
 CACHE = ROOT / ".run/drives"
+MAKER = ROOT / ".run/maker"
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +22,8 @@ class Kit:
     drives: Mapping[str, Path]
     payloads: Mapping[str, str]
     """Payload ids."""
+    trust: Path
+    """The trust file by which robots let them in."""
 
     @classmethod
     def built(
@@ -33,13 +37,16 @@ class Kit:
         """Build drives, or take them from the cache. `folders` are the sources of plugins and
         libraries that are not where they are in the checkout."""
         where = {name: folders.get(name, PLUGINS / name) for name in (*names, *libraries)}
+        maker = Maker.at(MAKER)
         drives = build(
             [where[name] for name in names],
             libraries=[where[name] for name in libraries],
             cache=cache,
+            maker=maker,
         )
         by_name = {name: drives[where[name].name] for name in names}
-        return cls(by_name, {name: payload_id(drive) for name, drive in by_name.items()})
+        payloads = {name: payload_id(drive) for name, drive in by_name.items()}
+        return cls(by_name, payloads, maker.trust)
 
     def of(self, names: Sequence[str]) -> dict[str, Path]:
         """Payload id → drive, in the order of `names`."""

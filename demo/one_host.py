@@ -53,7 +53,7 @@ def main(arguments: Sequence[str]) -> int:
 def _play(options: argparse.Namespace, work: Path, say: Says) -> Iterator[StageResult]:
     kit = _kit(options, work, say)
     with (
-        running(work, name="panther", initial=kit.of([INITIAL])) as robot,
+        running(work, name="panther", initial=kit.of([INITIAL]), trust=kit.trust) as robot,
         live.view([robot], is_shown=not (options.json or options.plain)),
     ):
         yield from _played(robot, kit, options, say)

@@ -123,19 +123,21 @@ def running(
     *,
     name: str,
     initial: Mapping[str, Path],
+    trust: Path | None = None,
     more: str = "",
     inside: Sequence[str] = (),
 ) -> Iterator[Robot]:
     """A host with initial components, started and at last stopped.
 
-    `more` are further lines of its configuration; `inside` is what runs commands on its machine,
-    if that is not this one.
+    `trust` is the trust file that it is given; without one, it takes any payload. `more` are
+    further lines of its configuration; `inside` is what runs commands on its machine, if that is
+    not this one.
     """
     robot = Robot(work, name=name)
     for folder in (robot.slots, robot.devices):
         folder.mkdir(parents=True)
     config = work / "host.toml"
-    config.write_text(configuration(robot) + more, encoding="utf-8")
+    config.write_text(configuration(robot, trust) + more, encoding="utf-8")
     command = [*inside, *NONDUM, "host", "run", "--user", "--config", str(config)]
     with (work / "daemon.log").open("wb") as log:
         daemon = robot.process = subprocess.Popen(command, stdout=log, stderr=log)
@@ -152,8 +154,10 @@ def running(
             daemon.wait(timeout=20)
 
 
-def configuration(robot: Robot) -> str:
-    """What a robot is told of itself: slots instead of real ports, unsigned payloads allowed."""
+def configuration(robot: Robot, trust: Path | None = None) -> str:
+    """What a robot is told of itself: slots instead of real ports, and whom to trust; nobody in
+    particular, without a trust file."""
+    believes = "allow_unsigned = true" if trust is None else f'[trust]\nfile = "{trust}"'
     return f"""\
 [host]
 name = "{robot.name}"
@@ -163,7 +167,7 @@ control = "{robot.control}"
 [drives]
 slots = ["{robot.slots}"]
 block_devices = false
-allow_unsigned = true
+{believes}
 
 [devices]
 slots = ["{robot.devices}"]

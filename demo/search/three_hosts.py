@@ -6,7 +6,7 @@ import argparse
 import functools
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -82,7 +82,7 @@ def _play(
         stack.enter_context(live.view(shown, is_shown=not (options.json or options.plain)))
 
         def switch_on(name: str, *initial: str) -> Robot:
-            shown.append(_switched_on(where, work / name, kit.of(initial), stack))
+            shown.append(_switched_on(where, work / name, kit, initial, stack))
             return shown[-1]
 
         yield from _played(options, where, kit, person, switch_on, say)
@@ -120,13 +120,22 @@ def _played(
         yield losing.lose_node(where, node, following, [robot])
 
 
-def _switched_on(where: Site, folder: Path, initial: Mapping[str, Path], stack: ExitStack) -> Robot:
+def _switched_on(
+    where: Site, folder: Path, kit: Kit, initial: Sequence[str], stack: ExitStack
+) -> Robot:
     """A host that runs until the stack is unwound; it is called as its folder."""
     folder.mkdir()
     name = folder.name
     more = where.prepare(name, folder / "state")
     return stack.enter_context(
-        running(folder, name=name, initial=initial, more=more, inside=where.inside(name))
+        running(
+            folder,
+            name=name,
+            initial=kit.of(initial),
+            trust=kit.trust,
+            more=more,
+            inside=where.inside(name),
+        )
     )
 
 

@@ -43,7 +43,7 @@ Commands:
   halt        Halt what the robot is doing.
   host        Run the daemon.
   journal     What happened on this host, oldest first.
-  keys        Make the keys of a fleet, and certify its hosts.
+  keys        Whose payloads robots run, and which hosts a fleet certifies.
   logs        What components have written.
   mount       Tell where on the body a unit is mounted.
   payload     Make, judge and install payloads.
