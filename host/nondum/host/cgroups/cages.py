@@ -132,7 +132,7 @@ class Cages:
     def problems(self) -> tuple[Problem, ...]:
         """What cannot be limited here, and what to do about it."""
         machine = known(Path("/proc/cgroups").read_text(encoding="ascii"))
-        return tuple(_problems(self._tree, machine))
+        return tuple(problems_of(self._tree, machine))
 
 
 class NoTree:
@@ -201,7 +201,8 @@ def _descendants(pid: int) -> Iterator[int]:
                 yield from _descendants(int(child))
 
 
-def _problems(tree: Tree, machine: Collection[str]) -> Iterator[Problem]:
+def problems_of(tree: Tree, machine: Collection[str]) -> Iterator[Problem]:
+    """What a tree does not limit, apart for controllers that the machine has and has not."""
     missing = [name for name in _MISSING if name not in tree.controllers]
     if withheld := [name for name in missing if name in machine]:
         yield Problem(

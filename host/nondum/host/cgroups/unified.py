@@ -141,7 +141,8 @@ def _hand_down(part: Path) -> None:
 
 def _enable(part: Path) -> frozenset[str]:
     """Enable each controller by itself: one that is missing must not cost the others."""
-    for controller in WANTED:
+    there = WANTED & knobs.words(part / "cgroup.controllers")
+    for controller in there - knobs.words(part / "cgroup.subtree_control"):
         with contextlib.suppress(OSError):
             knobs.put(part / "cgroup.subtree_control", f"+{controller}")
     return WANTED & knobs.words(part / "cgroup.subtree_control")
