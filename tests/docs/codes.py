@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -72,6 +73,16 @@ def references() -> str:
         told[found.code].append(found)
     sections = (_section(area, declared, told) for area, declared in codes.areas().items())
     return "\n".join(sections)
+
+
+def told_words() -> str:
+    """The sentences of each code, as JSON."""
+    words: dict[str, dict[str, None]] = defaultdict(dict)
+    for told in all_told():
+        if told.words:
+            words[told.code][told.words] = None
+    rows = {code: list(said) for code, said in sorted(words.items())}
+    return json.dumps(rows, ensure_ascii=False, indent=0) + "\n"
 
 
 @cache

@@ -1,4 +1,4 @@
-"""The parts of docs/ that say what the code says: made from it, and compared with it.
+"""The parts of docs/ (and what `nondum explain` quotes) that say what the code says: made from it.
 
     python -m tests.docs.reference        # writes them anew
 
@@ -18,10 +18,13 @@ import click
 from tests.docs import codes
 
 from nondum.host import config
+from nondum.host.cli import explain
 from nondum.host.cli.main import cli
 from nondum.sdk import hooks
 
 DOCS = Path(__file__).parents[2] / "docs"
+TOLD = Path(explain.__file__).with_name(explain.TOLD)
+"""What `nondum explain` quotes; it ships with nondum, which does not read its own sources."""
 MARK = "<!-- What follows is written by `python -m tests.docs.reference`. -->\n"
 
 
@@ -145,6 +148,7 @@ def main() -> None:
         path = DOCS / name
         words = path.read_text(encoding="utf-8").partition(MARK)[0]
         path.write_text(f"{words}{MARK}\n{make()}", encoding="utf-8")
+    TOLD.write_text(codes.told_words(), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -37,6 +37,7 @@ Commands:
   components  What the robot is made of at this moment.
   devices     What is plugged in, and who has it.
   doctor      Look for what is wrong around this host, without a daemon.
+  explain     Say what a code means, where it comes from, and what to do.
   facts       What the robot believes, and why.
   goal        Give the robot a goal, in words or in PDDL.
   goals       What can be asked for now, and what was.

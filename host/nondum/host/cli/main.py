@@ -28,6 +28,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "components": ("body", "What the robot is made of at this moment."),
     "devices": ("body", "What is plugged in, and who has it."),
     "doctor": ("doctor", "Look for what is wrong around this host, without a daemon."),
+    "explain": ("explain", "Say what a code means, where it comes from, and what to do."),
     "facts": ("mind", "What the robot believes, and why."),
     "goal": ("act", "Give the robot a goal, in words or in PDDL."),
     "goals": ("mind", "What can be asked for now, and what was."),
