@@ -70,6 +70,7 @@ class Executor:
         )
         self._lanes = Lanes()
         self._quiet = Quiet()
+        self._is_prune_waiting = False
         self._drives = DriveReading(self.children, emit, self.trust)
         self.installation = Installation(
             host, folders, workers, self.children, emit, options, self.trust
@@ -118,7 +119,7 @@ class Executor:
         instead = isinstance(effect, _INSTEAD)
         self._lanes.add(_lane(effect), partial(self._carry_out, effect), instead=instead)
         if isinstance(effect, effects.ClearPayload):
-            self._lanes.add("store", self._prune)
+            self._want_prune()
 
     async def close(self) -> None:
         """Give up what is being done, unmount drives, end children. Workers are their owner's."""
@@ -150,7 +151,14 @@ class Executor:
     async def _compile(self, effect: effects.CompileWheels) -> tuple[Event, ...]:
         return await self._quiet.run(partial(self.installation.compile, effect))
 
+    def _want_prune(self) -> None:
+        """Have the store pruned; one that is to come serves all who have asked till then."""
+        if not self._is_prune_waiting:
+            self._is_prune_waiting = True
+            self._lanes.add("store", self._prune)
+
     async def _prune(self) -> None:
+        self._is_prune_waiting = False
         # What fails is tried again when the next payload goes.
         with contextlib.suppress(NondumError), self._quiet.urgent():
             await self.installation.prune()

@@ -51,6 +51,9 @@ or refused; the others wait."""
 COPY_SILENCE_S = 20.0
 """A drive that gives not a megabyte in this time hangs."""
 
+OWN = "store"
+"""Owner of the children that read nothing but what was checked before."""
+
 STOP_S = 1.5
 """What workers have to end once their payload is withdrawn; the rest of the two promised seconds
 is for deleting."""
@@ -236,13 +239,13 @@ class Installation:
         async with self._store:
             payloads = [str(folder) for folder in self._folders.all_payloads()]
             arguments = self._arguments(folders=payloads, quota_mb=self._options.quota_mb)
-            await self._children.run("prune", arguments)
+            await self._children.run("prune", arguments, owner=OWN)
 
     async def listing(self) -> list[dict[str, Any]]:
         """What the store holds: wheel, bytes, used_by (payload keys), sha256."""
         payloads = [str(folder) for folder in self._folders.all_payloads()]
         rows: list[dict[str, Any]] = await self._children.run(
-            "listing", self._arguments(folders=payloads)
+            "listing", self._arguments(folders=payloads), owner=OWN
         )
         return rows
 
