@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import ctypes
 import errno
+import fcntl
 import hashlib
 import os
 import struct
@@ -16,6 +18,7 @@ import pytest
 import pyudev
 from tests.host.drives.test_usb import stick
 from tests.host.lifecycle.living import LAMP, Living, left_over, living
+from tests.lab.traces import until_unmounted
 from tests.payloads import Part, make_payload, make_wheel
 
 from nondum.host import events
@@ -62,9 +65,9 @@ def make_ext4(content: Path, file: Path, size_mb: int = 24) -> None:
 
 
 @contextmanager
-def attached(file: Path, *options: str) -> Iterator[Path]:
-    """A loop device on an image."""
-    node = _run("losetup", "--find", "--show", *options, str(file)).strip()
+def attached(file: Path) -> Iterator[Path]:
+    """A loop device on an image, which may have partitions."""
+    node = _run("losetup", "--find", "--show", "--partscan", str(file)).strip()
     try:
         yield Path(node)
     finally:
@@ -182,9 +185,19 @@ def test_drive_is_mounted_without_powers(tmp_path: Path) -> None:
 def test_wrong_file_system_is_told(tmp_path: Path) -> None:
     file = image(tmp_path, Part("lamp", LAMP))
     with attached(file) as node, pytest.raises(PayloadRefused) as refused:
-        mounting.mount(node, tmp_path / "mount", "exfat")
+        mounting.mount(node, tmp_path / "mount", "ext2")
     assert refused.value.code == "FS_ERROR"
     assert not (tmp_path / "mount").exists()
+
+
+def test_file_system_that_the_kernel_does_not_know_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mounting, "FILESYSTEMS", {"ext9": ""})
+    file = image(tmp_path, Part("lamp", LAMP))
+    with attached(file) as node, pytest.raises(PayloadRefused) as refused:
+        mounting.mount(node, tmp_path / "mount", "ext9")
+    assert refused.value.code == "FS_UNSUPPORTED"
 
 
 def attribute(node: Path, name: str) -> int:
@@ -268,22 +281,29 @@ async def test_drive_without_payloads_is_let_go_unread(tmp_path: Path) -> None:
             await until_drive_is(host, DriveState.IDLE)
             (drive,) = host.snapshot.drives
             assert [problem.code for problem in drive.problems] == ["DRIVE_NOT_PAYLOAD"]
-            await host.until(lambda: not mounting.mounted_below(host.folders.mounts))
+            await asyncio.to_thread(until_unmounted, host.folders.mounts)
 
 
 def partitioned(tmp_path: Path, *images: Path) -> Path:
-    """A disk with one Linux partition for each image, by a partition table of the old kind."""
-    disk, start, entries = tmp_path / "disk.img", 2048, b""
+    """A disk that is to have a partition of each image, one after the other."""
+    disk = tmp_path / "disk.img"
     with disk.open("wb") as out:
+        out.write(bytes(PARTITION))
         for file in images:
-            sectors = file.stat().st_size // 512
-            entries += struct.pack("<8B2I", 0, 0, 0, 0, 0x83, 0, 0, 0, start, sectors)
-            out.seek(start * 512)
-            out.write(file.read_bytes())
-            start += sectors
-        out.seek(446)
-        out.write(entries.ljust(64, b"\0") + b"\x55\xaa")
+            out.write(file.read_bytes().ljust(PARTITION, b"\0"))
     return disk
+
+
+def partition(node: Path, number: int) -> None:
+    """Have a disk's partition known, as reading its table does (BLKPG): kernels read few kinds."""
+    entry = struct.pack("<qqi64s64s4x", number * PARTITION, PARTITION, number, b"", b"")
+    buffer = ctypes.create_string_buffer(entry, len(entry))
+    argument = struct.pack("<iiixxxxQ", 1, 0, len(entry), ctypes.addressof(buffer))
+    with node.open("rb") as disk:
+        fcntl.ioctl(disk, 0x1269, argument)
+
+
+PARTITION = 24 * 2**20
 
 
 async def test_each_partition_is_judged_alone(tmp_path: Path) -> None:
@@ -291,7 +311,9 @@ async def test_each_partition_is_judged_alone(tmp_path: Path) -> None:
     bad = image(tmp_path / "bad", Part("worse", LAMP), payload_id="org.example.worse", spoilt=True)
     disk = partitioned(tmp_path, good, bad)
     async with living(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
-        with attached(disk, "--partscan"):
+        with attached(disk) as node:
+            for number in (1, 2):
+                partition(node, number)
             await host.until_step(LAMP_ID, Step.ACTIVE)
             record = await host.until_step("org.example.worse", Step.REFUSED)
             assert [problem.code for problem in record.problems] == ["HASH_MISMATCH"]
@@ -319,8 +341,9 @@ async def test_composite_stick_is_refused_unread(tmp_path: Path) -> None:
             assert attribute(node, "ro") == 0, "it was not touched"
 
         def allowed(folders: Folders) -> Sequence[DriveSource]:
-            rule = {"accepts": on(tmp_path), "sysfs": sysfs, "single_function": False}
-            return [BlockSource(folders.mounts, **rule)]
+            accepts = on(tmp_path)
+            rule = BlockSource(folders.mounts, accepts=accepts, sysfs=sysfs, single_function=False)
+            return [rule]
 
         async with living(tmp_path, sources=allowed) as host:
             await host.until_step(LAMP_ID, Step.ACTIVE)

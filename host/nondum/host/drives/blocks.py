@@ -54,6 +54,8 @@ class BlockSource:
                     self._look_at_all(context, emit)
                     continue
                 for device in devices:
+                    if device.device_type == "partition" and device.parent is not None:
+                        self._look(device.parent, emit)  # it may have been taken for a drive
                     self._look(device, emit)
 
     def _look_at_all(self, context: pyudev.Context, emit: Emit) -> None:

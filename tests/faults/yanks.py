@@ -1,0 +1,170 @@
+"""Drives yanked at any moment: the loop's backing file is cut off, and the kernel says it went.
+
+What is measured is the time from that until nothing of its payload is left: no row, no process, no
+mount and no folder. The good payload beside it must not notice.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import random
+import subprocess
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tests.faults.hostile.gauntlet import attach, detach
+from tests.host.drives.test_blocks import make_ext4, on
+from tests.host.lifecycle.living import LAMP, Living, living
+from tests.payloads import Part, make_payload, make_wheel
+
+from nondum.host.catalogue.records import Step
+from nondum.host.drives import mounting
+from nondum.host.drives.blocks import BlockSource
+from nondum.host.lifecycle.folders import Folders
+
+GOOD, BAD = "org.example.good", "org.example.lamp"
+PHASES = ("look", "copy", "install", "run", "idle")
+"""What is going on when the drive is yanked: see `phase_of`."""
+BALLAST_MB = 8
+CUT_TO = 1024**2
+PRUNED_S = 20.0
+IDLE_S = 0.5
+
+
+@dataclass
+class Yanks:
+    """What came of them."""
+
+    seconds: dict[str, list[float]] = field(default_factory=lambda: {p: [] for p in PHASES})
+    """Phase → times until nothing was left."""
+    stuck_mounts: int = 0
+    left_over: list[str] = field(default_factory=list)
+    disturbed: int = 0
+    """How often the good payload was not as it had been."""
+
+    @property
+    def all_seconds(self) -> list[float]:
+        """Of all phases, in order of length."""
+        return sorted(s for each in self.seconds.values() for s in each)
+
+
+class Bench:
+    """A host with a good payload, and a drive to be yanked. Made by `bench`."""
+
+    def __init__(self, host: Living, image: Path, root: Path) -> None:
+        self.host, self._image, self._root = host, image, root
+        self.told = Yanks()
+        self._good = host.workers.pids()["good"]
+        self._kept = set(self._folders())
+        self._whole_s = 0.0
+
+    async def measure(self) -> None:
+        """See how long a payload takes from its drive's coming until it is active."""
+        node = await self._insert()
+        began = time.monotonic()
+        await self.host.until_step(BAD, Step.ACTIVE)
+        self._whole_s = time.monotonic() - began
+        await self._yank(node)
+        await self._until_pruned(node)
+
+    async def yank(self, share: float) -> None:
+        """Insert the drive and yank it at a share of the time that all takes; 1 and more: while it
+        runs, and when nothing is wanted of it any more."""
+        node = await self._insert()
+        await asyncio.sleep(share * self._whole_s + (IDLE_S if share > 1 else 0.0))
+        phase = self._phase()
+        began = time.monotonic()
+        await self._yank(node)
+        await self._until_pruned(node)
+        self.told.seconds[phase].append(time.monotonic() - began)
+        self._look_around()
+
+    async def _insert(self) -> Path:
+        copy = self._root / f"stick-{time.monotonic_ns()}.img"
+        await asyncio.to_thread(_clone, self._image, copy)
+        return await asyncio.to_thread(attach, copy)
+
+    async def _yank(self, node: Path) -> None:
+        """What is left of a stick that is pulled: errors; and what the kernel says of it."""
+        await asyncio.to_thread(_cut, node)
+
+    async def _until_pruned(self, node: Path) -> None:
+        host = self.host
+        async with asyncio.timeout(PRUNED_S):
+            await host.until(lambda: not any(d.kind == "block" for d in host.snapshot.drives))
+            await host.until(lambda: host.payload(BAD) is None)
+            while self._left():  # noqa: ASYNC110  # folders and mounts tell nobody that they go
+                await asyncio.sleep(0.01)
+        await asyncio.to_thread(detach, node)
+        for image in self._root.glob("stick-*.img"):
+            image.unlink()
+
+    def _left(self) -> list[str]:
+        """Folders, mounts and processes of the payload that was yanked."""
+        mounts = [str(path) for path in mounting.mounted_below(self.host.folders.mounts)]
+        workers = [id for id in self.host.workers.pids() if id != "good"]
+        return [*(set(self._folders()) - self._kept), *mounts, *workers]
+
+    def _folders(self) -> list[str]:
+        names = ("staging", "payloads", "venvs", "scratch", "mounts")
+        roots = [self.host.folders.root / name for name in names]
+        return [str(path) for root in roots if root.is_dir() for path in root.iterdir()]
+
+    def _phase(self) -> str:
+        record = self.host.payload(BAD)
+        if record is None:
+            return "look"
+        if record.step is Step.ACTIVE:
+            states = {drive.state.value for drive in self.host.snapshot.drives}
+            return "idle" if "copying" not in states else "run"
+        return "copy" if record.step is Step.RECEIVED else "install"
+
+    def _look_around(self) -> None:
+        self.told.stuck_mounts += len(mounting.mounted_below(self.host.folders.mounts))
+        self.told.left_over += self._left()
+        self.told.disturbed += self.host.workers.pids() != {"good": self._good}
+
+
+@asynccontextmanager
+async def bench(root: Path) -> AsyncIterator[Bench]:
+    """A host under `root`, with a good payload at work and an image to attach."""
+    content, image = root / "content", root / "whole.img"
+    data = {"ballast.bin": os.urandom(BALLAST_MB * 2**20)}
+    ballast = make_wheel(root, "ballast", "1.0", data)
+    make_payload(content, Part("lamp", LAMP, wheels=[ballast]), payload_id=BAD)
+    make_ext4(content, image, size_mb=3 * BALLAST_MB)
+    make_payload(root / "good", Part("good", LAMP), payload_id=GOOD)
+
+    def sources(folders: Folders) -> list[BlockSource]:
+        return [BlockSource(folders.mounts, accepts=on(root))]
+
+    async with living(root, sources=sources) as host:
+        host.plug(root / "good", "good")
+        await host.until_step(GOOD, Step.ACTIVE)
+        made = Bench(host, image, root)
+        await made.measure()
+        yield made
+
+
+async def yank_all(made: Bench, points: int, *, seed: int) -> Yanks:
+    """Yank at so many points, uniformly from the coming of the drive until it idles."""
+    moments = random.Random(seed)
+    for _ in range(points):
+        await made.yank(moments.uniform(0.0, 1.3))
+    return made.told
+
+
+def _clone(image: Path, copy: Path) -> None:
+    copy.write_bytes(image.read_bytes())
+
+
+def _cut(node: Path) -> None:
+    backing = Path(f"/sys/block/{node.name}/loop/backing_file").read_text().strip()
+    os.truncate(backing, CUT_TO)
+    Path("/proc/sys/vm/drop_caches").write_text("1")
+    Path(f"/sys/block/{node.name}/uevent").write_text("remove")
+    subprocess.run(["losetup", "--detach", str(node)], check=False, capture_output=True)
