@@ -2,51 +2,52 @@
 
 from __future__ import annotations
 
-import asyncio
-import logging
 import os
+import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from tests.faults.ways import LAMP_ID, sound
+from tests.faults.ways import LAMP_ID, newer, sound
 from tests.host.lifecycle.living import LAMP, left_over, living
 from tests.payloads import Part, make_payload, make_wheel
 
 from nondum.host import events
 from nondum.host.catalogue.records import Step
+from nondum.host.catalogue.reserve import RESERVE_BYTES
+from nondum.host.lifecycle.folders import Folders, claim
 from nondum.host.lifecycle.installation import InstallOptions
+from nondum.host.lifecycle.installed import install, uninstall
+from nondum.sdk.errors import ConfigRefused
 
 pytestmark = pytest.mark.anyio
 
 TINY_MB = 24
+TORCH_ID = "org.example.torch"
+
+
+def disk_of(root: Path, options: str) -> Path:
+    """A host's root whose state folder is on a file system of its own."""
+    (root / "state").mkdir(parents=True)
+    mount = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(root / "state")]
+    subprocess.run(mount, check=True)
+    return root
 
 
 @pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A host's root whose state folder is on a small file system."""
+def mounted(tmp_path: Path) -> Iterator[Callable[[str], Path]]:
+    """Makes a host's root whose state folder is on a file system with such options."""
     if os.geteuid() != 0:
         pytest.skip("mounting needs root")
     root = tmp_path / "host"
-    (root / "state").mkdir(parents=True)
-    options = f"size={TINY_MB}m"
-    mount = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(root / "state")]
-    subprocess.run(mount, check=True)
-    yield root
+    yield lambda options: disk_of(root, options)
     subprocess.run(["umount", "--lazy", str(root / "state")], check=True)
 
 
-class Complaint(logging.Handler):
-    """Waits for a logger to complain."""
-
-    def __init__(self, logger: str) -> None:
-        super().__init__(logging.ERROR)
-        self.heard = asyncio.Event()
-        logging.getLogger(logger).addHandler(self)
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.heard.set()
+@pytest.fixture
+def small_disk(mounted: Callable[[str], Path]) -> Path:
+    return mounted(f"size={TINY_MB}m")
 
 
 def fill(file: Path) -> None:
@@ -93,29 +94,148 @@ async def test_full_disk_while_installing_rolls_back(small_disk: Path, tmp_path:
         assert not left_over(host.folders)
 
 
-async def test_full_disk_delays_the_catalogue_and_loses_nothing(
+async def test_full_disk_does_not_keep_the_catalogue_from_being_written(
+    mounted: Callable[[str], Path], tmp_path: Path
+) -> None:
+    """Some of it was set aside, and is so again once there is room."""
+    sound(tmp_path / "drive")
+    root = mounted("size=160m")
+    async with living(root) as host:
+        filler = root / "state/filler"
+        fill(filler)
+        host.plug(tmp_path / "drive")
+        record = await host.until_step(LAMP_ID, Step.REFUSED)
+        assert [problem.code for problem in record.problems] == ["DISK_FULL"]
+        assert host.catalogue.unwritten is None
+        assert (await host.journal())[-1].event == "PayloadRefused"
+        filler.unlink()
+        host.bus.emit(events.RetryAsked(record.key))
+        await host.until(lambda: host.snapshot.component("lamp") is not None)
+        assert (root / "state/reserve").stat().st_size == RESERVE_BYTES
+
+
+async def test_withdrawal_does_not_wait_for_a_disk_that_cannot_be_written(
     small_disk: Path, tmp_path: Path
 ) -> None:
+    """It has no reserve, as when the card has become read-only."""
     sound(tmp_path / "drive")
     options = InstallOptions(allow_unsigned=True, reserve_mb=0)
     async with living(small_disk, options=options) as host:
+        host.plug(tmp_path / "drive")
+        await host.until_step(LAMP_ID, Step.ACTIVE)
         filler = small_disk / "state/filler"
         fill(filler)
-        complained = Complaint("nondum.host.lifecycle.component_manager")
-        host.plug(tmp_path / "drive")
-        await complained.heard.wait()
-        assert not host.snapshot.drives
+        host.pull()
+        await host.until_gone(LAMP_ID)
+        assert host.catalogue.unwritten is not None
+        assert not host.snapshot.components
         filler.unlink()
-        await host.until_step(LAMP_ID, Step.ACTIVE)
+        await host.until(lambda: isinstance(host.heard[-1], events.CatalogueWritten))
+        assert "PayloadCleared" in [entry.event for entry in await host.journal()]
+    async with living(small_disk, options=options) as host:
+        assert not host.snapshot.payloads
 
 
-async def test_damaged_catalogue_is_set_aside_and_drives_are_read_anew(tmp_path: Path) -> None:
+async def test_disk_without_room_for_files_is_told(
+    mounted: Callable[[str], Path], tmp_path: Path
+) -> None:
+    sound(tmp_path / "drive")
+    root = mounted("size=128m,nr_inodes=40")
+    async with living(root) as host:
+        host.plug(tmp_path / "drive")
+        record = await host.until_step(LAMP_ID, Step.REFUSED)
+        (problem,) = record.problems
+        assert (problem.code, "files" in problem.message) == ("DISK_FULL", True)
+        host.pull()
+        await host.until_gone(LAMP_ID)
+        assert not left_over(host.folders)
+
+
+async def test_host_does_not_start_on_a_disk_that_is_read_only(
+    mounted: Callable[[str], Path],
+) -> None:
+    root = mounted("size=64m,ro")
+    with pytest.raises(ConfigRefused) as refused:
+        async with living(root):
+            pass
+    assert refused.value.code == "STATE_UNWRITABLE"
+    with pytest.raises(ConfigRefused) as refused:
+        claim(Folders(root / "state"))
+    assert refused.value.code == "STATE_UNWRITABLE"
+
+
+Harm = Callable[[Path], object]
+
+HARMS: dict[str, Harm] = {
+    "damaged": lambda file: file.write_bytes(b"not a database" * 1000),
+    "cut": lambda file: os.truncate(file, 5000),
+    "gone": lambda file: file.unlink(),
+    "log-gone": lambda file: file.with_name(f"{file.name}-wal").unlink(missing_ok=True),
+}
+
+
+@pytest.mark.parametrize("has_backup", [True, False], ids=["backup", "no-backup"])
+@pytest.mark.parametrize("harm", HARMS)
+async def test_all_that_is_here_outlives_the_catalogue(
+    tmp_path: Path, harm: str, has_backup: bool
+) -> None:
+    """One payload is installed for good, another on a drive."""
+    installed = make_payload(tmp_path / "usb", Part("torch", LAMP), payload_id=TORCH_ID)
     sound(tmp_path / "drive")
     async with living(tmp_path) as host:
+        await install(installed, host.catalogue, host.bus)
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
-    host.folders.catalogue.write_bytes(b"not a database" * 1000)
+        if has_backup:
+            host.catalogue.backups.make()
+    shutil.rmtree(tmp_path / "usb")
+    HARMS[harm](host.folders.catalogue)
     async with living(tmp_path) as host:
+        await host.until_step(TORCH_ID, Step.ACTIVE)
         await host.until_step(LAMP_ID, Step.ACTIVE)
         told = [event for event in host.heard if isinstance(event, events.CatalogueSetAside)]
-        assert [problem.code for problem in told[0].problems] == ["CATALOGUE_REBUILT"]
+        codes = [problem.code for event in told for problem in event.problems]
+        assert codes == ([] if harm == "log-gone" else ["CATALOGUE_REBUILT"])
+        assert (host.catalogue.loss is None) == (harm == "log-gone")
+    async with living(tmp_path) as host:
+        await host.until_step(TORCH_ID, Step.ACTIVE)
+        assert host.catalogue.loss is None
+        await uninstall(TORCH_ID, host.catalogue, host.bus)
+        host.pull()
+        await host.until_gone(LAMP_ID)
+        assert not left_over(host.folders)
+
+
+async def test_older_release_is_refused_by_a_catalogue_made_anew(tmp_path: Path) -> None:
+    """What is installed for good tells what was active here."""
+    newer(tmp_path / "usb")
+    installed = tmp_path / "usb/nondum" / LAMP_ID
+    async with living(tmp_path) as host:
+        await install(installed, host.catalogue, host.bus)
+    host.folders.catalogue.unlink()
+    HARMS["damaged"](host.folders.catalogue)
+    sound(tmp_path / "drive")
+    async with living(tmp_path) as host:
+        await host.until(lambda: host.snapshot.component("lamp") is not None)
+        host.plug(tmp_path / "drive")
+        await host.until(lambda: any(p.step is Step.REFUSED for p in host.snapshot.payloads))
+        codes = [problem.code for p in host.snapshot.payloads for problem in p.problems]
+        assert codes == ["ROLLBACK"]
+
+
+async def test_files_that_were_taken_away_are_told(tmp_path: Path) -> None:
+    """A guest comes back from its drive; what was installed for good must be installed again."""
+    installed = make_payload(tmp_path / "usb", Part("torch", LAMP), payload_id=TORCH_ID)
+    sound(tmp_path / "drive")
+    async with living(tmp_path) as host:
+        await install(installed, host.catalogue, host.bus)
+        host.plug(tmp_path / "drive")
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+    shutil.rmtree(host.folders.payloads)
+    async with living(tmp_path) as host:
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+        record = await host.until_step(TORCH_ID, Step.QUARANTINED)
+        assert [problem.code for problem in record.problems] == ["PAYLOAD_LOST"]
+        await uninstall(TORCH_ID, host.catalogue, host.bus)
+        await install(installed, host.catalogue, host.bus)
+        await host.until_step(TORCH_ID, Step.ACTIVE)

@@ -7,6 +7,9 @@ from collections.abc import Iterable
 from nondum.host.catalogue.records import PayloadRecord, Snapshot, Step
 from nondum.host.events import (
     BesideRefused,
+    CatalogueSetAside,
+    CatalogueUnwritten,
+    CatalogueWritten,
     DriveFlapping,
     DriveRead,
     DriveUnreadable,
@@ -39,11 +42,13 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
     """What is said of an event once `snapshot` has taken it in; None: nothing."""
     match event:
         case PayloadRefused():
-            told = f"{_name(event.payload, snapshot)} is refused: {_joined(event.problems)}"
-            return told + _stays(event.payload, snapshot)
+            told = f"{_name(event.payload, snapshot)} is refused{_stays(event.payload, snapshot)}"
+            return f"{told}: {_joined(event.problems)}"
         case PayloadFailed():
-            told = f"{_name(event.payload, snapshot)} does not work: {_joined(event.problems)}"
-            return told + _stays(event.payload, snapshot)
+            told = (
+                f"{_name(event.payload, snapshot)} does not work{_stays(event.payload, snapshot)}"
+            )
+            return f"{told}: {_joined(event.problems)}"
         case PayloadActivated():
             return _took_over(event, snapshot)
         case WheelsStored() | PayloadResumed():
@@ -88,6 +93,10 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return f"a trust file from {event.source} is not taken: {_joined(event.problems)}"
         case DriveUnreadable():
             return f"drive {event.drive} cannot be used: {_joined(event.problems)}"
+        case CatalogueUnwritten() | CatalogueSetAside():
+            return _joined(event.problems)
+        case CatalogueWritten():
+            return "the catalogue is written again, with all that happened meanwhile"
         case PeerJoined():
             return f"the host {event.host} is here"
         case PeerTurnedAway():
@@ -122,7 +131,7 @@ def _brought_up(event: WheelsStored | PayloadResumed, snapshot: Snapshot) -> str
 def _stays(key: str, snapshot: Snapshot) -> str:
     """What goes on instead of a release that fails."""
     old = _in_force(key, snapshot)
-    return f"; {old.version} (release {old.release}) stays" if old is not None else ""
+    return f", {old.version} (release {old.release}) stays" if old is not None else ""
 
 
 def _in_force(key: str, snapshot: Snapshot) -> PayloadRecord | None:

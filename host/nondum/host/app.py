@@ -86,7 +86,7 @@ async def _run(
     stop: asyncio.Event,
 ) -> None:
     bus = Bus()
-    timing = Timing(startup_s=config.workers.startup_s)
+    timing = Timing(startup_s=config.workers.startup_s, settle_beats=config.workers.settle_beats)
     cages = await in_thread(_cages, folders)
     standing = await in_thread(
         choice.standing,
@@ -101,9 +101,7 @@ async def _run(
     manager = ComponentManager(catalogue, executor, bus)
     for source in (*drive_sources(config, folders), *more_drives):
         manager.add_source(source)
-    neighbours = await _neighbours(
-        config, folders, workers, catalogue, bus, lambda: mind, executor
-    )
+    neighbours = await _neighbours(config, folders, workers, catalogue, bus, lambda: mind, executor)
     mind = Mind(
         config.host.name,
         neighbours.calls if neighbours else workers,
@@ -290,11 +288,8 @@ def _install_options(config: HostConfig) -> InstallOptions:
 def _warnings(catalogue: Catalogue) -> Iterator[str]:
     if catalogue.loss is not None:
         yield str(opening.problem_of(catalogue.loss, ()))
-    if catalogue.why_unwritten:
-        yield (
-            f"the catalogue cannot be written ({catalogue.why_unwritten}): what happens now may be "
-            "forgotten when this host starts again; see to its disk"
-        )
+    if catalogue.unwritten is not None:
+        yield str(catalogue.unwritten)
 
 
 def _told_to_stop() -> asyncio.Event:

@@ -437,6 +437,23 @@ class CatalogueSetAside(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class CatalogueUnwritten(Event):
+    """What happens is not on disk: the host goes on, and writes it as soon as it can."""
+
+    JOURNALLED: ClassVar[bool] = False
+
+    host: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CatalogueWritten(Event):
+    """All that happened is on disk again."""
+
+    host: str
+
+
+@dataclass(frozen=True, slots=True)
 class Recomposed(Event):
     """The catalogue has a new revision: components came, went or changed."""
 

@@ -22,6 +22,7 @@ from nondum.host.catalogue.opening import Instead, Loss, Opened
 from nondum.host.catalogue.records import JournalEntry, Moment, Snapshot
 from nondum.host.catalogue.reserve import Reserve
 from nondum.host.catalogue.state import HostState
+from nondum.sdk.errors import Problem
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -50,8 +51,8 @@ class Catalogue:
         """Names this run of the daemon in the journal."""
         self.loss = opened.loss
         """What became of a file that could not be used, if there was one."""
-        self.why_unwritten = ""
-        """Why the state is newer than what is on disk; empty: it is not."""
+        self.unwritten: Problem | None = None
+        """Why the state is newer than what is on disk; None: it is not."""
 
     @classmethod
     async def open(cls, path: Path, host: str, *, keep: int = journal.KEEP) -> Catalogue:
@@ -104,7 +105,7 @@ class Catalogue:
         The next commit that works writes it, too.
         """
         self._owed.extend(entries)
-        self.why_unwritten = str(why)
+        self.unwritten = opening.unwritten(self._path, why)
         self._take(after)
 
     async def journal(
@@ -121,7 +122,7 @@ class Catalogue:
     def _wrote(self, after: HostState) -> None:
         self._owed.clear()
         self._written = after
-        self.why_unwritten = ""
+        self.unwritten = None
         self._take(after)
 
     def _take(self, after: HostState) -> None:

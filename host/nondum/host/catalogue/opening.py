@@ -15,6 +15,9 @@ from nondum.host.catalogue.state import HostState
 from nondum.sdk.errors import ConfigRefused, NondumError, Problem
 from nondum.wheelhouse import disk
 
+TRACES = ("store", "installed")
+"""Folders that are filled only after the catalogue was made."""
+
 
 class Instead(Enum):
     """What took the place of a file that could not be used."""
@@ -49,14 +52,14 @@ class Opened:
 
 def open_file(path: Path, host: str) -> Opened:
     """Open the file, made if there is none. A damaged one is set aside; the last whole backup, or
-    else an empty one, takes its place. So it is for one that is gone, where there are backups.
+    else an empty one, takes its place. So it is for one that is gone where a host has lived.
 
     Raises `ConfigRefused` (CATALOGUE_VERSION, STATE_UNWRITABLE).
     """
     backups = Backups(path)
     try:
         disk.make_folder(path.parent)
-        if path.exists() or not any(True for _ in backups.found()):
+        if path.exists() or not _was_there(path, backups):
             opened = _opened(path, host)
             if opened is not None:
                 return opened
@@ -75,6 +78,12 @@ def set_aside(path: Path) -> Path | None:
             moved = moved or not suffix
     disk.sync(path.parent)
     return aside if moved else None
+
+
+def _was_there(path: Path, backups: Backups) -> bool:
+    """Whether a host has lived in this folder, by what it leaves there beside the catalogue."""
+    beside = (path.with_name(name) for name in TRACES)
+    return any(backups.found()) or any(one.is_dir() and any(one.iterdir()) for one in beside)
 
 
 def _opened(path: Path, host: str) -> Opened | None:
@@ -131,6 +140,17 @@ _LOST = {
     Instead.NOTHING: "lost: the journal, goals, mounts that people set, releases of payloads that "
     "are not here",
 }
+
+
+def unwritten(path: Path, why: Exception) -> Problem:
+    """What is told when a daemon cannot write its catalogue any more."""
+    return Problem(
+        "CATALOGUE_UNWRITTEN",
+        f"the catalogue cannot be written ({why}); what happens now may be forgotten when this "
+        "host starts again",
+        where=str(path),
+        fix="see to it that the disk works and has room; it is tried again all the time",
+    )
 
 
 def _unwritable(path: Path, error: Exception) -> Problem:

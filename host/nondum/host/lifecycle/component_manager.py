@@ -19,7 +19,14 @@ from nondum.host.catalogue.records import INSTALLED, Moment, Snapshot
 from nondum.host.catalogue.state import HostState
 from nondum.host.drives.source import DriveSource
 from nondum.host.effects import Effect
-from nondum.host.events import CatalogueSetAside, DrivesScanned, HostSteady, HostStopped
+from nondum.host.events import (
+    CatalogueSetAside,
+    CatalogueUnwritten,
+    CatalogueWritten,
+    DrivesScanned,
+    HostSteady,
+    HostStopped,
+)
 from nondum.host.lifecycle.advance import advance
 from nondum.host.lifecycle.bus import Bus, Stamped, is_told_early
 from nondum.host.lifecycle.rebuilding import noting_all
@@ -137,7 +144,7 @@ class ComponentManager:
 
     async def _follow_all(self) -> None:
         while True:
-            patience = COMMIT_AGAIN_S if self._catalogue.why_unwritten else None
+            patience = COMMIT_AGAIN_S if self._catalogue.unwritten else None
             try:
                 async with asyncio.timeout(patience):
                     batch = await self._bus.batch()
@@ -159,11 +166,11 @@ class ComponentManager:
         """Write a state down. Where that cannot be done, go on with it all the same: what was
         pulled must go, whatever the disk does. What is owed is written as soon as it can be."""
         catalogue = self._catalogue
-        before, loss = catalogue.state, catalogue.loss
-        if after is before and not told and not catalogue.why_unwritten:
+        before, loss, unwritten = catalogue.state, catalogue.loss, catalogue.unwritten
+        if after is before and not told and unwritten is None:
             return
         entries = list(entries_of(told, before, after, catalogue.boot))
-        tries_left = 0 if catalogue.why_unwritten else COMMIT_TRIES
+        tries_left = COMMIT_TRIES if unwritten is None else 0
         while True:
             try:
                 await catalogue.commit(after, entries)
@@ -177,7 +184,17 @@ class ComponentManager:
                 await asyncio.sleep(COMMIT_AGAIN_S)
         if catalogue.loss is not loss:
             self._tell_loss(after, after)
+        if (catalogue.unwritten is None) != (unwritten is None):
+            self._tell_whether_written()
         self._try(after)
+
+    def _tell_whether_written(self) -> None:
+        host, unwritten = self._catalogue.state.host, self._catalogue.unwritten
+        if unwritten is None:
+            self._bus.emit(CatalogueWritten(host))
+        else:
+            log.error("%s", unwritten)
+            self._bus.emit(CatalogueUnwritten(host, (unwritten,)))
 
     def _try(self, state: HostState) -> None:
         """See after a while whether all is well with what others may have died of."""
