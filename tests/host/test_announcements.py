@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -52,3 +53,52 @@ WRONG = (Problem("PYTHON_VERSION", "needs another Python"), Problem("DISK_FULL",
 )
 def test_event_is_said_in_a_sentence(event: Event, said: str | None) -> None:
     assert announced(event, Snapshot("spot", revision=1, payloads=(LAMP,))) == said
+
+
+OLD = replace(LAMP, step=Step.ACTIVE)
+NEW = replace(LAMP, key="2" * 16, digest="2" * 64, version="2", release=2, step=Step.STORED)
+
+
+@pytest.mark.parametrize(
+    ("event", "step", "said"),
+    [
+        (
+            events.WheelsStored(NEW.key, 1),
+            Step.STORED,
+            "org.example.lamp 2 is being brought up beside 1",
+        ),
+        (events.WheelsStored(NEW.key, 1), Step.SUPERSEDED, None),
+        (
+            events.PayloadFailed(NEW.key, WRONG[1:]),
+            Step.QUARANTINED,
+            f"org.example.lamp 2 does not work, 1 (release 1) stays: {WRONG[1]}",
+        ),
+        (
+            events.BesideRefused(NEW.key, "it runs alone"),
+            Step.STORED,
+            "org.example.lamp 2 takes the place of the release before it, not beside it: "
+            "it runs alone",
+        ),
+        (
+            events.RollbackAsked(KEY, 1, 2),
+            Step.ACTIVE,
+            "a person goes back to org.example.lamp 1 (release 1) from release 2",
+        ),
+    ],
+    ids=lambda value: getattr(value, "name", None),
+)
+def test_release_is_told_beside_the_one_in_force(
+    event: Event, step: Step, said: str | None
+) -> None:
+    payloads = OLD, replace(NEW, step=step)
+    assert announced(event, Snapshot("spot", revision=1, payloads=payloads)) == said
+
+
+def test_takeover_and_return_are_told() -> None:
+    new = replace(NEW, step=Step.ACTIVE, was=1)
+    snapshot = Snapshot("spot", revision=2, payloads=(replace(OLD, step=Step.SUPERSEDED), new))
+    told = announced(events.PayloadActivated(new.key, ()), snapshot)
+    assert told == "org.example.lamp 2 (release 2) took over from release 1"
+    back = Snapshot("spot", revision=3, payloads=(replace(OLD, step=Step.STORED),))
+    told = announced(events.PayloadResumed(KEY, "the one that was in force is not any more"), back)
+    assert told == ("org.example.lamp 1 comes back: the one that was in force is not any more")

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import subprocess
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 from demo.robot import NONDUM, View
 from tests.lab.plugins import TALKER, scribe, talker
-from tests.lab.running_host import RunningHost
+from tests.lab.running_host import RunningHost, running
 from tests.payloads import Part, make_payload
 
 pytestmark = [pytest.mark.lab, pytest.mark.beside]
@@ -71,6 +73,13 @@ def nondum(host: RunningHost, *arguments: str) -> Any:
     command = [*NONDUM, "--control", str(host.control), *arguments, "--json"]
     done = subprocess.run(command, capture_output=True, text=True)
     return json.loads(done.stdout or done.stderr)
+
+
+@pytest.fixture
+def host(tmp_path: Path) -> Iterator[RunningHost]:
+    """A host that does not watch newer releases for long."""
+    with running(tmp_path, more="[workers]\nsettle_beats = 1\n") as host:
+        yield host
 
 
 def test_robot_goes_on_through_upgrades_and_back(host: RunningHost) -> None:

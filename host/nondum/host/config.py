@@ -114,6 +114,9 @@ class WorkersSection:
     """Disk that its scratch folder may take; more ends it, and the folder is emptied."""
     startup_s: float = 30.0
     """What a plugin has from its launch until it has started; then it counts as hung."""
+    settle_beats: int = 2
+    """Signs of life, two seconds apart, that each worker of a newer release gives before it takes
+    over."""
     confinement: str = "auto"
     """Level at which workers are confined: `3` bubblewrap, `2` a systemd service, `1` Landlock and
     filtered system calls, `0` resource limits only; `auto`: the highest that the machine has."""
@@ -257,9 +260,9 @@ def parse(text: str, where: str, defaults: HostConfig) -> HostConfig:
     if sections["trust"].on_revoke not in ("stop", "flag"):
         on_revoke = sections["trust"].on_revoke
         problems.append(_wrong("[trust] on_revoke", '"stop" or "flag"', on_revoke, where))
-    problems.extend(_contradictions(
-            sections["host"], sections["install"], sections["workers"], where
-        ))
+    problems.extend(
+        _contradictions(sections["host"], sections["install"], sections["workers"], where)
+    )
     if problems:
         raise ConfigRefused(*problems)
     return HostConfig(**sections)

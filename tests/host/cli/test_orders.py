@@ -23,6 +23,8 @@ async def start(ctx):
 """
 SHINE = f"test-beacon.shine {LAMP} {BRIGHTNESS} panther"
 
+TORCH_ID = "org.example.torch"
+
 
 @pytest.fixture(autouse=True)
 def at_rest(daemon: Daemon) -> Iterator[None]:
@@ -180,6 +182,31 @@ def test_a_payload_is_installed_for_good_and_removed(daemon: Daemon) -> None:
     removed = daemon.run("payload", "uninstall", "org.example.torch").ok().out
     assert removed == "uninstalled org.example.torch\n"
     daemon.run("payload", "uninstall", "org.example.torch").refused(1, "NOT_INSTALLED")
+
+
+def test_a_payload_is_taken_back_to_the_release_before(daemon: Daemon) -> None:
+    drives = {n: daemon.root / f"drives/torch-{n}" for n in (1, 2)}
+    for release, drive in drives.items():
+        version = f"{release}.0"
+        torch = Part("torch", BEACON.replace("beacon", "torch"), version=version)
+        make_payload(drive, torch, payload_id=TORCH_ID, version=version, release=release)
+    daemon.run("payload", "rollback", TORCH_ID).refused(1, "PAYLOAD_UNKNOWN")
+    daemon.run("payload", "install", drives[1]).ok()
+    daemon.run("payload", "rollback", TORCH_ID).refused(1, "ROLLBACK_NOTHING")
+    daemon.run("payload", "install", drives[2]).ok()
+    shown = daemon.run("status").ok().out
+    assert "2 (was 1)" in shown
+    assert "superseded" in shown
+    gone_back = daemon.run("payload", "rollback", TORCH_ID).ok().out
+    assert gone_back == f"{TORCH_ID} 1.0 is in force, release 1 (gone back from 2)\n"
+    warned = f"{TORCH_ID} is at release 1: a person went back to it"
+    assert warned in daemon.run("status").ok().out
+    assert "1 (gone back from 2)" in daemon.run("components").ok().out
+    daemon.run("retry", TORCH_ID).ok()
+    daemon.until(
+        lambda view: {r["release"]: r["state"] for r in view["payloads"]}.get(2) == "active"
+    )
+    daemon.run("payload", "uninstall", TORCH_ID).ok()
 
 
 def test_what_cannot_be_installed_leaves_nothing(daemon: Daemon) -> None:
