@@ -10,6 +10,7 @@
     ├── LinkClosed            the other end of a worker link is gone
     ├── MessageInvalid        a stream message with wrong fields, shape or units
     ├── FragmentRefused       PDDL that does not parse, type-check or merge
+    │   └── TooManyBindings   there is more in it than can be looked at
     ├── GoalRefused           words or PDDL that name no goal here
     ├── PlannerFailed         a planner broke its contract
     ├── BehaviourFailed       a behaviour ended in FAILURE
@@ -21,7 +22,8 @@
     ├── EntryRefused          what cannot be shared with peers
     └── FrameUnknown          no transform between two frames
 
-Those of hosts among each other are defined in `nondum.transport`.
+TooManyBindings is defined in `nondum.planning`, those of hosts among each other in
+`nondum.transport`. Other exceptions of nondum are signals within one package, and never leave it.
 
 A mistake in calling code stays `TypeError` or `ValueError`; these say that the world failed.
 """
