@@ -114,6 +114,28 @@ async def test_newer_release_takes_over_and_the_old_one_comes_back(tmp_path: Pat
         assert not host.workers.pids()
 
 
+async def test_components_come_and_go_with_a_release(tmp_path: Path) -> None:
+    """None of the new ones counts before all of them do."""
+    for number, other in ((1, "bell"), (2, "horn")):
+        parts = [Part(id, LAMP, version=f"{number}.0") for id in ("lamp", other)]
+        version = f"{number}.0"
+        drive = tmp_path / f"drive-{number}"
+        make_payload(drive, *parts, payload_id=LAMP_ID, version=version, release=number)
+    async with living(tmp_path, timing=WATCHED) as host:
+        host.plug(tmp_path / "drive-1", "a")
+        await until(host, r1=Step.ACTIVE)
+        host.plug(tmp_path / "drive-2", "b")
+        await until(host, r2=Step.PROBED)
+        assert set(host.workers.pids()) == set(host.workers.plugins()) == {"bell", "lamp"}
+        await until(host, r1=Step.SUPERSEDED, r2=Step.ACTIVE)
+        assert {c.id for c in host.snapshot.components} == {"horn", "lamp"}
+        await host.until(lambda: set(host.workers.pids()) == {"horn", "lamp"})
+        assert set(host.workers.plugins()) == {"horn", "lamp"}
+        host.pull("b")
+        await until(host, r1=Step.ACTIVE, r2=None)
+        assert set(host.workers.pids()) == {"bell", "lamp"}
+
+
 BROKEN = {
     "cannot be imported": ("import no_such_module", PluginDescription("test-lamp", "2.0")),
     "is not what it says": (LAMP, PluginDescription("test-lamp", "2.0", summary="another")),

@@ -184,7 +184,7 @@ class PeerComponent:
     @property
     def payload(self) -> str:
         """Tells it from another component of that id, as payload keys do at home."""
-        return self.life
+        return f"{self.life} {self.version}"
 
 
 @dataclass(frozen=True, slots=True)

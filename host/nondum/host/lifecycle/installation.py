@@ -40,6 +40,7 @@ from nondum.host.lifecycle.rebuilding import with_found, write_note
 from nondum.host.lifecycle.room import Needs, used_mb, why_not_beside
 from nondum.host.trust.payload_trust import PayloadTrust, TrustOptions
 from nondum.host.workers import Limits, Workers, base_interpreter, end_leftovers
+from nondum.host.workers.standing import Standing
 from nondum.sdk.errors import NondumError, WorkerFailed, problems_of
 from nondum.wheelhouse import disk, preflight
 from nondum.wheelhouse.signatures import Grant
@@ -174,8 +175,9 @@ class Installation:
             return (BesideRefused(key, reason),)
         await self._workers.ended(effect.after)
         specs = [component.spec(key, self._options.limits) for component in self._prepared[key]]
+        standing = Standing.BESIDE if effect.beside else Standing.IN_FORCE
         started = await asyncio.gather(
-            *(self._workers.start(spec) for spec in specs), return_exceptions=True
+            *(self._workers.start(spec, standing) for spec in specs), return_exceptions=True
         )
         failed = [error for error in started if isinstance(error, BaseException)]
         if failed:

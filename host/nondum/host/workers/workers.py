@@ -78,20 +78,23 @@ class Workers:
         """The hooks of all running plugins; acting ones give awaitables. Pass `ctx=None`."""
         return self._manager.hook
 
-    async def start(self, spec: WorkerSpec) -> PluginDescription:
+    async def start(
+        self, spec: WorkerSpec, standing: Standing = Standing.IN_FORCE
+    ) -> PluginDescription:
         """Start a component's worker and keep one alive until `stop`.
 
-        Beside one of another payload it stands for nothing until `take_over`. Returns once its
-        plugin has described itself as the index says and has started. Raises `errors.WorkerFailed`
-        with what went wrong, and `ValueError` when it has a worker already; one that is being
-        stopped is waited for.
+        Beside one of another payload, or if told so, it stands for nothing until `take_over`.
+        Returns once its plugin has described itself as the index says and has started. Raises
+        `errors.WorkerFailed` with what went wrong, and `ValueError` when it has a worker already;
+        one that is being stopped is waited for.
         """
         while (present := self._found(spec.component, spec.payload)) and present.is_alive:
             if not present.is_stopping:
                 raise ValueError(f"component {spec.component!r} has a worker already")
             await present.ended()
         in_force = self._supervisors.get(spec.component)
-        if in_force is not None and in_force.spec.payload != spec.payload:
+        is_second = in_force is not None and in_force.spec.payload != spec.payload
+        if is_second or standing is Standing.BESIDE:
             supervisor = Supervisor(spec, self, Standing.BESIDE)
             self._others.add(supervisor)
         else:
@@ -145,7 +148,7 @@ class Workers:
         try:
             await supervisor.start()
         except errors.WorkerFailed as error:
-            self.emit(WorkerFailed(component, error.problems))
+            self.emit(WorkerFailed(component, error.problems, supervisor.spec.payload))
 
     async def stop(self, component: str, grace_s: float = GRACE_S, payload: str = "") -> None:
         """End a component's worker within `grace_s`: ask, then SIGTERM, then SIGKILL to the group.
