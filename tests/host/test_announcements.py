@@ -9,8 +9,15 @@ import pytest
 
 from nondum.host import events
 from nondum.host.announcements import announced
-from nondum.host.catalogue.records import PayloadRecord, Snapshot, Step
+from nondum.host.catalogue.records import (
+    ComponentRecord,
+    ComponentState,
+    PayloadRecord,
+    Snapshot,
+    Step,
+)
 from nondum.host.events import Event
+from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
 
 KEY = "0" * 16
@@ -102,3 +109,19 @@ def test_takeover_and_return_are_told() -> None:
     back = Snapshot("spot", revision=3, payloads=(replace(OLD, step=Step.STORED),))
     told = announced(events.PayloadResumed(KEY, "the one that was in force is not any more"), back)
     assert told == ("org.example.lamp 1 comes back: the one that was in force is not any more")
+
+
+def test_people_are_told_what_a_component_may_use() -> None:
+    listener = ComponentRecord(
+        *("listener", KEY, "org.example.lamp", "test-listener", "test_listener", "1"),
+        ComponentState.READY,
+        PluginDescription("test-listener", "1"),
+        *(Path("/venv"), Path("/site"), Path("/scratch")),
+        rank=0,
+        permissions=("network", "audio"),
+    )
+    lamp = replace(LAMP, step=Step.ACTIVE)
+    told = announced(
+        events.PayloadActivated(KEY, (listener,)), Snapshot("spot", revision=1, payloads=(lamp,))
+    )
+    assert told == "listener may use: audio, network"

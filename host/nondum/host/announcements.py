@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from nondum.host.catalogue.records import PayloadRecord, Snapshot, Step
 from nondum.host.events import (
@@ -50,7 +50,7 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             )
             return f"{told}: {_joined(event.problems)}"
         case PayloadActivated():
-            return _took_over(event, snapshot)
+            return "; ".join(_told_of_arrival(event, snapshot)) or None
         case WheelsStored() | PayloadResumed():
             return _brought_up(event, snapshot)
         case BesideRefused():
@@ -108,13 +108,15 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
     return None
 
 
-def _took_over(event: PayloadActivated, snapshot: Snapshot) -> str | None:
+def _told_of_arrival(event: PayloadActivated, snapshot: Snapshot) -> Iterator[str]:
+    """What it replaces, and what its components were granted: people should know who listens."""
     new = _record(event.payload, snapshot)
-    if new is None or not new.was:
-        return None
-    return (
-        f"{new.payload_id} {new.version} (release {new.release}) took over from release {new.was}"
-    )
+    if new is not None and new.was:
+        release = f"{new.payload_id} {new.version} (release {new.release})"
+        yield f"{release} took over from release {new.was}"
+    for component in event.components:
+        if component.permissions:
+            yield f"{component.id} may use: {', '.join(sorted(component.permissions))}"
 
 
 def _brought_up(event: WheelsStored | PayloadResumed, snapshot: Snapshot) -> str | None:

@@ -6,26 +6,21 @@
 from __future__ import annotations
 
 import asyncio
-import ctypes
 import fcntl
-import os
 import resource
-import signal
 import socket
 import sys
 
 from nondum.host.bridge.service import Service
+from nondum.host.confinement import own_children
 
 MEMORY_BYTES = 2 * 1024**3
 """What strangers send is bounded piece by piece, and all together here (setrlimit(2))."""
-_PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 
 def main(link: int, daemon: int) -> int:
     """Serve until the daemon is gone, or needs it no more."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != daemon:  # it died before this was asked for
-        return 1
+    own_children.settle(daemon)
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_BYTES, MEMORY_BYTES))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     fcntl.fcntl(link, fcntl.F_SETFD, fcntl.FD_CLOEXEC)

@@ -5,11 +5,9 @@ It dies with the daemon, and what it may use is bounded: what it reads was writt
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
 import select
-import signal
 import sys
 import time
 import traceback
@@ -17,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
 
+from nondum.host.confinement import own_children
 from nondum.host.lifecycle import jobs
 from nondum.host.lifecycle.allowance import allowed, confine_process
 from nondum.sdk.errors import NondumError, Problem
@@ -28,12 +27,10 @@ PROGRESS_S = 0.1
 IDLE_S = 0.1
 """A child that has nothing to do for so long makes ready for whatever comes."""
 
-PR_SET_PDEATHSIG = 1
-
 
 def main(daemon: int) -> None:
     """Do jobs from stdin until it ends."""
-    _bind_to(daemon)
+    own_children.settle(daemon, keeps=("mounts",))  # drives are mounted by them
     confine_process()
     if not select.select([sys.stdin], [], [], IDLE_S)[0]:
         _warm()
@@ -43,12 +40,6 @@ def main(daemon: int) -> None:
         for line in sys.stdin:
             request = json.loads(line)
             _say(answers, _do(request["job"], request["arguments"], answers))
-
-
-def _bind_to(daemon: int) -> None:
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != daemon:  # it died before this was asked for
-        sys.exit(1)
 
 
 def _warm() -> None:

@@ -1,4 +1,4 @@
-"""The process that one planner runs in: `python -m nondum.host.mind.planner_child MODULE:CLASS MB`.
+"""The process that one planner runs in: `planner_child MODULE:CLASS MB DAEMON`, run by `-m`.
 
 It says what it speaks and handles, reads tasks from standard input and writes answers to standard
 output until the input ends. It is niced and limited in memory, and dies with the daemon. It is kept
@@ -7,27 +7,25 @@ while idle, so what it imports is little.
 
 from __future__ import annotations
 
-import ctypes
 import os
 import resource
-import signal
 import sys
 import time
 from importlib import import_module
 from typing import Any, BinaryIO
 
+from nondum.host.confinement import own_children
 from nondum.host.mind import planner_wire as wire
 from nondum.sdk.planner import Planner, TextPlanner
 
 NICENESS = 10
-_PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 
-def main(reference: str, memory_mb: int) -> int:
+def main(reference: str, memory_mb: int, daemon: int) -> int:
     """Serve one planner, which an entry point refers to, until standard input ends."""
     requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)  # what a planner prints must not get between the answers
-    _limit(memory_mb)
+    _limit(memory_mb, daemon)
     module, _, name = reference.partition(":")
     planner: Planner | TextPlanner = getattr(import_module(module), name)()
     answers.write(wire.frame(["ready", planner.speaks, sorted(planner.handles)]))
@@ -36,8 +34,8 @@ def main(reference: str, memory_mb: int) -> int:
     return 0
 
 
-def _limit(memory_mb: int) -> None:
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+def _limit(memory_mb: int, daemon: int) -> None:
+    own_children.settle(daemon)
     os.nice(NICENESS)
     size = memory_mb * 1024 * 1024
     resource.setrlimit(resource.RLIMIT_AS, (size, size))
@@ -65,4 +63,4 @@ def _read(stream: BinaryIO) -> bytes | None:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1], int(sys.argv[2])))
+    sys.exit(main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3])))

@@ -117,7 +117,8 @@ class PlannerProcess:
         await self._kill()
         module = "nondum.host.mind.planner_child"
         self._process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", module, self._reference, str(self._memory_mb)),
+            *(sys.executable, "-m", module, self._reference),
+            *(str(self._memory_mb), str(os.getpid())),
             stdin=PIPE,
             stdout=PIPE,
             stderr=DEVNULL,
