@@ -43,7 +43,7 @@ def new(session: Session, folder: Path, name: str | None) -> None:
     from nondum.transport.peers import fleet_files
     from nondum.transport.peers.keys import fingerprint
 
-    public = fleet_files.create(folder, name or folder.resolve().name)
+    public = fleet_files.create(folder, name or folder.absolute().name)
     found = fingerprint(public.key)
     if session.as_json:
         render.as_json({"name": public.name, "fingerprint": found, "key": public.key})

@@ -149,7 +149,7 @@ def _sign_plain(data: bytes, key: Path, namespace: str) -> bytes:
 
 
 def _public_path(path: Path) -> Path:
-    return path.with_name(path.name + PUBLIC_SUFFIX)
+    return Path(f"{path}{PUBLIC_SUFFIX}")  # also of a path without a name
 
 
 def _refused(code: str, told: str, path: Path, fix: str) -> TrustRefused:
