@@ -72,6 +72,8 @@ PAYLOAD_KEYS = {
     "codes",
     "phases",
     "place",
+    "signers",
+    "built",
 }
 
 STATUS = """\

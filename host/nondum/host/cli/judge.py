@@ -35,7 +35,7 @@ def inspect(session: Session, drive: Path) -> None:
         about = f"{view['id']} {view['version']} (release {view['release']}): {view['summary']}"
         render.sentence(f"{about}  {render.size(view['bytes'])}")
         by = f"signed by {', '.join(view['signers'])}" if view["signers"] else view["unsigned"]
-        render.sentence(f"  built {view['built']}, {by}")
+        render.sentence(f"  built {view['built']} ({render.age_of(view['built'])} ago), {by}")
         for component in view["components"]:
             can = ", ".join(component["behaviours"]) or "no behaviours"
             render.sentence(f"  component {component['id']}: {can}")

@@ -77,6 +77,8 @@ def _show_payloads(payloads: list[dict[str, Any]]) -> None:
             "on": row["place"],
             "release": render.release(row),
             "progress": render.progress(row["progress"]),
+            "signed by": ", ".join(row["signers"]),
+            "age": render.age_of(row["built"]),
         }
         for row in payloads
     ]
@@ -85,6 +87,8 @@ def _show_payloads(payloads: list[dict[str, Any]]) -> None:
         columns.insert(2, "release")
     if any(row["on"] for row in rows):
         columns.insert(columns.index("drive"), "on")
+    if any(row["signers"] for row in rows):
+        columns += ["signed by", "age"]
     if any(row["progress"] for row in rows):
         columns.append("progress")
     table(rows, columns, empty="no payloads")
