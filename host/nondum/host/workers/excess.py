@@ -21,6 +21,8 @@ NEARLY = 0.9
 """Part of a limit at which people are told."""
 SPIN_S = 10.0
 """How long a worker that nobody asks anything may keep a processor busy."""
+SPIN_PART = 0.25
+"""Of a processor: what spins beside others gets no more on a busy machine."""
 SPARED = 3
 """Descriptors below the limit at which there are none left to work with."""
 
@@ -97,9 +99,9 @@ class Watch:
             yield problems.spinning(self.component, SPIN_S)
 
     def _is_spinning(self, last: Reading, now: Reading) -> bool:
-        available = min(1.0, self.limits.processors or 1.0)
+        most = min(1.0, self.limits.processors or 1.0) * SPIN_PART
         used = (now.usage.cpu_s - last.usage.cpu_s) / max(now.at_s - last.at_s, 1e-9)
-        if now.is_asked or used < available * NEARLY:
+        if now.is_asked or used < most:
             self._busy_since_s = None
         elif self._busy_since_s is None:
             self._busy_since_s = last.at_s

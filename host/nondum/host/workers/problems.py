@@ -90,7 +90,7 @@ def spinning(component: str, busy_s: float) -> Problem:
     """It keeps a processor busy for nothing."""
     return Problem(
         "WORKER_CPU",
-        f"the worker keeps a processor busy for {busy_s:g} s, though nobody asks it for anything",
+        f"the worker has kept a processor busy for {busy_s:g} s, and nobody asks it for anything",
         where=component,
         fix="`nondum payload forget` it or pull it if that hurts; bound it by `cpu_percent` in "
         "[workers]",
