@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import socket
 
+import pytest
 from tests.host.cli.daemon import nondum
 
 
@@ -23,3 +25,12 @@ def test_what_is_bad_is_told_with_its_own_exit_code() -> None:
     (found,) = (one for one in told["findings"] if one["check"] == f"TCP port {port}")
     assert (done.code, told["ok"], found["result"]) == (3, False, "bad")
     assert "peers.listen" in found["fix"]
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="cgroups are root's here")
+def test_what_workers_are_limited_in_is_told() -> None:
+    told = json.loads(nondum("doctor", "limits", "--json").ok().out)
+    assert told["ok"]
+    assert told["cgroups"] in ("v1", "v2")
+    assert all(limit["held"] for limit in told["limits"])
+    assert "memory  yes" in nondum("doctor", "limits").out

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -74,6 +77,34 @@ def confinement(session: Session) -> int:
             if row["fix"]:
                 render.sentence(row["fix"], mark=f"→ level {row['level']}: ")
     return 0 if is_well else EXIT_PROBLEMS
+
+
+@doctor.command()
+@json_option
+@click.pass_obj
+def limits(session: Session) -> int:
+    """Tell what workers can be limited in here. Exits with 3 when something is missing.
+
+    A service may do more than the person who asks: `nondum status` tells what a running host does.
+
+    Example: nondum doctor limits
+    """
+    from nondum.host.cgroups import Cages
+
+    cages = Cages.open(Path(tempfile.gettempdir()) / f"nondum-doctor-{os.getpid()}")
+    problems = cages.problems()
+    cages.close()
+    rows = [{"limit": name, "held": name in cages.holds} for name in ("memory", "pids", "cpu")]
+    if session.as_json:
+        told = [problem.to_dict() for problem in problems]
+        render.as_json(
+            {"ok": not problems, "cgroups": cages.kind, "limits": rows, "problems": told}
+        )
+    else:
+        table(rows, ["limit", "held"], empty="")
+        for problem in problems:
+            render.sentence(str(problem), mark="→ ")
+    return EXIT_PROBLEMS if problems else 0
 
 
 def _row(finding: Finding) -> dict[str, Any]:
