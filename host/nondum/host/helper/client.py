@@ -20,6 +20,7 @@ from nondum.sdk import errors
 from nondum.sdk.errors import InstallFailed, NondumError, Problem
 
 SOCKET = Path("/run/nondum-helper/helper.sock")
+MOUNTS = Path("/run/nondum-helper/mounts")
 DEVICES = Path("/run/nondum-helper/devices")
 """Below it, component by component, are the nodes that the helper makes."""
 WAIT_S = 15.0
@@ -34,6 +35,10 @@ class HelperClient:
 
     def __init__(self, path: Path = SOCKET) -> None:
         self._path = path
+
+    def mounts(self, folder: Path) -> Path:
+        """The helper's folder."""
+        return MOUNTS
 
     def mount(self, node: Path, root: Path, filesystem: str, drive: str, use: str) -> Path:
         """Have a drive mounted where the helper has its mounts (see `Privileged`)."""

@@ -16,6 +16,10 @@ from nondum.sdk.errors import InstallFailed, Problem
 class Privileged(Protocol):
     """What a daemon needs root for. All of it may block: not for the loop."""
 
+    def mounts(self, folder: Path) -> Path:
+        """Where drives are mounted to be read: in this folder of the daemon's, or the helper's."""
+        ...
+
     def mount(self, node: Path, root: Path, filesystem: str, drive: str, use: str) -> Path:
         """Mount a drive, and tell where: at `root`, or where the helper has its mounts.
 
@@ -48,6 +52,10 @@ class Privileged(Protocol):
 
 class InProcess:
     """For a daemon that is root."""
+
+    def mounts(self, folder: Path) -> Path:
+        """Its own folder."""
+        return folder
 
     def mount(self, node: Path, root: Path, filesystem: str, drive: str, use: str) -> Path:
         """Mount a drive (see `Privileged`)."""

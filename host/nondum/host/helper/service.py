@@ -39,7 +39,7 @@ class Service:
             case requests.Mount():
                 return {"at": str(self._mount(request))}
             case requests.Unmount(drive, use):
-                mounting.unmount(self.mounts / f"{drive}.{use}")
+                mounting.unmount(self.mounts / _folder(drive, use))
             case requests.UnmountAll():
                 mounting.unmount_all(self.mounts)
             case requests.PutNode(component, need, major, minor):
@@ -60,7 +60,7 @@ class Service:
         if sum(1 for _ in self.mounts.iterdir()) >= MOST_DRIVES:
             raise refused(f"{MOST_DRIVES} drives are mounted already")
         drive = drive_name(request.device, request.diskseq)
-        target = self.mounts / f"{drive}.{request.use}"
+        target = self.mounts / _folder(drive, request.use)
         try:
             target.mkdir(mode=0o755)  # who makes the folder mounts the drive
         except FileExistsError:
@@ -108,6 +108,11 @@ class Service:
             signal.pidfd_send_signal(descriptor, 0)  # it is still the same
         finally:
             os.close(descriptor)
+
+
+def _folder(drive: str, use: str) -> str:
+    """Where a drive is mounted; the daemon knows beforehand where it reads one."""
+    return drive if use == "read" else f"{drive}.{use}"
 
 
 def _users(pid: int) -> Iterator[int]:
