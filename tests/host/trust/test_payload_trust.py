@@ -230,6 +230,15 @@ async def test_what_lost_its_trust_while_the_host_slept_does_not_start(tmp_path:
         assert not [e for e in await host.journal() if e.event == "WorkerReady"][1:]
 
 
+async def test_what_cannot_be_judged_again_is_not_trusted(tmp_path: Path) -> None:
+    async with trusting(tmp_path) as host:
+        host.plug(lamp(tmp_path / "drive", ALICE))
+        record = await host.until_step(LAMP_ID, Step.ACTIVE)
+        (host.folders.payload(record.key) / "CONTENTS").unlink()
+        host.plug(with_trust(tmp_path / "news", signed(SECOND, ROOT)), "b")
+        assert await refusal(host) == ["IO_ERROR"]
+
+
 # What is on disk
 
 

@@ -33,12 +33,13 @@ def release_problems(state: HostState, found: PayloadFound, at: Moment) -> Itera
         return
     where, newest = found.payload_id, _newest(state, found)
     limit = max(newest.release, int(at.wall_s), _date_s(found)) + RELEASE_JUMP
-    if newest.owner in found.grant.owners and found.grant.role != newest.owner:
+    owner = _owner(state, found.payload_id)
+    if owner in found.grant.owners and found.grant.role != owner:
         yield Problem(
             "ID_OWNED_BY",
-            f"the role {newest.owner} was the first to bring it, and has its next releases",
+            f"the role {owner} was the first to bring it, and has its next releases",
             where=where,
-            need=f"signed by {newest.owner}",
+            need=f"signed by {owner}",
             have=f"signed by {found.grant.role} ({', '.join(found.signers)})",
             fix="build it under another id, or leave it to one role in the trust file",
         )
@@ -80,10 +81,17 @@ def release_problems(state: HostState, found: PayloadFound, at: Moment) -> Itera
 def reached(state: HostState, payload: PayloadRecord, event: PayloadActivated) -> Highwater:
     """The newest release of a payload that is active, now that this one is."""
     newest = state.highwater.get((payload.fleet, payload.payload_id), _NOTHING)
-    owner = newest.owner if newest.owner in event.grant.owners else event.grant.role
+    before = _owner(state, payload.payload_id)
+    owner = before if before in event.grant.owners else event.grant.role
     if newest.release > payload.release and not _is_void(newest, event.grant):
         return replace(newest, owner=owner)
     return Highwater(payload.release, payload.digest, owner)
+
+
+def _owner(state: HostState, payload_id: str) -> str:
+    """The role that was the first to bring a payload, for whatever fleet; empty: none."""
+    marks = (mark for (_, id), mark in state.highwater.items() if id == payload_id)
+    return next((mark.owner for mark in marks if mark.owner), "")
 
 
 def _newest(state: HostState, found: PayloadFound) -> Highwater:

@@ -77,7 +77,7 @@ def judge_kept(arguments: Arguments, report: Report) -> dict[str, dict[str, Any]
     return {
         folder.name: _told_of(arguments, folder)
         for folder in map(Path, arguments["folders"])
-        if (folder / contents.NAME).exists()
+        if folder.exists()
     }
 
 

@@ -35,6 +35,9 @@ from nondum.wheelhouse.trust.trust import Trust
 PERSON = "a person"
 """What has brought a trust file that no drive has."""
 
+MOST_TOLD = 8
+"""Problems of one drive's trust files that are told."""
+
 log = logging.getLogger(__name__)
 
 
@@ -128,7 +131,7 @@ class PayloadTrust:
                     if told["taken"]:
                         self._take({**told, "problems": ()})
                         taken = self._changed(source)
-        return (*taken, TrustFileRefused(source, problems)) if problems else taken
+        return (*taken, TrustFileRefused(source, problems[:MOST_TOLD])) if problems else taken
 
     async def give(self, file: SignedFile) -> tuple[Event, ...]:
         """Take the file that follows the one in force, from a person.
@@ -142,13 +145,16 @@ class PayloadTrust:
         return events
 
     async def judged(self, effect: JudgePayloads) -> tuple[Event, ...]:
-        """Judge anew what is here, by the trust in force. Raises `InstallFailed`."""
-        folders = [str(self._folders.payload(key)) for key in effect.payloads]
-        arguments = {**self.arguments, "folders": folders}
-        told = await self._children.run("trust_judge_kept", arguments)
-        for key, said in told.items():
-            self.note(key, said)
-        found = {key: _problems(said) for key, said in told.items()}
+        """Judge anew what is here, by the trust in force; what cannot be judged is not trusted."""
+        try:
+            found = await self._judged(effect.payloads)
+        except NondumError:  # one of them is at fault
+            found = {}
+            for key in effect.payloads:
+                try:
+                    found |= await self._judged((key,))
+                except NondumError as error:
+                    found[key] = error.problems
         if self._stop:
             return tuple(PayloadDistrusted(key, wrong) for key, wrong in found.items() if wrong)
         return tuple(PayloadDoubted(key, wrong) for key, wrong in found.items())
@@ -173,6 +179,15 @@ class PayloadTrust:
             "on_revoke": "stop" if self._stop else "flag",
             "warnings": list(self.warnings),
         }
+
+    async def _judged(self, payloads: Sequence[str]) -> dict[str, tuple[Problem, ...]]:
+        """What is wrong with each, but for those of which nothing is kept. Raises `NondumError`."""
+        folders = [str(self._folders.payload(key)) for key in payloads]
+        arguments = {**self.arguments, "folders": folders}
+        told = await self._children.run("trust_judge_kept", arguments)
+        for key, said in told.items():
+            self.note(key, said)
+        return {key: _problems(said) for key, said in told.items()}
 
     async def _loaded(self) -> dict[str, Any]:
         told: dict[str, Any] = await self._children.run("trust_load", self._places())
