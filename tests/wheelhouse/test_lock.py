@@ -110,6 +110,24 @@ def test_a_missing_architecture_is_told_with_what_there_is() -> None:
     assert problem.where == "pylock.n.toml"
 
 
+@pytest.mark.parametrize("platform", ["manylinux_2_39_x86_64", "musllinux_1_2_x86_64", "win_amd64"])
+def test_a_newer_or_another_libc_is_told(platform: str) -> None:
+    text = HEAD + package("n", "1.0", wheel(f"n-1.0-cp311-cp311-{platform}.whl"))
+    with pytest.raises(PayloadRefused) as found:
+        lock.select(lock.parse(text, "pylock.n.toml"), *host((3, 11), "x86_64"))
+    (problem,) = found.value.problems
+    assert problem.code == "WHEEL_INCOMPATIBLE"
+    assert problem.have == f"cp311 on {platform}"
+    assert problem.need == "wheels for x86_64, Python 3.11, manylinux_2_28_x86_64 or older"
+
+
+def test_two_entries_for_one_host_are_refused() -> None:
+    text = PLAIN + package("a", "2.0", wheel("a-2.0-py3-none-any.whl"))
+    with pytest.raises(PayloadRefused) as found:
+        lock.select(lock.parse(text, "pylock.a.toml"), *host((3, 11), "x86_64"))
+    assert found.value.code == "WHEEL_INCOMPATIBLE"
+
+
 A = "a-1.0-py3-none-any.whl"
 REFUSED = {
     "not-toml": ("LOCK_TOML", "a = = b"),
