@@ -95,20 +95,12 @@ def _look(confinement: Confinement, folder: Path) -> dict[str, Any]:
             ours.settimeout(ANSWER_S)
             seen = ours.recv(_ANSWER_BYTES)
         if not seen:
-            raise OSError(_last_words(spare) or "it ended at once")
+            spare.close()
+            raise OSError(spare.said or "it ended at once")
         answer: dict[str, Any] = json.loads(seen)
         return answer
     finally:
         spare.close()
-
-
-def _last_words(spare: Spare) -> str:
-    """The last line that a process said before it ended."""
-    if spare.popen.stderr is None:
-        return ""
-    spare.popen.kill()
-    said = spare.popen.stderr.read().decode("utf-8", "replace").strip()
-    return said.splitlines()[-1] if said else ""
 
 
 def _spec(folder: Path) -> WorkerSpec:

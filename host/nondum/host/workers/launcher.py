@@ -64,23 +64,25 @@ class WorkerLauncher:
 
     def launch(self, spec: WorkerSpec, sock: socket.socket) -> WorkerProcess:
         """Start a worker (see `Launcher`), from the spare interpreter if there is one."""
+        said = ""
         try:
             spec.scratch.mkdir(parents=True, exist_ok=True, mode=0o700)
             ground = self._confinement.ground(spec)
             with self._confinement.entry(spec, ground) as entry:
                 told = parameters(spec, entry)
                 for started in (self._taken(), None):
-                    if started is not None and started.ground != ground:
+                    if started is not None and not started.serves(ground):
                         started.close()
                         continue
                     spare = started or Spare(self._confinement, ground, self._cages)
                     spare.limit(spec.limits)
                     if spare.become(told, sock, entry.ruleset):
                         return spare.process()
+                    said = spare.said
         except OSError as error:
             problem = Problem("LAUNCH_FAILED", str(error), where=spec.component)
             raise WorkerFailed(problem) from error
-        text = f"{spec.python} ends at once"
+        text = f"{spec.python} ends at once{f': {said}' if said else ''}"
         raise WorkerFailed(Problem("LAUNCH_FAILED", text, where=spec.component))
 
     def warm(self) -> None:

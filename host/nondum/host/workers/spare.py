@@ -7,13 +7,15 @@ the same for all workers: it is done before anybody waits for it.
 from __future__ import annotations
 
 import json
+import os
 import socket
 import subprocess
 from collections.abc import Mapping
-from typing import Any
+from typing import IO, Any
 
 from nondum.host.cgroups import Cage, CageLimits, Cages
 from nondum.host.confinement.bubblewrap import Ground
+from nondum.host.printable import printable
 from nondum.host.workers.confinements import Confinement
 from nondum.host.workers.keeper import Keeper
 from nondum.host.workers.process import WorkerProcess
@@ -22,6 +24,7 @@ from nondum.host.workers.spec import Limits
 ROOM = "NONDUM_ROOM"
 """Environment variable that keeps room for the mark of the worker (see `launcher.py`)."""
 ROOM_BYTES = 2048
+SAID_BYTES = 64 * 1024
 
 
 class Spare:
@@ -33,6 +36,8 @@ class Spare:
         """Start it, in a cage of its own. Raises `OSError`."""
         self.ground = ground
         self.cage: Cage | None = None
+        self.said = ""
+        """The last line that it said before it ended without having become a worker."""
         self._has_keeper = confinement.has_keeper
         self._orders, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         if self._has_keeper:  # whose a message is comes with it
@@ -46,6 +51,10 @@ class Spare:
             raise
         if cages is not None:
             self._be_caged(cages)
+
+    def serves(self, ground: Ground) -> bool:
+        """Whether it is there still, and stands on that ground."""
+        return self.ground == ground and self.popen.poll() is None
 
     def limit(self, limits: Limits) -> None:
         """Set what it may use, before it becomes a worker. Raises `OSError`."""
@@ -81,6 +90,7 @@ class Spare:
         self.popen.wait()
         if self.cage is not None:
             self.cage.end()
+        self.said = _last_line(self.popen.stderr) or self.said
         for pipe in (self.popen.stdout, self.popen.stderr):
             if pipe is not None:
                 pipe.close()
@@ -92,6 +102,15 @@ class Spare:
         except OSError:
             self.close()
             raise
+
+
+def _last_line(pipe: IO[bytes] | None) -> str:
+    """What is in a pipe now, the last line of it."""
+    if pipe is None or pipe.closed:
+        return ""
+    os.set_blocking(pipe.fileno(), False)
+    said = (pipe.read(SAID_BYTES) or b"").decode("utf-8", "replace").strip()
+    return printable(said.splitlines()[-1]) if said else ""
 
 
 def _started(command: list[str], orders: int) -> subprocess.Popen[bytes]:

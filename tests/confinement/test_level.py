@@ -1,0 +1,147 @@
+"""Which level a host runs at: found by trying, kept as long as it counts, refused where too low."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from nondum.host.confinement import choice, landlock, probe, sight
+from nondum.host.confinement.level import Finding, Level, Standing
+from nondum.sdk.errors import ConfigRefused
+
+HELD = {
+    "capabilities": 0,
+    "no_new_privileges": True,
+    "filters": True,
+    "processes": 2,
+    "interfaces": ["lo"],
+    "sees_state": False,
+    "writes_system": False,
+    "makes_namespaces": False,
+    "signals_host": False,
+}
+"""What is seen from within a room that holds."""
+
+
+@pytest.fixture
+def no_bwrap(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+
+
+def test_this_machine_has_rooms() -> None:
+    assert probe.findings() == (Finding(Level.BOX, is_available=True),)
+
+
+def test_without_bubblewrap_the_kernel_has_to_do(no_bwrap: None) -> None:
+    box, *_, kernel = probe.findings()
+    assert (box.is_available, box.reason) == (False, "bubblewrap is not installed")
+    assert box.fix == "apt install bubblewrap"
+    assert kernel == Finding(Level.KERNEL, is_available=True)
+
+
+def test_bubblewrap_that_fails_is_told_in_its_words(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    broken = tmp_path / "bwrap"
+    broken.write_text("#!/bin/sh\necho 'bwrap: No permissions to create new namespace' >&2\nexit 1")
+    broken.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    box = probe.findings()[0]
+    assert not box.is_available
+    assert "No permissions to create new namespace" in box.reason
+    assert "unprivileged_userns_clone" in box.fix
+
+
+@pytest.mark.parametrize(
+    ("hole", "said"),
+    [
+        ({"capabilities": 1 << 21}, "holds capabilities"),
+        ({"no_new_privileges": False}, "may gain privileges"),
+        ({"filters": False}, "has all system calls"),
+        ({"sees_state": True}, "reads the host's files"),
+        ({"writes_system": True}, "writes to the system"),
+        ({"makes_namespaces": True}, "makes namespaces"),
+        ({"processes": 80}, "sees other processes"),
+        ({"interfaces": ["lo", "eth0"]}, "has a network"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else None,
+)
+def test_room_with_a_hole_is_none(hole: dict[str, object], said: str) -> None:
+    assert sight.judged(Level.BOX, HELD).is_available
+    finding = sight.judged(Level.BOX, {**HELD, **hole})
+    assert not finding.is_available
+    assert finding.reason == f"in it a process still {said}"
+    assert finding.fix
+
+
+def test_what_is_not_told_counts_as_a_hole() -> None:
+    for key in set(HELD) - {"signals_host"}:
+        told = {name: value for name, value in HELD.items() if name != key}
+        assert not sight.judged(Level.BOX, told).is_available, key
+
+
+def test_findings_are_kept_until_something_changes(tmp_path: Path) -> None:
+    file = tmp_path / "confinement.json"
+    found = probe.findings(file)
+    kept = json.loads(file.read_text())
+    kept["findings"][0]["reason"] = "as it was kept"
+    file.write_text(json.dumps(kept))
+    assert probe.findings(file) == (replace(found[0], reason="as it was kept"),)
+    file.write_text(json.dumps({**kept, "of": ["another boot"]}))
+    assert probe.findings(file) == found
+    file.write_text("{")
+    assert probe.findings(file) == found
+
+
+def test_best_level_is_taken(no_bwrap: None) -> None:
+    standing = choice.standing("auto", 1)
+    assert standing.level == Level.KERNEL
+    assert standing.to_dict()["missing"][0]["level"] == 3
+    assert not list(standing.warnings())
+
+
+def test_level_that_is_asked_for_is_taken() -> None:
+    assert choice.standing("1", 1).level == Level.KERNEL
+    standing = choice.standing("0", 1)
+    assert standing.level == Level.LIMITS
+    (warning,) = standing.warnings()
+    assert warning.startswith("plugins are not confined")
+
+
+def test_level_that_is_not_there_is_refused(no_bwrap: None) -> None:
+    with pytest.raises(ConfigRefused) as caught:
+        choice.standing("3", 0)
+    (problem,) = caught.value.problems
+    assert problem.code == "CONFINEMENT_UNAVAILABLE"
+    assert (problem.need, problem.have) == ("level 3", "level 0")
+    assert problem.fix and "apt install bubblewrap" in problem.fix
+
+
+def test_host_does_not_start_below_its_minimum(
+    no_bwrap: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(landlock, "version", lambda: 0)
+    with pytest.raises(ConfigRefused) as caught:
+        choice.standing("auto", 1)
+    (problem,) = caught.value.problems
+    assert problem.where == "[workers] minimum_confinement = 1"
+    assert "the kernel has no Landlock" in problem.message
+    standing = choice.standing("auto", 0)
+    assert standing.level == Level.LIMITS
+    assert "the kernel has no Landlock" in next(standing.warnings())
+
+
+def test_standing_tells_only_what_is_above_it() -> None:
+    findings = (
+        Finding(Level.BOX, is_available=False, reason="no bwrap"),
+        Finding(Level.KERNEL, is_available=True),
+    )
+    assert Standing(Level.KERNEL, findings).to_dict() == {
+        "level": 1,
+        "name": "Landlock and filtered system calls",
+        "missing": [findings[0].to_dict()],
+    }
