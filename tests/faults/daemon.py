@@ -33,6 +33,7 @@ from nondum.host.catalogue.records import DriveState, JournalEntry, Step
 from nondum.host.catalogue.state import HostState
 from nondum.host.drives.slots import SlotSource
 from nondum.host.lifecycle.bus import Bus
+from nondum.host.lifecycle.children import watch_without_threads
 from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
 from nondum.host.lifecycle.folders import Folders, claim
@@ -130,6 +131,8 @@ class DeadlyCatalogue(Catalogue):
                 self.bus.emit(events.DriveRemoved(SLOT))
             case "send":
                 self.bus.emit(events.PayloadSentAway(key, "mule", (problem,)))
+            case "distrust":
+                self.bus.emit(events.PayloadDistrusted(key, (problem,)))
             case "retry":
                 self.bus.emit(events.RetryAsked(key))
             case "rollback":
@@ -194,6 +197,7 @@ async def main(orders: dict[str, Any]) -> None:
     root = Path(orders["root"])
     os.environ[MARK] = str(root)
     told = os.open(root / "told", os.O_CREAT | os.O_APPEND | os.O_WRONLY | os.O_CLOEXEC)
+    watch_without_threads()
     folders = Folders(root / "state")
     claim(folders)
     bus = Bus()

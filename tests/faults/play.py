@@ -12,8 +12,8 @@ import signal
 import sqlite3
 import subprocess
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 PATIENCE_S = 25.0
@@ -32,8 +32,10 @@ class Player:
 
     root: Path
     script: Sequence[str] = ("plug a", "pull a")
-    before: Callable[[int], None] = lambda pid: None
+    before: Callable[[int], object] = lambda pid: None
     """Called with its pid once it is up, and before anything is plugged in."""
+    between: Mapping[int, Callable[[int], object]] = field(default_factory=dict)
+    """Number of a line of the script → what is called with the pid before it."""
     late_s: float | None = None
     """When it is killed after that; None: it may go on to the end."""
     stuck: str = ""
@@ -44,7 +46,9 @@ class Player:
             self._until(pid, "start", self._is_up)
             self.before(pid)
             begun = time.monotonic()
-            for line in (*self.script, "end"):
+            for number, line in enumerate((*self.script, "end")):
+                if number in self.between:
+                    self.between[number](pid)
                 what, *slots = line.split()
                 for slot in slots:
                     place = self.root / "slots" / slot
@@ -53,8 +57,8 @@ class Player:
                     else:
                         place.unlink()
                 self._until(pid, line, self._is_settled, begun)
-            os.kill(pid, signal.SIGTERM)
-            self._until(pid, "SIGTERM", lambda: False)
+            # The write(2) by which a signal wakes a loop may have been made to fail: again.
+            self._until(pid, "SIGTERM", lambda: os.kill(pid, signal.SIGTERM))
         except ProcessLookupError:
             pass
         except Stuck as stuck:
@@ -63,7 +67,7 @@ class Player:
                 os.kill(pid, signal.SIGKILL)
 
     def _until(
-        self, pid: int, what: str, holds: Callable[[], bool], begun: float | None = None
+        self, pid: int, what: str, holds: Callable[[], object], begun: float | None = None
     ) -> None:
         """Wait for something. Raises `ProcessLookupError` once the daemon is dead, and `Stuck`."""
         patience = time.monotonic() + PATIENCE_S
@@ -78,7 +82,7 @@ class Player:
             time.sleep(POLL_S)
 
     def _is_up(self) -> bool:
-        return bool(self._ask("SELECT 1 FROM journal WHERE event = 'HostStarted'"))
+        return bool(self._ask("SELECT 1 FROM journal WHERE event = 'DrivesScanned'"))
 
     def _is_settled(self) -> bool:
         drives = {row[0]: row[1] for row in self._ask("SELECT id, state FROM drives")}

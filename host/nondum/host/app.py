@@ -32,6 +32,7 @@ from nondum.host.drives.steady import Steady
 from nondum.host.events import Event, HostStarted, Recomposed
 from nondum.host.helper import privileged
 from nondum.host.lifecycle.bus import Bus
+from nondum.host.lifecycle.children import watch_without_threads
 from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
 from nondum.host.lifecycle.folders import Folders, claim
@@ -64,6 +65,7 @@ async def run_host(config: HostConfig, *, more_drives: Sequence[DriveSource] = (
     Raises `ConfigRefused` (ALREADY_RUNNING, SYSTEM_TREE, …) before anything has begun.
     """
     stop = _told_to_stop()
+    watch_without_threads()
     _make_slots(config)
     folders = Folders(config.host.state)
     held = claim(folders)
@@ -218,7 +220,8 @@ def drive_sources(config: HostConfig, folders: Folders) -> list[DriveSource]:
         sources.append(SlotSource(config.drives.slots))
     if config.drives.block_devices:
         single_function = config.drives.single_function
-        sources.append(Steady(BlockSource(folders.mounts, single_function=single_function)))
+        mounts = privileged().mounts(folders.mounts)
+        sources.append(Steady(BlockSource(mounts, single_function=single_function)))
     return sources
 
 

@@ -16,10 +16,12 @@ import signal
 import sys
 from asyncio.subprocess import PIPE, Process
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 from nondum.sdk import errors
 from nondum.sdk.errors import InstallFailed, NondumError, Problem
+from nondum.wheelhouse import disk
 
 LINE_LIMIT = 16 * 1024 * 1024
 """Bytes of one answer: it may hold the descriptions of many components."""
@@ -156,8 +158,11 @@ class Children:
         try:
             self._spares.append(await asyncio.shield(spawned))
         except asyncio.CancelledError:
-            self._spares.append(await spawned)
+            with contextlib.suppress(InstallFailed):
+                self._spares.append(await spawned)
             raise
+        except InstallFailed as error:
+            log.warning("no spare child: %s", error)
 
     async def _keep(self, child: Process, owner: str) -> None:
         """Keep a child for its owner, in the place of whichever was kept longest."""
@@ -192,14 +197,30 @@ class Children:
             log.warning("child %d hangs in its disk and is left behind", child.pid)
 
 
+def watch_without_threads() -> None:
+    """Be told of children's ends by descriptors (pidfd_open(2)), as Python 3.12 does by itself.
+
+    3.11 has a thread for each child, which there is no memory for just when it is needed.
+    """
+    if sys.version_info < (3, 12):
+        watcher = asyncio.PidfdChildWatcher()
+        watcher.attach_loop(asyncio.get_running_loop())
+        asyncio.set_child_watcher(watcher)
+
+
 async def _spawn() -> Process:
-    return await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "nondum.host.lifecycle.child", str(os.getpid())),
-        stdin=PIPE,
-        stdout=PIPE,
-        limit=LINE_LIMIT,
-        start_new_session=True,
-    )
+    """Start a child. Raises `InstallFailed` (NO_RESOURCES, IO_ERROR)."""
+    try:
+        return await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "nondum.host.lifecycle.child", str(os.getpid())),
+            stdin=PIPE,
+            stdout=PIPE,
+            limit=LINE_LIMIT,
+            start_new_session=True,
+        )
+    except OSError as error:
+        text = "a child process cannot be started"
+        raise disk.failed(error, text, Path(sys.executable)) from error
 
 
 async def _converse(

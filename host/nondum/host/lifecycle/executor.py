@@ -137,6 +137,8 @@ class Executor:
             log.exception("%r", effect)
             where = Path(error.filename or "")
             reported = _failure(effect, disk.failed(error, type(effect).__name__, where))
+        except MemoryError:
+            reported = _failure(effect, NondumError(_no_memory(effect)))
         except Exception as error:
             log.exception("%r", effect)
             internal = Problem("INTERNAL", f"{type(effect).__name__}: {error!r}")
@@ -177,6 +179,11 @@ class Executor:
     async def _detach(self, effect: effects.DetachDevice) -> tuple[Event, ...]:
         await self._workers.detach(effect.component, effect.need)
         return ()
+
+
+def _no_memory(effect: Effect) -> Problem:
+    text = f"{type(effect).__name__}: there is no memory left"
+    return Problem("NO_MEMORY", text, fix="pull a payload, or give this host more memory")
 
 
 def _lane(effect: Effect) -> str:

@@ -1,0 +1,39 @@
+"""System calls that fail, or never return: told as what they are, survived, and nothing is left.
+
+The long form, `python -m tests.faults`, goes through some thousands of them.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from tests.faults.nursery import Nursery
+from tests.faults.points import Point, moments
+
+pytestmark = pytest.mark.slow
+
+FAILS = ("ENOSPC openat 300", "EIO fdatasync 6", "EMFILE pipe2 3", "ENOMEM clone3 1")
+KILLS = ("fdatasync 9", "rename 2", "link 20")
+
+
+def point(kind: str, name: str) -> Point:
+    *error, call, nth = name.split()
+    return Point(kind, name, {"call": call, "nth": int(nth), "error": "".join(error)})
+
+
+@pytest.mark.parametrize("name", FAILS)
+def test_call_fails(nursery: Nursery, tmp_path: Path, name: str) -> None:
+    result = point("error", name).run(nursery, tmp_path)
+    assert not result.wrong
+    assert result.outcome == "lived"
+
+
+@pytest.mark.parametrize("name", KILLS)
+def test_kill_at_a_call(nursery: Nursery, tmp_path: Path, name: str) -> None:
+    assert not point("kill", name).run(nursery, tmp_path).wrong
+
+
+def test_kill_at_a_moment_of_an_upgrade(nursery: Nursery, tmp_path: Path) -> None:
+    (moment,) = moments(1)
+    assert not moment.run(nursery, tmp_path).wrong
