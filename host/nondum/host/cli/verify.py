@@ -96,7 +96,9 @@ def _tell(session: Session, drive: Path, verifier: Verifier, facts: HostFacts | 
         render.as_json({**told, "signers": signers})
     else:
         for name, keys in signers.items():
-            render.sentence(f"{name}: signed by {', '.join(keys)}" if keys else f"{name}: unsigned")
+            render.sentence(
+                f"{name}: signed by {', '.join(keys)}" if keys else f"{name}: nobody has signed it"
+            )
         for problem in problems:
             render.sentence(str(problem), colour="red")
         for warning in warnings:

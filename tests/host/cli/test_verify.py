@@ -1,0 +1,77 @@
+"""`nondum payload verify` on the command line: what people and programs are told, and the code."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from tests.host.cli.daemon import nondum
+from tests.payloads import Part, make_payload, make_wheel, seal
+
+ID = "org.example.test"
+PLAIN = Part("blinker", "X = 1\n", with_sdk=False)
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> Path:
+    make_payload(tmp_path / "drive", PLAIN)
+    return tmp_path / "drive"
+
+
+@pytest.fixture
+def trust(tmp_path: Path) -> Path:
+    """A trust file by which payloads that the key `alice` signed may come."""
+    nondum("keys", "new", tmp_path / "alice").ok()
+    file = tmp_path / "trust.toml"
+    nondum("keys", "init", file, "--owner", "survey", "--root", tmp_path / "alice.pub").ok()
+    given = ("--name", "alice", "--payloads", "org.example")
+    nondum("keys", "allow", file, tmp_path / "alice.pub", *given).ok()
+    return file
+
+
+def test_what_is_signed_by_a_trusted_key_is_accepted(drive: Path, trust: Path) -> None:
+    nondum("payload", "sign", drive, "--key", trust.parent / "alice").ok()
+    ran = nondum("payload", "verify", drive, "--trust", trust, "--json").ok()
+    assert ran.json == {"ok": True, "problems": [], "warnings": [], "signers": {ID: ["alice"]}}
+
+
+def test_what_was_changed_after_it_was_signed_is_refused(drive: Path, trust: Path) -> None:
+    nondum("payload", "sign", drive, "--key", trust.parent / "alice").ok()
+    seal(drive / "nondum" / ID, payload_id=ID, version="2.0")
+    ran = nondum("payload", "verify", drive, "--trust", trust)
+    assert ran.code == 3
+    assert ran.out.startswith(f"{ID}: nobody has signed it\nSIG_INVALID ")
+    assert ran.out.endswith("\nrefused\n")
+
+
+def test_every_problem_has_its_four_keys(drive: Path) -> None:
+    (drive / "nondum" / ID / "payload.toml").write_text("id = 1\n")
+    ran = nondum("payload", "verify", drive, "--json")
+    assert (ran.code, ran.json["ok"]) == (3, False)
+    assert {row["code"] for row in ran.json["problems"]} == {"SIG_MISSING", "HASH_MISMATCH"}
+    for row in ran.json["problems"]:
+        assert {"code", "where", "message", "fix"} <= row.keys()
+        assert row["message"] and row["fix"]
+
+
+def test_a_folder_that_is_none_has_problems_too(tmp_path: Path) -> None:
+    ran = nondum("payload", "verify", tmp_path, "--json")
+    assert (ran.code, [row["code"] for row in ran.json["problems"]]) == (3, ["DRIVE_NOT_PAYLOAD"])
+
+
+def test_signatures_may_be_left_unasked(drive: Path) -> None:
+    assert nondum("payload", "verify", drive, "--unsigned").ok().out.endswith("accepted\n")
+    assert nondum("payload", "check", drive).ok().out.endswith("accepted\n")
+
+
+def test_another_kind_of_host_is_asked_about(tmp_path: Path) -> None:
+    native = make_wheel(
+        tmp_path, "native", "1.0", {"native.py": ""}, tag="cp312-cp312-linux_aarch64"
+    )
+    part = Part("blinker", "X = 1\n", wheels=(native,), with_sdk=False)
+    make_payload(tmp_path / "drive", part)
+    asked = ("payload", "verify", tmp_path / "drive", "--unsigned")
+    nondum(*asked, "--arch", "aarch64", "--python", "3.12").ok()
+    ran = nondum(*asked, "--arch", "x86_64", "--json")
+    assert [row["code"] for row in ran.json["problems"]] == ["WHEEL_INCOMPATIBLE"]
+    nondum(*asked, "--arch", "sparc").refused(2, "TARGET_UNKNOWN")
