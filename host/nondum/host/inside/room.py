@@ -72,6 +72,8 @@ def move_in(room: Mapping[str, Any]) -> None:
 def grant(outside: str, need: str, node: str) -> None:
     """Make a device of the host appear below `DEVICES`. Raises `OSError`."""
     revoke(need)
+    if os.path.isdir(outside + node):  # noqa: PTH112
+        raise OSError(f"{node} is no device")
     _bind_node(outside + node, f"{DEVICES}/{need}")
 
 

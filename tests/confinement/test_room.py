@@ -1,0 +1,200 @@
+"""What is in a worker's room: what it was granted, and nothing for longer than that."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import pty
+import shutil
+import socket
+from collections.abc import AsyncIterator, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tests.host.workers.house import HOST, House, until_gone
+
+from nondum.host.events import WorkerLogged
+from nondum.host.workers import confinements
+from nondum.host.workers.confinements import Boxed, Confinement, Held
+from nondum.planning.running import RunState
+from nondum.sdk.description import Behaviour, Unit
+
+pytestmark = pytest.mark.anyio
+
+DO = Behaviour("do", "(do ?u - sensor)")
+PLUGIN = """
+import os, socket, subprocess, sys, tty
+from nondum.sdk import Unit, behaviour, hookimpl
+
+@hookimpl
+def units():
+    return (Unit("it", "sensor"),)
+
+@behaviour("do", action="(do ?u - sensor)")
+async def do(ctx, u):
+    device = ctx.device("line")
+    {body}
+"""
+
+
+@pytest.fixture
+async def house(tmp_path: Path) -> AsyncIterator[House]:
+    house = House(tmp_path, confinement=Boxed(shutil.which("bwrap") or "bwrap"))
+    yield house
+    await house.workers.close(grace_s=1.0)
+
+
+@pytest.fixture
+def line() -> Iterator[tuple[int, str]]:
+    """A serial line: its far end, and the node of the near one."""
+    far, near = pty.openpty()
+    yield far, os.ttyname(near)
+    for end in (far, near):
+        with contextlib.suppress(OSError):
+            os.close(end)
+
+
+async def guest(house: House, body: str, permissions: tuple[str, ...] = ()) -> None:
+    source = PLUGIN.replace("{body}", body.replace("\n", "\n    "))
+    spec = house.spec("guest", source, behaviours=(DO,), units=(Unit("it", "sensor"),))
+    await house.workers.start(replace(spec, permissions=permissions))
+
+
+async def does(house: House) -> str:
+    """Have it do its thing; why it failed, if so."""
+    call = house.behave("guest", "do", u=f"{HOST}__guest__it")
+    return "" if await call.ended() is RunState.SUCCEEDED else call.reason
+
+
+async def test_device_appears_and_vanishes_while_it_runs(
+    house: House, line: tuple[int, str]
+) -> None:
+    far, node = line
+    await guest(
+        house,
+        "assert os.listdir('/dev/nondum') == ([] if device is None else ['line'])\n"
+        "if device is not None:\n"
+        "    port = os.open(device.node, os.O_RDWR | os.O_NOCTTY)\n"
+        "    os.write(port, b'hello')\n"
+        "    os.close(port)",
+    )
+    assert await does(house) == ""
+    await house.workers.attach("guest", "line", node, {})
+    assert await does(house) == ""
+    assert await asyncio.to_thread(os.read, far, 5) == b"hello"
+    await house.workers.detach("guest", "line")
+    assert await does(house) == ""
+
+
+async def test_only_devices_are_handed_in(house: House, tmp_path: Path) -> None:
+    secret = tmp_path / "secret"
+    secret.write_text("of the host")
+    await guest(house, "assert os.listdir('/dev/nondum') == []")
+    for node in (secret, tmp_path, Path("/dev/pts/no-such")):
+        await house.workers.attach("guest", "line", str(node), {})
+        said = house.told(WorkerLogged)[-1].message
+        assert said.startswith("DEVICE_REFUSED"), said
+        assert await does(house) == ""
+
+
+async def test_link_to_a_device_is_followed_outside(
+    house: House, tmp_path: Path, line: tuple[int, str]
+) -> None:
+    link = tmp_path / "by-id"
+    link.symlink_to(line[1])
+    await guest(house, "os.close(os.open(device.node, os.O_RDWR | os.O_NOCTTY))")
+    await house.workers.attach("guest", "line", str(link), {})
+    assert await does(house) == ""
+
+
+async def test_device_is_there_before_the_plugin_starts(
+    house: House, line: tuple[int, str]
+) -> None:
+    await house.workers.attach("guest", "line", line[1], {})
+    await guest(house, "os.close(os.open('/dev/nondum/line', os.O_RDWR | os.O_NOCTTY))")
+    assert await does(house) == ""
+
+
+CONNECT = "socket.create_connection(('127.0.0.1', {port}), 2).close()"
+
+
+@pytest.mark.parametrize("make", [Boxed, Held], ids=["level 3", "level 1"])
+async def test_network_is_a_permission(tmp_path: Path, make: type[Boxed] | type[Held]) -> None:
+    confinement: Confinement = Boxed(shutil.which("bwrap") or "bwrap") if make is Boxed else Held()
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        body = CONNECT.replace("{port}", str(listener.getsockname()[1]))
+        for number, permissions in enumerate(((), ("network",))):
+            house = House(tmp_path / str(number), confinement=confinement)
+            await guest(house, body, permissions)
+            assert (await does(house) == "") is bool(permissions)
+            await house.workers.close()
+
+
+async def test_permission_brings_its_device_nodes(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(confinements, "NODES", {"audio": ("/dev/kms*", "/dev/no-such")})
+    body = "print('sees', sorted(n for n in os.listdir('/dev') if n.startswith('k')))"
+    await guest(house, body, ("audio",))
+    assert await does(house) == ""
+    said = await house.until(WorkerLogged, lambda event: event.message.startswith("sees"))
+    assert said.message == "sees ['kmsg']"
+
+
+async def test_what_is_left_in_a_room_is_reaped(house: House) -> None:
+    await guest(
+        house,
+        "if os.fork() == 0:\n"
+        "    if os.fork() == 0:\n"
+        "        os._exit(0)\n"
+        "    os._exit(0)\n"
+        "os.wait()\n"
+        "while len([p for p in os.listdir('/proc') if p.isdigit()]) > 2:\n"
+        "    await ctx.sleep(0.01)",
+    )
+    assert await does(house) == ""
+
+
+async def test_room_ends_with_its_worker(house: House) -> None:
+    body = (
+        "if os.fork() == 0:\n"
+        "    os.setsid()\n"
+        "    print('child', os.getpid(), flush=True)\n"
+        "    os.execve('/usr/bin/sleep', ['sleep', '600'], {})\n"
+        "await ctx.sleep(600)"
+    )
+    await guest(house, body)
+    house.behave("guest", "do", u=f"{HOST}__guest__it")
+    await house.until(WorkerLogged, lambda event: event.message.startswith("child"))
+    keeper = parent(house.workers.pids()["guest"])
+    others = children(keeper)
+    await house.workers.stop("guest")
+    for pid in (keeper, *others):
+        await until_gone(pid)
+
+
+async def test_outside_is_not_told_by_what_a_worker_is(house: House) -> None:
+    body = (
+        "assert os.getuid() == os.getgid() == 65534\n"
+        "assert os.environ['HOME'] == os.getcwd() == str(ctx.scratch)\n"
+        "import pwd\n"
+        "assert pwd.getpwuid(os.getuid()).pw_dir == str(ctx.scratch)\n"
+        "assert socket.gethostname() == 'worker'\n"
+        "assert not os.path.exists('/home') and not os.path.exists('/var')\n"
+        "assert sorted(os.listdir('/dev')) == sorted(['core', 'fd', 'full', 'nondum', 'null',"
+        " 'ptmx', 'pts', 'random', 'shm', 'stderr', 'stdin', 'stdout', 'tty', 'urandom', 'zero'])"
+    )
+    await guest(house, body)
+    assert await does(house) == ""
+
+
+def children(pid: int) -> set[int]:
+    listed = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii")
+    return set(map(int, listed.split()))
+
+
+def parent(pid: int) -> int:
+    fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+    return int(fields[1])
