@@ -113,7 +113,7 @@ class Agent:
             self._waiting.pop(number, None)
 
     def _read(self) -> None:
-        with self._socket.makefile("rb") as lines:
+        with self._socket.makefile("rb") as lines, contextlib.suppress(ConnectionError):
             for line in lines:
                 said = json.loads(line)
                 if "hello" in said:

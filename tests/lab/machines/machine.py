@@ -17,6 +17,8 @@ from tests.lab.machines.qmp import Qmp, QmpError
 
 BOOT_S = 240.0
 """Sixteen seconds on an idle machine; this one may be shared by many."""
+PATIENCE_S = 240.0
+"""How long a program inside may run, unless its caller says otherwise."""
 POLL_S = 0.2
 T = TypeVar("T")
 
@@ -78,14 +80,14 @@ class Machine:
 
     # What happens inside
 
-    def run(self, command: str, *, timeout_s: float = 60.0) -> str:
+    def run(self, command: str, *, timeout_s: float = PATIENCE_S) -> str:
         """Run a line of shell as root; answers its output. Raises `CommandFailed`."""
         outcome = self.attempt(command, timeout_s=timeout_s)
         if outcome.status != 0:
             raise CommandFailed(str(outcome))
         return outcome.out
 
-    def attempt(self, command: str, *, timeout_s: float = 60.0) -> Outcome:
+    def attempt(self, command: str, *, timeout_s: float = PATIENCE_S) -> Outcome:
         """Run a line of shell as root, whatever comes of it."""
         outcome = self.agent.run("/bin/sh", "-c", command, timeout_s=timeout_s)
         with (self.work / "commands.log").open("a", encoding="utf-8") as log:
