@@ -34,3 +34,13 @@ def test_what_workers_are_limited_in_is_told() -> None:
     assert told["cgroups"] in ("v1", "v2")
     assert all(limit["held"] for limit in told["limits"])
     assert "memory  yes" in nondum("doctor", "limits").out
+
+
+def test_every_level_of_confinement_is_tried() -> None:
+    done = nondum("doctor", "confinement").ok()
+    assert done.out.splitlines()[0].split() == ["LEVEL", "NAME", "AVAILABLE", "REASON"]
+    told = json.loads(nondum("doctor", "confinement", "--json").ok().out)
+    available = {row["level"]: row["available"] for row in told["levels"]}
+    assert told["ok"]
+    assert (available[3], available[1]) == (True, True), "tests need bubblewrap and Landlock"
+    assert all(row["available"] or (row["reason"] and row["fix"]) for row in told["levels"])

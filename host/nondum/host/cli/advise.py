@@ -90,11 +90,12 @@ def surroundings(
 
     A bare host where one is named. Raises `HostUnreachable`.
     """
+    from nondum.host.confinement import choice
     from nondum.host.counsel import Surroundings, waiting
     from nondum.host.shelf import Shelved, on_shelf
     from nondum.wheelhouse import preflight
 
-    facts = preflight.probe(Path.cwd(), reserve_mb=0, confinement=0)
+    facts = preflight.probe(Path.cwd(), reserve_mb=0, confinement=choice.best())
     told = None if host else _told(session)
     shelf: list[Shelved] = []
     problems: list[Problem] = []

@@ -134,11 +134,12 @@ def _verified(
 
 def _facts(arch: str | None, python: str | None) -> HostFacts:
     """The host that is asked about: this machine, or any of the kind that is named."""
+    from nondum.host.confinement import choice
     from nondum.wheelhouse import preflight
     from nondum.wheelhouse.target import Target, targets
 
     if arch is None and python is None:
-        return preflight.probe(Path.cwd(), reserve_mb=0, confinement=0)
+        return preflight.probe(Path.cwd(), reserve_mb=0, confinement=choice.best())
     here = Target.here()
     (target,) = targets((arch or here.architecture,), (python or here.python,))
     return preflight.of_target(target)

@@ -43,3 +43,8 @@ def confinement(at: Level, places: tuple[Path, ...]) -> Confinement:
             return Held()
         case _:
             return Unconfined()
+
+
+def best() -> int:
+    """The best level that the one who asks could have here. Blocks, see `probe.findings`."""
+    return int(standing(AUTO, 0).level)

@@ -47,8 +47,8 @@ def furnish(room: Mapping[str, Any]) -> None:
 def move_in(room: Mapping[str, Any]) -> None:
     """Leave the keeper's view for the worker's, and its user for one that owns nothing of it.
 
-    `sealed`: what may be read only, though it could be written by the user's own right; `protected`:
-    mounts likewise. Raises `OSError`.
+    `sealed`: what may be read only, though its user might write it; `protected`: mounts likewise.
+    Raises `OSError`.
     """
     kernel.unshare(kernel.CLONE_NEWNS)
     kernel.mount(None, DEVICES, None, kernel.MS_SLAVE)
