@@ -126,7 +126,6 @@ async def test_worker_that_nobody_asks_and_spins_is_told_once(
     caged: House, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(excess, "SPIN_S", 0.5)
-    monkeypatch.setattr(excess, "SPIN_PART", 0.1)  # other tests may want the processors, too
     spin = "def spin():\n    while True:\n        pass\n"
     await begin(caged, "guest", f"{spin}threading.Thread(target=spin, daemon=True).start()")
     assert await done(caged, "guest") is RunState.SUCCEEDED

@@ -7,7 +7,7 @@ limit it was, and ends workers that beat against one instead of working.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from nondum.host.cgroups import Usage
@@ -21,8 +21,8 @@ NEARLY = 0.9
 """Part of a limit at which people are told."""
 SPIN_S = 10.0
 """How long a worker that nobody asks anything may keep a processor busy."""
-SPIN_PART = 0.25
-"""Of a processor: what spins beside others gets no more on a busy machine."""
+SPIN_PART = 0.8
+"""Of that time, one of its threads runs or waits for a processor: on a busy machine, it waits."""
 SPARED = 3
 """Descriptors below the limit at which there are none left to work with."""
 
@@ -36,6 +36,8 @@ class Reading:
     descriptors: int = 0
     """Most of any one of its processes."""
     scratch_bytes: int = 0
+    wanted_s: Mapping[int, float] = field(default_factory=dict)
+    """Thread → seconds that it has run or waited for a processor since it began."""
     is_asked: bool = False
     """Whether a behaviour of its runs or a stream of its flows."""
 
@@ -100,8 +102,11 @@ class Watch:
 
     def _is_spinning(self, last: Reading, now: Reading) -> bool:
         most = min(1.0, self.limits.processors or 1.0) * SPIN_PART
-        used = (now.usage.cpu_s - last.usage.cpu_s) / max(now.at_s - last.at_s, 1e-9)
-        if now.is_asked or used < most:
+        wanted_s = max(
+            (wanted_s - last.wanted_s.get(task, 0.0) for task, wanted_s in now.wanted_s.items()),
+            default=0.0,
+        )
+        if now.is_asked or wanted_s < most * (now.at_s - last.at_s):
             self._busy_since_s = None
         elif self._busy_since_s is None:
             self._busy_since_s = last.at_s

@@ -29,6 +29,10 @@ class Gauge:
             return self._cage.usage()
         return Usage(cpu_s=_cpu_s(self._pid))
 
+    def wanted_s(self) -> dict[int, float]:
+        """Thread → seconds that it has run or waited for a processor (sched-stats.rst)."""
+        return {task: wanted_s for pid in self.pids() for task, wanted_s in _wanted_s(pid)}
+
     def descriptors(self) -> int:
         """Open files of that process of its which has most."""
         return max((count for pid in self.pids() for count in _open_files(pid)), default=0)
@@ -37,6 +41,14 @@ class Gauge:
 def _open_files(pid: int) -> Iterator[int]:
     with contextlib.suppress(OSError):  # it has ended, or may not be looked at
         yield sum(1 for _ in Path(f"/proc/{pid}/fd").iterdir())
+
+
+def _wanted_s(pid: int) -> Iterator[tuple[int, float]]:
+    with contextlib.suppress(OSError):  # it has ended
+        for task in Path(f"/proc/{pid}/task").iterdir():
+            with contextlib.suppress(OSError, ValueError):
+                run_ns, wait_ns, _ = (task / "schedstat").read_text(encoding="ascii").split()
+                yield int(task.name), (int(run_ns) + int(wait_ns)) / 1e9
 
 
 def _cpu_s(pid: int) -> float:

@@ -203,6 +203,7 @@ class Worker:
             at_s=time.monotonic(),
             usage=self._gauge.usage(),
             descriptors=self._gauge.descriptors(),
+            wanted_s=self._gauge.wanted_s(),
             scratch_bytes=await asyncio.to_thread(scratch.used_bytes, folder, pids),
             is_asked=bool(self._calls) or is_flowing,
         )
