@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from tests.host.cli.daemon import BEACON, BEACON_ID, nondum, running
 from tests.payloads import Part, make_payload
-from tests.signing import Key
+from tests.signing import MADE, Key
 
-from nondum.wheelhouse.trust import owners_folder, trust_file
+from nondum.wheelhouse.trust import editing, owners_folder, trust_file
 from nondum.wheelhouse.trust.succession import successor
 
 ALICE, BOB, CAROL = Key("alice"), Key("bob"), Key("carol")
@@ -21,9 +21,18 @@ def owner(tmp_path: Path) -> Path:
     """A folder with keys and a trust file of which alice is the root."""
     for key in (ALICE, BOB, CAROL):
         key.write(tmp_path)
-    trust, root = tmp_path / "trust.toml", tmp_path / "alice.pub"
-    nondum("keys", "init", trust, "--owner", "survey", "--root", root, "--fleet", "survey").ok()
+    known = [ALICE.trusted()]
+    trust = editing.begun("survey", known, known, threshold=1, fleets=["survey"], made=MADE)
+    owners_folder.create(tmp_path / "trust.toml", trust)
     return tmp_path
+
+
+def test_a_trust_file_is_begun_and_not_begun_twice(owner: Path) -> None:
+    trust, root = owner / "new.toml", owner / "alice.pub"
+    begin = ("keys", "init", trust, "--owner", "survey", "--root", root, "--fleet", "survey")
+    nondum(*begin).ok()
+    assert owners_folder.parsed(trust).roles == owners_folder.parsed(owner / "trust.toml").roles
+    nondum(*begin).refused(1, "TRUST_EXISTS")
 
 
 def test_keys_are_those_of_ssh_keygen(tmp_path: Path) -> None:
