@@ -60,7 +60,24 @@ WHEELS: tuple[HostileWheel, ...] = (
     HostileWheel(
         "too-many-requirements",
         "WHEEL_METADATA",
-        lambda canary: WheelBuilder(metadata=METADATA + b"Requires-Dist: a\n" * 3000).bytes(),
+        lambda canary: WheelBuilder(
+            metadata=METADATA + b"Requires-Dist: a%s\n" % (b"a" * 100) * 3000
+        ).bytes(),
+    ),
+    HostileWheel(
+        "headers-without-end",
+        "WHEEL_METADATA",
+        lambda canary: WheelBuilder(metadata=METADATA + b"R:\n" * 200_000).bytes(),
+    ),
+    HostileWheel(
+        "folded-header-without-end",
+        "WHEEL_METADATA",
+        lambda canary: WheelBuilder(metadata=METADATA + b"R: x\n" + b" x\n" * 200_000).bytes(),
+    ),
+    HostileWheel(
+        "record-without-end",
+        "WHEEL_RECORD",
+        lambda canary: WheelBuilder(record=b"".join(b"%d,,\n" % n for n in range(60_000))).bytes(),
     ),
     HostileWheel(
         "entry-points-too-long",

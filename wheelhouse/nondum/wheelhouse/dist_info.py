@@ -8,8 +8,9 @@ points" of the PyPA.)
 from __future__ import annotations
 
 import configparser
+import itertools
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from email.message import Message
 from email.parser import HeaderParser
@@ -22,13 +23,26 @@ from packaging.utils import canonicalize_name, parse_wheel_filename
 from packaging.version import InvalidVersion, Version
 
 MAX_METADATA = 4 * 1024**2
-MAX_ENTRY_POINTS = 1024**2
-MAX_REQUIREMENTS = 2000
-MAX_REQUIREMENT = 8000
+MAX_WHEEL = 64 * 1024
+MAX_ENTRY_POINTS = 256 * 1024
+MAX_HEADERS = 512 * 1024
+"""Characters of METADATA before its text begins: reading headers takes long. boto3-stubs, with 882
+dependencies, has 81,000 of them."""
+MAX_LINES = 10_000
+"""Lines of the same."""
+MAX_REQUIREMENTS = 256 * 1024
+"""Characters of all dependencies together."""
+MAX_REQUIREMENT = 2000
 """Characters of one."""
+MAX_TOLD = 10
+"""Dependencies that are told when they are wrong."""
+MAX_TEXT = 250
+"""Characters of a version, a specifier or a tag."""
+MAX_TAGS = 1000
 OWN_GROUPS = "nondum."
 """Groups of entry points that are read here begin so."""
 
+_END_OF_HEADERS = re.compile(r"\n\r?\n")
 _OBJECT = re.compile(r"[\w.]+(\s*:\s*[\w.]+)?(\s*\[[^\]]*\])?")
 _PLATFORM = re.compile(r"(?:linux|manylinux\d+|(?:many|musl)linux_\d+_\d+)_(\w+)")
 _WHEEL_VERSION = re.compile(r"1\.\d{1,4}")
@@ -85,44 +99,55 @@ def folder(paths: Sequence[str], named: WheelName) -> str:
 
 def metadata_flaws(text: str, named: WheelName) -> Iterator[str]:
     """What is wrong with METADATA."""
-    said = _headers(text)
+    headers = _headers_of(text)
+    if len(headers) > MAX_HEADERS or headers.count("\n") > MAX_LINES:
+        yield "METADATA has headers without end"
+        return
+    said = _parsed(headers)
     names, versions = said.get_all("Name", []), said.get_all("Version", [])
     if [canonicalize_name(str(name)) for name in names] != [named.name]:
         yield f"METADATA is of {', '.join(map(str, names))[:80] or 'nobody'!r}, not {named.name!r}"
     if len(versions) != 1 or not _is(str(versions[0]), named.version):
         told = ", ".join(map(str, versions))[:80]
         yield f"METADATA is of version {told!r}, not {named.version}"
-    needed = needs(text)
-    if len(needed.requirements) > MAX_REQUIREMENTS:
-        yield f"METADATA has more than {MAX_REQUIREMENTS} dependencies"
+    needed = _needs(said)
+    if sum(map(len, needed.requirements)) > MAX_REQUIREMENTS:
+        yield "METADATA has dependencies without end"
         return
-    for line in needed.requirements:
-        if flaw := _requirement_flaw(line):
-            yield f"the dependency {line[:80]!r} {flaw}"
-    try:
-        SpecifierSet(needed.python)
-    except InvalidSpecifier:
+    yield from itertools.islice(_requirement_flaws(needed.requirements), MAX_TOLD)
+    if not _is_specifier(needed.python):
         yield f"Requires-Python {needed.python[:80]!r} is no version specifier"
 
 
 def needs(text: str) -> Needs:
-    """What METADATA asks for."""
-    said = _headers(text)
+    """What METADATA without flaws asks for."""
+    return _needs(_parsed(_headers_of(text)))
+
+
+def _needs(said: Message) -> Needs:
     requirements = tuple(str(line) for line in said.get_all("Requires-Dist", []))
     return Needs(requirements, str(said.get("Requires-Python", "")).strip())
 
 
+def _headers_of(text: str) -> str:
+    """What stands before the first empty line; nobody takes what follows for headers."""
+    end = _END_OF_HEADERS.search(text)
+    return text[: end.start() + 1] if end else text
+
+
 def wheel_flaws(text: str, named: WheelName) -> Iterator[str]:
     """What is wrong with WHEEL."""
-    said = _headers(text)
+    said = _parsed(text)
     version = str(said.get("Wheel-Version", "")).strip()
     if not _WHEEL_VERSION.fullmatch(version):
         yield f"WHEEL is of format {version[:40]!r}, expected '1.x'"
     purelib = str(said.get("Root-Is-Purelib", "")).strip().lower()
     if purelib not in ("true", "false"):
         yield f"Root-Is-Purelib is {purelib[:40]!r}, neither true nor false"
+    lines = [str(line).strip() for line in said.get_all("Tag", [])]
     try:
-        lines = (str(line).strip() for line in said.get_all("Tag", []))
+        if len(lines) > MAX_TAGS or any(len(line) > MAX_TEXT for line in lines):
+            raise ValueError("they would take long to be told apart")
         tags = frozenset(tag for line in lines for tag in parse_tag(line))
     except ValueError:
         yield "a Tag in WHEEL is none"
@@ -151,6 +176,12 @@ def _object_flaws(group: str, entries: Mapping[str, str]) -> Iterator[str]:
             yield f"entry point {name[:40]!r} of {group} names no object: {value[:60]!r}"
 
 
+def _requirement_flaws(lines: Iterable[str]) -> Iterator[str]:
+    for line in lines:
+        if flaw := _requirement_flaw(line):
+            yield f"the dependency {line[:80]!r} {flaw}"
+
+
 def _requirement_flaw(line: str) -> str | None:
     if len(line) > MAX_REQUIREMENT:
         return "is too long"
@@ -161,15 +192,25 @@ def _requirement_flaw(line: str) -> str | None:
     return "is an address, not a version" if wanted.url else None
 
 
-def _headers(text: str) -> Message:
+def _parsed(text: str) -> Message:
     return HeaderParser().parsestr(text)
 
 
 def _is(told: str, version: Version) -> bool:
     try:
-        return Version(told.strip()) == version
+        return len(told) <= MAX_TEXT and Version(told.strip()) == version
     except InvalidVersion:
         return False
+
+
+def _is_specifier(told: str) -> bool:
+    if len(told) > MAX_TEXT:
+        return False
+    try:
+        SpecifierSet(told)
+    except InvalidSpecifier:
+        return False
+    return True
 
 
 def _machine(tag: Tag) -> tuple[str, str, bool]:

@@ -9,9 +9,10 @@ import io
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from nondum.wheelhouse.archive import Member
+from nondum.wheelhouse.archive import MAX_MEMBERS, Member
 
-MAX_BYTES = 16 * 1024**2
+MAX_BYTES = 8 * 1024**2
+MAX_ROWS = 2 * MAX_MEMBERS
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +35,8 @@ def parse(text: str) -> Record:
         for row in csv.reader(io.StringIO(text)):
             if not row:
                 continue
+            if len(record) >= MAX_ROWS:
+                raise ValueError(f"it has more than {MAX_ROWS} rows")
             if len(row) != 3:
                 raise ValueError(f"row {','.join(row)[:60]!r} has not three columns")
             path, digest, size = row

@@ -178,12 +178,12 @@ def _described(
 
     if (metadata := text_of("METADATA", dist_info.MAX_METADATA)) is not None:
         flaws += dist_info.metadata_flaws(metadata, named)
-    if (wheel := text_of("WHEEL", dist_info.MAX_METADATA)) is not None:
+    if (wheel := text_of("WHEEL", dist_info.MAX_WHEEL)) is not None:
         flaws += dist_info.wheel_flaws(wheel, named)
     has_entry_points = f"{info}/{ENTRY_POINTS}" in by_path
     if has_entry_points and (text := text_of(ENTRY_POINTS, dist_info.MAX_ENTRY_POINTS)) is not None:
         flaws += dist_info.entry_point_flaws(text)
-    return dist_info.needs(metadata or ""), flaws
+    return dist_info.needs(metadata or "") if not flaws else Needs(), flaws
 
 
 def read_text(data: Bytes, by_path: Mapping[str, Member], path: str, limit: int) -> str:
