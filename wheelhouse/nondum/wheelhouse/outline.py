@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 Bytes = memoryview
-MAX_DIRECTORY = 16 * 1024**2
+MAX_DIRECTORY = 8 * 1024**2
 """Bytes of a directory: more are not read, since each entry takes ten times its bytes."""
 LOCAL = struct.Struct("<4s5H3L2H")
 _CENTRAL = struct.Struct("<4s6H3L5H2L")
