@@ -8,6 +8,7 @@ import os
 import pty
 import shutil
 import socket
+import tempfile
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -15,9 +16,17 @@ from pathlib import Path
 import pytest
 from tests.host.workers.house import HOST, House, until_gone
 
+from nondum.host.confinement import bubblewrap
 from nondum.host.events import WorkerLogged
 from nondum.host.workers import confinements
-from nondum.host.workers.confinements import Boxed, Confinement, Held
+from nondum.host.workers.confinements import (
+    FIRST_USER,
+    USERS,
+    Boxed,
+    Confinement,
+    Held,
+    user_for,
+)
 from nondum.planning.running import RunState
 from nondum.sdk.description import Behaviour, Unit
 
@@ -190,6 +199,15 @@ async def test_outside_is_not_told_by_what_a_worker_is(house: House) -> None:
     assert await does(house) == ""
 
 
+@contextlib.contextmanager
+def open_folder() -> Iterator[Path]:
+    """A folder that everybody may go into, unlike those of tests."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        folder.chmod(0o755)
+        yield folder
+
+
 def children(pid: int) -> set[int]:
     listed = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii")
     return set(map(int, listed.split()))
@@ -198,3 +216,18 @@ def children(pid: int) -> set[int]:
 def parent(pid: int) -> int:
     fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
     return int(fields[1])
+
+
+async def test_worker_of_root_gets_a_user_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where all may read what it needs: Debian's interpreter, unlike one in root's home."""
+    monkeypatch.setattr(bubblewrap, "prefixes", lambda: (Path("/usr/lib"),))
+    with open_folder() as folder:
+        house = House(folder, confinement=Held())
+        source = "import os; print('users', os.getuid(), os.getgroups(), os.stat('.').st_uid)"
+        spec = replace(house.spec("guest", source), python=Path("/usr/bin/python3"))
+        await house.workers.start(spec)
+        said = await house.until(WorkerLogged, lambda event: event.message.startswith("users"))
+        user = user_for(spec)
+        await house.workers.close()
+    assert user in range(FIRST_USER, FIRST_USER + USERS)
+    assert said.message == f"users {user} [] {user}"

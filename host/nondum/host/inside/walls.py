@@ -13,11 +13,11 @@ from nondum.host.inside import kernel
 def put_up(walls: Mapping[str, Any], ruleset: int | None) -> None:
     """Give up what `walls` says; Landlock's ruleset comes as a descriptor.
 
-    `user`: another user's and group's id, or null. `keeps_capabilities`, `filter` (base64 of
-    `struct sock_filter`, or null).
+    `user`: another user's and group's id, or null; `groups` that it has beside.
+    `keeps_capabilities`. `filter`: base64 of `struct sock_filter`, or null.
     """
     if walls["user"] is not None:
-        os.setgroups([])
+        os.setgroups(walls["groups"])
         os.setresgid(walls["user"], walls["user"], walls["user"])
         os.setresuid(walls["user"], walls["user"], walls["user"])
     if not walls["keeps_capabilities"]:

@@ -125,21 +125,22 @@ class Held:
             "sockets": refusals.SOCKETS_OF_THE_HOST[has_network],
         }
         user = None if "user" in self._without else user_for(spec)
+        nodes = (*_existing(INSTRUMENTS if spec.index.devices else ()), *_nodes(spec))
         if user is not None:
             os.chown(spec.scratch, user, user)
         walls = {
             "user": user,
+            "groups": sorted(_groups_of(nodes)),
             "keeps_capabilities": "capabilities" in self._without,
             "filter": calls_refused(groups, self._without),
         }
         if "landlock" in self._without or not self._abi:
             yield Entry(walls)
             return
-        patterns = INSTRUMENTS if spec.index.devices else ()
         with landlock.ruleset(
             readable=(*spec.site_packages, *bubblewrap.prefixes(), *_more_files(spec)),
             writable=(spec.scratch,),
-            nodes=(*_existing(patterns), *_nodes(spec)),
+            nodes=nodes,
             has_network=has_network,
             abi=self._abi,
         ) as ruleset:
@@ -214,6 +215,17 @@ def user_for(spec: WorkerSpec) -> int | None:
     if not all(map(_is_open, needed)):
         return None
     return FIRST_USER + zlib.crc32(spec.component.encode()) % USERS
+
+
+def _groups_of(nodes: Collection[str]) -> set[int]:
+    """Groups, other than root's, that may open some of these nodes: `dialout`, `video`, …"""
+    found = set()
+    for node in nodes:
+        with contextlib.suppress(OSError):
+            about = Path(node).stat()
+            if about.st_mode & stat.S_IRGRP and not stat.S_ISDIR(about.st_mode):
+                found.add(about.st_gid)
+    return found - {0}
 
 
 def _is_open(folder: Path) -> bool:
