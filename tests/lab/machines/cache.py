@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 DONE = ".done"
+MODEST = ("nice", "-n", os.environ.get("NONDUM_LAB_NICE", "15"))
+"""Begins the command of what takes much of a processor: others may need it, too."""
 
 
 def cache_folder() -> Path:
@@ -45,7 +47,7 @@ def call(*command: str | Path, env: dict[str, str] | None = None) -> str:
 
     Returns what it wrote. Raises `RuntimeError` with its last words.
     """
-    words: Sequence[str | Path] = ("nice", "-n", "15", *command)
+    words: Sequence[str | Path] = (*MODEST, *command)
     surroundings = {**os.environ, **(env or {})}
     done = subprocess.run(
         words, capture_output=True, text=True, stdin=subprocess.DEVNULL, env=surroundings

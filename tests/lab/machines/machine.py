@@ -12,7 +12,7 @@ from typing import TypeVar
 
 from tests.lab.machines.agent import Agent, CommandFailed, MachineSilent, Outcome
 from tests.lab.machines.building import Built
-from tests.lab.machines.cache import call
+from tests.lab.machines.cache import MODEST, call
 from tests.lab.machines.qmp import Qmp, QmpError
 
 BOOT_S = 240.0
@@ -150,19 +150,8 @@ class Machine:
         for image in self._drives:
             disks += ["-drive", f"file={image},format=raw,if=virtio,readonly=on"]
         return [
-            *(
-                "setpriv",
-                "--pdeathsig",
-                "KILL",
-                "nice",
-                "-n",
-                "15",
-                recipe.program,
-                "-nodefaults",
-                "-display",
-                "none",
-                "-no-reboot",
-            ),
+            *("setpriv", "--pdeathsig", "KILL", *MODEST, recipe.program),
+            *("-nodefaults", "-display", "none", "-no-reboot"),
             *("-accel", "tcg,thread=multi,tb-size=512", *recipe.machine),
             *("-smp", "2", "-m", str(self._memory_mb)),
             *("-kernel", self.built.kernel, "-initrd", self.built.initramfs),
