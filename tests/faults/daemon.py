@@ -8,7 +8,7 @@ The orders are one JSON object: `root`, and optionally
   soon as that step was committed, one after the other,
 - `kill_while` (a drive's state): SIGKILL itself once a drive was committed to be in it,
 - `script`: things to do one after the other, each when all that came before has settled: `plug`
-  and `pull` slots, `go` (wait for SIGUSR1), `steady` (wait until nothing is on trial), `end`; or
+  and `pull` slots, `tried` (something is on trial), `steady` (wait until nothing is), `end`; or
   `end now`.
 
 Each commit is told in the file `told` under the root once it is acknowledged. The catalogue handed
@@ -69,10 +69,10 @@ class DeadlyCatalogue(Catalogue):
     entries = 0
 
     async def commit(self, after: HostState, entries: Sequence[JournalEntry]) -> None:
-        passed = list(self._passed(entries))
+        passed, parts = list(self._passed(entries)), list(self._components_passed(entries))
         when, *row = self.orders.get("kill", ("", "", ""))
-        names = [[step.name, event] for step, event, _ in passed]
-        is_deadly = row in [*names, *self._component_rows(entries)]
+        rows = [[step.name, event] for step, event, _ in passed]
+        is_deadly = row in [*rows, *([state, event] for state, event, _ in parts)]
         if is_deadly and when == "BEFORE":
             os.kill(os.getpid(), signal.SIGKILL)
         await super().commit(after, entries)
@@ -83,7 +83,7 @@ class DeadlyCatalogue(Catalogue):
             os.kill(os.getpid(), signal.SIGKILL)
         for step, event, payload in passed:
             self._nudge(ROWS[step, event].to.name, payload)
-        for _, event, to in self._components_passed(entries):
+        for _, event, to in parts:
             self._nudge(f"{to}-{event}", "")
 
     def tell(self, line: str) -> None:
@@ -102,9 +102,6 @@ class DeadlyCatalogue(Catalogue):
             if (step, entry.event) in ROWS:
                 yield step, entry.event, payload
                 steps[payload] = ROWS[step, entry.event].to
-
-    def _component_rows(self, entries: Sequence[JournalEntry]) -> list[list[str]]:
-        return [[state, event] for state, event, _ in self._components_passed(entries)]
 
     def _components_passed(self, entries: Sequence[JournalEntry]) -> Iterator[tuple[str, str, str]]:
         """Every transition of the component: (state, event, next state)."""
@@ -153,8 +150,6 @@ class Script:
         self._catalogue, self._slots = catalogue, slots
         self._changed = asyncio.Event()
         bus.subscribe(lambda event: self._changed.set())
-        self._go = asyncio.Event()
-        asyncio.get_running_loop().add_signal_handler(signal.SIGUSR1, self._go.set)
 
     async def run(self, script: Sequence[str]) -> None:
         for line in script:
@@ -170,8 +165,8 @@ class Script:
                 case "pull":
                     for slot in slots:
                         (self._slots / slot).unlink(missing_ok=True)
-                case "go":
-                    await self._go.wait()
+                case "tried":
+                    assert self._catalogue.state.tries
                 case "steady":
                     await self._until(lambda: not self._catalogue.state.tries)
                 case "end":
@@ -181,7 +176,8 @@ class Script:
     async def _until(self, holds: Callable[[], bool]) -> None:
         while not holds():
             self._changed.clear()
-            await self._changed.wait()
+            with contextlib.suppress(TimeoutError):  # not all that changes is told
+                await asyncio.wait_for(self._changed.wait(), 0.1)
 
     def _is_settled(self) -> bool:
         state = self._catalogue.state

@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-PATIENCE_S = 25.0
+PATIENCE_S = 12.0
 POLL_S = 0.02
 
 _AT_REST = ("active", "superseded", "refused", "quarantined")
@@ -57,8 +57,12 @@ class Player:
                     else:
                         place.unlink()
                 self._until(pid, line, self._is_settled, begun)
-            # The write(2) by which a signal wakes a loop may have been made to fail: again.
-            self._until(pid, "SIGTERM", lambda: os.kill(pid, signal.SIGTERM))
+            os.kill(pid, signal.SIGTERM)
+            with contextlib.suppress(Stuck):
+                self._until(pid, "SIGTERM", lambda: False)
+            # The write(2) by which a signal wakes the loop may have been made to fail.
+            os.kill(pid, signal.SIGTERM)
+            self._until(pid, "a second SIGTERM", lambda: False)
         except ProcessLookupError:
             pass
         except Stuck as stuck:
@@ -67,7 +71,7 @@ class Player:
                 os.kill(pid, signal.SIGKILL)
 
     def _until(
-        self, pid: int, what: str, holds: Callable[[], object], begun: float | None = None
+        self, pid: int, what: str, holds: Callable[[], bool], begun: float | None = None
     ) -> None:
         """Wait for something. Raises `ProcessLookupError` once the daemon is dead, and `Stuck`."""
         patience = time.monotonic() + PATIENCE_S

@@ -68,7 +68,7 @@ def test_a_system_tree_that_is_none_is_told(tmp_path: Path) -> None:
 def test_a_state_folder_that_cannot_be_is_told(tmp_path: Path) -> None:
     config = write_config(tmp_path)
     (tmp_path / "state").write_text("a file", encoding="utf-8")
-    refused(host_run("--config", config), str(tmp_path / "state"), code=1)
+    refused(host_run("--config", config), "STATE_UNWRITABLE", str(tmp_path / "state"))
 
 
 def test_every_slot_folder_that_cannot_be_is_told(tmp_path: Path) -> None:

@@ -1,0 +1,82 @@
+"""The clock of the wall jumps by years under a running host: nothing is decided by it."""
+
+from __future__ import annotations
+
+import sqlite3
+import subprocess
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, running
+from tests.payloads import Part
+
+pytestmark = [pytest.mark.lab, pytest.mark.beside]
+
+LIBRARIES = ("libfaketimeMT.so.1", "libfaketime.so.1")
+JUMPS = ("-10y", "+10y")
+TORCH_ID = "org.example.torch"
+TORCH = BEACON.replace("beacon", "torch")
+
+
+def library() -> Path:
+    """Of Debian's package libfaketime."""
+    found = [path for name in LIBRARIES for path in Path("/usr/lib").glob(f"*/faketime/{name}")]
+    if not found:
+        pytest.skip("libfaketime is not installed")
+    return found[0]
+
+
+@pytest.fixture
+def clock(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A file: what is written to it (`+10y`) is added to the wall clock of all processes that are
+    started; clocks that do not jump are left alone."""
+    file = tmp_path / "clock"
+    file.write_text("+0")
+    monkeypatch.setenv("LD_PRELOAD", str(library()))
+    monkeypatch.setenv("FAKETIME_TIMESTAMP_FILE", str(file))
+    monkeypatch.setenv("FAKETIME_CACHE_DURATION", "1")
+    monkeypatch.setenv("FAKETIME_DONT_FAKE_MONOTONIC", "1")
+    monkeypatch.setenv("FAKETIME_DONT_RESET", "1")
+    yield file
+
+
+def year(daemon: Daemon) -> int:
+    """What year it is for the daemon, by the last entry of its journal."""
+    with closing(sqlite3.connect(daemon.root / "state/catalogue.sqlite")) as connection:
+        query = "SELECT strftime('%Y', wall_s, 'unixepoch') FROM journal ORDER BY id DESC LIMIT 1"
+        (found,) = connection.execute(query).fetchone()
+    return int(found)
+
+
+def test_clock_that_jumps_changes_nothing(tmp_path: Path, clock: Path) -> None:
+    (tmp_path / "host").mkdir()
+    with running(tmp_path / "host") as daemon:
+        daemon.plug(BEACON_ID, Part("beacon", BEACON))
+        daemon.until_state(BEACON_ID, "active")
+        daemon.run("goal", "shine").ok()
+        daemon.until(lambda view: any(goal["holds"] for goal in view["goals"]))
+        began = year(daemon)
+        for jump in JUMPS:
+            clock.write_text(jump)
+            daemon.plug(TORCH_ID, Part("torch", TORCH))
+            daemon.until_state(TORCH_ID, "active")
+            assert abs(year(daemon) - began) >= 9, "the clock did jump"
+            daemon.pull(TORCH_ID)
+            daemon.until(lambda view: len(view["payloads"]) == 1)
+            (tmp_path / "host/drives" / TORCH_ID).rename(tmp_path / f"old{jump}")
+            view = daemon.until(lambda view: any(goal["holds"] for goal in view["goals"]))
+            assert [row["state"] for row in view["payloads"]] == ["active"]
+        told = daemon.run("journal", "--json").ok().json
+    assert not [entry for entry in told if entry["event"] in ("WorkerExited", "WorkerFailed")]
+
+
+def test_shim_is_what_it_is_taken_for(clock: Path) -> None:
+    """That the test above could fail."""
+    years = []
+    for jump in ("+10y", "+0"):
+        clock.write_text(jump)
+        told = subprocess.run(["date", "+%Y"], capture_output=True, text=True, check=True).stdout
+        years.append(int(told))
+    assert years[0] - years[1] in (9, 10)
