@@ -32,7 +32,10 @@ LAMP = PayloadRecord(
     sources={},
     phases={},
 )
-WRONG = (Problem("PYTHON_VERSION", "needs another Python"), Problem("DISK_FULL", "no room"))
+WRONG = (
+    Problem("PYTHON_VERSION", "needs another Python", fix="use another payload"),
+    Problem("DISK_FULL", "no room", fix="free some"),
+)
 
 
 @pytest.mark.parametrize(
@@ -40,18 +43,22 @@ WRONG = (Problem("PYTHON_VERSION", "needs another Python"), Problem("DISK_FULL",
     [
         (
             events.PayloadRefused(KEY, WRONG),
-            "org.example.lamp is refused: PYTHON_VERSION needs another Python; DISK_FULL no room",
+            "org.example.lamp is refused: PYTHON_VERSION needs another Python → use another payload; "
+            "DISK_FULL no room → free some",
         ),
         (
             events.PayloadFailed(KEY, WRONG[1:]),
-            "org.example.lamp does not work: DISK_FULL no room",
+            "org.example.lamp does not work: DISK_FULL no room → free some",
         ),
         (
             events.PayloadWithdrawn(KEY, "its drive was pulled"),
             "org.example.lamp is withdrawn: its drive was pulled",
         ),
         (events.PayloadWithdrawn("1", "it left"), "payload 1 is withdrawn: it left"),
-        (events.DriveUnreadable("a", WRONG[1:]), "drive a cannot be used: DISK_FULL no room"),
+        (
+            events.DriveUnreadable("a", WRONG[1:]),
+            "drive a cannot be used: DISK_FULL no room → free some",
+        ),
         (events.DriveRead("a", ()), "drive a carries no payload"),
         (events.DriveRead("a", (KEY,)), None),
         (events.DriveInserted("a", Path("/a"), "slot"), None),

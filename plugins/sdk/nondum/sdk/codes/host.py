@@ -20,6 +20,11 @@ CODES = (
         "see `nondum status`: install, set or ask for again what is not there",
     ),
     Code(
+        "CATALOGUE_UNWRITTEN",
+        "The catalogue cannot be written, so what happens now may be forgotten at the next start.",
+        "see to it that the disk works and has room; it is tried again all the time",
+    ),
+    Code(
         "CATALOGUE_VERSION",
         "The catalogue was written by another version of nondum.",
         "run the nondum that wrote it, or move the file away",
