@@ -1,0 +1,126 @@
+"""What daemons die of is counted, and after five deaths left alone until a person acts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from tests.host.lifecycle.test_advance import (
+    AT,
+    active,
+    after,
+    at_step,
+    drive,
+    found,
+    way_to_active,
+)
+
+from nondum.host import effects, events
+from nondum.host.catalogue.records import DriveState, Moment, Step
+from nondum.host.catalogue.state import HostState
+from nondum.host.events import Event
+from nondum.host.lifecycle.advance import advance
+from nondum.host.lifecycle.recovery import recover
+from nondum.host.lifecycle.tries import ATTEMPTS, STEADY_S
+
+BEGUN = (Step.RECEIVED, Step.COPIED, Step.VERIFIED, Step.STAGED, Step.STORED, Step.PROBED)
+DRIVE = "slot:a"
+LATER = Moment(AT.monotonic_s + STEADY_S, AT.wall_s)
+
+
+def died(state: HostState, times: int = 1) -> HostState:
+    """Daemons that start on it, and die at once."""
+    for _ in range(times):
+        state = recover(state, AT).state
+    return state
+
+
+def stopped(state: HostState) -> HostState:
+    return replace(state, is_stopped=True)
+
+
+def on(state: HostState, *happened: Event) -> HostState:
+    return after(*happened, state=state)[0]
+
+
+@pytest.mark.parametrize("step", BEGUN)
+def test_payload_that_was_begun_is_counted(step: Step) -> None:
+    read = on(at_step(step), events.DriveRead("a", ("k1",)))
+    assert died(read).tries == {"k1": 1}
+    assert died(stopped(read)).tries == {}
+
+
+@pytest.mark.parametrize("step", [Step.REFUSED, Step.QUARANTINED, Step.REMOVING])
+def test_payload_that_waits_is_not_counted(step: Step) -> None:
+    assert died(on(at_step(step), events.DriveRead("a", ("k1",)))).tries == {}
+
+
+def test_drive_that_was_being_read_is_counted() -> None:
+    assert died(on(HostState("spot"), drive())).tries == {DRIVE: 1}
+
+
+def test_guests_that_ran_are_to_blame_only_where_nothing_was_begun() -> None:
+    assert died(active()).tries == {"k1": 1}
+    assert died(on(active(), drive("b"))).tries == {"slot:b": 1}
+
+
+def test_what_is_installed_for_good_is_never_to_blame_while_it_runs() -> None:
+    installed = on(HostState("spot"), drive("a", "installed"), *way_to_active())
+    assert died(on(installed, events.DriveRead("a", ("k1",)))).tries == {}
+
+
+def test_drive_is_left_alone_until_it_is_plugged_in_again() -> None:
+    state = HostState("spot")
+    for _ in range(ATTEMPTS):
+        state = died(on(state, drive()))
+    again, done = after(drive(), state=state)
+    assert [type(effect) for effect in done] == [effects.ReleaseDrive]
+    assert again.drives["a"].state is DriveState.IDLE
+    assert [problem.code for problem in again.drives["a"].problems] == ["QUARANTINED"]
+    assert died(stopped(again)).tries == {DRIVE: ATTEMPTS}
+    pulled, done = after(events.DriveRemoved("a"), drive(), state=again)
+    assert any(isinstance(effect, effects.ReadDrive) for effect in done)
+    assert not pulled.tries
+
+
+def test_drive_that_was_pulled_while_no_daemon_ran_is_forgotten() -> None:
+    state = died(on(HostState("spot"), drive()), 2)
+    assert not on(state, events.DrivesScanned("slot", ())).tries
+    assert on(state, events.DrivesScanned("block", ())).tries
+
+
+def test_payload_is_refused_after_too_many_deaths_and_retried_when_asked() -> None:
+    state = HostState("spot")
+    read = events.DriveRead("a", ("k1",))
+    for _ in range(ATTEMPTS):
+        state = died(on(state, drive(), found(), read))
+    state, done = after(drive(), found(), read, state=state)
+    assert state.payloads["k1"].step is Step.REFUSED
+    assert [problem.code for problem in state.payloads["k1"].problems] == ["QUARANTINED"]
+    assert not any(isinstance(effect, effects.CopyPayload) for effect in done)
+    cleared = events.PayloadCleared("k1")
+    state, done = after(events.RetryAsked("k1"), cleared, found(), state=state)
+    assert state.payloads["k1"].step is Step.RECEIVED
+    assert any(isinstance(effect, effects.CopyPayload) for effect in done)
+
+
+def test_daemon_that_lives_on_clears_what_is_active_for_long_enough() -> None:
+    state = died(active())
+    back = on(state, drive(), events.DriveRead("a", ("k1",)), *way_to_active()[5:])
+    assert on(back, events.HostSteady("spot")).tries == {"k1": 1}
+    turned = replace(
+        back,
+        payloads={
+            "k1": replace(
+                back.payloads["k1"], phases={"ready": Moment(AT.monotonic_s - STEADY_S, 0)}
+            )
+        },
+    )
+    assert not on(turned, events.HostSteady("spot")).tries
+
+
+def test_nothing_is_cleared_while_a_drive_is_being_read() -> None:
+    state = replace(on(HostState("spot"), drive()), tries={"k9": 3})
+    assert on(state, events.HostSteady("spot")).tries == {"k9": 3}
+    read = on(state, events.DriveRead("a", ()))
+    assert not on(read, events.HostSteady("spot")).tries
