@@ -43,8 +43,8 @@ WRONG = (
     [
         (
             events.PayloadRefused(KEY, WRONG),
-            "org.example.lamp is refused: PYTHON_VERSION needs another Python → use another payload; "
-            "DISK_FULL no room → free some",
+            "org.example.lamp is refused: PYTHON_VERSION needs another Python → use another payload"
+            "; DISK_FULL no room → free some",
         ),
         (
             events.PayloadFailed(KEY, WRONG[1:]),
