@@ -6,6 +6,7 @@ for an effect that says nothing.
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import logging
 from collections.abc import Awaitable, Callable, Mapping
@@ -105,8 +106,7 @@ class Executor:
 
     async def prepare(self, state: HostState) -> None:
         """Clear away what a recovered state does not account for; start a spare child."""
-        await self.trust.open()
-        await self.installation.prepare(state)
+        await asyncio.gather(self.trust.open(), self.installation.prepare(state))
         if payloads := payload_rules.kept(state):
             self.start(effects.JudgePayloads(payloads))
 
