@@ -133,16 +133,9 @@ class Executor:
                 reported = await self._hands[type(effect)](effect)
         except NondumError as error:
             reported = _failure(effect, error)
-        except OSError as error:
-            log.exception("%r", effect)
-            where = Path(error.filename or "")
-            reported = _failure(effect, disk.failed(error, type(effect).__name__, where))
-        except MemoryError:
-            reported = _failure(effect, NondumError(_no_memory(effect)))
         except Exception as error:
             log.exception("%r", effect)
-            internal = Problem("INTERNAL", f"{type(effect).__name__}: {error!r}")
-            reported = _failure(effect, NondumError(internal))
+            reported = _failure(effect, _translated(effect, error))
         for event in reported:
             self._emit(event)
 
@@ -181,9 +174,17 @@ class Executor:
         return ()
 
 
-def _no_memory(effect: Effect) -> Problem:
-    text = f"{type(effect).__name__}: there is no memory left"
-    return Problem("NO_MEMORY", text, fix="pull a payload, or give this host more memory")
+def _translated(effect: Effect, error: Exception) -> NondumError:
+    """What is told of an error that nobody below has put into words."""
+    what = type(effect).__name__
+    if isinstance(error, OSError):
+        return disk.failed(error, what, Path(error.filename or ""))
+    # Python has no error of its own for a thread that there is no memory for.
+    if isinstance(error, MemoryError) or "start new thread" in str(error):
+        text, fix = f"{what}: there is no memory left", "pull a payload, and try again"
+        return NondumError(Problem("NO_MEMORY", text, fix=fix))
+    fix = "see the log, and report it with what it says"
+    return NondumError(Problem("INTERNAL", f"{what}: {error!r}", fix=fix))
 
 
 def _lane(effect: Effect) -> str:

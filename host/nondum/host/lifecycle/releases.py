@@ -50,7 +50,9 @@ def others(state: HostState, payload: PayloadRecord) -> Iterator[PayloadRecord]:
     return (
         other
         for other in state.payloads.values()
-        if key_of(other) == key_of(payload) and other.key != payload.key
+        if other.payload_id == payload.payload_id
+        and other.fleet == payload.fleet
+        and other.key != payload.key
     )
 
 

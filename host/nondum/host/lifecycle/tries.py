@@ -64,7 +64,7 @@ def left_alone(where: str) -> Problem:
         "QUARANTINED",
         f"{ATTEMPTS} daemons in a row ended while they were at it, so it is left alone",
         where=where,
-        fix="pull it and plug it in again, or ask for another try with `nondum payload retry`",
+        fix="pull it and plug it in again, or ask for another try with `nondum retry`",
     )
 
 
