@@ -101,6 +101,11 @@ def write_to_dev(bait: Bait) -> Any:
 
 
 @attempt
+def write_among_its_devices(bait: Bait) -> Any:
+    return written("/dev/nondum/nondum-escape")
+
+
+@attempt
 def change_its_own_code(bait: Bait) -> Any:
     return written(os.path.join(os.path.dirname(os.path.abspath(__file__)), "escape"))
 

@@ -141,6 +141,15 @@ async def test_network_is_a_permission(tmp_path: Path, make: type[Boxed] | type[
             await house.workers.close()
 
 
+async def test_network_is_not_the_sockets_of_other_programs(house: House) -> None:
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind("\0nondum-of-another-program")
+        listener.listen()
+        body = "socket.socket(socket.AF_UNIX).connect('\\0nondum-of-another-program')"
+        await guest(house, body, ("network",))
+        assert "Address family not supported" in await does(house)
+
+
 async def test_permission_brings_its_device_nodes(
     house: House, monkeypatch: pytest.MonkeyPatch
 ) -> None:

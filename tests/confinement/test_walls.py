@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 from tests.confinement.baits import SMALL, attempted, laid
+from tests.confinement.test_room import children
 from tests.host.workers.house import until_gone
 
 from nondum.host.confinement import bubblewrap, refusals
@@ -33,7 +34,7 @@ IN_A_ROOM = {
     "cgroups": ("know its control group", ()),
     "size of tmp": ("fill tmp", ()),
     "outside": ("see what the keeper sees", ()),
-    "system": ("write to the root", ()),
+    "system": ("write among its devices", ()),
     "code": ("change its own code", ()),
     "settings": ("write a setting of the kernel", ()),
     "user": ("be root", ()),
@@ -159,19 +160,23 @@ async def spare_of_a_daemon_that_dies(*without: str) -> tuple[int, int]:
     )
     assert daemon.stdout is not None
     outer = int(await daemon.stdout.readline())
-    keeper = await asyncio.to_thread(child_of, outer)
+    keeper = await asyncio.to_thread(keeper_of, outer)
     os.kill(keeper, signal.SIGSTOP)
     daemon.kill()
     await daemon.communicate()
     return outer, keeper
 
 
-def child_of(pid: int) -> int:
-    """The only child of a process, as soon as it has one."""
-    children = Path(f"/proc/{pid}/task/{pid}/children")
-    while not (found := children.read_text(encoding="ascii").split()):
+def keeper_of(pid: int) -> int:
+    """The only child of what makes a room, as soon as the room is made."""
+    while not any(name.startswith("python") for name in map(name_of, children(pid))):
         time.sleep(0.01)
-    return int(found[0])
+    (keeper,) = children(pid)
+    return keeper
+
+
+def name_of(pid: int) -> str:
+    return Path(f"/proc/{pid}/comm").read_text(encoding="utf-8")
 
 
 async def test_spare_that_hangs_ends_with_its_daemon() -> None:

@@ -97,7 +97,7 @@ async def _run(
         folders.confinement,
     )
     confinement = choice.confinement(standing.level, folders.of_workers)
-    launcher = WorkerLauncher(confinement, cages)
+    launcher = WorkerLauncher(confinement, cages, folders.scratches)
     workers = Workers(config.host.name, bus.emit, launcher=launcher, timing=timing)
     executor = Executor(config.host.name, folders, workers, bus.emit, _install_options(config))
     manager = ComponentManager(catalogue, executor, bus)

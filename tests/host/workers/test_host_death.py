@@ -12,6 +12,7 @@ import pytest
 from tests.host.workers.house import House, is_alive, until_gone
 
 from nondum.host.workers import end_leftovers
+from nondum.host.workers.launcher import owner_mark
 
 pytestmark = pytest.mark.anyio
 
@@ -81,6 +82,21 @@ async def test_stuck_interpreter_ends_too(tmp_path: Path) -> None:
     await kill(daemon)
     assert is_alive(worker)
     await until_gone(worker, timeout_s=4.0)
+
+
+async def test_next_daemon_ends_what_was_to_become_a_worker(house: House) -> None:
+    commands = (
+        {"NONDUM_SPARE_OF": f"{house.folder}:1"},
+        {"NONDUM_SPARE_OF": owner_mark(house.folder)},
+    )
+    orphan, own = [
+        await asyncio.create_subprocess_exec("sleep", "3600", env=marked) for marked in commands
+    ]
+    assert await asyncio.to_thread(end_leftovers, house.folder) == 1
+    assert await orphan.wait() == -signal.SIGKILL
+    assert own.returncode is None
+    own.kill()
+    await own.wait()
 
 
 async def test_next_daemon_ends_what_was_left(house: House) -> None:

@@ -181,6 +181,9 @@ class Boxed:
     def entry(self, spec: WorkerSpec, ground: Ground) -> Iterator[Entry]:
         """Its own folders and nodes are brought in, everything outside is shut out."""
         kept = self._without
+        groups = refusals.GROUPS
+        if "network" in spec.permissions:  # abstract names of sockets belong to the network
+            groups = {**groups, "sockets": refusals.SOCKETS_OF_THE_HOST[True]}
         mounts_too = {*kept, "mounts"}
         given = {
             "outside": bubblewrap.OUTSIDE,
@@ -192,7 +195,7 @@ class Boxed:
             "nodes": list(_nodes(spec)),
             "shared_mb": SHARED_MB,
             "sealed": [] if "settings" in kept else SETTINGS,
-            "protected": [*(() if "system" in kept else ("/", "/dev")), room.DEVICES],
+            "protected": [] if "system" in kept else ["/", "/dev", room.DEVICES],
             "is_last": "user namespaces" not in kept,
             "changes_user": "user" not in kept,
             "keeper_filter": calls_refused(refusals.GROUPS, mounts_too),
@@ -200,7 +203,7 @@ class Boxed:
         walls = {
             "user": None,
             "keeps_capabilities": "capabilities" in kept,
-            "filter": calls_refused(refusals.GROUPS, kept),
+            "filter": calls_refused(groups, kept),
         }
         yield Entry(walls, room=given)
 

@@ -10,6 +10,7 @@ import logging
 import os
 import socket
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any, Protocol
 
 from nondum.host.cgroups import Cages
@@ -55,9 +56,16 @@ class Launcher(Protocol):
 class WorkerLauncher:
     """Starts workers in one confinement, from a spare interpreter if there is one that will do."""
 
-    def __init__(self, confinement: Confinement | None = None, cages: Cages | None = None) -> None:
+    def __init__(
+        self,
+        confinement: Confinement | None = None,
+        cages: Cages | None = None,
+        scratches: Path | None = None,
+    ) -> None:
+        """`scratches`, where all scratch folders are, lets the next daemon find what is left."""
         self._confinement = confinement or Unconfined()
         self._cages = cages
+        self._owner = owner_mark(scratches) if scratches is not None else ""
         self._spare: Spare | None = None
         self.level = int(self._confinement.level)
         self.name = NAMES[self._confinement.level]
@@ -74,7 +82,7 @@ class WorkerLauncher:
                     if started is not None and not started.serves(ground):
                         started.close()
                         continue
-                    spare = started or Spare(self._confinement, ground, self._cages)
+                    spare = started or Spare(self._confinement, ground, self._cages, self._owner)
                     spare.limit(spec.limits)
                     if spare.become(told, sock, entry.ruleset):
                         return spare.process()
@@ -90,7 +98,7 @@ class WorkerLauncher:
         if self._spare is None:
             try:
                 ground = self._confinement.ground(None)
-                self._spare = Spare(self._confinement, ground, self._cages)
+                self._spare = Spare(self._confinement, ground, self._cages, self._owner)
             except OSError as error:  # launching will tell, should it be lasting
                 log.warning("no spare interpreter: %s", error)
 
@@ -102,6 +110,11 @@ class WorkerLauncher:
     def _taken(self) -> Spare | None:
         spare, self._spare = self._spare, None
         return spare
+
+
+def owner_mark(scratches: Path) -> str:
+    """Whose an interpreter is before it becomes a worker: this daemon's life."""
+    return f"{scratches}:{os.getpid()}"
 
 
 def parameters(spec: WorkerSpec, entry: Entry, *, looks: bool = False) -> dict[str, Any]:

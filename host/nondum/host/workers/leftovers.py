@@ -13,7 +13,8 @@ import signal
 from collections.abc import Iterator
 from pathlib import Path
 
-from nondum.host.workers.launcher import MARK
+from nondum.host.workers.launcher import MARK, owner_mark
+from nondum.host.workers.spare import OWNER
 
 ROUNDS = 5
 """Searches at most: a process may fork while it is being found."""
@@ -22,33 +23,39 @@ ROUNDS = 5
 def end_leftovers(folder: Path) -> int:
     """SIGKILL every process of a worker whose scratch folder is `folder` or below it.
 
+    Likewise what an earlier daemon with its scratch folders there had started to become a worker.
     Blocks for some milliseconds; returns how many were found.
     """
     ended: set[int] = set()
     for _ in range(ROUNDS):
-        found = set(_end_marked(f"{MARK}={folder}".encode()))
+        found = set(_end_marked(folder))
         ended |= found
         if not found:
             break
     return len(ended)
 
 
-def _end_marked(mark: bytes) -> Iterator[int]:
+def _end_marked(folder: Path) -> Iterator[int]:
     for pid in [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()]:
         with contextlib.suppress(OSError):
             # Taken before the look, so that what is ended is what was seen.
             descriptor = os.pidfd_open(pid)
             try:
-                if _is_marked(pid, mark):
+                if _is_marked(pid, folder):
                     signal.pidfd_send_signal(descriptor, signal.SIGKILL)
                     yield pid
             finally:
                 os.close(descriptor)
 
 
-def _is_marked(pid: int, mark: bytes) -> bool:
+def _is_marked(pid: int, folder: Path) -> bool:
     try:
         variables = Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
     except OSError:  # not ours to look at, or it has just ended
         return False
-    return any(v == mark or v.startswith(mark + b"/") for v in variables)
+    mark, own = f"{MARK}={folder}".encode(), f"{OWNER}={owner_mark(folder)}".encode()
+    spares = own[: own.rindex(b":") + 1]
+    return any(
+        v == mark or v.startswith(mark + b"/") or (v.startswith(spares) and v != own)
+        for v in variables
+    )

@@ -6,8 +6,10 @@ the same for all workers: it is done before anybody waits for it.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import signal
 import socket
 import subprocess
 from collections.abc import Mapping
@@ -24,6 +26,8 @@ from nondum.host.workers.spec import Limits
 ROOM = "NONDUM_ROOM"
 """Environment variable that keeps room for the mark of the worker (see `launcher.py`)."""
 ROOM_BYTES = 2048
+OWNER = "NONDUM_SPARE_OF"
+"""Environment variable of interpreters that have not become a worker: whose they are."""
 SAID_BYTES = 64 * 1024
 
 
@@ -31,9 +35,13 @@ class Spare:
     """A started interpreter. It ends when it is closed, or with the thread that started it."""
 
     def __init__(
-        self, confinement: Confinement, ground: Ground, cages: Cages | None = None
+        self,
+        confinement: Confinement,
+        ground: Ground,
+        cages: Cages | None = None,
+        owner: str = "",
     ) -> None:
-        """Start it, in a cage of its own. Raises `OSError`."""
+        """Start it, in a cage of its own; `owner`, if any, tells whose it is. Raises `OSError`."""
         self.ground = ground
         self.cage: Cage | None = None
         self.said = ""
@@ -45,7 +53,7 @@ class Spare:
         try:
             with theirs:
                 command = confinement.command(ground, theirs.fileno())
-                self.popen = _started(command, theirs.fileno())
+                self.popen = _started(command, theirs.fileno(), owner)
         except OSError:
             self._orders.close()
             raise
@@ -86,7 +94,8 @@ class Spare:
     def close(self) -> None:
         """End it unused."""
         self._orders.close()
-        self.popen.kill()
+        with contextlib.suppress(ProcessLookupError):  # its room may not be finished: all of it
+            os.killpg(self.popen.pid, signal.SIGKILL)
         self.popen.wait()
         if self.cage is not None:
             self.cage.end()
@@ -113,7 +122,7 @@ def _last_line(pipe: IO[bytes] | None) -> str:
     return printable(said.splitlines()[-1]) if said else ""
 
 
-def _started(command: list[str], orders: int) -> subprocess.Popen[bytes]:
+def _started(command: list[str], orders: int, owner: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,
@@ -127,6 +136,7 @@ def _started(command: list[str], orders: int) -> subprocess.Popen[bytes]:
             "PATH": "/usr/local/bin:/usr/bin:/bin",
             "LANG": "C.UTF-8",
             "MALLOC_ARENA_MAX": "2",  # read before Python's first line
+            OWNER: owner,
             ROOM: "-" * ROOM_BYTES,
         },
     )
