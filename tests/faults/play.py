@@ -132,6 +132,13 @@ def _is_traced(pid: int) -> bool:
         return True
 
 
+def has_stopped(root: Path) -> bool:
+    """Whether the last daemon ended because it was told to, as far as its journal goes."""
+    with contextlib.closing(sqlite3.connect(root / "state/catalogue.sqlite")) as connection:
+        last = connection.execute("SELECT event FROM journal ORDER BY id DESC LIMIT 1").fetchone()
+    return bool(last) and last[0] == "HostStopped"
+
+
 def codes_of(root: Path) -> list[str]:
     """Codes of all problems in the journal."""
     with contextlib.closing(sqlite3.connect(root / "state/catalogue.sqlite")) as connection:

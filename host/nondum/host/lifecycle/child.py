@@ -57,15 +57,16 @@ def _do(job: str, arguments: dict[str, Any], answers: TextIO) -> dict[str, Any]:
             return {"result": jobs.find(job)(arguments, _reporter(answers))}
     except NondumError as error:
         return _failure(type(error).__name__, *error.problems)
-    except MemoryError:
-        return _failure("InstallFailed", _too_much(job))
     except OSError as error:
         where = Path(error.filename or arguments.get("store", ""))
         return _failure("InstallFailed", disk.problem_of(error, job, where))
     except Exception as error:
+        if disk.is_short_of_memory(error):
+            return _failure("InstallFailed", _too_much(job))
         traceback.print_exc()
         message = f"{job}: {type(error).__name__}: {error}"
-        return _failure("InstallFailed", Problem("INTERNAL", message))
+        fix = "see the log, and report it with what it says"
+        return _failure("InstallFailed", Problem("INTERNAL", message, fix=fix))
 
 
 def _too_much(job: str) -> Problem:

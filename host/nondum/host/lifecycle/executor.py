@@ -179,8 +179,7 @@ def _translated(effect: Effect, error: Exception) -> NondumError:
     what = type(effect).__name__
     if isinstance(error, OSError):
         return disk.failed(error, what, Path(error.filename or ""))
-    # Python has no error of its own for a thread that there is no memory for.
-    if isinstance(error, MemoryError) or "start new thread" in str(error):
+    if disk.is_short_of_memory(error):
         text, fix = f"{what}: there is no memory left", "pull a payload, and try again"
         return NondumError(Problem("NO_MEMORY", text, fix=fix))
     fix = "see the log, and report it with what it says"
