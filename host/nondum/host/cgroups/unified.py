@@ -128,15 +128,24 @@ def _settings(limits: CageLimits, controllers: frozenset[str]) -> Iterator[tuple
 
 
 def _hand_down(part: Path) -> None:
-    """Let the cgroups inside one be limited; this daemon moves out of the way if it must."""
+    """Let the cgroups inside one be limited; this daemon moves out of the way first if it must.
+
+    Of a cgroup with processes, `cpu` and `pids` would be handed down all the same, and then no
+    process could enter those inside ("domain invalid"). The root of all has no `cgroup.type`, and
+    may have processes.
+    """
     wanted = WANTED & knobs.words(part / "cgroup.controllers")
-    if _enable(part) >= wanted or str(os.getpid()) not in knobs.words(part / "cgroup.procs"):
+    if wanted <= knobs.words(part / "cgroup.subtree_control"):
         return
-    (part / LEAF).mkdir(exist_ok=True)
-    knobs.put(part / LEAF / "cgroup.procs", os.getpid())
-    if not _enable(part):  # there are others in it, which are not ours to move
-        knobs.put(part / "cgroup.procs", os.getpid())
-        knobs.remove(part / LEAF)
+    is_inside = str(os.getpid()) in knobs.words(part / "cgroup.procs")
+    if is_inside and (part / "cgroup.type").exists():
+        (part / LEAF).mkdir(exist_ok=True)
+        knobs.put(part / LEAF / "cgroup.procs", os.getpid())
+        if knobs.words(part / "cgroup.procs"):  # there are others in it, which are not ours to move
+            knobs.put(part / "cgroup.procs", os.getpid())
+            knobs.remove(part / LEAF)
+            return
+    _enable(part)
 
 
 def _enable(part: Path) -> frozenset[str]:

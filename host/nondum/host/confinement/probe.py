@@ -24,7 +24,7 @@ from nondum.host.workers.spare import Spare
 from nondum.host.workers.spec import WorkerSpec, base_interpreter
 from nondum.sdk.description import PluginDescription
 
-ANSWER_S = 10.0
+ANSWER_S = 30.0
 """How long a process is waited for that is to look around."""
 _ANSWER_BYTES = 65_536
 log = logging.getLogger(__name__)
