@@ -11,7 +11,7 @@ import os
 import shutil
 import sys
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from nondum.host.helper.client import DEVICES
@@ -47,6 +47,11 @@ _OF_THE_NETWORK = (
 _OF_THE_GPU = ("/sys", "/etc/OpenCL", "/etc/vulkan", "/etc/glvnd", "/etc/nvidia")
 
 
+def places_of_nodes() -> tuple[str, ...]:
+    """Where device nodes are: the machine's, and, for one who is not root, the helper's."""
+    return ("/dev", *([str(DEVICES)] if os.geteuid() != 0 and DEVICES.is_dir() else ()))
+
+
 @dataclass(frozen=True, slots=True)
 class Ground:
     """What an interpreter is started with; a worker that needs no other may be made of it."""
@@ -56,6 +61,8 @@ class Ground:
     """Folders of the host from which code and scratch come."""
     permissions: frozenset[str] = frozenset()
     """Of those that were granted, the ones that change the ground."""
+    nodes: tuple[str, ...] = field(default_factory=places_of_nodes)
+    """Folders of devices, as far as they are there by now."""
 
     def carries(self, python: Path, folders: Collection[Path], permissions: frozenset[str]) -> bool:
         """Whether a worker of this interpreter, these folders and permissions may stand on it."""
@@ -86,7 +93,7 @@ def command(bwrap: str, ground: Ground, orders: int, *, without: Collection[str]
         *_interpreter(),
         *("--ro-bind", str(INSIDE), str(PLACE_OF_INSIDE)),
         *(part for folder in ground.seen for part in ("--bind", str(folder), f"{OUTSIDE}{folder}")),
-        *(part for at in _nodes() for part in ("--dev-bind", at, f"{OUTSIDE}{at}")),
+        *(part for at in ground.nodes for part in ("--dev-bind", at, f"{OUTSIDE}{at}")),
         *("--chdir", "/", "--"),
         *(str(ground.python), "-I", "-S", "-B", "-u", str(BOOTSTRAP), str(orders)),
         "0",
@@ -95,12 +102,7 @@ def command(bwrap: str, ground: Ground, orders: int, *, without: Collection[str]
 
 def seen_outside(ground: Ground) -> list[str]:
     """The host's folders that are seen below `OUTSIDE`."""
-    return [*map(str, ground.seen), *_nodes()]
-
-
-def _nodes() -> list[str]:
-    """Where device nodes are: the machine's, and, for one who is not root, the helper's."""
-    return ["/dev", *([str(DEVICES)] if os.geteuid() != 0 and DEVICES.is_dir() else ())]
+    return [*map(str, ground.seen), *ground.nodes]
 
 
 def _namespaces(permissions: Collection[str], without: Collection[str]) -> Iterator[str]:
