@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import shutil
+import signal
 import sys
 import tempfile
 import time
@@ -81,4 +82,5 @@ def _arguments(known: dict[str, Scenario], words: Sequence[str]) -> argparse.Nam
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that all is switched off
     sys.exit(main(sys.argv[1:]))

@@ -93,11 +93,16 @@ class Machine:
 
 def parse(data: bytes, places: Collection[Path]) -> Request:
     """Read a request from a daemon whose workers' code lies in `places`. Raises `ValueError`."""
-    body = json.loads(data[:MAX_BYTES])
+    try:
+        body = json.loads(data[:MAX_BYTES])
+    except RecursionError:
+        raise ValueError("a request is no such heap of brackets") from None
     if not isinstance(body, dict) or body.keys() != {each.name for each in fields(Request)}:
         raise ValueError("a request has other parts")
     parts: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in body.items()}
     request = Request(**parts)
+    if type(request.code) is not tuple or type(request.permissions) is not tuple:
+        raise ValueError("a list is expected")
     if not COMPONENT.fullmatch(_text(request.component)):
         raise ValueError("that is no component")
     for folder in (*request.code, request.scratch):
