@@ -303,7 +303,7 @@ class Link:
         except Exception as error:
             log.exception("a request's handler failed")
             told = f"{type(error).__name__}: {error}"[:1000]
-            answer = Failure(request.id, (Problem("INTERNAL", told),))
+            answer = Failure(request.id, (Problem(_code_of(error), told),))
         self._answer(answer)
 
     def _give_up(self, call_id: int, handles: tuple[Handle, ...]) -> None:
@@ -334,6 +334,12 @@ class Link:
         elif not self.is_closed:
             self.close()
             self._on_closed()
+
+
+def _code_of(error: Exception) -> str:
+    """Of a fault that nobody put into words; for want of a thread Python has no error class."""
+    is_short = isinstance(error, MemoryError) or "can't start new thread" in str(error)
+    return "NO_MEMORY" if is_short else "INTERNAL"
 
 
 def _halted(call_id: int) -> Failure:
