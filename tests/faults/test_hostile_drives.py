@@ -12,10 +12,14 @@ import pytest
 from tests.faults.hostile import DRIVES, FAMILIES, HostileDrive
 from tests.faults.hostile.gauntlet import Gauntlet, can_have_devices, gauntlet
 
+from nondum.host.lifecycle.children import KEPT
+
 pytestmark = [pytest.mark.lab, pytest.mark.beside, pytest.mark.timeout(300)]
 
 AT_ONCE = 16
 MOST_GROWTH_MB = 10.0
+OF_A_CHILD = 4
+"""Descriptors."""
 
 
 @pytest.fixture
@@ -50,5 +54,6 @@ def test_hostile_drives_are_told_with_their_codes(run: Gauntlet) -> None:
     assert not told.canaries
     assert not told.strays
     assert len(told.pids) == 1
-    assert told.descriptors[0] == told.descriptors[-1]
+    # Children that are kept for a while are no leak; the long form waits until they have gone.
+    assert told.descriptors[-1] - told.descriptors[0] <= KEPT * OF_A_CHILD
     assert told.memory_mb[-1] - told.memory_mb[0] <= MOST_GROWTH_MB

@@ -19,11 +19,13 @@ from tests.faults.hostile import (
     manifests,
     objects,
     paths,
+    signing,
     wheels,
 )
 from tests.faults.hostile.case import Bench, HostileDrive
 
 FAMILIES: dict[str, tuple[HostileDrive, ...]] = {
+    "signatures": signing.DRIVES,
     "contents lists": envelope.DRIVES,
     "paths": paths.DRIVES,
     "files that are none": objects.DRIVES,

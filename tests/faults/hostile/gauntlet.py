@@ -12,10 +12,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tests.faults.hostile.case import Bench, HostileDrive
-from tests.faults.hostile.draft import Sign, unsigned
+from tests.faults.hostile.signing import MAKER, sign, trust
 from tests.lab.plugins import scribe, talker
-from tests.lab.running_host import Row, RunningHost, running
+from tests.lab.running_host import Row, RunningHost
 from tests.lab.traces import Traces
+from tests.payloads import Part
+from tests.signing import sign_payload
 
 HEALTHY = ("talker", "scribe")
 GOAL = "(written spot)"
@@ -79,21 +81,21 @@ class Gauntlet:
 
     def begin(self) -> None:
         """Have the benign payloads at work."""
-        self.host.bring("talk", talker())
-        self.host.bring("write", scribe())
+        for name, part in (("talk", talker()), ("write", scribe())):
+            self._bring(name, part)
         self._goal = self.host.want(GOAL)
         self.host.until_goal(self._goal, "holds")
         self._healthy = self._at_work()
         # The first drive has spare processes made, which stay.
         self.host.plug(self.host.drive("first"))
-        self.host.until_told("MANIFEST_KEY")
+        self.host.until_told("SIG_MISSING")
         self.host.pull("first")
         self.host.until_gone("first")
         self._traces = self.host.traces()
         self._measure()
 
-    def make(self, cases: Sequence[HostileDrive], sign: Sign = unsigned) -> list[Plugged]:
-        """Write the drives, once."""
+    def make(self, cases: Sequence[HostileDrive]) -> list[Plugged]:
+        """Write the drives, once. What is wrong with each is found although it is signed."""
         made = []
         for number, case in enumerate(cases):
             drive = self._work / f"h{number}"
@@ -124,6 +126,13 @@ class Gauntlet:
             time.sleep(PRUNED_S / 50)
         assert stayed == []
         self._measure()
+
+    def _bring(self, name: str, part: Part) -> None:
+        """Have a benign payload at work, signed by whom the host trusts."""
+        drive = self.host.drive(name, part)
+        sign_payload(drive / "nondum" / f"org.example.{name}", MAKER)
+        self.host.plug(drive)
+        self.host.until_step(name, "active")
 
     def _plug(self, drive: Plugged) -> Plugged:
         if not drive.case.is_image:
@@ -205,10 +214,24 @@ def gauntlet(root: Path) -> Iterator[Gauntlet]:
     surroundings = (f"HOME={home}", f"TMPDIR={temporary}", f"XDG_CONFIG_HOME={config}")
     daemon = (sys.executable, "-m", "tests.lab.loop_daemon", str(work))
     program = ("env", *surroundings, *daemon)
-    with running(root / "host", more=MORE, program=program) as host:
+    anchor = root / "trust.toml"
+    anchor.write_text(trust())
+    more = f'{MORE}[trust]\nfile = "{anchor}"\n'
+    host = RunningHost(root / "host", more=more, program=program)
+    demand_signatures(root / "host/host.toml")
+    try:
+        host.start()
         run = Gauntlet(host, work, elsewhere)
         run.begin()
         yield run
+    finally:
+        host.stop()
+
+
+def demand_signatures(config: Path) -> None:
+    """What the service has by default, and demonstrations have not."""
+    text = config.read_text(encoding="utf-8")
+    config.write_text(text.replace("allow_unsigned = true", "allow_unsigned = false"))
 
 
 def descriptors(pid: int) -> int:

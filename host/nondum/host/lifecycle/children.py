@@ -59,6 +59,8 @@ class Children:
         self._kept: dict[str, Process] = {}
         """Owner → the child that worked for it, and for nobody else; the last ones last."""
         self._busy: set[Process] = set()
+        self._left_behind: set[Process] = set()
+        """Those that could not be killed, as long as they are there."""
         self._warming: asyncio.Task[None] | None = None
         self._shrinking: asyncio.Task[None] | None = None
 
@@ -101,7 +103,7 @@ class Children:
 
         Otherwise as `run`; the child ends with its job.
         """
-        child = await _spawn()
+        child = await self._spawn()
         self._busy.add(child)
         try:
             _make_idle(child.pid)
@@ -142,27 +144,30 @@ class Children:
         await asyncio.gather(*(self._end(child) for child in everyone))
         self._spares.clear()
         self._kept.clear()
+        for child in self._left_behind:
+            # asyncio has no other way of not waiting for a process.
+            child._transport.close()  # type: ignore[attr-defined]  # it is there, and not told
 
     async def _take(self, owner: str) -> Process:
         """A child that nobody else's bytes have touched."""
         if owner in self._kept:
             return self._kept.pop(owner)
-        child = self._spares.pop() if self._spares else await _spawn()
+        child = self._spares.pop() if self._spares else await self._spawn()
         self.warm()
         return child
 
     async def _warm(self) -> None:
         await asyncio.sleep(WARM_S)
-        # Shielded: one that was begun is not lost when this is cancelled.
-        spawned = asyncio.ensure_future(_spawn())
+        self._spares.append(await self._spawn())
+
+    async def _spawn(self) -> Process:
+        """A new child; one that was begun when this is cancelled is not lost."""
+        spawning = asyncio.ensure_future(_spawn())
         try:
-            self._spares.append(await asyncio.shield(spawned))
+            return await asyncio.shield(spawning)
         except asyncio.CancelledError:
-            with contextlib.suppress(InstallFailed):
-                self._spares.append(await spawned)
+            self._spares.append(await spawning)
             raise
-        except InstallFailed as error:
-            log.warning("no spare child: %s", error)
 
     async def _keep(self, child: Process, owner: str) -> None:
         """Keep a child for its owner, in the place of whichever was kept longest."""
@@ -189,12 +194,14 @@ class Children:
 
     async def _end(self, child: Process) -> None:
         self._busy.discard(child)
+        self._left_behind = {other for other in self._left_behind if other.returncode is None}
         with contextlib.suppress(ProcessLookupError):
             child.kill()
         try:
             await asyncio.wait_for(child.wait(), END_S)
         except TimeoutError:
             log.warning("child %d hangs in its disk and is left behind", child.pid)
+            self._left_behind.add(child)
 
 
 def watch_without_threads() -> None:
