@@ -110,6 +110,14 @@ def test_a_service_sees_no_more_than_it_needs() -> None:
     assert {"DynamicUser=yes", "CapabilityBoundingSet=", "NoNewPrivileges=yes"} <= asked
 
 
+def test_a_service_writes_to_memory_only() -> None:
+    asked = properties(REQUEST)
+    assert {"ProtectSystem=strict", "ReadOnlyPaths=/tmp /var/tmp"} <= asked
+    sized = [each for each in asked if "mode=0777" in each or "mode=1777" in each]
+    assert len(sized) == 2
+    assert all("size=" in each for each in sized)
+
+
 def test_a_service_is_limited() -> None:
     asked = properties(replace(REQUEST, processors=0.5))
     assert {"MemoryMax=128M", "MemorySwapMax=0", "TasksMax=64", "CPUQuota=50%"} <= asked

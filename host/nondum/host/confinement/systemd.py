@@ -157,6 +157,8 @@ def _view(request: Request, machine: Machine) -> Iterator[str]:
     hidden = [f"/{name}:ro" for name in machine.top if name not in _SEEN]
     yield f"TemporaryFileSystem={' '.join(hidden)}"
     yield f"TemporaryFileSystem={request.scratch}:mode=0777,size={request.scratch_mb}M"
+    # They are folders of the host's disk, which a worker could fill: TMPDIR is its scratch folder.
+    yield "ReadOnlyPaths=/tmp /var/tmp"
     yield "TemporaryFileSystem=/dev/shm:mode=1777,size=64M,nodev,nosuid,noexec"
     if "gpu" not in request.permissions:
         yield "InaccessiblePaths=/sys"

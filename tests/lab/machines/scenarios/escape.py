@@ -28,8 +28,8 @@ async def tried():
 print(json.dumps(asyncio.run(tried())))
 """
 RESULTS = "escape.json"
-LEFT_AT_2 = frozenset({"know its control group"})
-"""Paths of control groups are told by /proc, and name the service."""
+LEFT_AT_2 = frozenset({"know the host name"})
+"""A service may have a host name of its own, but no other one."""
 
 
 def run(lab: Lab) -> str:
