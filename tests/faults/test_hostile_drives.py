@@ -1,6 +1,6 @@
 """Hostile drives, once through one daemon: each is told with its code, and nobody else notices.
 
-Ten times through is `python -m tests.faults.hostile`.
+Ten times through is `python -m tests.faults.drive_figures hostile`.
 """
 
 from __future__ import annotations
@@ -48,7 +48,9 @@ def chosen() -> list[HostileDrive]:
 
 def test_hostile_drives_are_told_with_their_codes(run: Gauntlet) -> None:
     drives = run.make([d for d in chosen() if can_have_devices() or not d.is_image])
+    run.measure()
     run.round(drives, at_once=AT_ONCE)
+    run.measure()
     told = run.outcome
     assert not told.wrong
     assert not told.canaries

@@ -92,7 +92,6 @@ class Gauntlet:
         self.host.pull("first")
         self.host.until_gone("first")
         self._traces = self.host.traces()
-        self._measure()
 
     def make(self, cases: Sequence[HostileDrive]) -> list[Plugged]:
         """Write the drives, once. What is wrong with each is found although it is signed."""
@@ -125,7 +124,6 @@ class Gauntlet:
         while (stayed := self._stayed()) and time.monotonic() < end:
             time.sleep(PRUNED_S / 50)
         assert stayed == []
-        self._measure()
 
     def _bring(self, name: str, part: Part) -> None:
         """Have a benign payload at work, signed by whom the host trusts."""
@@ -191,7 +189,8 @@ class Gauntlet:
     def _at_work(self) -> list[Row]:
         return [row for row in self.host.ask("components") if row["component"] in HEALTHY]
 
-    def _measure(self) -> None:
+    def measure(self) -> None:
+        """Note what the daemon takes when it is at rest."""
         pid = self.host.pid
         until_at_rest(pid)
         status = Path(f"/proc/{pid}/status").read_text()

@@ -1,0 +1,231 @@
+"""The long form of the tests of drives: `python -m tests.faults.drive_figures WHAT…`.
+
+`hostile`: the whole corpus ten times through one daemon. `yanks`: 500 drives yanked at any moment.
+`crowd`: a hundred drives in ten seconds. Each is written to a folder when it is done, and
+docs/reliability/drives.md from all that are there. Exits with 1 if anything was wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import platform
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from tests.faults import crowds
+from tests.faults.hostile import FAMILIES
+from tests.faults.hostile.gauntlet import gauntlet
+from tests.faults.yanks import PHASES, bench, yank_all
+from tests.lab.running_host import running
+
+from nondum.host.lifecycle.children import QUIET_S
+
+FOLDER = Path("build/drives")
+PAGE = Path("docs/reliability/drives.md")
+AT_ONCE = 16
+CROWD, WITHIN_S = 100, 10.0
+
+Figures = dict[str, Any]
+
+
+def hostile(root: Path, options: argparse.Namespace) -> Figures:
+    """Every drive alone once, which is timed, then all of them some at a time."""
+    with gauntlet(root) as run:
+        drives = run.make([case for cases in FAMILIES.values() for case in cases])
+        rest()
+        run.measure()
+        for number in range(options.rounds):
+            run.round(drives, at_once=AT_ONCE if number else 1)
+            rest()
+            run.measure()
+            say(f"round {number + 1}: {run.outcome.memory_mb[-1]:.1f} MB, {run.outcome.wrong}")
+        told = asdict(run.outcome)
+    told["pids"] = len(told["pids"])
+    return {
+        **told,
+        "families": {family: len(cases) for family, cases in FAMILIES.items()},
+        "rounds": options.rounds,
+        "is_wrong": bool(told["wrong"] or told["canaries"] or told["strays"]),
+    }
+
+
+def yanks(root: Path, options: argparse.Namespace) -> Figures:
+    """Yank a drive at so many points."""
+
+    async def run() -> Figures:
+        async with bench(root) as made:
+            told = await yank_all(made, options.points, seed=11)
+            return asdict(told)
+
+    told = asyncio.run(run())
+    wrong = told["stuck_mounts"] or told["left_over"] or told["disturbed"]
+    return {**told, "is_wrong": bool(wrong)}
+
+
+def crowd(root: Path, options: argparse.Namespace) -> Figures:
+    """Plug in a crowd."""
+    with running(root / "host") as host:
+        told = crowds.plug_all(host, crowds.make(root / "drives", CROWD), WITHIN_S)
+    return {**asdict(told), "is_wrong": told.most_at_once > 2}
+
+
+WHAT: Mapping[str, Callable[[Path, argparse.Namespace], Figures]] = {
+    "hostile": hostile,
+    "yanks": yanks,
+    "crowd": crowd,
+}
+
+
+def main() -> int:
+    """Measure what is asked for, and write the page."""
+    options = _options()
+    options.folder.mkdir(parents=True, exist_ok=True)
+    for name in options.what:
+        with tempfile.TemporaryDirectory(prefix=f"nondum-{name}-") as root:
+            figures = WHAT[name](Path(root), options)
+        figures["machine"] = _machine()
+        (options.folder / f"{name}.json").write_text(json.dumps(figures))
+        say(f"{name}: {'WRONG' if figures['is_wrong'] else 'as it should be'}")
+    found = {name: _read(options.folder / f"{name}.json") for name in WHAT}
+    PAGE.write_text("\n".join(_page(found)) + "\n", encoding="utf-8")
+    return any(figures and figures["is_wrong"] for figures in found.values())
+
+
+def rest() -> None:
+    """Give a daemon the time after which nothing is kept any more that can be had again."""
+    time.sleep(QUIET_S + 2.0)
+
+
+def say(line: str) -> None:
+    """Tell how far it has come."""
+    print(line, flush=True)  # noqa: T201  # a program for people
+
+
+def _page(found: Mapping[str, Figures | None]) -> Iterator[str]:
+    yield "# Drives: what was tried, and what it came to"
+    yield ""
+    yield "Written by `python -m tests.faults.drive_figures hostile yanks crowd`."
+    for name, show in (("hostile", _hostile), ("yanks", _yanks), ("crowd", _crowd)):
+        figures = found[name]
+        if figures is not None:
+            yield ""
+            yield from show(figures)
+            yield ""
+            yield f"Machine: {figures['machine']}."
+
+
+def _hostile(told: Figures) -> Iterator[str]:
+    drives = sum(told["families"].values())
+    memory, descriptors = told["memory_mb"], told["descriptors"]
+    growth, more = max(memory[1:]) - memory[0], descriptors[-1] - descriptors[0]
+    seconds = sorted(told["seconds"])
+    yield "## Hostile drives"
+    yield ""
+    yield f"{drives} different drives, each {told['rounds']} times through one daemon that demands"
+    yield "signatures: once alone, which is timed, then sixteen at a time; two benign payloads"
+    yield "pursue a goal that must hold after each batch. All but those of the first family"
+    yield "are signed by a key that the daemon trusts: what is wrong with them is reached."
+    yield ""
+    yield "| family | drives |"
+    yield "|---|---|"
+    for family, number in told["families"].items():
+        yield f"| {family} | {number} |"
+    yield ""
+    yield "| | reached | aim |"
+    yield "|---|---|---|"
+    yield f"| drives told | {told['drives']} | {drives * told['rounds']} |"
+    yield f"| told with another code than theirs | {len(told['wrong'])} | 0 |"
+    yield f"| daemons that it took | {told['pids']} | 1 |"
+    yield f"| memory of the daemon | {memory[0]:.1f} MB, {growth:+.1f} MB at most | +10 MB |"
+    yield f"| descriptors | {descriptors[0]}, {more:+d} after | +0 |"
+    yield f"| canaries that ran | {told['canaries']} | 0 |"
+    yield f"| files outside the state folder | {len(told['strays'])} | 0 |"
+    yield f"| told after, median (p95, longest) | {_spread(seconds)} | 2 s |"
+    if told["wrong"]:
+        yield ""
+        yield "Told with another code: " + "; ".join(sorted(set(told["wrong"]))) + "."
+
+
+def _yanks(told: Figures) -> Iterator[str]:
+    every = sorted(second for each in told["seconds"].values() for second in each)
+    yield "## Yanked drives"
+    yield ""
+    yield f"{len(every)} times a loop device with a payload of 8 MB and more was attached and, at a"
+    yield "moment drawn evenly from its coming until after it idled, its backing file cut off, the"
+    yield "page cache dropped and its removal told by the kernel. The time is that until no row,"
+    yield "process, mount and folder of it was left; the aim is 2 s for 95 in 100, and 5 s at most."
+    yield ""
+    yield "| while | yanks | median (p95, longest) |"
+    yield "|---|---|---|"
+    for phase in PHASES:
+        seconds = sorted(told["seconds"][phase])
+        yield f"| {WHILE[phase]} | {len(seconds)} | {_spread(seconds)} |"
+    yield f"| all | {len(every)} | {_spread(every)} |"
+    yield ""
+    yield f"Mounts left over: {told['stuck_mounts']}. Folders and processes left over:"
+    yield f"{len(told['left_over'])}. Times the benign payload noticed: {told['disturbed']}."
+
+
+WHILE = {
+    "look": "it was mounted and looked through",
+    "copy": "its payload was copied",
+    "install": "its payload was checked and installed",
+    "run": "its payload ran, and others were read",
+    "idle": "its payload ran, and it was let go",
+}
+
+
+def _crowd(told: Figures) -> Iterator[str]:
+    yield "## A crowd of drives"
+    yield ""
+    yield f"{told['drives']} drives plugged in within {told['plugged_s']:.1f} s: by turns a payload"
+    yield "of its own, a copy of one and the same, one with a changed file, and one without any."
+    yield ""
+    yield "| | reached | aim |"
+    yield "|---|---|---|"
+    yield f"| all over after | {told['over_s']:.1f} s | 300 s |"
+    yield f"| active, refused, let go | {told['active']}, {told['refused']}, {told['let_go']} | |"
+    yield f"| most memory of the daemon | {told['memory_mb']:.0f} MB | 200 MB |"
+    yield f"| payloads brought in at the same time | {told['most_at_once']} | 2 |"
+    yield f"| processes beside the daemon and its workers | {told['children']} | |"
+    yield f"| drives and payloads that were shown as waiting | {told['queued']} | |"
+
+
+def _spread(ordered: Sequence[float]) -> str:
+    if not ordered:
+        return "-"
+    p95 = ordered[min(len(ordered) - 1, int(len(ordered) * 0.95))]
+    return f"{statistics.median(ordered):.2f} s ({p95:.2f}, {ordered[-1]:.2f})"
+
+
+def _read(file: Path) -> Figures | None:
+    return json.loads(file.read_text()) if file.exists() else None
+
+
+def _machine() -> str:
+    return f"{platform.machine()}, Linux {platform.release()}, Python {platform.python_version()}"
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.faults.drive_figures",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("what", nargs="*", choices=[*WHAT, []], help="nothing: only the page")
+    parser.add_argument("--rounds", type=int, default=10, help="of hostile drives")
+    parser.add_argument("--points", type=int, default=500, help="yanks")
+    parser.add_argument("--folder", type=Path, default=FOLDER, help="what was measured so far")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
