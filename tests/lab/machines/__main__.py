@@ -62,7 +62,8 @@ def _run(lab: Lab, wanted: Sequence[Scenario], asked: argparse.Namespace) -> int
 
 def _show(result: Result) -> None:
     mark = "FAILED" if result.failure else "passed"
-    print(f"{mark}  {result.seconds:5.0f} s  {result.scenario.name:20}  {result.note}", flush=True)
+    times = f"{result.seconds:5.0f} s  {result.cpu_s:5.0f} s cpu"
+    print(f"{mark}  {times}  {result.scenario.name:14}  {result.note}", flush=True)
 
 
 def _told(what: str, began: float) -> None:

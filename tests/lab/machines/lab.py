@@ -27,6 +27,7 @@ class Lab:
     """A folder with a short path, for all that is made on the way."""
     machines: list[Machine] = field(default_factory=list)
     """Every machine that was switched on in the present scenario, the shared one first."""
+    all_machines: list[Machine] = field(default_factory=list)
     boots_s: list[float] = field(default_factory=list)
     """How long each boot took."""
     _shared: Installed | None = None
@@ -54,11 +55,16 @@ class Lab:
             self.built, self.work / f"m{next(self._numbers)}", drives=(self.software,)
         )
         self.machines.append(machine)
+        self.all_machines.append(machine)
         self.boots_s.append(machine.boot())
         machine.wait_for_system()
         installed = Installed(machine)
         installed.install()
         return installed
+
+    def cpu_s(self) -> float:
+        """Processor time that all machines took so far."""
+        return sum(machine.cpu_s for machine in self.all_machines)
 
     def stick(self, name: str, *parts: Part, **options: Any) -> Path:
         """The image of a stick that carries one payload, `org.example.<name>`."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import signal
 import subprocess
 import time
@@ -20,6 +21,7 @@ BOOT_S = 240.0
 PATIENCE_S = 240.0
 """How long a program inside may run, unless its caller says otherwise."""
 POLL_S = 0.2
+TICKS_HZ = os.sysconf("SC_CLK_TCK")
 T = TypeVar("T")
 
 
@@ -35,6 +37,7 @@ class Machine:
         self._memory_mb, self._drives = memory_mb, drives
         self._qemu: subprocess.Popen[bytes] | None = None
         self._plugged = itertools.count(1)
+        self._cpu_s = 0.0
         work.mkdir(parents=True, exist_ok=True)
         self._disk = work / "disk.qcow2"
         overlay = ("-q", "-f", "qcow2", "-F", "raw", "-b", built.disk)
@@ -63,6 +66,7 @@ class Machine:
     def cut_power(self) -> None:
         """End it at once: what its disk was not told to keep is lost."""
         assert self._qemu is not None
+        self._cpu_s = self.cpu_s
         self._qemu.send_signal(signal.SIGKILL)
         self._see_end()
 
@@ -70,6 +74,7 @@ class Machine:
         """Have it go down as from its power button's menu."""
         assert self._qemu is not None
         self.agent.run("systemctl", "--no-block", "poweroff")
+        self._cpu_s = self.cpu_s
         self._qemu.wait(timeout_s)
         self._see_end()
 
@@ -129,6 +134,15 @@ class Machine:
         self.until("the stick let go", lambda: True if self._let_go(name) else None)
 
     # What is left to see
+
+    @property
+    def cpu_s(self) -> float:
+        """Processor time that it took of the machine it stands on, over all boots."""
+        if self._qemu is None:
+            return self._cpu_s
+        line = Path(f"/proc/{self._qemu.pid}/stat").read_text(encoding="ascii")
+        user, system = line.rpartition(")")[2].split()[11:13]
+        return self._cpu_s + (int(user) + int(system)) / TICKS_HZ
 
     @property
     def console(self) -> Path:

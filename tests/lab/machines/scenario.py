@@ -36,6 +36,8 @@ class Result:
 
     scenario: Scenario
     seconds: float
+    cpu_s: float
+    """Processor time of its machines: what it takes however many others there are."""
     note: str
     """Of one that failed: why, in a line."""
     failure: str = ""
@@ -51,7 +53,7 @@ def scenarios() -> dict[str, Scenario]:
 def run_all(wanted: Iterable[Scenario], lab: Lab) -> Iterator[Result]:
     """Run scenarios, each whatever became of the others."""
     for scenario in wanted:
-        began = time.monotonic()
+        began, before_s = time.monotonic(), lab.cpu_s()
         try:
             with lab.scenario():
                 note, failure, kept = _run(scenario, lab)
@@ -59,7 +61,8 @@ def run_all(wanted: Iterable[Scenario], lab: Lab) -> Iterator[Result]:
                     raise _Failed
         except _Failed:
             pass
-        yield Result(scenario, time.monotonic() - began, note, failure, kept)
+        spent_s = lab.cpu_s() - before_s
+        yield Result(scenario, time.monotonic() - began, spent_s, note, failure, kept)
 
 
 class _Failed(Exception):
