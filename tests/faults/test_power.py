@@ -19,7 +19,7 @@ from tests.faults.recorded_disk import cut, recorded, writes
 
 pytestmark = pytest.mark.slow
 
-CUTS = 8
+CUTS = 5
 
 
 @pytest.fixture(scope="module")

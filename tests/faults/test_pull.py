@@ -76,7 +76,7 @@ async def test_pull_at_any_moment(tmp_path: Path) -> None:
     moments = random.Random(11)
     async with living(tmp_path) as host:
         await plug_good(host, tmp_path)
-        for _ in range(25):
+        for _ in range(12):
             host.plug(tmp_path / "drive")
             await asyncio.sleep(moments.uniform(0.0, 0.4))
             host.pull()

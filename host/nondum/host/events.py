@@ -421,9 +421,7 @@ class HostStopped(Event):
 
 @dataclass(frozen=True, slots=True)
 class HostSteady(Event):
-    """The daemon has lived for a while beside what others may have died of."""
-
-    JOURNALLED: ClassVar[bool] = False
+    """The daemon has lived for a while beside what others had died of."""
 
     host: str
 

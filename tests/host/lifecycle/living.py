@@ -18,6 +18,7 @@ from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
 from nondum.host.lifecycle.folders import Folders
 from nondum.host.lifecycle.installation import InstallOptions
+from nondum.host.lifecycle.tries import STEADY_S
 from nondum.host.workers import Timing, Workers
 
 HOST = "spot"
@@ -107,6 +108,7 @@ async def living(
     options: InstallOptions | None = None,
     timing: Timing | None = None,
     sources: Callable[[Folders], Sequence[DriveSource]] = lambda folders: (),
+    steady_s: float = STEADY_S,
 ) -> AsyncIterator[Living]:
     """Run a host's lifecycle under `root`; its state stays there for the next one."""
     folders, slots = Folders(root / "state"), root / "slots"
@@ -115,7 +117,7 @@ async def living(
     workers = Workers(HOST, bus.emit, timing=timing)
     options = options or InstallOptions(allow_unsigned=True)
     executor = Executor(HOST, folders, workers, bus.emit, options)
-    manager = ComponentManager(catalogue, executor, bus)
+    manager = ComponentManager(catalogue, executor, bus, steady_s=steady_s)
     for source in (SlotSource([slots]), *sources(folders)):
         manager.add_source(source)
     host = Living(catalogue, manager, executor, workers, bus, folders, slots, root / "drives")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -229,3 +230,12 @@ def _state(host: Living) -> ComponentState | None:
 def _height(host: Living, unit: str) -> float | None:
     pose = host.snapshot.mount(unit)
     return pose.xyz[2] if pose else None
+
+
+async def test_daemon_that_lives_on_clears_what_was_counted(tmp_path: Path) -> None:
+    async with living(tmp_path) as host:
+        counted = replace(host.catalogue.state, tries={"what never came again": 4})
+        await host.catalogue.commit(counted, ())
+    async with living(tmp_path, steady_s=0.01) as host:
+        await host.until(lambda: not host.catalogue.state.tries)
+        assert "HostSteady" in [entry.event for entry in await host.journal()]

@@ -74,12 +74,15 @@ class Executes(Protocol):
 class ComponentManager:
     """Owns the state of a host from start to stop."""
 
-    def __init__(self, catalogue: Catalogue, executor: Executes, bus: Bus) -> None:
+    def __init__(
+        self, catalogue: Catalogue, executor: Executes, bus: Bus, *, steady_s: float = STEADY_S
+    ) -> None:
         self._catalogue = catalogue
         self._executor = executor
         self._bus = bus
         self._sources: list[DriveSource] = []
         self._trial: asyncio.TimerHandle | None = None
+        self._steady_s = steady_s
 
     def add_source(self, source: DriveSource) -> None:
         """Watch one more source of drives; call it before `run`."""
@@ -199,7 +202,7 @@ class ComponentManager:
     def _try(self, state: HostState) -> None:
         """See after a while whether all is well with what others may have died of."""
         if state.tries and self._trial is None:
-            self._trial = asyncio.get_running_loop().call_later(STEADY_S, self._tried)
+            self._trial = asyncio.get_running_loop().call_later(self._steady_s, self._tried)
 
     def _tried(self) -> None:
         self._trial = None

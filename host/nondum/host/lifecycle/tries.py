@@ -114,6 +114,7 @@ def on_host_steady(turn: Turn, event: HostSteady) -> None:
         if subject in drives or _is_on_trial(turn, state.payloads.get(subject))
     }
     if kept != state.tries:
+        turn.events.append(event)
         turn.change(tries=kept)
 
 
