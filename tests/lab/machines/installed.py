@@ -34,6 +34,8 @@ systemctl daemon-reload
 systemctl -q enable nondum.service
 """
 SERVICE = "nondum.service"
+LOOK_S = 2.0
+"""Between two looks at the status: each takes a second of an emulated processor."""
 T = TypeVar("T")
 View = dict[str, Any]
 
@@ -86,7 +88,7 @@ class Installed:
             view = self.status()
             return look(view) if view is not None else None
 
-        return self.machine.until(what, found, PATIENCE_S)
+        return self.machine.until(what, found, PATIENCE_S, LOOK_S)
 
     def until_payload(self, payload: str, state: str) -> View:
         """Wait until a payload is in a state, or shown no more for the state `gone`."""

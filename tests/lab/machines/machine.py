@@ -104,13 +104,19 @@ class Machine:
         data = content.encode() if isinstance(content, str) else content
         self.agent.put(path, data, mode)
 
-    def until(self, what: str, look: Callable[[], T | None], timeout_s: float = BOOT_S) -> T:
+    def until(
+        self,
+        what: str,
+        look: Callable[[], T | None],
+        timeout_s: float = BOOT_S,
+        every_s: float = POLL_S,
+    ) -> T:
         """Look until there is something to see. Raises `AssertionError` when there is not."""
         deadline = time.monotonic() + timeout_s
         while (seen := look()) is None:
             if time.monotonic() > deadline:
                 raise AssertionError(f"not seen in {timeout_s:.0f} s: {what}")
-            time.sleep(POLL_S)
+            time.sleep(every_s)
         return seen
 
     def wait_for_system(self) -> str:
