@@ -5,15 +5,17 @@ from __future__ import annotations
 import os
 import signal
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.host.lifecycle.living import LAMP, Living, left_over, living
+from tests.host.lifecycle.living import HOST, LAMP, Living, left_over, living
 from tests.payloads import Part, make_payload
 
+from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import ComponentState, Step
+from nondum.host.catalogue.state import HostState
 from nondum.host.events import MountSet
+from nondum.host.lifecycle.folders import Folders
 from nondum.host.lifecycle.installation import InstallOptions
 from nondum.host.lifecycle.installed import install, uninstall
 from nondum.sdk.errors import PayloadRefused
@@ -233,9 +235,9 @@ def _height(host: Living, unit: str) -> float | None:
 
 
 async def test_daemon_that_lives_on_clears_what_was_counted(tmp_path: Path) -> None:
-    async with living(tmp_path) as host:
-        counted = replace(host.catalogue.state, tries={"what never came again": 4})
-        await host.catalogue.commit(counted, ())
+    catalogue = await Catalogue.open(Folders(tmp_path / "state").catalogue, HOST)
+    await catalogue.commit(HostState(HOST, tries={"what never came again": 4}), ())
+    await catalogue.close()
     async with living(tmp_path, steady_s=0.01) as host:
         await host.until(lambda: not host.catalogue.state.tries)
         assert "HostSteady" in [entry.event for entry in await host.journal()]
