@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 from tests.faults.hostile import DRIVES, FAMILIES, HostileDrive
-from tests.faults.hostile.gauntlet import Gauntlet, can_have_devices, gauntlet
+from tests.faults.hostile.gauntlet import Gauntlet, gauntlet
+from tests.loops import can_be_made
 
 from nondum.host.lifecycle.children import KEPT
 
@@ -47,7 +48,7 @@ def chosen() -> list[HostileDrive]:
 
 
 def test_hostile_drives_are_told_with_their_codes(run: Gauntlet) -> None:
-    drives = run.make([d for d in chosen() if can_have_devices() or not d.is_image])
+    drives = run.make([d for d in chosen() if can_be_made() or not d.is_image])
     run.measure()
     run.round(drives, at_once=AT_ONCE)
     run.measure()

@@ -157,16 +157,14 @@ async def test_device_that_is_silent_is_given_up(
         return b""
 
     where = LIST if path == "list" else wheel(tmp_path)
-    try:
-        async with lying(tmp_path, answers={where: answer}) as (host, _):
-            make_payload(tmp_path / "good", Part("good", LAMP), payload_id="org.example.good")
-            host.plug(tmp_path / "good", "good")
-            await host.until_step("org.example.good", Step.ACTIVE)
-            await host.until(lambda: any(drive.problems for drive in host.snapshot.drives))
-            (problem,) = (p for drive in host.snapshot.drives for p in drive.problems)
-            assert problem.code == "DRIVE_STALLED"
-            await host.until_gone(LAMP_ID)
-            host.pull("good")
-            await host.until_gone("org.example.good")
-    finally:
+    async with lying(tmp_path, answers={where: answer}) as (host, _):
+        make_payload(tmp_path / "good", Part("good", LAMP), payload_id="org.example.good")
+        host.plug(tmp_path / "good", "good")
+        await host.until_step("org.example.good", Step.ACTIVE)
+        await host.until(lambda: any(drive.problems for drive in host.snapshot.drives))
+        (problem,) = (p for drive in host.snapshot.drives for p in drive.problems)
+        assert problem.code == "DRIVE_STALLED"
+        await host.until_gone(LAMP_ID)
+        host.pull("good")
+        await host.until_gone("org.example.good")
         heard.set()

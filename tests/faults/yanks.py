@@ -9,16 +9,15 @@ from __future__ import annotations
 import asyncio
 import os
 import random
-import subprocess
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tests.faults.hostile.gauntlet import attach, detach
 from tests.host.drives.test_blocks import make_ext4, on
 from tests.host.lifecycle.living import LAMP, Living, living
+from tests.loops import attach, cut_off, detach
 from tests.payloads import Part, make_payload, make_wheel
 
 from nondum.host.catalogue.records import Step
@@ -64,44 +63,43 @@ class Bench:
 
     async def measure(self) -> None:
         """See how long a payload takes from its drive's coming until it is active."""
-        node = await self._insert()
-        began = time.monotonic()
-        await self.host.until_step(BAD, Step.ACTIVE)
-        self._whole_s = time.monotonic() - began
-        await self._yank(node)
-        await self._until_pruned(node)
+        async with self._stick() as (node, image):
+            began = time.monotonic()
+            await self.host.until_step(BAD, Step.ACTIVE)
+            self._whole_s = time.monotonic() - began
+            await asyncio.to_thread(_cut, node, image)
+            await self._until_pruned()
 
     async def yank(self, share: float) -> None:
         """Insert the drive and yank it at a share of the time that all takes; 1 and more: while it
         runs, and when nothing is wanted of it any more."""
-        node = await self._insert()
-        await asyncio.sleep(share * self._whole_s + (IDLE_S if share > 1 else 0.0))
-        phase = self._phase()
-        began = time.monotonic()
-        await self._yank(node)
-        await self._until_pruned(node)
-        self.told.seconds[phase].append(time.monotonic() - began)
-        self._look_around()
+        async with self._stick() as (node, image):
+            await asyncio.sleep(share * self._whole_s + (IDLE_S if share > 1 else 0.0))
+            phase = self._phase()
+            began = time.monotonic()
+            await asyncio.to_thread(_cut, node, image)
+            await self._until_pruned()
+            self.told.seconds[phase].append(time.monotonic() - began)
+            self._look_around()
 
-    async def _insert(self) -> Path:
-        copy = self._root / f"stick-{time.monotonic_ns()}.img"
-        await asyncio.to_thread(_clone, self._image, copy)
-        return await asyncio.to_thread(attach, copy)
+    @asynccontextmanager
+    async def _stick(self) -> AsyncIterator[tuple[Path, Path]]:
+        """A device on a copy of the image, which is taken away at the end."""
+        copy = self._root / "stick.img"
+        await asyncio.to_thread(copy.write_bytes, self._image.read_bytes())
+        node = await asyncio.to_thread(attach, copy)
+        try:
+            yield node, copy
+        finally:
+            await asyncio.to_thread(detach, node)
 
-    async def _yank(self, node: Path) -> None:
-        """What is left of a stick that is pulled: errors; and what the kernel says of it."""
-        await asyncio.to_thread(_cut, node)
-
-    async def _until_pruned(self, node: Path) -> None:
+    async def _until_pruned(self) -> None:
         host = self.host
         async with asyncio.timeout(PRUNED_S):
             await host.until(lambda: not any(d.kind == "block" for d in host.snapshot.drives))
             await host.until(lambda: host.payload(BAD) is None)
             while self._left():  # noqa: ASYNC110  # folders and mounts tell nobody that they go
                 await asyncio.sleep(0.01)
-        await asyncio.to_thread(detach, node)
-        for image in self._root.glob("stick-*.img"):
-            image.unlink()
 
     def _left(self) -> list[str]:
         """Folders, mounts and processes of the payload that was yanked."""
@@ -158,13 +156,7 @@ async def yank_all(made: Bench, points: int, *, seed: int) -> Yanks:
     return made.told
 
 
-def _clone(image: Path, copy: Path) -> None:
-    copy.write_bytes(image.read_bytes())
-
-
-def _cut(node: Path) -> None:
-    backing = Path(f"/sys/block/{node.name}/loop/backing_file").read_text().strip()
-    os.truncate(backing, CUT_TO)
-    Path("/proc/sys/vm/drop_caches").write_text("1")
+def _cut(node: Path, image: Path) -> None:
+    """What is left of a stick that is pulled: errors; and what the kernel says of it."""
+    cut_off(image, CUT_TO)
     Path(f"/sys/block/{node.name}/uevent").write_text("remove")
-    subprocess.run(["losetup", "--detach", str(node)], check=False, capture_output=True)

@@ -8,10 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from tests.host.drives.test_blocks import attached, cut_off, detach, image
+from tests.host.drives.test_blocks import cut_off, image
 from tests.lab.plugins import scribe, talker
 from tests.lab.running_host import RunningHost, running
 from tests.lab.traces import until_unmounted
+from tests.loops import attached, detach
 from tests.payloads import make_wheel
 
 pytestmark = [

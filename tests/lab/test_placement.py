@@ -15,11 +15,12 @@ from typing import Any
 
 import pytest
 from demo.robot import nondum
-from tests.host.drives.test_blocks import attached, detach, image
+from tests.host.drives.test_blocks import image
 from tests.lab.neighbours import beacon, free_port, until_peer, until_shared, written
 from tests.lab.plugins import talker
 from tests.lab.running_host import DAEMON, READY_S, RunningHost
 from tests.lab.traces import until_unmounted
+from tests.loops import attached, detach
 from tests.payloads import Part
 
 from nondum.sdk.errors import NondumError

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -16,6 +14,7 @@ from tests.faults.hostile.signing import MAKER, sign, trust
 from tests.lab.plugins import scribe, talker
 from tests.lab.running_host import Row, RunningHost
 from tests.lab.traces import Traces
+from tests.loops import attach, detach
 from tests.payloads import Part
 from tests.signing import sign_payload
 
@@ -247,20 +246,3 @@ def until_at_rest(pid: int, timeout_s: float = 15.0) -> None:
         calm = calm + 1 if now == before else 0
         before = now
         time.sleep(CALM_S / CALM)
-
-
-def attach(image: Path) -> Path:
-    """A loop device on an image."""
-    command = ["losetup", "--find", "--show", str(image)]
-    return Path(subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip())
-
-
-def detach(node: Path) -> None:
-    """Pull it; that it was read-only goes with a stick, and stays with a loop device."""
-    subprocess.run(["losetup", "--detach", str(node)], check=False, capture_output=True)
-    subprocess.run(["blockdev", "--setrw", str(node)], check=False, capture_output=True)
-
-
-def can_have_devices() -> bool:
-    """Whether loop devices can be made here."""
-    return os.geteuid() == 0 and Path("/dev/loop-control").exists()

@@ -10,8 +10,7 @@ import hashlib
 import os
 import struct
 import subprocess
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -19,6 +18,7 @@ import pyudev
 from tests.host.drives.test_usb import stick
 from tests.host.lifecycle.living import LAMP, Living, left_over, living
 from tests.lab.traces import until_unmounted
+from tests.loops import attached, can_be_made, detach
 from tests.payloads import Part, make_payload, make_wheel
 
 from nondum.host import events
@@ -28,15 +28,13 @@ from nondum.host.drives.blocks import Accepts, BlockSource
 from nondum.host.drives.source import DriveSource
 from nondum.host.lifecycle.folders import Folders
 from nondum.sdk.errors import DriveGone, PayloadRefused
+from tests import loops
 
 LAMP_ID = "org.example.lamp"
 
 pytestmark = [
     pytest.mark.anyio,
-    pytest.mark.skipif(
-        os.geteuid() != 0 or not Path("/dev/loop-control").exists(),
-        reason="loop devices need root",
-    ),
+    pytest.mark.skipif(not can_be_made(), reason="loop devices need root"),
 ]
 
 
@@ -64,26 +62,9 @@ def make_ext4(content: Path, file: Path, size_mb: int = 24) -> None:
     _run("mkfs.ext4", "-q", "-d", str(content), str(file))
 
 
-@contextmanager
-def attached(file: Path) -> Iterator[Path]:
-    """A loop device on an image, which may have partitions."""
-    node = _run("losetup", "--find", "--show", "--partscan", str(file)).strip()
-    try:
-        yield Path(node)
-    finally:
-        subprocess.run(["losetup", "--detach", node], check=False, capture_output=True)
-        # A stick that is pulled takes along that it was read-only; a loop device is used again.
-        _run("blockdev", "--setrw", node)
-
-
 def cut_off(file: Path) -> None:
-    """What lies behind gives EIO from now on, as a pulled stick does."""
-    os.truncate(file, 6 * 1024**2)
-    Path("/proc/sys/vm/drop_caches").write_text("1")
-
-
-def detach(node: Path) -> None:
-    _run("losetup", "--detach", str(node))
+    """Most of an image is gone."""
+    loops.cut_off(file, 6 * 1024**2)
 
 
 def on(tmp_path: Path) -> Accepts:
@@ -268,6 +249,7 @@ async def test_next_stick_in_the_same_node_is_another_drive(tmp_path: Path) -> N
             (after,) = (drive.id for drive in host.snapshot.drives)
             assert before.split("-")[0] == after.split("-")[0] == node.name
             assert before != after
+            detach(node)
 
 
 async def test_drive_without_payloads_is_let_go_unread(tmp_path: Path) -> None:

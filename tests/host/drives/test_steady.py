@@ -112,7 +112,7 @@ async def test_ten_times_a_second_is_told_once_and_then_read_once_it_stays(cable
         assert isinstance(told[-1], DriveInserted)
         cable.now_s += SHORT_STAY_S
         cable.pull(drive)
-        assert told[-1] == DriveRemoved(drive)
+        assert told[-1:] == [DriveRemoved(drive)]
 
 
 async def test_other_ports_are_not_made_to_wait(cable: Cable) -> None:

@@ -19,7 +19,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
-from tests.host.drives.test_blocks import attached, make_ext4
+from tests.host.drives.test_blocks import make_ext4
+from tests.loops import attached
 
 from nondum.host.cgroups import CageLimits, Cages
 from nondum.host.drives import nodes

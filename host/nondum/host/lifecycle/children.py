@@ -144,6 +144,11 @@ class Children:
         await asyncio.gather(*(self._end(child) for child in everyone))
         self._spares.clear()
         self._kept.clear()
+        if self._left_behind:
+            ends = [asyncio.ensure_future(child.wait()) for child in self._left_behind]
+            _, hanging = await asyncio.wait(ends, timeout=END_S)
+            for end in hanging:
+                end.cancel()
         for child in self._left_behind:
             # asyncio has no other way of not waiting for a process.
             child._transport.close()  # type: ignore[attr-defined]  # it is there, and not told
