@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import shutil
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -94,7 +96,7 @@ def plug_all(host: RunningHost, drives: list[Path], within_s: float) -> Crowd:
     seen = [0]
 
     def is_over(view: Row) -> bool:
-        seen.append(len(descendants(host.pid)) - workers(view))
+        seen.append(len(list(readers(host.pid))))
         return (
             len(view["drives"]) == len(drives)
             and all(row["state"] == "idle" for row in view["drives"])
@@ -122,9 +124,12 @@ def states(view: Row) -> list[str]:
     return [row["state"] for row in view["payloads"]]
 
 
-def workers(view: Row) -> int:
-    """How many components have a process."""
-    return len(view["components"])
+def readers(daemon: int) -> Iterator[int]:
+    """Processes that read drives for a daemon, or are ready to."""
+    for pid in descendants(daemon):
+        with contextlib.suppress(OSError):  # it ended meanwhile
+            if b"nondum.host.lifecycle.child" in Path(f"/proc/{pid}/cmdline").read_bytes():
+                yield pid
 
 
 def at_once(view: Row) -> int:

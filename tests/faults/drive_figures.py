@@ -195,7 +195,7 @@ def _crowd(told: Figures) -> Iterator[str]:
     yield f"| active, refused, let go | {told['active']}, {told['refused']}, {told['let_go']} | |"
     yield f"| most memory of the daemon | {told['memory_mb']:.0f} MB | 200 MB |"
     yield f"| payloads brought in at the same time | {told['most_at_once']} | 2 |"
-    yield f"| processes beside the daemon and its workers | {told['children']} | |"
+    yield f"| processes that read drives at the same time | {told['children']} | |"
     yield f"| drives and payloads that were shown as waiting | {told['queued']} | |"
 
 

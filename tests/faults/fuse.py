@@ -50,6 +50,10 @@ class FuseDrive:
     """Path → what is answered to whoever reads it."""
     reads: dict[str, int] = field(default_factory=dict)
     """Path → how often it was opened."""
+    listed: set[str] = field(default_factory=set)
+    """Folders whose names were read."""
+    asked: set[str] = field(default_factory=set)
+    """Paths that were asked for by name, whether they are there or not."""
     _nodes: list[str] = field(default_factory=lambda: [""])
     _device: int = -1
     _openings: dict[int, int] = field(default_factory=dict)
@@ -89,6 +93,7 @@ class FuseDrive:
         if opcode == GETATTR:
             return struct.pack("<QII", 0, 0, 0) + self._attributes(path, node)
         if opcode == OPENDIR:
+            self.listed.add(path)
             return struct.pack("<QIi", 0, 0, 0)
         if opcode == READDIR:
             return self._names(path, _READ.unpack_from(given)[1])
@@ -110,6 +115,7 @@ class FuseDrive:
         return lambda opening, offset, size: data[offset : offset + size]
 
     def _entry(self, path: str) -> bytes:
+        self.asked.add(path)
         if not (self.root / path).exists():
             raise OSError(errno.ENOENT, path)
         if path not in self._nodes:

@@ -98,6 +98,36 @@ async def test_nothing_is_read_twice(tmp_path: Path) -> None:
         assert set(paths) <= drive.reads.keys()
 
 
+async def test_what_is_not_listed_is_not_looked_at(tmp_path: Path) -> None:
+    async with lying(tmp_path, answers={}) as (host, drive):
+        folder = tmp_path / "root" / FOLDER
+        (folder / "secret.txt").write_text("not listed")
+        (folder.parent / "letters").mkdir()
+        (folder.parent / "letters/love.txt").touch()
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+        assert drive.listed <= {"", "nondum", FOLDER, f"{FOLDER}/wheels"}
+        assert not [path for path in drive.asked if "secret" in path or "love" in path]
+
+
+async def test_foreign_drive_is_left_alone(tmp_path: Path) -> None:
+    """Of somebody's pictures, not even the names are read."""
+    root = tmp_path / "root"
+    (root / "DCIM/100CANON").mkdir(parents=True)
+    (root / "DCIM/100CANON/IMG_0001.JPG").write_bytes(b"beach")
+    (root / "tax.ods").write_bytes(b"private")
+    async with living(tmp_path) as host:
+        with served(root, tmp_path / "fuse") as drive:
+            host.plug(drive.mount)
+            await host.until(lambda: any(d.problems for d in host.snapshot.drives))
+            (found,) = host.snapshot.drives
+            assert [problem.code for problem in found.problems] == ["DRIVE_NOT_PAYLOAD"]
+            assert drive.asked == {"nondum", "nondum-peers", "nondum-trust"}
+            assert not drive.reads
+            assert drive.listed <= {""}
+            host.pull()
+            await host.until(lambda: not host.snapshot.drives)
+
+
 async def test_list_that_is_another_one_now_is_refused(tmp_path: Path) -> None:
     async with lying(tmp_path, answers={LIST: changing(tmp_path, LIST)}) as (host, _):
         record = await refused(host)
@@ -148,8 +178,8 @@ async def test_device_that_is_silent_is_given_up(
     tmp_path: Path, path: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its child hangs in the kernel; nobody else waits for it."""
-    monkeypatch.setattr(reading, "LOOK_S", 1.0)
-    monkeypatch.setattr(installation, "COPY_SILENCE_S", 1.0)
+    monkeypatch.setattr(reading, "LOOK_S", 4.0)
+    monkeypatch.setattr(installation, "COPY_SILENCE_S", 4.0)
     heard = threading.Event()
 
     def answer(opening: int, offset: int, size: int) -> bytes:

@@ -175,6 +175,42 @@ def test_other_drives_are_left_alone(tmp_path: Path, make: str) -> None:
     assert drive.find_payloads(tmp_path) == ()
 
 
+def test_litter_is_passed_over(tmp_path: Path) -> None:
+    """What macOS and Windows leave on sticks, beside payloads and among them."""
+    payload = tmp_path / "nondum/org.example.a"
+    payload.mkdir(parents=True)
+    for name in (".DS_Store", "._org.example.b", "desktop.ini", "Thumbs.db", ".Trashes/1"):
+        for folder in (tmp_path, tmp_path / "nondum"):
+            (folder / name).parent.mkdir(exist_ok=True)
+            (folder / name).touch()
+    (tmp_path / "nondum/System Volume Information").mkdir()
+    assert drive.find_payloads(tmp_path) == (payload,)
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("org.example.p{}", drive.MAX_PAYLOADS), ("litter-{}", drive.MAX_ENTRIES)],
+    ids=["payloads", "entries"],
+)
+def test_more_than_a_person_puts_there_is_refused(tmp_path: Path, name: str, count: int) -> None:
+    for number in range(count):
+        (tmp_path / "nondum" / name.format(number)).mkdir(parents=True)
+    drive.find_payloads(tmp_path)
+    (tmp_path / "nondum" / name.format(count)).mkdir()
+    with pytest.raises(PayloadRefused) as found:
+        drive.find_payloads(tmp_path)
+    assert found.value.code == "TOO_MANY_FILES"
+
+
+def test_progress_is_told_while_a_long_file_is_copied(folder: Path, tmp_path: Path) -> None:
+    """Silence would be taken for a drive that hangs."""
+    told: list[int] = []
+    drive.copy(folder, LISTED, tmp_path / "staging", lambda phase, done, total: told.append(done))
+    assert len(told) >= 3
+    assert told == sorted(told)
+    assert told[-1] == LISTED.total_bytes
+
+
 def test_payloads_are_not_found_through_a_link(tmp_path: Path) -> None:
     (tmp_path / "real/org.example.a").mkdir(parents=True)
     (tmp_path / "drive").mkdir()

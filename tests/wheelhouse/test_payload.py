@@ -14,7 +14,7 @@ from tests.payloads import Part, make_payload, make_wheel, seal
 from tests.wheelhouse.hostile_wheels import WheelBuilder
 
 from nondum.sdk.errors import PayloadRefused, Problem
-from nondum.wheelhouse import contents, drive, preflight
+from nondum.wheelhouse import contents, drive, payload, preflight
 from nondum.wheelhouse.payload import (
     StagedPayload,
     check_wheels,
@@ -190,3 +190,29 @@ def test_a_refusal_is_one_error_with_all(folder: Path, tmp_path: Path) -> None:
         load(tmp_path / "staging", listed)
     assert len(refused.value.problems) >= 3
     assert json.dumps([p.to_dict() for p in refused.value.problems])
+
+
+@pytest.mark.parametrize(
+    ("path", "most"),
+    [
+        ("payload.toml", 64 * 1024),
+        ("pylock.blinker.toml", 1024 * 1024),
+        ("index.json", 4 * 1024 * 1024),
+        ("leaflet.pdf", payload.MAX_METADATA),
+    ],
+)
+def test_metadata_that_is_too_long_is_refused_by_the_list(path: str, most: int) -> None:
+    """Nothing of it is copied first; wheels are another matter."""
+
+    def listed(*entries: contents.Entry) -> contents.Contents:
+        return contents.Contents(ID, "1.0", 1, "", "0.1", "2026-01-01T00:00:00Z", entries)
+
+    def entry(path: str, size: int) -> contents.Entry:
+        return contents.Entry("0" * 64, size, path)
+
+    wheel = entry("wheels/a-1-py3-none-any.whl", 2**30)
+    assert not list(payload.oversized(listed(entry(path, most), wheel)))
+    (first, *_) = payload.oversized(listed(entry(path, most + 1), wheel))
+    assert (first.code, first.where) == ("TOO_LARGE", path)
+    halves = (entry("a", payload.MAX_METADATA - 1), entry("b", 2))
+    assert [problem.code for problem in payload.oversized(listed(*halves))] == ["TOO_LARGE"]
