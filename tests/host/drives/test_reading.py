@@ -1,0 +1,90 @@
+"""What a whole host makes of drives with several payloads, of copies, and of bad cables."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from tests.host.drives.test_blocks import image, on
+from tests.host.lifecycle.living import LAMP, Living, left_over, living
+from tests.loops import attached, can_be_made
+from tests.payloads import Part, make_payload
+
+from nondum.host.catalogue.records import Step
+from nondum.host.drives import steady
+from nondum.host.drives.blocks import BlockSource
+from nondum.host.drives.source import DriveSource
+from nondum.host.drives.steady import Steady
+from nondum.host.events import DriveFlapping, DriveInserted, PayloadFound, WheelsStored
+from nondum.host.lifecycle.folders import Folders
+
+pytestmark = pytest.mark.anyio
+
+LAMP_ID = "org.example.lamp"
+
+
+def heard(host: Living, kind: type) -> list[object]:
+    return [event for event in host.heard if type(event) is kind]
+
+
+async def test_payloads_of_one_drive_are_judged_each_alone(tmp_path: Path) -> None:
+    names = ("zebra", "lamp", "bad", "apple")
+    for name in names:
+        make_payload(tmp_path / "drive", Part(name, LAMP), payload_id=f"org.example.{name}")
+    with (tmp_path / "drive/nondum/org.example.bad/index.json").open("ab") as index:
+        index.write(b" ")
+    async with living(tmp_path) as host:
+        host.plug(tmp_path / "drive")
+        for name in names:
+            end = Step.REFUSED if name == "bad" else Step.ACTIVE
+            await host.until_step(f"org.example.{name}", end)
+        found = [event.payload_id for event in host.heard if isinstance(event, PayloadFound)]
+        assert found == [f"org.example.{name}" for name in sorted(names)]
+        host.pull()
+        await host.until(lambda: not host.snapshot.payloads)
+        assert not left_over(host.folders)
+
+
+async def test_copies_of_a_payload_are_installed_once(tmp_path: Path) -> None:
+    make_payload(tmp_path / "one", Part("lamp", LAMP), payload_id=LAMP_ID)
+    shutil.copytree(tmp_path / "one", tmp_path / "other")
+    async with living(tmp_path) as host:
+        host.plug(tmp_path / "one", "one")
+        host.plug(tmp_path / "other", "other")
+        record = await host.until_step(LAMP_ID, Step.ACTIVE)
+        await host.until(lambda: len(host.payload(LAMP_ID).drives) == 2)  # type: ignore[union-attr]  # it is there
+        pids = host.workers.pids()
+        host.pull("one")
+        await host.until(lambda: len(host.snapshot.drives) == 1)
+        after = await host.until_step(LAMP_ID, Step.ACTIVE)
+        assert after.key == record.key
+        assert host.workers.pids() == pids
+        assert len(heard(host, WheelsStored)) == 1
+        host.pull("other")
+        await host.until_gone(LAMP_ID)
+
+
+@pytest.mark.skipif(not can_be_made(), reason="loop devices need root")
+async def test_bad_cable_is_told_and_read_once_it_holds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The kernel says ten times over that a stick came and went."""
+    monkeypatch.setattr(steady, "FIRST_WAIT_S", 0.2)
+    monkeypatch.setattr(steady, "MOST_WAIT_S", 0.5)
+
+    def sources(folders: Folders) -> Sequence[DriveSource]:
+        return [Steady(BlockSource(folders.mounts, accepts=on(tmp_path)))]
+
+    async with living(tmp_path, sources=sources) as host:
+        with attached(image(tmp_path, Part("lamp", LAMP))) as node:
+            say = Path(f"/sys/block/{node.name}/uevent")
+            for _ in range(10):
+                for action in ("remove", "add"):
+                    await asyncio.to_thread(say.write_text, action)
+            await host.until_step(LAMP_ID, Step.ACTIVE)
+            (told,) = (event for event in host.heard if isinstance(event, DriveFlapping))
+            assert [problem.code for problem in told.problems] == ["DRIVE_FLAPPING"]
+            assert len(heard(host, DriveInserted)) <= steady.FREE_FLAPS + 1
