@@ -15,6 +15,7 @@ from typing import Any
 
 from packaging.version import Version
 
+from nondum.host.brief import brief
 from nondum.host.drives import trial
 from nondum.host.helper import privileged
 from nondum.host.trust.chain import packed
@@ -59,7 +60,7 @@ def look(arguments: Arguments, report: Report) -> dict[str, list[Any]]:
     verifier = rules.verifier()
     return {
         "trust": packed(offered),
-        "trust_problems": [problem.to_dict() for problem in flaws],
+        "trust_problems": [problem.to_dict() for problem in brief(flaws)],
         "payloads": [_found(folder, verifier) for folder in folders],
         "certificates": [] if is_payload else list(_certificates(root)),
     }
@@ -188,7 +189,7 @@ def _found(folder: Path, verifier: Verifier) -> dict[str, Any]:
         "release": listed.release if listed else 0,
         "fleet": listed.fleet if listed else "",
         "built": listed.built if listed else "",
-        "problems": [problem.to_dict() for problem in problems],
+        "problems": [problem.to_dict() for problem in brief(problems)],
         "warnings": [problem.to_dict() for problem in verdict.warnings],
         "signers": list(verdict.signers),
         "grant": verdict.grant.to_dict(),

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
 
+from nondum.host.brief import brief
 from nondum.host.confinement import own_children
 from nondum.host.lifecycle import jobs
 from nondum.host.lifecycle.allowance import allowed, confine_process
@@ -75,7 +76,7 @@ def _too_much(job: str) -> Problem:
 
 
 def _failure(kind: str, *problems: Problem) -> dict[str, Any]:
-    return {"error": kind, "problems": [problem.to_dict() for problem in problems]}
+    return {"error": kind, "problems": [problem.to_dict() for problem in brief(problems)]}
 
 
 def _reporter(answers: TextIO) -> Callable[[str, int, int], None]:
