@@ -24,6 +24,9 @@ ROWS: dict[str, set[str]] = {
         "devices",
         "pid",
         "problem",
+        "confinement",
+        "release",
+        "was",
     },
     "facts": {"fact", "age_s", "source", "value"},
     "journal": {
@@ -55,6 +58,7 @@ VIEWS: dict[str, set[str]] = {
         "drives",
         "goals",
         "told",
+        "confinement",
     },
     "tree": {"name", "kind", "status", "why", "policy", "children"},
     "why": {"advice", "sentences", "problems", "told"},
@@ -74,11 +78,14 @@ PAYLOAD_KEYS = {
     "place",
     "signers",
     "built",
+    "was",
+    "gone_back",
 }
 
 STATUS = """\
 host panther  revision N  ready
 warning: payloads without a signature are accepted (allow_unsigned)
+workers are confined at level N: WALLS
 
 PAYLOAD             VERSION  STATE   DRIVE               COMPONENTS
 org.example.beacon  1.0      active  org.example.beacon  beacon
@@ -86,8 +93,8 @@ org.example.beacon  1.0      active  org.example.beacon  beacon
 > beacon is here: it can greet, shine
 """
 COMPONENTS = """\
-COMPONENT  STATE  PLUGIN       VERSION  PAYLOAD             UNITS  PROBLEM
-beacon     ready  test-beacon  1.0      org.example.beacon  lamp   -
+COMPONENT  STATE  PLUGIN       VERSION  PAYLOAD             UNITS  CONFINEMENT  PROBLEM
+beacon     ready  test-beacon  1.0      org.example.beacon  lamp   N            -
 """
 BEHAVIOURS = """\
 BEHAVIOUR  COMPONENT  KIND       RUNNING  PHRASES
@@ -153,6 +160,8 @@ def normalised(text: str) -> str:
     """What a command printed, without what differs from run to run."""
     text = re.sub(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d", "WHEN", text)
     text = re.sub(r"(?<=  )\d+ (?:s|min)(?= )", lambda age: "AGE".ljust(len(age[0])), text)
+    text = re.sub(r"(confined at level) \d: .*", r"\1 N: WALLS", text)
+    text = re.sub(r"(lamp   )\d( +-)", r"\1N\2", text)
     return re.sub(r"(revision|world model  —|people  —) \d+", r"\1 N", text)
 
 
