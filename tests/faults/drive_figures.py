@@ -170,16 +170,16 @@ def _yanks(told: Figures) -> Iterator[str]:
         yield f"| {WHILE[phase]} | {len(seconds)} | {_spread(seconds)} |"
     yield f"| all | {len(every)} | {_spread(every)} |"
     yield ""
-    yield f"Mounts left over: {told['stuck_mounts']}. Folders and processes left over:"
-    yield f"{len(told['left_over'])}. Times the benign payload noticed: {told['disturbed']}."
+    yield f"- mounts left over: {told['stuck_mounts']}"
+    yield f"- folders and processes left over: {len(told['left_over'])}"
+    yield f"- times that the benign payload beside it noticed: {told['disturbed']}"
 
 
 WHILE = {
     "look": "it was mounted and looked through",
     "copy": "its payload was copied",
     "install": "its payload was checked and installed",
-    "run": "its payload ran, and others were read",
-    "idle": "its payload ran, and it was let go",
+    "run": "its payload ran, and it had been let go",
 }
 
 
