@@ -64,7 +64,7 @@ class FuseDrive:
             try:
                 request = os.read(self._device, _MOST + 4096)
             except OSError as error:
-                if error.errno == errno.ENODEV:
+                if error.errno in (errno.ENODEV, errno.EBADF):  # unmounted; and closed, too
                     return
                 if error.errno in (errno.ENOENT, errno.EINTR):
                     continue

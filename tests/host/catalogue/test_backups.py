@@ -67,8 +67,8 @@ async def test_backups_are_made_only_when_something_changed(tmp_path: Path) -> N
         asked.clear()
         await asked.wait()
 
-    keeping = asyncio.create_task(backups.keep(catalogue.backups, now, 0.02, pace_s=0.01))
     await catalogue.commit(HostState("spot", 1), ())
+    keeping = asyncio.create_task(backups.keep(catalogue.backups, now, 0.02, pace_s=0.01))
     while not made or made[-1] != 1:
         await look()
     written = catalogue.backups.newest.stat().st_mtime_ns
