@@ -36,18 +36,19 @@ def test_what_is_written_stands_over_the_defaults() -> None:
 
 
 def test_all_mistakes_are_told_at_once() -> None:
+    remedy = " → correct it; docs/configuration.md says what is expected"
     assert refused(
         '[host]\nname = "Spot 7"\nstat = "/x"\n[drives]\nslots = "/a"\n[dirves]\n'
         '[install]\nmethod = "conda"\nreserve_mb = true\n'
     ) == [
         "CONFIG_KEY host.toml [host]: unknown key 'stat' → did you mean 'state'?",
-        "CONFIG_VALUE host.toml: [drives] slots = '/a': expected a list of paths",
+        "CONFIG_VALUE host.toml: [drives] slots = '/a': expected a list of paths" + remedy,
         "CONFIG_KEY host.toml: unknown key 'dirves' → did you mean 'drives'?",
         "CONFIG_VALUE host.toml: [install] reserve_mb = True: expected a whole number of at "
-        "least 0",
+        "least 0" + remedy,
         "CONFIG_VALUE host.toml: [host] name = 'Spot 7' is not a host name → lower-case letters, "
         "digits and single hyphens: 'spot-7'",
-        'CONFIG_VALUE host.toml: [install] method = \'conda\': expected "store" or "pip"',
+        'CONFIG_VALUE host.toml: [install] method = \'conda\': expected "store" or "pip"' + remedy,
     ]
 
 
