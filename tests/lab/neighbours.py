@@ -11,6 +11,9 @@ from tests.lab.running_host import READY_S, RunningHost
 from tests.payloads import Part
 from tests.transport.fleet.fleets import router
 
+UNCONFINED = '[workers]\nconfinement = "0"\nminimum_confinement = 0\n\n'
+"""Plugins of these tests write down beside their rooms what they are made to do."""
+
 
 def free_port() -> int:
     """A port that nobody listens at just now."""
@@ -35,7 +38,9 @@ def neighbours(work: Path, *names: str, more: str = "") -> Iterator[list[Running
 def open_host(work: Path, name: str, port: int = 0) -> Iterator[tuple[RunningHost, str]]:
     """One host that needs no keys, and where it listens, unless that port is taken."""
     port = port or free_port()
-    host = RunningHost(work, name=name, more=_section(port, []) + "development = true\n")
+    host = RunningHost(
+        work, name=name, more=UNCONFINED + _section(port, []) + "development = true\n"
+    )
     try:
         host.start()
         yield host, f"tcp://127.0.0.1:{port}"
@@ -55,7 +60,7 @@ def routed(work: Path, *names: str) -> Iterator[list[RunningHost]]:
             (work / name).mkdir(parents=True)
             more = _section(free_port(), []) + "development = true\n"
             more += f'[router]\nendpoints = ["tcp/127.0.0.1:{port}"]\n'
-            host = RunningHost(work / name, name=name, more=more)
+            host = RunningHost(work / name, name=name, more=UNCONFINED + more)
             stack.callback(host.stop)
             host.start()
             hosts.append(host)
@@ -76,7 +81,7 @@ def looking(work: Path, *names: str, more: str = "") -> Iterator[list[RunningHos
             others = [f"127.0.0.1:{port}" for other, port in ports.items() if other != name]
             section = _section(ports[name], others)
             (work / name).mkdir(parents=True, exist_ok=True)
-            host = RunningHost(work / name, name=name, more=section + more)
+            host = RunningHost(work / name, name=name, more=UNCONFINED + section + more)
             stack.callback(host.stop)
             host.start()
             hosts.append(host)

@@ -14,7 +14,8 @@ from tests.payloads import make_payload
 
 pytestmark = [pytest.mark.lab, pytest.mark.beside]
 
-IMPATIENT = "[workers]\nstartup_s = 2.0\n"
+IMPATIENT = '[workers]\nstartup_s = 2.0\nconfinement = "0"\nminimum_confinement = 0\n'
+"""And without walls, so that who demands some is refused."""
 HEALTHY = ("talker", "scribe")
 
 

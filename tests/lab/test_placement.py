@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from demo.robot import nondum
 from tests.host.drives.test_blocks import image
-from tests.lab.neighbours import beacon, free_port, until_peer, until_shared, written
+from tests.lab.neighbours import UNCONFINED, beacon, free_port, until_peer, until_shared, written
 from tests.lab.plugins import talker
 from tests.lab.running_host import DAEMON, READY_S, RunningHost
 from tests.lab.traces import until_unmounted
@@ -53,7 +53,8 @@ def hosts(
             host = RunningHost(
                 work / name,
                 name=name,
-                more=f"[peers]\nenabled = true\ndevelopment = true\ndiscover = false\n{more}\n"
+                more=f"{UNCONFINED}[peers]\nenabled = true\ndevelopment = true\n"
+                f"discover = false\n{more}\n"
                 f'listen = ["tcp://127.0.0.1:{ports[name]}"]\nstatic = {others}\n',
                 program=programs.get(name, DAEMON),
             )

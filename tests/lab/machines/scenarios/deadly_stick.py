@@ -9,9 +9,9 @@ from tests.lab.plugins import talker
 MOST = 8
 """Kills that are tried; five must do."""
 KILL = """
-cd /var/lib/nondum/staging
-while ls | grep -q .; do sleep 0.02; done
-until ls | grep -q .; do sleep 0.02; done
+staged() { ls /var/lib/nondum/staging 2>/dev/null | grep -q .; }
+while staged; do sleep 0.02; done
+until staged; do sleep 0.02; done
 kill -KILL $(systemctl show --value -p MainPID nondum.service)
 """
 
