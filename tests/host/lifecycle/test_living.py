@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import signal
 import time
@@ -14,7 +15,7 @@ from tests.payloads import Part, make_payload
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import ComponentState, Step
 from nondum.host.catalogue.state import HostState
-from nondum.host.events import MountSet
+from nondum.host.events import DrivesScanned, Emit, HostSteady, MountSet
 from nondum.host.lifecycle.folders import Folders
 from nondum.host.lifecycle.installation import InstallOptions
 from nondum.host.lifecycle.installed import install, uninstall
@@ -241,3 +242,24 @@ async def test_daemon_that_lives_on_clears_what_was_counted(tmp_path: Path) -> N
     async with living(tmp_path, steady_s=0.01) as host:
         await host.until(lambda: not host.catalogue.state.tries)
         assert "HostSteady" in [entry.event for entry in await host.journal()]
+
+
+async def test_nothing_is_cleared_before_it_is_known_what_is_plugged_in(tmp_path: Path) -> None:
+    catalogue = await Catalogue.open(Folders(tmp_path / "state").catalogue, HOST)
+    await catalogue.commit(HostState(HOST, tries={"block:a": 4, "what was on it": 4}), ())
+    await catalogue.close()
+    async with living(tmp_path, steady_s=0.01, sources=lambda folders: (SlowSource(),)) as host:
+        await host.until(lambda: not host.catalogue.state.tries)
+        order = [type(event) for event in host.heard]
+        assert order[: order.index(HostSteady)].count(DrivesScanned) == len(("slot", "block"))
+
+
+class SlowSource:
+    """A source of drives that takes its time to look, twenty times as long as `steady_s`."""
+
+    kind = "block"
+
+    async def watch(self, emit: Emit) -> None:
+        await asyncio.sleep(0.2)
+        emit(DrivesScanned(self.kind, ("a",)))
+        await asyncio.Event().wait()

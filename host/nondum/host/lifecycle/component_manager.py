@@ -81,6 +81,8 @@ class ComponentManager:
         self._executor = executor
         self._bus = bus
         self._sources: list[DriveSource] = []
+        self._unscanned: set[str] = set()
+        """Kinds of drives of which it is not known yet what is plugged in."""
         self._trial: asyncio.TimerHandle | None = None
         self._steady_s = steady_s
 
@@ -114,6 +116,7 @@ class ComponentManager:
 
     async def _start(self) -> None:
         """The recovered state is committed first: who dies of what follows is counted by it."""
+        self._unscanned = {source.kind for source in self._sources}
         state, at = self._catalogue.state, self._bus.clock()
         if self._catalogue.loss is not None:
             rebuilt = await self._executor.rebuild(state, at)
@@ -126,7 +129,7 @@ class ComponentManager:
         self._bus.tell(recovered.events)
         for effect in (*recovered.effects, *noting_all(recovered.state)):
             self._executor.start(effect)
-        watched = {INSTALLED, *(source.kind for source in self._sources)}
+        watched = {INSTALLED, *self._unscanned}
         for kind in {drive.kind for drive in recovered.state.drives.values()} - watched:
             self._bus.emit(DrivesScanned(kind, ()))
 
@@ -157,6 +160,7 @@ class ComponentManager:
 
     async def _follow(self, batch: Sequence[Stamped]) -> None:
         """Events that waited together share one commit."""
+        self._unscanned -= {event.kind for event, _ in batch if isinstance(event, DrivesScanned)}
         outcome, told = _advance_all(self._catalogue.state, batch)
         await self._commit(outcome.state, told)
         self._executor.adopt(outcome.state)
@@ -200,8 +204,12 @@ class ComponentManager:
             self._bus.emit(CatalogueUnwritten(host, (unwritten,)))
 
     def _try(self, state: HostState) -> None:
-        """See after a while whether all is well with what others may have died of."""
-        if state.tries and self._trial is None:
+        """See after a while whether all is well with what others may have died of.
+
+        The while begins once it is known what is plugged in: a slow host is not well for the
+        reason that it has not looked yet.
+        """
+        if state.tries and self._trial is None and not self._unscanned:
             self._trial = asyncio.get_running_loop().call_later(self._steady_s, self._tried)
 
     def _tried(self) -> None:
