@@ -65,6 +65,7 @@ def laid(folder: Path, cgroup: str = "") -> Iterator[dict[str, Any]]:
         stack.callback(os.close, master)
         stack.callback(os.close, terminal)
         stack.enter_context(_shared_memory())
+        stack.enter_context(_environment())
         tmp = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="nondum-bait-")))
         yield {
             "secret": str(secret),
@@ -76,12 +77,23 @@ def laid(folder: Path, cgroup: str = "") -> Iterator[dict[str, Any]]:
             "abstract_socket": f"{TOKEN}-{os.getpid()}",
             "pid": process.pid,
             "token": TOKEN,
+            "session": os.getsid(0),
             "terminal": os.ttyname(terminal),
             "host_name": socket.gethostname(),
             "shared_key": SHARED_KEY,
             "tmp": str(tmp),
             "cgroup": cgroup,
         }
+
+
+@contextmanager
+def _environment() -> Iterator[None]:
+    """A word in the environment of this process, which starts the workers."""
+    os.environ["NONDUM_BAIT"] = TOKEN
+    try:
+        yield
+    finally:
+        del os.environ["NONDUM_BAIT"]
 
 
 @contextmanager

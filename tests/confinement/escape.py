@@ -300,6 +300,16 @@ def gain_privileges(bait: Bait) -> Any:
 
 
 @attempt
+def read_the_environment_it_was_started_with(bait: Bait) -> Any:
+    return "a token" if bait["token"] in open("/proc/self/environ").read() else None
+
+
+@attempt
+def be_in_the_session_of_the_host(bait: Bait) -> Any:
+    return bait["session"] if os.getsid(0) == bait["session"] else None
+
+
+@attempt
 def be_root(bait: Bait) -> Any:
     return "user 0" if os.getuid() == 0 else os.setuid(0)
 

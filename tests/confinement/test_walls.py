@@ -40,6 +40,7 @@ IN_A_ROOM = {
     "user": ("be root", ()),
     "user namespaces": ("make a user namespace", ("namespaces",)),
     "capabilities": ("hold capabilities", ()),
+    "environment": ("read the environment it was started with", ()),
     "filter": ("use keyrings", ()),
     "mounts": ("open a mount tree", ()),
     "namespaces": ("call unshare at all", ()),
@@ -60,17 +61,21 @@ ON_THE_HOST = {
     "landlock": ("read a file of the host", ("user",)),
     "capabilities": ("hold capabilities", ("user",)),
     "filter": ("trace a child", ("user",)),
+    "environment": ("read the environment it was started with", ()),
+    "session": ("be in the session of the host", ()),
+    "new privileges": ("gain privileges", ("landlock", "filter")),
     "messages": ("attach to shared memory", ("user",)),
     "sockets": ("connect to a path", ("user",)),
     "spying": ("trace a child", ("user",)),
 }
-"""The same of level 1."""
+"""The same of level 1. Landlock and filters need a process that may gain no privileges."""
 
 LIMITS = {
     "memory_mb": ("take all memory", 2048),
     "tasks": ("fork without end", 1000),
     "descriptors": ("open files without end", 1024),
     "file_mb": ("write a huge file", 100),
+    "core_mb": ("dump core", 1),
 }
 """Limit → what succeeds with more of it."""
 
@@ -94,7 +99,7 @@ def moved() -> Iterator[str]:
     for line in Path("/proc/self/cgroup").read_text(encoding="ascii").split():
         _, controllers, before = line.split(":", 2)
         root = Path("/sys/fs/cgroup") / (controllers.removeprefix("name=") or ".")
-        own = root / before.lstrip("/") / "nondum-walls"
+        own = root / before.lstrip("/") / f"nondum-walls-{os.getpid()}"
         with contextlib.suppress(OSError):
             own.mkdir(exist_ok=True)
             (own / "cgroup.procs").write_text(str(os.getpid()))

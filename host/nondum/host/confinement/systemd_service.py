@@ -26,6 +26,7 @@ class Served:
 
     level = Level.SERVICE
     has_keeper = False
+    without: frozenset[str] = frozenset()
 
     def __init__(self, *, without: Collection[str] = ()) -> None:
         """`without` leaves groups of system calls out of the filter that the worker puts up."""
@@ -48,7 +49,13 @@ class Served:
             "cpu_weight": spec.limits.of_cage().cpu_weight,
         }
         calls = calls_refused(refusals.GROUPS, self._without)
-        walls = {"user": None, "keeps_capabilities": True, "filter": calls, "service": service}
+        walls = {
+            "user": None,
+            "keeps_capabilities": True,
+            "may_gain_privileges": False,
+            "filter": calls,
+            "service": service,
+        }
         yield Entry(walls)
 
 

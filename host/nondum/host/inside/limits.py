@@ -16,7 +16,7 @@ def limit(limits: Mapping[str, int | None]) -> None:
         resource.RLIMIT_DATA: _bytes(limits["memory_mb"]),
         resource.RLIMIT_NOFILE: limits["descriptors"],
         resource.RLIMIT_FSIZE: _bytes(limits["file_mb"]),
-        resource.RLIMIT_CORE: 0,
+        resource.RLIMIT_CORE: _bytes(limits["core_mb"]),
         resource.RLIMIT_CPU: limits["cpu_s"],
     }
     tasks = limits["tasks"]

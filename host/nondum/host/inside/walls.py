@@ -14,7 +14,8 @@ def put_up(walls: Mapping[str, Any], ruleset: int | None) -> None:
     """Give up what `walls` says; Landlock's ruleset comes as a descriptor.
 
     `user`: another user's and group's id, or null; `groups` that it has beside.
-    `keeps_capabilities`. `filter`: base64 of `struct sock_filter`, or null.
+    `keeps_capabilities`; `may_gain_privileges`, by running a file of another user.
+    `filter`: base64 of `struct sock_filter`, or null.
     """
     if walls["user"] is not None:
         os.setgroups(walls["groups"])
@@ -22,7 +23,8 @@ def put_up(walls: Mapping[str, Any], ruleset: int | None) -> None:
         os.setresuid(walls["user"], walls["user"], walls["user"])
     if not walls["keeps_capabilities"]:
         kernel.keep_capabilities()
-    kernel.prctl(kernel.PR_SET_NO_NEW_PRIVS, 1)
+    if not walls["may_gain_privileges"]:
+        kernel.prctl(kernel.PR_SET_NO_NEW_PRIVS, 1)
     if ruleset is not None:
         kernel.restrict_to(ruleset)
         os.close(ruleset)

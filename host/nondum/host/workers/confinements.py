@@ -62,6 +62,8 @@ class Confinement(Protocol):
     level: Level
     has_keeper: bool
     """Whether its interpreter is process 1 of a namespace, and hears orders as long as it runs."""
+    without: frozenset[str]
+    """Walls that are left out, so that each can be seen to matter; none, outside tests."""
 
     def ground(self, spec: WorkerSpec | None) -> Ground:
         """What a worker's interpreter is started with, or that of a spare, of any worker."""
@@ -81,6 +83,7 @@ class Unconfined:
 
     level = Level.LIMITS
     has_keeper = False
+    without: frozenset[str] = frozenset()
 
     def ground(self, spec: WorkerSpec | None) -> Ground:
         """The interpreter, wherever it is."""
@@ -93,7 +96,8 @@ class Unconfined:
     @contextlib.contextmanager
     def entry(self, spec: WorkerSpec, ground: Ground) -> Iterator[Entry]:
         """Nothing is given up."""
-        yield Entry({"user": None, "keeps_capabilities": True, "filter": None})
+        walls = {"user": None, "keeps_capabilities": True, "filter": None}
+        yield Entry({**walls, "may_gain_privileges": False})
 
 
 class Held:
@@ -103,8 +107,7 @@ class Held:
     has_keeper = False
 
     def __init__(self, *, without: Collection[str] = ()) -> None:
-        """`without` leaves walls out, so that each can be seen to matter."""
-        self._without = frozenset(without)
+        self.without = frozenset(without)
         self._abi = landlock.version()
 
     def ground(self, spec: WorkerSpec | None) -> Ground:
@@ -124,17 +127,18 @@ class Held:
             **refusals.WITHOUT_NAMESPACES,
             "sockets": refusals.SOCKETS_OF_THE_HOST[has_network],
         }
-        user = None if "user" in self._without else user_for(spec)
+        user = None if "user" in self.without else user_for(spec)
         nodes = (*_existing(INSTRUMENTS if spec.index.devices else ()), *_nodes(spec))
         if user is not None:
             os.chown(spec.scratch, user, user)
         walls = {
             "user": user,
             "groups": sorted(_groups_of(nodes)),
-            "keeps_capabilities": "capabilities" in self._without,
-            "filter": calls_refused(groups, self._without),
+            "keeps_capabilities": "capabilities" in self.without,
+            "may_gain_privileges": "new privileges" in self.without,
+            "filter": calls_refused(groups, self.without),
         }
-        if "landlock" in self._without or not self._abi:
+        if "landlock" in self.without or not self._abi:
             yield Entry(walls)
             return
         with landlock.ruleset(
@@ -157,10 +161,10 @@ class Boxed:
         self, bwrap: str, places: tuple[Path, ...] = (), *, without: Collection[str] = ()
     ) -> None:
         """`places` are folders in which most workers' code and scratch are: a spare sees them until
-        it becomes one. `without` leaves walls out, so that each can be seen to matter.
+        it becomes one.
         """
         self._bwrap, self._places = bwrap, places
-        self._without = frozenset(without)
+        self.without = frozenset(without)
 
     def ground(self, spec: WorkerSpec | None) -> Ground:
         """Where the worker's folders are; the usual places will do if they are there."""
@@ -175,12 +179,12 @@ class Boxed:
 
     def command(self, ground: Ground, orders: int) -> list[str]:
         """Bubblewrap, with the interpreter in it."""
-        return bubblewrap.command(self._bwrap, ground, orders, without=self._without)
+        return bubblewrap.command(self._bwrap, ground, orders, without=self.without)
 
     @contextlib.contextmanager
     def entry(self, spec: WorkerSpec, ground: Ground) -> Iterator[Entry]:
         """Its own folders and nodes are brought in, everything outside is shut out."""
-        kept = self._without
+        kept = self.without
         groups = refusals.GROUPS
         if "network" in spec.permissions:  # abstract names of sockets belong to the network
             groups = {**groups, "sockets": refusals.SOCKETS_OF_THE_HOST[True]}
@@ -203,6 +207,7 @@ class Boxed:
         walls = {
             "user": None,
             "keeps_capabilities": "capabilities" in kept,
+            "may_gain_privileges": "new privileges" in kept,
             "filter": calls_refused(groups, kept),
         }
         yield Entry(walls, room=given)

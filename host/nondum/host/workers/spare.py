@@ -12,7 +12,7 @@ import os
 import signal
 import socket
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import IO, Any
 
 from nondum.host.cgroups import Cage, CageLimits, Cages
@@ -53,7 +53,7 @@ class Spare:
         try:
             with theirs:
                 command = confinement.command(ground, theirs.fileno())
-                self.popen = _started(command, theirs.fileno(), owner)
+                self.popen = _started(command, theirs.fileno(), owner, confinement.without)
         except OSError:
             self._orders.close()
             raise
@@ -122,7 +122,9 @@ def _last_line(pipe: IO[bytes] | None) -> str:
     return printable(said.splitlines()[-1]) if said else ""
 
 
-def _started(command: list[str], orders: int, owner: str) -> subprocess.Popen[bytes]:
+def _started(
+    command: list[str], orders: int, owner: str, without: Collection[str]
+) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,
@@ -130,9 +132,10 @@ def _started(command: list[str], orders: int, owner: str) -> subprocess.Popen[by
         stderr=subprocess.PIPE,
         bufsize=0,
         pass_fds=(orders,),
-        start_new_session=True,  # no terminal reaches it
+        start_new_session="session" not in without,  # no terminal reaches it
         cwd="/",
         env={
+            **(os.environ if "environment" in without else {}),
             "PATH": "/usr/local/bin:/usr/bin:/bin",
             "LANG": "C.UTF-8",
             "MALLOC_ARENA_MAX": "2",  # read before Python's first line
