@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.host.workers.house import HOST, House, until_gone
+from tests.host.workers.house import HOST, LIBRARIES, SDK, House, until_gone
 
 from nondum.host.confinement import bubblewrap
 from nondum.host.events import WorkerLogged
@@ -233,7 +233,11 @@ async def test_worker_of_root_gets_a_user_of_its_own(monkeypatch: pytest.MonkeyP
     with open_folder() as folder:
         house = House(folder, confinement=Held())
         source = "import os; print('users', os.getuid(), os.getgroups(), os.stat('.').st_uid)"
-        spec = replace(house.spec("guest", source), python=Path("/usr/bin/python3"))
+        spec = house.spec("guest", source)
+        site = spec.site_packages[0]
+        for package in (SDK / "nondum", LIBRARIES / "pluggy", LIBRARIES / "msgpack"):
+            shutil.copytree(package, site / package.name)  # where they are, not all may read
+        spec = replace(spec, site_packages=(site,), python=Path("/usr/bin/python3"))
         await house.workers.start(spec)
         said = await house.until(WorkerLogged, lambda event: event.message.startswith("users"))
         user = user_for(spec)

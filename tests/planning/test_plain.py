@@ -32,6 +32,24 @@ def plan_of(task: GroundTask) -> Plan:
     return answer if isinstance(answer, Plan) else Plan((), 0)
 
 
+def test_step_that_deletes_a_fact_makes_room_for_what_needs_it_false() -> None:
+    """The last action's conditional effect would undo what it adds, were `a` still true."""
+    harm = ConditionalEffect(frozenset({0}), frozenset(), frozenset({2}))
+    task = GroundTask(
+        ("a", "b", "c"),
+        init=frozenset({0, 2}),
+        goal=frozenset({1, 2}),
+        actions=(
+            GroundAction("end-a", frozenset(), frozenset(), frozenset({0}), 1),
+            GroundAction("make-b", frozenset(), frozenset({1}), frozenset(), 1, (harm,)),
+        ),
+    )
+    written, steps = plain(task, Plan((0, 1), 2))
+    assert validate(written, steps) == ()
+    last = written.actions[steps.steps[1]]
+    assert [written.facts[fact] for fact in last.precondition] == ["!a"]
+
+
 @settings(max_examples=150, deadline=None)
 @given(tasks())
 def test_plain_plan_is_valid_and_has_the_same_steps(task: GroundTask) -> None:

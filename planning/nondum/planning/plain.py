@@ -43,10 +43,10 @@ class _Writing:
         goal = needed = self._supports(self._task.goal, states[-1])
         steps: list[GroundAction] = []
         for action, state in zip(reversed(taken), reversed(states[:-1]), strict=True):
-            step = self._step(action, state, needed)
+            step = self._with_twins(self._step(action, state, needed))
             needed = (needed - step.add) | step.precondition
             steps.append(step)
-        steps.reverse()
+        steps = [self._with_twins(step) for step in reversed(steps)]  # of which there are more now
         added = self._facts[len(self._task.facts) :]
         true = {self._number[text] for text in added if self._number[twin(text)] not in states[0]}
         task = GroundTask(tuple(self._facts), self._task.init | true, goal, tuple(steps))
@@ -61,6 +61,15 @@ class _Writing:
                 precondition |= self._against_all(effect.condition, state)
         add, delete = changes(action, state)
         return GroundAction(action.name, frozenset(precondition), add, delete - add, action.cost)
+
+    def _with_twins(self, step: GroundAction) -> GroundAction:
+        """A step that changes the twins, as far as there are some by now, with their facts."""
+        add, delete = step.add | self._twins(step.delete), step.delete | self._twins(step.add)
+        return replace(step, add=add, delete=delete)
+
+    def _twins(self, facts: State) -> State:
+        twins = (twin(self._facts[fact]) for fact in facts)
+        return frozenset(self._number[text] for text in twins if text in self._number)
 
     def _supports(self, facts: State, state: State) -> State:
         reasons = self._reasons(state)

@@ -165,6 +165,23 @@ async def test_stop_ends_what_ignores_everything(house: House) -> None:
     assert not house.told(WorkerExited), "an expected end is no crash"
 
 
+async def test_worker_has_ended_once_it_is_said_to_have_stopped(house: House) -> None:
+    """The kernel takes a while over much memory; who asks next may want the same device."""
+    heavy = (
+        "@hookimpl\n"
+        "async def start(ctx):\n"
+        "    signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
+        "    globals()['ballast'] = bytearray(b'x' * 800_000_000)\n"
+        "@hookimpl\n"
+        "async def stop(ctx):\n"
+        "    time.sleep(3600)"
+    )
+    await guest(house, "pass", heavy)
+    pid = house.workers.pids()["guest"]
+    await house.workers.stop("guest", grace_s=0.1)
+    assert not is_alive(pid)
+
+
 async def test_stop_hook_leaves_things_safe(house: House) -> None:
     await guest(house, "pass", "@hookimpl\nasync def stop(ctx):\n    open('safe', 'w').close()")
     await house.workers.stop("guest")

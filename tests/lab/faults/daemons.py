@@ -17,7 +17,7 @@ from nondum.host.peers.trust_keeper import KEY_NAME, TRUST_NAME
 from nondum.transport.peers import Trust, trust_file
 from nondum.transport.peers.keys import load_or_create
 
-SECTION = "[workers]\nconfinement = \"0\"\nminimum_confinement = 0\n[peers]\nenabled = true\n"
+SECTION = '[workers]\nconfinement = "0"\nminimum_confinement = 0\n[peers]\nenabled = true\n'
 
 
 class WiredHost(RunningHost):

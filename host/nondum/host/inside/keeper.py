@@ -31,16 +31,22 @@ def keep(orders: socket.socket, given: Mapping[str, Any], links: Sequence[int]) 
     # The host's end is seen at the socket from now on: the plugin may have two seconds.
     kernel.prctl(kernel.PR_SET_PDEATHSIG, 0)
     room.furnish(given)
+    _say_who(orders, "keeper")
     worker = os.fork()
     if worker == 0:
         os.setsid()
-        orders.send(json.dumps({"is": "worker"}).encode())  # the kernel adds whose it is
+        _say_who(orders, "worker")
         orders.close()
         room.move_in(given)
         return
     for link in links:
         os.close(link)
     os._exit(_Keeper(orders, given, worker).run())
+
+
+def _say_who(orders: socket.socket, who: str) -> None:
+    """The kernel adds the process's id, as the host counts."""
+    orders.send(json.dumps({"is": who}).encode())
 
 
 class _Keeper:

@@ -33,6 +33,7 @@ class Keeper:
         self._orders.settimeout(0)
         self._turn = asyncio.Lock()
         self._worker: int | None = None
+        self._pidfd: int | None = None
         self._answers: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
         asyncio.get_running_loop().add_reader(orders.fileno(), self._read)
 
@@ -63,6 +64,12 @@ class Keeper:
         """Have it vanish."""
         await self._ask({"do": "revoke", "need": need})
 
+    def take_pidfd(self) -> int | None:
+        """The keeper's own process, for the caller to wait for and close; None if it is gone, or
+        never said who it is. It ends last: everything in its room has ended before."""
+        taken, self._pidfd = self._pidfd, None
+        return taken
+
     def close(self) -> None:
         """Give no more orders."""
         if self._orders.fileno() >= 0:
@@ -84,18 +91,30 @@ class Keeper:
     def _read(self) -> None:
         room_for_credentials = socket.CMSG_SPACE(_CREDENTIALS.size)
         with contextlib.suppress(BlockingIOError):
-            try:
-                data, more, _, _ = self._orders.recvmsg(_ANSWER_BYTES, room_for_credentials)
-            except ConnectionError:
-                data, more = b"", []
-            if not data:
-                self.close()
-                return
-            said = json.loads(data)
-            if said["is"] == "worker":
-                self._worker = next(_CREDENTIALS.unpack(value)[0] for _, _, value in more)
-            else:
+            while True:
+                try:
+                    data, more, _, _ = self._orders.recvmsg(_ANSWER_BYTES, room_for_credentials)
+                except ConnectionError:
+                    data, more = b"", []
+                if not data:
+                    self.close()
+                    return
+                self._hear(json.loads(data), more)
+
+    def _hear(self, said: dict[str, Any], more: list[tuple[int, int, bytes]]) -> None:
+        match said["is"]:
+            case "keeper":
+                with contextlib.suppress(ProcessLookupError):  # it has ended meanwhile
+                    self._pidfd = os.pidfd_open(_sender(more))
+            case "worker":
+                self._worker = _sender(more)
+            case _:
                 self._answers.put_nowait(said)
+
+
+def _sender(more: list[tuple[int, int, bytes]]) -> int:
+    process: int = next(_CREDENTIALS.unpack(value)[0] for _, _, value in more)
+    return process
 
 
 def node_of(need: str) -> str:

@@ -49,7 +49,7 @@ class WorkerProcess:
 
     def signal(self, number: signal.Signals) -> None:
         """Send a signal to the whole group, if any of it is left."""
-        if not self.exited.done():  # from then on the id may be somebody else's
+        if self._popen.returncode is None:  # from then on the id may be somebody else's
             inner = self._keeper.worker if self._keeper is not None else None
             if inner is not None:  # its room and keeper only end, by themselves or like this
                 _signal_group(inner, number)
@@ -90,9 +90,22 @@ class WorkerProcess:
         # Its children in the group go with it. It is not reaped yet, so the id is still its own.
         self.signal(signal.SIGKILL)
         status = self._popen.wait()
-        if self._keeper is not None:
-            self._keeper.close()
-            status = 128 - status if status > 128 else status  # as shells and bwrap(1) tell it
+        if self._keeper is None:
+            self.exited.set_result(status)
+            return
+        status = 128 - status if status > 128 else status  # as shells and bwrap(1) tell it
+        room_ended = self._keeper.take_pidfd()
+        self._keeper.close()
+        if room_ended is None:
+            self.exited.set_result(status)
+        else:  # what made the room may be gone before what is in it
+            asyncio.get_running_loop().add_reader(
+                room_ended, self._on_room_ended, room_ended, status
+            )
+
+    def _on_room_ended(self, pidfd: int, status: int) -> None:
+        asyncio.get_running_loop().remove_reader(pidfd)
+        os.close(pidfd)
         self.exited.set_result(status)
 
 
