@@ -19,12 +19,12 @@ PLUGINS = Path(__file__).parents[2] / "plugins"
 
 @pytest.fixture
 def drive(tmp_path: Path) -> Path:
-    """A drive with the payload, as `nondum payload build` makes it, for a machine without sound."""
+    """A drive with the payload, as `nondum payload build` makes it, for a machine without sound:
+    recordings are put into its scratch folder, and found there, since it can reach no other."""
     plugin = tmp_path / "speech"
     shutil.copytree(PLUGINS / "speech", plugin)
     with (plugin / "payload.toml").open("a", encoding="utf-8") as manifest:
-        folders = f'inbox = "{tmp_path / "in"}"\nsaid = "{tmp_path / "out"}"\n'
-        manifest.write(f'\n[component.settings]\nmicrophone = ""\n{folders}')
+        manifest.write('\n[component.settings]\nmicrophone = ""\ninbox = "in"\nsaid = "out"\n')
     return build(
         [plugin], libraries=[PLUGINS / "sdk", PLUGINS / "espeak"], cache=tmp_path / "cache"
     )["speech"]
@@ -46,11 +46,12 @@ def test_spoken_goal_is_reached_and_told_aloud(
     host.plug(drive)
     host.until_component("speech", "ready")
     host.bring("beacon", Part("beacon", BEACON))
+    (scratch,) = host.state.glob("scratch/*/speech")
     until_logged(host, "2 phrases can be heard")
     for name, text in (("no phrase", "the weather is fine today"), ("goal", "greet people")):
         sound = espeak.say(text, voice="en-us", words_per_minute=150)
-        (tmp_path / "unfinished").write_bytes(sound.to_wav())
-        (tmp_path / "unfinished").rename(tmp_path / "in" / f"{name}.wav")
+        (scratch / "unfinished").write_bytes(sound.to_wav())
+        (scratch / "unfinished").rename(scratch / "in" / f"{name}.wav")
     host.until_told("speech heard 'greet people': that is goal")
     host.until("the goal is reached", greeted, timeout_s=30)
     assert not any("weather" in goal["text"] for goal in host.view["goals"])
@@ -62,7 +63,7 @@ def test_spoken_goal_is_reached_and_told_aloud(
     def repeated(_view: object) -> bool:
         return any(
             ears.hear(sentence).said == said.phrases[0]
-            for file in (tmp_path / "out").glob("*.wav")
+            for file in (scratch / "out").glob("*.wav")
             for sentence in sentences_of(read_wav(file))
         )
 
