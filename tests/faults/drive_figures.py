@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.faults import crowds
+from tests.faults.footprint import slope
 from tests.faults.hostile import FAMILIES
 from tests.faults.hostile.gauntlet import gauntlet
 from tests.faults.yanks import PHASES, bench, yank_all
@@ -32,6 +33,9 @@ FOLDER = Path("build/drives")
 PAGE = Path("docs/reliability/drives.md")
 AT_ONCE = 16
 CROWD, WITHIN_S = 100, 10.0
+SLOPES = ("rss_mb", "pss_mb", "descriptors", "files", "catalogue_mb")
+FLAWS = ("wrong", "without_remedy", "canaries", "strays", "touched", "controls")
+REFUSED_S = 2.0
 
 Figures = dict[str, Any]
 
@@ -46,14 +50,15 @@ def hostile(root: Path, options: argparse.Namespace) -> Figures:
             run.round(drives, at_once=AT_ONCE if number else 1)
             rest()
             run.measure()
-            say(f"round {number + 1}: {run.outcome.memory_mb[-1]:.1f} MB, {run.outcome.wrong}")
+            say(f"round {number + 1}: {run.outcome.footprints[-1]}, {run.outcome.wrong}")
+        slopes = {of: slope(run.outcome.footprints[1:], of) for of in SLOPES}
         told = asdict(run.outcome)
-    told["pids"] = len(told["pids"])
+    told["pids"], told["slopes"] = len(told["pids"]), slopes
     return {
         **told,
         "families": {family: len(cases) for family, cases in FAMILIES.items()},
         "rounds": options.rounds,
-        "is_wrong": bool(told["wrong"] or told["canaries"] or told["strays"]),
+        "is_wrong": any(told[flaw] for flaw in FLAWS),
     }
 
 

@@ -54,9 +54,14 @@ def test_hostile_drives_are_told_with_their_codes(run: Gauntlet) -> None:
     run.measure()
     told = run.outcome
     assert not told.wrong
+    assert not told.without_remedy
     assert not told.canaries
     assert not told.strays
+    assert not told.touched
+    assert not told.controls
     assert len(told.pids) == 1
+    before, after = told.footprints
     # Children that are kept for a while are no leak; the long form waits until they have gone.
-    assert told.descriptors[-1] - told.descriptors[0] <= KEPT * OF_A_CHILD
-    assert told.memory_mb[-1] - told.memory_mb[0] <= MOST_GROWTH_MB
+    assert after.descriptors - before.descriptors <= KEPT * OF_A_CHILD
+    assert after.rss_mb - before.rss_mb <= MOST_GROWTH_MB
+    assert (after.mounts, after.zombies) == (before.mounts, before.zombies)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import re
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -9,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tests.faults.footprint import Footprint
 from tests.faults.hostile.case import Bench, HostileDrive
 from tests.faults.hostile.signing import MAKER, sign, trust
 from tests.lab.plugins import scribe, talker
@@ -22,10 +25,13 @@ HEALTHY = ("talker", "scribe")
 GOAL = "(written spot)"
 JUDGED_S = 60.0
 PRUNED_S = 5.0
-CALM, CALM_S = 8, 1.6
 PLANNERS = "/nondum-fast-downward-"
 """Where planners write down what they search."""
 OVER = ("refused", "quarantined", "active")
+REMEDY = "→ "
+"""Stands before what to do, in each problem that is told."""
+CONTROLS = re.compile(rb"[\x00-\x08\x0b-\x1f\x7f]")
+"""What a terminal would do something with, but for line ends and tabs."""
 MORE = "[workers]\nstartup_s = 5.0\n"
 
 
@@ -42,6 +48,17 @@ class Plugged:
         """Whether it is a block device."""
         return self.node is not None
 
+    def fingerprint(self) -> str:
+        """Another one when a byte, a name or a moment of it is another."""
+        if self.case.is_image:
+            return hashlib.sha256(self.folder.with_suffix(".img").read_bytes()).hexdigest()
+        digest = hashlib.sha256()
+        for path in sorted(self.folder.rglob("*")):
+            found = path.lstat()
+            seen = (bytes(path), found.st_mode, found.st_size, found.st_mtime_ns)
+            digest.update(repr(seen).encode())
+        return digest.hexdigest()
+
     def is_called(self, drive: str) -> bool:
         """Whether the daemon means this one."""
         if self.node is not None:
@@ -56,15 +73,20 @@ class Outcome:
     drives: int = 0
     wrong: list[str] = field(default_factory=list)
     """Drives that were told with another code, and with which."""
-    seconds: list[float] = field(default_factory=list)
-    """From plugging in until told, of those that were plugged in alone."""
+    without_remedy: list[str] = field(default_factory=list)
+    """Drives that were refused without a word of what to do."""
+    seconds: dict[str, float] = field(default_factory=dict)
+    """Drive → from plugging in until told, of those that were plugged in alone."""
     pids: set[int] = field(default_factory=set)
-    memory_mb: list[float] = field(default_factory=list)
+    footprints: list[Footprint] = field(default_factory=list)
     """Of the daemon, at rest: before, and after each round."""
-    descriptors: list[int] = field(default_factory=list)
     canaries: int = 0
     strays: list[str] = field(default_factory=list)
     """What lies outside the state folder and was not there before."""
+    touched: list[str] = field(default_factory=list)
+    """Drives that are not as they were made."""
+    controls: int = 0
+    """Bytes in the log that a terminal would obey."""
 
 
 class Gauntlet:
@@ -77,6 +99,8 @@ class Gauntlet:
         self._goal = ""
         self._healthy: list[Row] = []
         self._traces: Traces | None = None
+        self._made: dict[str, str] = {}
+        """Drive → what it was made as."""
 
     def begin(self) -> None:
         """Have the benign payloads at work."""
@@ -100,6 +124,7 @@ class Gauntlet:
             drive.mkdir()
             case.make(Bench(drive, number, self._canary, sign))
             made.append(Plugged(case, drive))
+            self._made[case.name] = made[-1].fingerprint()
         return made
 
     def round(self, drives: Sequence[Plugged], *, at_once: int) -> None:
@@ -109,16 +134,17 @@ class Gauntlet:
             batch = [self._plug(drive) for drive in drives[first : first + at_once]]
             told = [self._judged(drive) for drive in batch]
             if at_once == 1:
-                self.outcome.seconds.append(time.monotonic() - began)
-            for drive, codes in zip(batch, told, strict=True):
-                self.outcome.drives += 1
-                if not drive.case.is_right(codes):
-                    self.outcome.wrong.append(f"{drive.case.name}: {', '.join(codes) or 'nothing'}")
+                self.outcome.seconds[batch[0].case.name] = time.monotonic() - began
+            for drive, problems in zip(batch, told, strict=True):
+                self._judge(drive.case, problems)
             for drive in batch:
                 self._pull(drive)
             for drive in batch:
                 self._gone(drive)
             self._check_others()
+            self.host.views.clear()  # each is big, and nobody asks for them
+        self.outcome.touched = [d.case.name for d in drives if not self._is_as_made(d)]
+        self.outcome.controls = len(CONTROLS.findall((self.host.work / "daemon.log").read_bytes()))
         end = time.monotonic() + PRUNED_S
         while (stayed := self._stayed()) and time.monotonic() < end:
             time.sleep(PRUNED_S / 50)
@@ -144,8 +170,20 @@ class Gauntlet:
         else:
             detach(drive.node)
 
+    def _judge(self, case: HostileDrive, problems: Sequence[str]) -> None:
+        """Note whether it was told what it should be."""
+        codes = [problem.split(" ")[0] for problem in problems]
+        self.outcome.drives += 1
+        if not case.is_right(codes):
+            self.outcome.wrong.append(f"{case.name}: {', '.join(codes) or 'nothing'}")
+        if not all(REMEDY in problem for problem in problems):
+            self.outcome.without_remedy.append(case.name)
+
+    def _is_as_made(self, drive: Plugged) -> bool:
+        return drive.fingerprint() == self._made[drive.case.name]
+
     def _judged(self, drive: Plugged) -> tuple[str, ...]:
-        """The codes that it is told with, once there is nothing more to be told."""
+        """The problems that it is told with, once there is nothing more to be told."""
 
         def found(view: Row) -> tuple[str, ...] | None:
             rows = [row for row in view["drives"] if drive.is_called(row["drive"])]
@@ -155,9 +193,8 @@ class Gauntlet:
             payloads = [p for p in view["payloads"] if names & set(p["drive"].split(", "))]
             if any(row["state"] not in OVER for row in payloads):
                 return None
-            codes = [problem.split(" ")[0] for row in rows for problem in row["problems"]]
-            codes += [code for row in payloads for code in row["codes"]]
-            return tuple(codes) if codes or payloads else None
+            problems = [problem for row in (*rows, *payloads) for problem in row["problems"]]
+            return tuple(problems) if problems or payloads else None
 
         return self.host.until(f"{drive.case.name} judged", found, timeout_s=JUDGED_S)
 
@@ -190,13 +227,8 @@ class Gauntlet:
 
     def measure(self) -> None:
         """Note what the daemon takes when it is at rest."""
-        pid = self.host.pid
-        until_at_rest(pid)
-        status = Path(f"/proc/{pid}/status").read_text()
-        kilobytes = next(line.split()[1] for line in status.splitlines() if "VmRSS" in line)
-        self.outcome.pids.add(pid)
-        self.outcome.memory_mb.append(int(kilobytes) / 1024)
-        self.outcome.descriptors.append(descriptors(pid))
+        self.outcome.pids.add(self.host.pid)
+        self.outcome.footprints.append(Footprint.of(self.host.pid, self.host.state))
         found = [str(p) for folder in self._elsewhere for p in folder.iterdir()]
         self.outcome.strays = [path for path in found if PLANNERS not in path]
 
@@ -230,19 +262,3 @@ def demand_signatures(config: Path) -> None:
     """What the service has by default, and demonstrations have not."""
     text = config.read_text(encoding="utf-8")
     config.write_text(text.replace("allow_unsigned = true", "allow_unsigned = false"))
-
-
-def descriptors(pid: int) -> int:
-    """How many a process has."""
-    return len(list(Path(f"/proc/{pid}/fd").iterdir()))
-
-
-def until_at_rest(pid: int, timeout_s: float = 15.0) -> None:
-    """Wait until a process has had the same number of descriptors for a while: what it still makes
-    ready or tidies up is done then, as far as anybody outside can tell."""
-    end, calm, before = time.monotonic() + timeout_s, 0, -1
-    while calm < CALM and time.monotonic() < end:
-        now = descriptors(pid)
-        calm = calm + 1 if now == before else 0
-        before = now
-        time.sleep(CALM_S / CALM)
