@@ -81,9 +81,7 @@ def _pip(arguments: Sequence[str], code: str, where: str) -> None:
         problem = Problem(code, f"pip took longer than {TIMEOUT_S} s", where=where)
         raise InstallFailed(problem) from error
     if done.returncode:
-        raise InstallFailed(
-            Problem(code, telling_line(done.stderr), where=where, fix="run pip by hand to see more")
-        )
+        raise InstallFailed(Problem(code, telling_line(done.stderr), where=where))
 
 
 def telling_line(said: str) -> str:

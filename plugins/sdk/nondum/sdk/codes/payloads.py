@@ -150,7 +150,7 @@ CODES = (
     Code(
         "WHEEL_MISSING",
         "pip found no wheel of a dependency for that architecture and Python.",
-        "build without that target, pin a version that has wheels, or give a folder of "
-        "wheels with --wheels",
+        "give its source folder with --library or a folder of wheels with --wheels, pin a "
+        "version that has wheels, or build without that target",
     ),
 )
