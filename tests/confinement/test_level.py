@@ -143,5 +143,17 @@ def test_standing_tells_only_what_is_above_it() -> None:
     assert Standing(Level.KERNEL, findings).to_dict() == {
         "level": 1,
         "name": "Landlock and filtered system calls",
+        "scratch": "disk",
         "missing": [findings[0].to_dict()],
     }
+
+
+def test_scratch_that_ends_with_its_worker_is_told() -> None:
+    standing = Standing(Level.SERVICE)
+    assert standing.to_dict()["scratch"] == "memory"
+    (warning,) = standing.warnings()
+    assert warning == (
+        "what plugins write to their scratch folders is in memory (level 2, systemd service): "
+        "it ends with their workers"
+    )
+    assert not list(Standing(Level.BOX).warnings())

@@ -130,9 +130,22 @@ def test_only_the_granted_is_opened() -> None:
     assert {
         "DevicePolicy=closed",
         "DeviceAllow=char-alsa rw",
-        "DeviceAllow=char-ttyUSB rw",
+        "DeviceAllow=char-188 rw",
     } <= asked
     assert not any(each.startswith("DeviceAllow=char-drm") for each in asked)
+
+
+def test_devices_whose_driver_comes_later_are_opened_then() -> None:
+    """systemd looks names of drivers up when a service starts, numbers never."""
+    asked = properties(replace(REQUEST, has_devices=True))
+    assert {f"DeviceAllow=char-{major} rw" for major in (188, 166, 189, 81)} <= asked
+
+
+def test_both_ends_know_the_unit() -> None:
+    unit = systemd.unit_of("talker", 4711)
+    words = systemd.command(REQUEST, unit, MACHINE)
+    assert "--unit=nondum-worker-talker-4711.service" in words
+    assert "Slice=system.slice" in words
 
 
 def test_a_warden_serves_its_user_only() -> None:

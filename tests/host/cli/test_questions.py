@@ -25,6 +25,7 @@ ROWS: dict[str, set[str]] = {
         "pid",
         "problem",
         "confinement",
+        "scratch",
         "release",
         "was",
     },

@@ -32,6 +32,9 @@ NAMES: Mapping[Level, str] = {
 }
 """What levels are called in status."""
 
+SCRATCH: Mapping[Level, str] = {level: "disk" for level in Level} | {Level.SERVICE: "memory"}
+"""Where a worker's scratch folder is: in `memory`, it ends with the worker."""
+
 
 @dataclass(frozen=True, slots=True)
 class Finding:
@@ -78,11 +81,17 @@ class Standing:
         return {
             "level": int(self.level),
             "name": self.name,
+            "scratch": SCRATCH[self.level],
             "missing": [f.to_dict() for f in self.findings if f.level > self.level],
         }
 
     def warnings(self) -> Iterator[str]:
-        """What every status says, as long as workers are hardly held."""
+        """What every status says of workers that are hardly held, or forget."""
+        if SCRATCH[self.level] == "memory":
+            yield (
+                f"what plugins write to their scratch folders is in memory (level {self.level:d}, "
+                f"{self.name}): it ends with their workers"
+            )
         if self.level is Level.LIMITS:
             why = "; ".join(f.reason for f in self.findings if f.level is Level.KERNEL)
             yield "plugins are not confined: they may do what the host's user may" + (

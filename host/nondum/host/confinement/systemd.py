@@ -14,6 +14,7 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from nondum.host.cgroups.services import SLICE
 from nondum.host.confinement import bubblewrap
 
 MAX_BYTES = 16 * 1024
@@ -37,6 +38,7 @@ _ALWAYS = (
     *("SystemCallFilter=@system-service", "SystemCallFilter=~@privileged"),
     *("MemorySwapMax=0", "OOMPolicy=kill", "KillMode=control-group", "TimeoutStopSec=2"),
     *("LimitCORE=0", "PartOf=nondum.service", "Description=A worker of nondum"),
+    f"Slice={SLICE}",
 )
 _SEEN = ("usr", "bin", "sbin", "lib", "lib32", "lib64", "libx32", "proc", "dev", "sys", "tmp")
 """Of the folders at the top, those that are not hidden whole."""
@@ -46,10 +48,13 @@ _CLASSES: Mapping[str, tuple[str, ...]] = {
     "gpu": ("char-drm", "char-nvidia*", "char-kfd"),
 }
 _INSTRUMENTS = (
-    *("char-ttyUSB", "char-ttyACM", "char-usb_device", "char-video4linux", "char-media"),
-    *("char-hidraw", "char-i2c", "char-spi", "char-gpiochip", "char-pts"),
+    *("char-188", "char-166", "char-189", "char-81", "char-89", "char-153"),
+    *("char-hidraw", "char-media", "char-gpiochip", "char-pts"),
 )
-"""What a worker that declares devices may open, of the drivers that are loaded when it starts."""
+"""What a worker that declares devices may open: USB serial lines (188, 166), USB devices (189),
+cameras (81), I2C (89) and SPI (153) by numbers, which are theirs for good (devices.txt), since a
+driver may be loaded only after the worker has started; systemd looks names up at that moment.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +128,17 @@ def parse(data: bytes, places: Collection[Path]) -> Request:
     if type(request.processors) is not float or not 0.0 <= request.processors <= 10_000.0:
         raise ValueError("that is no number of processors")
     return request
+
+
+def unit_of(component: str, stand_in: int) -> str:
+    """The unit of the service for which a process of the daemon's stands in.
+
+    Both ends know it without being told: the warden sees whose connection it serves.
+
+    >>> unit_of("talker", 4711)
+    'nondum-worker-talker-4711.service'
+    """
+    return f"nondum-worker-{component}-{stand_in}.service"
 
 
 def command(request: Request, unit: str, machine: Machine) -> list[str]:

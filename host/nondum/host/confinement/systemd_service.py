@@ -10,7 +10,8 @@ import shutil
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from nondum.host.confinement import refusals, systemd_stand_in
+from nondum.host.cgroups.services import service_group
+from nondum.host.confinement import refusals, systemd, systemd_stand_in
 from nondum.host.confinement.bubblewrap import Ground
 from nondum.host.confinement.level import Level
 from nondum.host.confinement.systemd import PERMISSIONS
@@ -56,7 +57,7 @@ class Served:
             "filter": calls,
             "service": service,
         }
-        yield Entry(walls)
+        yield Entry(walls, service=lambda pid: service_group(systemd.unit_of(spec.component, pid)))
 
 
 def missing() -> str:

@@ -14,7 +14,6 @@ import grp
 import json
 import os
 import pwd
-import secrets
 import select
 import signal
 import socket
@@ -46,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it ends with its service, which it ends first
     with socket.socket(fileno=os.dup(0)) as connection:
         user = pwd.getpwnam(told.user).pw_uid if told.user else os.getuid()
-        if _peer(connection) != user:
+        if _peer(connection)[1] != user:
             raise SystemExit("this user is not served")
         places = (told.state / "venvs", *told.place)
         attend(connection, [place.resolve() for place in places])
@@ -60,7 +59,7 @@ def attend(connection: socket.socket, places: Sequence[Path]) -> None:
         request = systemd.parse(data, places)
         if len(descriptors) != _DESCRIPTORS:
             raise ValueError("a request brings three descriptors")
-        unit = f"nondum-worker-{request.component}-{secrets.token_hex(4)}.service"
+        unit = systemd.unit_of(request.component, _peer(connection)[0])
         orders, output, errors = descriptors
         running = _started(request, unit, orders, output, errors)
         orders.close()
@@ -138,11 +137,11 @@ def _systemctl(*words: str) -> str:
     return done.stdout
 
 
-def _peer(connection: socket.socket) -> int:
-    """The user at the other end (SO_PEERCRED, unix(7))."""
+def _peer(connection: socket.socket) -> tuple[int, int]:
+    """The process at the other end, and its user (SO_PEERCRED, unix(7))."""
     told = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
-    uid: int = _CREDENTIALS.unpack(told)[1]
-    return uid
+    process, user, _ = _CREDENTIALS.unpack(told)
+    return process, user
 
 
 def _parser() -> argparse.ArgumentParser:

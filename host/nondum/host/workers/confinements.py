@@ -9,12 +9,13 @@ import contextlib
 import os
 import stat
 import zlib
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from nondum.host.cgroups.services import ServiceGroup
 from nondum.host.confinement import bubblewrap, landlock, refusals
 from nondum.host.confinement.bubblewrap import Ground
 from nondum.host.confinement.filters import Rule
@@ -54,6 +55,8 @@ class Entry:
     """See `nondum.host.inside.room`; None: it stays where it is."""
     ruleset: int | None = None
     """Landlock's, by descriptor."""
+    service: Callable[[int], ServiceGroup] | None = None
+    """The service for which the process of that id will only stand in; None: it is the worker."""
 
 
 class Confinement(Protocol):

@@ -6,27 +6,40 @@ import contextlib
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Protocol
 
-from nondum.host.cgroups import Cage, Usage
+from nondum.host.cgroups import Usage
 
 TICKS_HZ = os.sysconf("SC_CLK_TCK")
 
 
-class Gauge:
-    """One worker's: of all its processes, where a cage holds them."""
+class Holder(Protocol):
+    """What all processes of a worker are in: a cage, or the cgroup of a service."""
 
-    def __init__(self, pid: int, cage: Cage | None) -> None:
-        self._pid, self._cage = pid, cage
+    def pids(self) -> tuple[int, ...]:
+        """The processes in it."""
+        ...
+
+    def usage(self) -> Usage:
+        """What they use."""
+        ...
+
+
+class Gauge:
+    """One worker's: of all its processes, where something holds them."""
+
+    def __init__(self, pid: int, holder: Holder | None) -> None:
+        self._pid, self._holder = pid, holder
 
     def pids(self) -> tuple[int, ...]:
         """Its processes, as far as they are known."""
-        held = self._cage.pids() if self._cage is not None else ()
+        held = self._holder.pids() if self._holder is not None else ()
         return held or (self._pid,)
 
     def usage(self) -> Usage:
-        """What it uses; without a cage, the processor time of its first process only."""
-        if self._cage is not None and self._cage.pids():
-            return self._cage.usage()
+        """What it uses; where nothing holds it, the processor time of its first process only."""
+        if self._holder is not None and self._holder.pids():
+            return self._holder.usage()
         return Usage(cpu_s=_cpu_s(self._pid))
 
     def wanted_s(self) -> dict[int, float]:
@@ -34,13 +47,15 @@ class Gauge:
         return {task: wanted_s for pid in self.pids() for task, wanted_s in _wanted_s(pid)}
 
     def descriptors(self) -> int:
-        """Open files of that process of its which has most."""
+        """Open files of that process of its which has most, as far as they may be counted: those of
+        another user are told from Linux 6.2 on."""
         return max((count for pid in self.pids() for count in _open_files(pid)), default=0)
 
 
 def _open_files(pid: int) -> Iterator[int]:
+    folder = Path(f"/proc/{pid}/fd")
     with contextlib.suppress(OSError):  # it has ended, or may not be looked at
-        yield sum(1 for _ in Path(f"/proc/{pid}/fd").iterdir())
+        yield folder.stat().st_size or sum(1 for _ in folder.iterdir())
 
 
 def _wanted_s(pid: int) -> Iterator[tuple[int, float]]:

@@ -85,7 +85,7 @@ class WorkerLauncher:
                     spare = started or Spare(self._confinement, ground, self._cages, self._owner)
                     spare.limit(spec.limits)
                     if spare.become(told, sock, entry.ruleset):
-                        return spare.process()
+                        return spare.process(entry.service)
                     said = spare.said
         except OSError as error:
             problem = Problem("LAUNCH_FAILED", str(error), where=spec.component)

@@ -12,10 +12,11 @@ import os
 import signal
 import socket
 import subprocess
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import IO, Any
 
 from nondum.host.cgroups import Cage, CageLimits, Cages
+from nondum.host.cgroups.services import ServiceGroup
 from nondum.host.confinement.bubblewrap import Ground
 from nondum.host.printable import printable
 from nondum.host.workers.confinements import Confinement
@@ -84,12 +85,16 @@ class Spare:
             return False
         return True
 
-    def process(self) -> WorkerProcess:
-        """The worker that it has become. Call it once, on the loop."""
+    def process(self, service: Callable[[int], ServiceGroup] | None = None) -> WorkerProcess:
+        """The worker that it has become, or the one for which it stands in (see `Entry`).
+
+        Call it once, on the loop.
+        """
         if self._has_keeper:
             return WorkerProcess(self.popen, self.cage, Keeper(self._orders))
         self._orders.close()
-        return WorkerProcess(self.popen, self.cage)
+        found = service(self.popen.pid) if service is not None else None
+        return WorkerProcess(self.popen, self.cage, service=found)
 
     def close(self) -> None:
         """End it unused."""

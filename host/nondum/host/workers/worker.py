@@ -64,7 +64,7 @@ class Worker:
         except WorkerFailed:
             ours.close()
             raise
-        self._gauge = Gauge(self._process.pid, self._process.cage)
+        self._gauge = Gauge(self._process.pid, self._process.service or self._process.cage)
         self._outputs = [
             Output(source, pipe, self._on_line)
             for source, pipe in zip(("stdout", "stderr"), self._process.outputs, strict=True)
@@ -78,6 +78,10 @@ class Worker:
     def pid(self) -> int:
         """The process's id."""
         return self._process.pid
+
+    def pids(self) -> tuple[int, ...]:
+        """All its processes, as far as they are known."""
+        return self._gauge.pids()
 
     async def introduce(self, welcome: Mapping[str, Any]) -> None:
         """Greet it, hear what it is, compare that with the index, and have the plugin start.
@@ -189,7 +193,9 @@ class Worker:
 
     async def _let_in(self, need: str, device: Mapping[str, Any]) -> dict[str, Any]:
         """Have a device where the worker can open it; what it is told of that."""
-        node = await asyncio.to_thread(reachable, self.spec.component, need, device["node"])
+        node = device["node"]
+        if self._process.service is None:  # a service has a user of its own, and the node's group
+            node = await asyncio.to_thread(reachable, self.spec.component, need, node)
         try:
             await self._process.grant(need, node)
         except WorkerFailed as error:
@@ -209,8 +215,8 @@ class Worker:
         )
 
     def _why_exited(self, status: int) -> Problem:
-        cage, said = self._process.cage, tuple(self._tail)
-        usage = cage.usage() if cage is not None else Usage()
+        holder, said = self._process.service or self._process.cage, tuple(self._tail)
+        usage = holder.usage() if holder is not None else Usage()
         exhausted = problems.exhausted(self.spec.component, self.spec.limits, usage, status, said)
         return exhausted or problems.exited(self.spec.component, status, said)
 
