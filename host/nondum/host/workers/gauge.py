@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Protocol
 
@@ -28,19 +28,20 @@ class Holder(Protocol):
 class Gauge:
     """One worker's: of all its processes, where something holds them."""
 
-    def __init__(self, pid: int, holder: Holder | None) -> None:
-        self._pid, self._holder = pid, holder
+    def __init__(self, first: Callable[[], int], holder: Holder | None) -> None:
+        """`first` tells its first process, as far as that is known by then."""
+        self._first, self._holder = first, holder
 
     def pids(self) -> tuple[int, ...]:
         """Its processes, as far as they are known."""
         held = self._holder.pids() if self._holder is not None else ()
-        return held or (self._pid,)
+        return held or (self._first(),)
 
     def usage(self) -> Usage:
         """What it uses; where nothing holds it, the processor time of its first process only."""
         if self._holder is not None and self._holder.pids():
             return self._holder.usage()
-        return Usage(cpu_s=_cpu_s(self._pid))
+        return Usage(cpu_s=_cpu_s(self._first()))
 
     def wanted_s(self) -> dict[int, float]:
         """Thread → seconds that it has run or waited for a processor (sched-stats.rst)."""

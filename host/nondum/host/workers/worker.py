@@ -64,7 +64,7 @@ class Worker:
         except WorkerFailed:
             ours.close()
             raise
-        self._gauge = Gauge(self._process.pid, self._process.service or self._process.cage)
+        self._gauge = Gauge(lambda: self.pid, self._process.service or self._process.cage)
         self._outputs = [
             Output(source, pipe, self._on_line)
             for source, pipe in zip(("stdout", "stderr"), self._process.outputs, strict=True)

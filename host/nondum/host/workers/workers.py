@@ -264,10 +264,10 @@ class Workers:
         return {worker.spec.component: worker.pid for worker in self._running()}
 
     def pids_of(self, payload: str) -> tuple[int, ...]:
-        """The processes of a payload's workers."""
+        """The processes of a payload's workers, as far as they are known."""
         every = (*self._supervisors.values(), *self._others)
         mine = (s.worker for s in every if s.spec.payload == payload)
-        return tuple(worker.pid for worker in mine if worker is not None)
+        return tuple(pid for worker in mine if worker is not None for pid in worker.pids())
 
     # What supervisors need
 
