@@ -83,6 +83,8 @@ class DriveInserted(Event):
     """What keeps it from being read at all."""
     port: str = ""
     """Where it is plugged in, as far as that is known: whatever comes there next has the same."""
+    mark: str = ""
+    """What it is by its own word, the same after the machine has been started anew; empty: none."""
 
 
 @dataclass(frozen=True, slots=True)

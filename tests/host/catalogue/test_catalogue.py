@@ -324,6 +324,7 @@ async def test_file_of_another_version_is_left_alone(tmp_path: Path) -> None:
 
 OF_4 = replace(FULL, tries={}, is_stopped=False, rollbacks={})
 THE_4 = (
+    "ALTER TABLE drives DROP COLUMN mark;"
     "DROP TABLE tries; DROP TABLE rollbacks; ALTER TABLE host DROP COLUMN stopped;"
     "ALTER TABLE payloads ADD COLUMN attempts INTEGER NOT NULL DEFAULT 0;"
     "ALTER TABLE payloads DROP COLUMN was; ALTER TABLE highwater DROP COLUMN owner;"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from tests.host.lifecycle.test_advance import (
@@ -87,6 +88,30 @@ def test_drive_that_was_pulled_while_no_daemon_ran_is_forgotten() -> None:
     state = died(on(HostState("spot"), drive()), 2)
     assert not on(state, events.DrivesScanned("slot", ())).tries
     assert on(state, events.DrivesScanned("block", ())).tries
+
+
+def numbered(number: int, mark: str = "Acme-0042") -> events.DriveInserted:
+    """A drive as the kernel numbers it; what it says of itself stays."""
+    return events.DriveInserted(f"sda-{number}", Path("/mounts"), "block", mark=mark)
+
+
+def test_drive_is_left_alone_after_the_machine_was_started_anew() -> None:
+    state = HostState("spot")
+    for number in range(ATTEMPTS):
+        state = died(on(state, numbered(number), events.DrivesScanned("block", (f"sda-{number}",))))
+    assert on(state, numbered(9)).drives["sda-9"].problems[0].code == "QUARANTINED"
+    assert not on(state, numbered(9, "Acme-0043")).drives["sda-9"].problems
+
+
+def test_drive_that_carried_what_ran_is_counted_on_under_its_new_number() -> None:
+    """What is remembered of the last start is taken for pulled, the same stick for plugged in."""
+    first = on(HostState("spot"), numbered(1), found(drive="sda-1"), *way_to_active()[2:])
+    reading = on(first, numbered(1))
+    assert reading.drives["sda-1"].state is DriveState.READING
+    state = on(died(reading), numbered(2), events.DrivesScanned("block", ("sda-2",)))
+    assert set(state.drives) == {"sda-2"}
+    assert state.tries["block:Acme-0042"] == 1
+    assert not on(state, events.DriveRemoved("sda-2")).tries.keys() & {"block:Acme-0042"}
 
 
 def test_payload_is_refused_after_too_many_deaths_and_retried_when_asked() -> None:

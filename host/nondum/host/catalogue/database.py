@@ -23,7 +23,8 @@ _UPGRADES = {
     " kind TEXT NOT NULL, priority INTEGER NOT NULL) STRICT;",
     2: "CREATE TABLE former (payload_id TEXT PRIMARY KEY, version TEXT NOT NULL,"
     " components TEXT NOT NULL, left_wall_s REAL NOT NULL) STRICT;",
-    3: "ALTER TABLE host ADD COLUMN stopped INTEGER NOT NULL DEFAULT 0;"
+    3: "ALTER TABLE drives ADD COLUMN mark TEXT NOT NULL DEFAULT '';"
+    "ALTER TABLE host ADD COLUMN stopped INTEGER NOT NULL DEFAULT 0;"
     "CREATE TABLE tries (subject TEXT PRIMARY KEY, deaths INTEGER NOT NULL) STRICT;"
     "INSERT INTO tries SELECT key, attempts FROM payloads WHERE attempts > 0;"
     "ALTER TABLE payloads DROP COLUMN attempts;"

@@ -224,6 +224,8 @@ class DriveRecord:
     since: Moment = Moment(0.0, 0.0)
     """When it was inserted."""
     problems: tuple[Problem, ...] = ()
+    mark: str = ""
+    """What it is by its own word, whenever it is plugged in; empty: it has none."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,6 +55,7 @@ def drive_row(drive: DriveRecord) -> Row:
         "state": drive.state.value,
         "since": as_json(_pair(drive.since)),
         "problems": as_json(drive.problems),
+        "mark": drive.mark,
     }
 
 
@@ -69,6 +70,7 @@ def drive(row: sqlite3.Row) -> DriveRecord:
         state=DriveState(row["state"]),
         since=Moment(*json.loads(row["since"])),
         problems=_problems(row["problems"]),
+        mark=row["mark"],
     )
 
 

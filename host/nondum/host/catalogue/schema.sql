@@ -15,7 +15,8 @@ CREATE TABLE drives (
     filesystem  TEXT NOT NULL,
     state       TEXT NOT NULL,
     since       TEXT NOT NULL,           -- JSON [monotonic_s, wall_s]
-    problems    TEXT NOT NULL            -- JSON
+    problems    TEXT NOT NULL,           -- JSON
+    mark        TEXT NOT NULL DEFAULT ''
 ) STRICT;
 
 CREATE TABLE payloads (

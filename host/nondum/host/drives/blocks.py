@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pyudev
@@ -16,6 +16,9 @@ from nondum.sdk.errors import Problem
 Accepts = Callable[[pyudev.Device], bool]
 
 SYSFS = Path("/sys")
+MARKS = ("ID_SERIAL", "PARTN", "ID_FS_UUID")
+"""Properties of udev by which a drive is known again."""
+MOST_MARK = 200
 
 
 def is_usb_drive(device: pyudev.Device) -> bool:
@@ -84,6 +87,7 @@ class BlockSource:
                     filesystem=device.properties.get("ID_FS_TYPE", ""),
                     problems=self._problems(device, drive),
                     port=usb.port_of(Path(device.sys_path)),
+                    mark=mark_of(device.properties),
                 )
             )
 
@@ -110,6 +114,18 @@ def _drive(device: pyudev.Device) -> str:
     if device.device_type == "partition":
         disk = disk.parent
     return drive_name(device.sys_name, _number(disk / "diskseq"))
+
+
+def mark_of(properties: Mapping[str, str]) -> str:
+    """What a drive is by its own word, as udev has read it: serial number, partition, file system.
+
+    >>> mark_of({"ID_SERIAL": "Acme_Stick_0042", "ID_FS_UUID": "1C2D-3E4F"})
+    'Acme_Stick_0042/1C2D-3E4F'
+    >>> mark_of({})
+    ''
+    """
+    said = [properties.get(name, "") for name in MARKS]
+    return "/".join(filter(None, said))[:MOST_MARK]
 
 
 def _size(device: pyudev.Device) -> int:

@@ -34,6 +34,7 @@ def on_drive_inserted(turn: Turn, event: DriveInserted) -> None:
         node=event.node,
         filesystem=event.filesystem,
         since=turn.at,
+        mark=event.mark,
     )
     if problems := (*event.problems, *tries.drive_problems(turn.state, drive)):
         turn.put_drive(drive)

@@ -6,7 +6,7 @@ last one was at. One that ended because it was told to counts for nothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 
 from nondum.host.catalogue.records import (
     INSTALLED,
@@ -42,8 +42,12 @@ _BEGUN = frozenset(
 
 
 def subject_of(drive: DriveRecord) -> str:
-    """What a drive is counted by; a payload is by its key."""
-    return f"{drive.kind}:{drive.id}"
+    """What a drive is counted by; a payload is by its key.
+
+    The kernel numbers drives anew when the machine starts, so what they say of themselves counts,
+    where they do. A drive that says another thing each time is counted until the next start.
+    """
+    return f"{drive.kind}:{drive.mark or drive.id}"
 
 
 def counted(state: HostState) -> Mapping[str, int]:
@@ -87,13 +91,17 @@ def on_event(turn: Turn, event: Event) -> None:
                 _clear(turn, subject_of(drive))
         case DriveRemoved():
             if (drive := turn.state.drives.get(event.drive)) is not None:
-                _clear(turn, subject_of(drive))
+                _clear(turn, *({subject_of(drive)} - _subjects(turn.state, drive.kind, but=drive)))
         case DrivesScanned():
-            there = {f"{event.kind}:{drive}" for drive in event.drives}
             known = {s for s in turn.state.tries if s.startswith(f"{event.kind}:")}
-            _clear(turn, *(known - there))
+            _clear(turn, *(known - _subjects(turn.state, event.kind)))
         case PayloadWithdrawn() | RetryAsked():
             _clear(turn, event.payload)
+
+
+def _subjects(state: HostState, kind: str, *, but: DriveRecord | None = None) -> Set[str]:
+    """What the drives of a kind are counted by."""
+    return {subject_of(d) for d in state.drives.values() if d.kind == kind and d is not but}
 
 
 def _clear(turn: Turn, *subjects: str) -> None:
