@@ -14,6 +14,7 @@ from tests.wheelhouse.test_lock import HEAD, host, package, wheel
 from nondum.sdk.errors import PayloadRefused
 from nondum.wheelhouse import lock, manifest
 from nondum.wheelhouse.lock import Lock
+from nondum.wheelhouse.memory import Memory
 from nondum.wheelhouse.preflight import HostFacts, preflight, probe, select, unmet
 
 ENVIRONMENT, TAGS = host((3, 11), "x86_64")
@@ -23,8 +24,7 @@ FACTS = HostFacts(
     environment=ENVIRONMENT,
     tags=tuple(TAGS),
     free_disk_mb=1000,
-    free_memory_mb=1000,
-    gpu_memory_mb=None,
+    memory=Memory(1000),
     confinement=1,
     nondum="0.1.0",
 )
@@ -178,7 +178,7 @@ def test_probing_looks_at_this_machine(tmp_path: Path) -> None:
     assert facts.architecture == platform.machine()
     assert facts.python == platform.python_version()
     assert (
-        0 < facts.free_memory_mb <= os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") >> 20
+        0 < facts.memory.free_mb <= os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") >> 20
     )
     free_mb = shutil.disk_usage(tmp_path).free >> 20
     assert abs(facts.free_disk_mb - (free_mb - 64)) < 200

@@ -71,7 +71,10 @@ class StagePayload(PayloadEffect):
 
 @dataclass(frozen=True, slots=True)
 class StoreWheels(PayloadEffect):
-    """Unpack each wheel that the store lacks into it."""
+    """Unpack each wheel that the store lacks into it, and promise it the memory that it needs."""
+
+    beside: str = ""
+    """Key of the release of it that is in force, which would make room for it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""How much memory GPUs have free: what NVML says, or the system's own where a GPU shares it.
+"""What memory GPUs have: what NVML says, or the system's own where a GPU shares it.
 
 NVML is asked through nvidia-ml-py where that is installed (`nondum[gpu]`), and only by processes
 that end soon: it keeps memory and threads.
@@ -6,7 +6,7 @@ that end soon: it keeps memory and threads.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 MODEL = Path("/proc/device-tree/model")
@@ -15,10 +15,22 @@ SHARING = ("Jetson", "Raspberry Pi")
 _MB = 1024 * 1024
 
 
-def free_memory_mb(system_memory_mb: Callable[[], int], *, model: Path = MODEL) -> int | None:
-    """The free memory of the GPU that has most of it; None where no GPU is known of."""
+@dataclass(frozen=True, slots=True)
+class Gpu:
+    """The memory of a host's GPUs."""
+
+    free_mb: int
+    """Of the GPU that has most of it: what one payload may find."""
+    total_mb: int
+    """Of all of them, used or not."""
+    is_shared: bool = False
+    """Whether it is the system's own memory."""
+
+
+def look(system_free_mb: int, system_total_mb: int, *, model: Path = MODEL) -> Gpu | None:
+    """The GPUs of this machine; None where none is known of."""
     if shares_memory(_text(model)):
-        return system_memory_mb()
+        return Gpu(system_free_mb, system_total_mb, is_shared=True)
     return _asked_of_nvml()
 
 
@@ -31,7 +43,7 @@ def shares_memory(model: str) -> bool:
     return any(name in model for name in SHARING)
 
 
-def _asked_of_nvml() -> int | None:
+def _asked_of_nvml() -> Gpu | None:
     try:
         import pynvml
     except ImportError:
@@ -39,10 +51,13 @@ def _asked_of_nvml() -> int | None:
     try:
         pynvml.nvmlInit()
         handles = map(pynvml.nvmlDeviceGetHandleByIndex, range(pynvml.nvmlDeviceGetCount()))
-        free = [int(pynvml.nvmlDeviceGetMemoryInfo(handle).free) for handle in handles]
+        every = [pynvml.nvmlDeviceGetMemoryInfo(handle) for handle in handles]
     except pynvml.NVMLError:  # no driver, or no device
         return None
-    return max(free) // _MB if free else None
+    if not every:
+        return None
+    free, total = max(int(one.free) for one in every), sum(int(one.total) for one in every)
+    return Gpu(free // _MB, total // _MB)
 
 
 def _text(path: Path) -> str:

@@ -6,7 +6,6 @@ Every problem is told at once, with what is needed and what is there.
 from __future__ import annotations
 
 import functools
-import os
 import platform
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -24,10 +23,12 @@ from packaging.utils import canonicalize_name
 from packaging.version import Version
 
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem
-from nondum.wheelhouse import gpu, wheel
 from nondum.wheelhouse import lock as locks_module
+from nondum.wheelhouse import memory, wheel
+from nondum.wheelhouse.gpu import Gpu
 from nondum.wheelhouse.lock import Lock, LockedWheel
 from nondum.wheelhouse.manifest import MAX_CONFINEMENT, Manifest
+from nondum.wheelhouse.memory import Memory
 from nondum.wheelhouse.target import Target
 from nondum.wheelhouse.wheel import Layout
 
@@ -51,9 +52,7 @@ class HostFacts:
     """Wheel tags that it takes, best first."""
     free_disk_mb: int
     """On the store's file system, less the reserve."""
-    free_memory_mb: int
-    gpu_memory_mb: int | None
-    """None: no GPU that is known of."""
+    memory: Memory
     confinement: int
     """Level at which workers run here."""
     nondum: str
@@ -69,8 +68,7 @@ def probe(state: Path, *, reserve_mb: int, confinement: int) -> HostFacts:
         environment=_environment(),
         tags=_tags(),
         free_disk_mb=max(0, shutil.disk_usage(there).free // _MB - reserve_mb),
-        free_memory_mb=free_memory_mb(),
-        gpu_memory_mb=gpu.free_memory_mb(free_memory_mb),
+        memory=memory.look(),
         confinement=confinement,
         nondum=nondum_version(),
     )
@@ -101,8 +99,7 @@ def of_target(target: Target) -> HostFacts:
             *tags.compatible_tags(version, interpreter, platforms),
         ),
         free_disk_mb=_PLENTY_MB,
-        free_memory_mb=_PLENTY_MB,
-        gpu_memory_mb=_PLENTY_MB,
+        memory=Memory(_PLENTY_MB, Gpu(_PLENTY_MB, _PLENTY_MB)),
         confinement=MAX_CONFINEMENT,
         nondum=nondum_version(),
     )
@@ -156,7 +153,7 @@ def preflight(
     """
     problems = [
         *_version_problems(manifest, facts, minimum_nondum),
-        *_resource_problems(manifest, facts),
+        *memory.problems(manifest.requires, facts.memory, manifest.id),
     ]
     for component in manifest.components:
         if component.id not in locks:
@@ -245,7 +242,7 @@ def unpacked_problems(layouts: Iterable[Layout], facts: HostFacts, where: str) -
     """When wheels are too much for the disk, by the sizes of all their files."""
     needed = sum(file.member.size for layout in layouts for file in layout.files) // _MB
     if needed > facts.free_disk_mb:
-        yield _short("DISK_FULL", "disk", needed, facts.free_disk_mb, where)
+        yield _short(needed, facts.free_disk_mb, where)
 
 
 def _wanted(line: str, extra: str, facts: HostFacts) -> Requirement | None:
@@ -302,38 +299,21 @@ def _version_problems(
         )
 
 
-def _resource_problems(manifest: Manifest, facts: HostFacts) -> Iterator[Problem]:
-    needs = manifest.requires
-    if needs.memory_mb > facts.free_memory_mb:
-        yield _short("NO_MEMORY", "memory", needs.memory_mb, facts.free_memory_mb, manifest.id)
-    if needs.gpu_memory_mb > (facts.gpu_memory_mb or 0):
-        have = facts.gpu_memory_mb or 0
-        yield _short("NO_GPU_MEMORY", "GPU memory", needs.gpu_memory_mb, have, manifest.id)
-
-
 def _disk_problems(
     manifest: Manifest, chosen: Mapping[str, Sequence[LockedWheel]], facts: HostFacts
 ) -> Iterator[Problem]:
     wheels = {wheel.sha256: wheel.size for group in chosen.values() for wheel in group}
     needed = max(manifest.requires.disk_mb, GROWTH * sum(wheels.values()) // _MB)
     if needed > facts.free_disk_mb:
-        yield _short("DISK_FULL", "disk", needed, facts.free_disk_mb, manifest.id)
+        yield _short(needed, facts.free_disk_mb, manifest.id)
 
 
-def _short(code: str, what: str, need: int, have: int, where: str) -> Problem:
+def _short(needed_mb: int, free_mb: int, where: str) -> Problem:
     return Problem(
-        code,
-        f"there is too little {what}",
+        "DISK_FULL",
+        "there is too little disk",
         where=where,
-        need=f"{need} MB",
-        have=f"{have} MB",
-        fix=f"free some {what}, or use another host",
+        need=f"{needed_mb} MB",
+        have=f"{free_mb} MB",
+        fix="free some disk, or use another host",
     )
-
-
-def free_memory_mb() -> int:
-    """Memory that can be had without swapping (proc_meminfo(5)), in MB."""
-    for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
-        if line.startswith("MemAvailable:"):
-            return int(line.split()[1]) // 1024
-    return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // _MB

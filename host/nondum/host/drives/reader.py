@@ -26,6 +26,7 @@ from nondum.wheelhouse import contents, drive, payload, preflight
 from nondum.wheelhouse.contents import Contents
 from nondum.wheelhouse.dist_info import Needs
 from nondum.wheelhouse.lock import LockedWheel
+from nondum.wheelhouse.memory import Memory, Promised
 from nondum.wheelhouse.payload import StagedPayload
 from nondum.wheelhouse.preflight import HostFacts
 from nondum.wheelhouse.signatures import Verdict, Verifier
@@ -89,23 +90,20 @@ def copy(arguments: Arguments, report: Report) -> dict[str, int]:
     # Trust may have changed since, and what is copied must say for itself why it was let in.
     signature = drive.read_signature(folder)
     verdict = Rules.of(arguments).verifier().verify(data, signature)
-    _refuse_if_any(verdict.problems)
+    refuse_if_any(verdict.problems)
     listed = contents.parse(data, f"{folder.name}/{contents.NAME}")
-    _refuse_if_any(tuple(payload.oversized(listed)))
+    refuse_if_any(tuple(payload.oversized(listed)))
     drive.copy(folder, listed, staging, wanted=lambda e: payload.is_metadata(e.path))
     (staging / contents.NAME).write_bytes(data)
     if signature is not None:
         (staging / contents.SIGNATURE_NAME).write_bytes(signature)
     trial.run(lambda: payload.load(staging, listed), listed.payload_id)
     staged = payload.load(staging, listed)
-    _refuse_if_any(verdict.grant.problems(staged.manifest))
+    refuse_if_any(verdict.grant.problems(staged.manifest))
     facts = facts_of(arguments)
-    freed_mb = arguments["freed_memory_mb"]  # by the release that this one takes over from
-    facts = replace(facts, free_memory_mb=facts.free_memory_mb + freed_mb)
+    facts = replace(facts, memory=memory_for(arguments, facts))
     minimum = listed.minimum_nondum
-    _refuse_if_any(
-        preflight.preflight(staged.manifest, staged.locks, facts, minimum_nondum=minimum)
-    )
+    refuse_if_any(preflight.preflight(staged.manifest, staged.locks, facts, minimum_nondum=minimum))
     needed = chosen(staged, facts)
     known = known_wheels(arguments, staged, facts)
     missing = {locked.path for locked in needed if locked.sha256 not in known}
@@ -125,7 +123,7 @@ def verify(arguments: Arguments, report: Report) -> list[str]:
         sha256: _stored_layout(found)
         for sha256, found in known_wheels(arguments, staged, facts).items()
     }
-    _refuse_if_any(payload.check_wheels(staged, facts, stored))
+    refuse_if_any(payload.check_wheels(staged, facts, stored))
     return [component.id for component in staged.manifest.components]
 
 
@@ -143,6 +141,14 @@ def facts_of(arguments: Arguments) -> HostFacts:
         reserve_mb=arguments["reserve_mb"],
         confinement=arguments["confinement"],
     )
+
+
+def memory_for(arguments: Arguments, facts: HostFacts) -> Memory:
+    """This host's memory for a payload: with that of a release which it takes over from, and less
+    what others were promised."""
+    room = arguments["room"]
+    have = replace(facts.memory, promised=Promised(**room["promised"]))
+    return have.with_freed(room["freed_mb"], room["freed_gpu_mb"])
 
 
 def chosen(staged: StagedPayload, facts: HostFacts) -> tuple[LockedWheel, ...]:
@@ -216,6 +222,6 @@ def _stored_layout(stored: StoredWheel) -> Layout:
     return Layout((), stored.left_out, (), Needs(requirements))
 
 
-def _refuse_if_any(problems: tuple[Problem, ...] | list[Problem]) -> None:
+def refuse_if_any(problems: tuple[Problem, ...] | list[Problem]) -> None:
     if problems:
         raise PayloadRefused(*problems)

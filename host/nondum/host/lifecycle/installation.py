@@ -35,14 +35,16 @@ from nondum.host.lifecycle.children import STALL_S, Children
 from nondum.host.lifecycle.folders import Folders, missing, remove, sweep
 from nondum.host.lifecycle.lanes import in_thread
 from nondum.host.lifecycle.prepared import Prepared
+from nondum.host.lifecycle.promises import Promises
 from nondum.host.lifecycle.queue import Queue
 from nondum.host.lifecycle.rebuilding import with_found, write_note
-from nondum.host.lifecycle.room import Needs, used_mb, why_not_beside
+from nondum.host.lifecycle.room import Needs
 from nondum.host.trust.payload_trust import PayloadTrust, TrustOptions
 from nondum.host.workers import Limits, Workers, base_interpreter, end_leftovers
 from nondum.host.workers.standing import Standing
 from nondum.sdk.errors import NondumError, WorkerFailed, problems_of
-from nondum.wheelhouse import disk, preflight
+from nondum.wheelhouse import disk
+from nondum.wheelhouse.gpu import Gpu
 from nondum.wheelhouse.signatures import Grant
 
 AT_ONCE = 2
@@ -97,6 +99,7 @@ class Installation:
         self._workers, self._children, self._emit = workers, children, emit
         self._prepared: dict[str, tuple[Prepared, ...]] = {}
         self._needs: dict[str, Needs] = {}
+        self._promises = Promises(workers.pids_of)
         self._queue = Queue(AT_ONCE)
         self._drives: dict[str, str] = {}
         """Payload → the drive that it was copied from: the owner of the children that read it."""
@@ -140,7 +143,7 @@ class Installation:
             folder=str(effect.folder),
             digest=effect.digest,
             staging=str(staging),
-            freed_memory_mb=await self._used_mb(effect.beside),
+            room=await self._promises.room(effect.payload, effect.beside),
         )
         with telling_stalls(effect.drive, COPY_SILENCE_S):
             copied = await self._run("copy", effect.payload, arguments, COPY_SILENCE_S)
@@ -163,7 +166,7 @@ class Installation:
 
     async def store(self, effect: effects.StoreWheels) -> tuple[Event, ...]:
         """Fill the store and make the venvs."""
-        fresh = await self._install(effect.payload)
+        fresh = await self._install(effect.payload, admit_beside=effect.beside)
         return (WheelsStored(effect.payload, fresh),)
 
     async def probe(self, effect: effects.ProbeComponents) -> tuple[Event, ...]:
@@ -171,7 +174,8 @@ class Installation:
         key = effect.payload
         if key not in self._prepared:  # a restart of the daemon, or another try
             await self._install(key)
-        if effect.beside and (reason := await self._why_not_beside(effect)):
+        self._promises.make(key, self._needs[key])
+        if effect.beside and (reason := await self._promises.why_not_beside(key, effect.beside)):
             return (BesideRefused(key, reason),)
         await self._workers.ended(effect.after)
         specs = [component.spec(key, self._options.limits) for component in self._prepared[key]]
@@ -221,6 +225,7 @@ class Installation:
         """Keep all of a payload but its processes."""
         self._queue.leave(effect.payload)
         await self._stop(effect.payload, effect.components)
+        self._promises.give_up(effect.payload)
         await in_thread(end_leftovers, self._folders.scratches_of(effect.payload))
         return ()
 
@@ -251,28 +256,29 @@ class Installation:
         )
         return rows
 
-    async def _install(self, key: str) -> int:
-        """Run the job `install`; says how many wheels the store did not have."""
+    async def _install(self, key: str, *, admit_beside: str | None = None) -> int:
+        """Run the job `install`; says how many wheels the store did not have.
+
+        A payload that is to be let in, beside a release or "", is refused if its memory is
+        promised to others. It is promised some before the next one asks.
+        """
         arguments = self._arguments(python=str(base_interpreter()), **self._places(key))
         async with self._store:
-            told = await self._run("install", key, arguments)
+            room = None
+            if admit_beside is not None:
+                room = await self._promises.room(key, admit_beside)
+            told = await self._run("install", key, {**arguments, "room": room})
+            self._needs[key] = Needs.parse(told["needs"])
+            self._promises.make(key, self._needs[key])
+            self._promises.saw_gpu(Gpu(**told["gpu"]) if told["gpu"] else None)
         if told["uncompiled"]:
             self._uncompiled.add(key)
         self._prepared[key] = tuple(
             Prepared.parse(said, self._folders.scratch(key, said["id"]))
             for said in told["components"]
         )
-        self._needs[key] = Needs.parse(told["needs"])
         self._grants[key] = Grant.parse(told["grant"])
         return int(told["fresh"])
-
-    async def _why_not_beside(self, effect: effects.ProbeComponents) -> str:
-        used_mb = await self._used_mb(effect.beside)
-        return why_not_beside(self._needs[effect.payload], used_mb, preflight.free_memory_mb())
-
-    async def _used_mb(self, payload: str) -> int:
-        """Memory that is free once a payload's workers have ended."""
-        return await in_thread(used_mb, self._workers.pids_of(payload))
 
     def _tell_queued(self, payload: str, ahead: int) -> None:
         self._emit(ProgressMade(payload, "queued" if ahead else "copy", 0, ahead))
@@ -298,6 +304,7 @@ class Installation:
         await self._children.release(self._drives.pop(effect.payload, effect.payload))
         self._prepared.pop(effect.payload, None)
         self._needs.pop(effect.payload, None)
+        self._promises.give_up(effect.payload)
         self._grants.pop(effect.payload, None)
         self._uncompiled.discard(effect.payload)
         scratches = self._folders.scratches_of(effect.payload)

@@ -6,6 +6,7 @@ import os
 import shutil
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from nondum.host.drives.reader import Arguments, Report
 from nondum.host.events import plain
 from nondum.host.trust import chain
 from nondum.sdk.errors import InstallFailed, Problem
-from nondum.wheelhouse import build, venvs
+from nondum.wheelhouse import build, memory, venvs
 from nondum.wheelhouse.lock import LockedWheel
 from nondum.wheelhouse.manifest import ComponentManifest
 from nondum.wheelhouse.payload import StagedPayload
@@ -30,13 +31,17 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
 
     Afterwards, whatever a starting daemon needs to make them again is safe on disk. Raises
     `InstallFailed` (DISK_FULL, STORE_DAMAGED, …) and `PayloadRefused`, also when it is not trusted
-    any more.
+    any more, or others were promised the memory that it needs; without `room`, nobody asks.
     """
     folder, root = Path(arguments["folder"]), Path(arguments["venvs"])
     by_pip = arguments["method"] == "pip"
     staged = reader.load_staged(folder)
     grant = chain.grant_of_kept(arguments, folder, staged.manifest)
     facts = reader.facts_of(arguments)
+    requires = staged.manifest.requires
+    if arguments["room"] is not None:
+        have = reader.memory_for(arguments, facts)
+        reader.refuse_if_any(tuple(memory.problems(requires, have, staged.manifest.id)))
     root.mkdir(parents=True, exist_ok=True)
     with ThreadPoolExecutor(1) as pool:  # disks take their time; what is linked is not waited for
         synced = pool.submit(_sync, folder, with_wheels=by_pip)
@@ -49,13 +54,14 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
     if not by_pip:
         shutil.rmtree(folder / "wheels", ignore_errors=True)  # the store has them now
     components = [_told(staged, component, root) for component in staged.manifest.components]
-    requires = staged.manifest.requires
-    needs = {"memory_mb": requires.memory_mb, "alone": requires.alone}
+    needs = {name: getattr(requires, name) for name in ("memory_mb", "gpu_memory_mb", "alone")}
+    gpu = facts.memory.gpu
     return {
         "fresh": fresh,
         "uncompiled": uncompiled,
         "components": components,
         "needs": needs,
+        "gpu": asdict(gpu) if gpu is not None else None,
         "grant": grant.to_dict(),
     }
 

@@ -17,6 +17,7 @@ from nondum.host.effects import (
     PayloadEffect,
     ProbeComponents,
     RestPayload,
+    StoreWheels,
     SuspendPayload,
     VerifyPayload,
 )
@@ -219,7 +220,7 @@ def effect_for(
         return copy_of(payload, state)
     if issubclass(kind, ClearPayload | RestPayload | SuspendPayload):
         return kind(payload.key, payload.components)
-    if issubclass(kind, ProbeComponents | ActivatePayload):
+    if issubclass(kind, StoreWheels | ProbeComponents | ActivatePayload):
         old = releases.in_force(state, payload)
         return kind(payload.key, beside=old.key if old else "")
     return kind(payload.key)

@@ -17,12 +17,13 @@ def probed(state: Path, *, reserve_mb: int) -> Compute:
     `machine`, `python`, `processors`, `memory_mb` and `disk_mb` that are free, `nondum`.
     """
     facts = preflight.probe(state, reserve_mb=reserve_mb, confinement=0)
+    gpu = facts.memory.gpu
     return {
         "machine": facts.architecture,
         "python": facts.python,
         "processors": len(os.sched_getaffinity(0)),
-        "memory_mb": facts.free_memory_mb,
-        "gpu_memory_mb": facts.gpu_memory_mb,
+        "memory_mb": facts.memory.free_mb,
+        "gpu_memory_mb": gpu.free_mb if gpu is not None else None,
         "disk_mb": facts.free_disk_mb,
         "nondum": facts.nondum,
     }

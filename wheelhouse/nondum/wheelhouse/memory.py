@@ -1,0 +1,132 @@
+"""Whether the memory is there that a payload asks for: free, and not promised to another one.
+
+What a payload was promised and does not use yet looks free. Of its own memory it is known what a
+worker uses; of GPU memory only what all use together.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from nondum.sdk.errors import Problem
+from nondum.wheelhouse import gpu
+from nondum.wheelhouse.gpu import Gpu
+from nondum.wheelhouse.manifest import Requires
+
+_MB = 1024 * 1024
+
+
+@dataclass(frozen=True, slots=True)
+class Promised:
+    """What other payloads of a host were promised, all of them together, in MB."""
+
+    memory_mb: int = 0
+    unused_mb: int = 0
+    """Of `memory_mb`, what they do not use yet."""
+    gpu_memory_mb: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """What a host has, in MB."""
+
+    free_mb: int
+    """What can be had without swapping."""
+    gpu: Gpu | None = None
+    """None: no GPU that is known of."""
+    promised: Promised = Promised()
+
+    def left_mb(self) -> int:
+        """Memory for one more payload.
+
+        >>> Memory(1000, promised=Promised(500, 300)).left_mb()
+        700
+        """
+        left = self.free_mb - self.promised.unused_mb
+        if self.gpu is not None and self.gpu.is_shared:
+            taken = self.promised.memory_mb + self.promised.gpu_memory_mb
+            left = min(left, self.gpu.total_mb - taken)
+        return max(0, left)
+
+    def gpu_left_mb(self, memory_mb: int) -> int:
+        """GPU memory for one more payload, which takes so much memory.
+
+        >>> Memory(1000, Gpu(3000, 4000), Promised(gpu_memory_mb=1500)).gpu_left_mb(0)
+        2500
+        >>> Memory(1000, Gpu(1000, 4000, is_shared=True)).gpu_left_mb(600)
+        400
+        """
+        if self.gpu is None:
+            return 0
+        if self.gpu.is_shared:
+            return max(0, self.left_mb() - memory_mb)
+        return max(0, min(self.gpu.free_mb, self.gpu.total_mb - self.promised.gpu_memory_mb))
+
+    def with_freed(self, memory_mb: int, gpu_memory_mb: int) -> Memory:
+        """As it is once somebody has ended who uses so much; of the GPU's, at most so much.
+
+        >>> Memory(1000, Gpu(3000, 4000)).with_freed(100, 1500)
+        Memory(free_mb=1100, gpu=Gpu(free_mb=4000, total_mb=4000, is_shared=False), \
+promised=Promised(memory_mb=0, unused_mb=0, gpu_memory_mb=0))
+        """
+        gpu = self.gpu
+        if gpu is None:
+            return replace(self, free_mb=self.free_mb + memory_mb)
+        freed_mb = memory_mb + (gpu_memory_mb if gpu.is_shared else 0)
+        gpu_free_mb = min(gpu.free_mb + gpu_memory_mb, gpu.total_mb)
+        return replace(self, free_mb=self.free_mb + freed_mb, gpu=replace(gpu, free_mb=gpu_free_mb))
+
+
+def problems(needs: Requires, have: Memory, payload_id: str) -> Iterator[Problem]:
+    """What there is too little of for a payload: NO_MEMORY, NO_GPU_MEMORY."""
+    left_mb, gpu_left_mb = have.left_mb(), have.gpu_left_mb(needs.memory_mb)
+    if needs.memory_mb > left_mb:
+        promised_mb = have.promised.unused_mb
+        yield Problem(
+            "NO_MEMORY",
+            f"there is too little memory{_since(promised_mb)}",
+            where=payload_id,
+            need=f"{needs.memory_mb} MB",
+            have=f"{left_mb} MB",
+            fix=_fix("free some memory", promised_mb, payload_id),
+        )
+    if needs.gpu_memory_mb > gpu_left_mb:
+        promised_mb = have.promised.gpu_memory_mb
+        yield Problem(
+            "NO_GPU_MEMORY",
+            f"there is too little GPU memory{_since(promised_mb)}",
+            where=payload_id,
+            need=f"{needs.gpu_memory_mb} MB",
+            have=f"{gpu_left_mb} MB",
+            fix=_fix("free some GPU memory", promised_mb, payload_id),
+        )
+
+
+def _since(promised_mb: int) -> str:
+    return f", since {promised_mb} MB are promised to other payloads" if promised_mb else ""
+
+
+def _fix(otherwise: str, promised_mb: int, payload_id: str) -> str:
+    pull = f"pull another payload, then `nondum retry {payload_id}`"
+    return f"{pull if promised_mb else otherwise}, or use another host"
+
+
+def look() -> Memory:
+    """This machine's memory, of which nothing is known to be promised."""
+    free_mb = free_memory_mb()
+    return Memory(free_mb, gpu.look(free_mb, _pages("SC_PHYS_PAGES")))
+
+
+def free_memory_mb() -> int:
+    """Memory that can be had without swapping (proc_meminfo(5)), in MB."""
+    for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
+        if line.startswith("MemAvailable:"):
+            return int(line.split()[1]) // 1024
+    return _pages("SC_AVPHYS_PAGES")
+
+
+def _pages(which: str) -> int:
+    return os.sysconf(which) * os.sysconf("SC_PAGE_SIZE") // _MB
