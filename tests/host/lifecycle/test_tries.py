@@ -84,10 +84,13 @@ def test_drive_is_left_alone_until_it_is_plugged_in_again() -> None:
     assert not pulled.tries
 
 
-def test_drive_that_was_pulled_while_no_daemon_ran_is_forgotten() -> None:
-    state = died(on(HostState("spot"), drive()), 2)
-    assert not on(state, events.DrivesScanned("slot", ())).tries
-    assert on(state, events.DrivesScanned("block", ())).tries
+def test_drive_that_was_pulled_while_no_daemon_ran_is_forgotten_after_a_while() -> None:
+    """It may only be found late."""
+    state = died(on(HostState("spot"), drive()))
+    scanned = on(state, events.DrivesScanned("slot", ()))
+    assert scanned.tries == {DRIVE: 1}
+    assert died(on(scanned, drive())).tries == {DRIVE: 2}
+    assert not on(scanned, events.HostSteady("spot")).tries
 
 
 def numbered(number: int, mark: str = "Acme-0042") -> events.DriveInserted:
@@ -111,6 +114,32 @@ def test_drive_that_carried_what_ran_is_counted_on_under_its_new_number() -> Non
     state = on(died(reading), numbered(2), events.DrivesScanned("block", ("sda-2",)))
     assert set(state.drives) == {"sda-2"}
     assert state.tries["block:Acme-0042"] == 1
+
+
+@pytest.mark.parametrize("is_found_late", [False, True])
+def test_payload_is_left_alone_after_the_machine_was_started_anew(is_found_late: bool) -> None:
+    state = HostState("spot")
+    for _ in range(ATTEMPTS):
+        state = died(
+            on(state, numbered(1), found(drive="sda-1"), events.DriveRead("sda-1", ("k1",)))
+        )
+    state = on(state, numbered(1), found(drive="sda-1"), events.DriveRead("sda-1", ("k1",)))
+    state = on(state, events.HostSteady("spot"))
+    assert state.payloads["k1"].step is Step.REFUSED
+    scanned = events.DrivesScanned("block", () if is_found_late else ("sda-2",))
+    news = (scanned, numbered(2)) if is_found_late else (numbered(2), scanned)
+    cleared = events.PayloadCleared("k1")
+    state = on(died(state), *news, cleared, found(drive="sda-2"))
+    assert set(state.drives) == {"sda-2"}
+    assert state.payloads["k1"].step is Step.REFUSED
+    pulled = on(state, events.DriveRemoved("sda-2"), cleared)
+    assert not pulled.tries
+    again = on(pulled, numbered(3), found(drive="sda-3"))
+    assert again.payloads["k1"].step is Step.RECEIVED
+
+
+def test_drive_under_its_new_number_is_pulled_like_any() -> None:
+    state = on(died(on(HostState("spot"), numbered(1))), numbered(2))
     assert not on(state, events.DriveRemoved("sda-2")).tries.keys() & {"block:Acme-0042"}
 
 

@@ -91,11 +91,9 @@ def on_drive_unreadable(turn: Turn, event: DriveUnreadable) -> None:
 def on_drives_scanned(turn: Turn, event: DrivesScanned) -> None:
     """Forget drives that were there before a restart and are not there any more."""
     turn.events.append(event)
-    turn.pending.extend(
-        DriveRemoved(drive.id)
-        for drive in turn.state.drives.values()
-        if drive.kind == event.kind and drive.id not in event.drives
-    )
+    known = {drive.id for drive in turn.state.drives.values() if drive.kind == event.kind}
+    turn.missed = frozenset(known - set(event.drives))
+    turn.pending.extend(map(DriveRemoved, sorted(turn.missed)))
 
 
 def lose_source(turn: Turn, payload: PayloadRecord, drive: str, reason: str) -> None:

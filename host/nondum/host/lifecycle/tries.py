@@ -19,12 +19,10 @@ from nondum.host.catalogue.state import HostState
 from nondum.host.events import (
     DriveRead,
     DriveRemoved,
-    DrivesScanned,
     DriveUnreadable,
     Event,
     HostSteady,
     PayloadFound,
-    PayloadWithdrawn,
     RetryAsked,
 )
 from nondum.host.lifecycle.turn import Turn
@@ -90,18 +88,18 @@ def on_event(turn: Turn, event: Event) -> None:
             if drive is not None and not is_left_alone(turn.state, subject_of(drive)):
                 _clear(turn, subject_of(drive))
         case DriveRemoved():
-            if (drive := turn.state.drives.get(event.drive)) is not None:
-                _clear(turn, *({subject_of(drive)} - _subjects(turn.state, drive.kind, but=drive)))
-        case DrivesScanned():
-            known = {s for s in turn.state.tries if s.startswith(f"{event.kind}:")}
-            _clear(turn, *(known - _subjects(turn.state, event.kind)))
-        case PayloadWithdrawn() | RetryAsked():
+            drive = turn.state.drives.get(event.drive)
+            if drive is not None and drive.id not in turn.missed:
+                _clear(turn, *_pulled_with(turn.state, drive))
+        case RetryAsked():
             _clear(turn, event.payload)
 
 
-def _subjects(state: HostState, kind: str, *, but: DriveRecord | None = None) -> Set[str]:
-    """What the drives of a kind are counted by."""
-    return {subject_of(d) for d in state.drives.values() if d.kind == kind and d is not but}
+def _pulled_with(state: HostState, drive: DriveRecord) -> Set[str]:
+    """What is not there any more once a drive has been pulled."""
+    payloads = {p.key for p in state.payloads.values() if p.sources.keys() == {drive.id}}
+    others = {subject_of(other) for other in state.drives.values() if other is not drive}
+    return payloads | ({subject_of(drive)} - others)
 
 
 def _clear(turn: Turn, *subjects: str) -> None:
@@ -111,7 +109,11 @@ def _clear(turn: Turn, *subjects: str) -> None:
 
 
 def on_host_steady(turn: Turn, event: HostSteady) -> None:
-    """Clear what has been lived with for a while, and what did not come again."""
+    """Clear what has been lived with for a while, and what did not come again.
+
+    What is left alone stays so for as long as it is there. A machine that has just been started may
+    find its drives a moment later, and by other names: it is not until now that they were pulled.
+    """
     state = turn.state
     if any(drive.state is DriveState.READING for drive in state.drives.values()):
         return
@@ -119,7 +121,9 @@ def on_host_steady(turn: Turn, event: HostSteady) -> None:
     kept = {
         subject: deaths
         for subject, deaths in state.tries.items()
-        if subject in drives or _is_on_trial(turn, state.payloads.get(subject))
+        if subject in drives
+        or _is_on_trial(turn, state.payloads.get(subject))
+        or (subject in state.payloads and is_left_alone(state, subject))
     }
     if kept != state.tries:
         turn.events.append(event)

@@ -43,6 +43,8 @@ class Turn:
     """The event and its consequences, in order: what the journal is told."""
     pending: list[Event] = field(default_factory=list)
     """Consequences that were not looked at yet."""
+    missed: frozenset[str] = frozenset()
+    """Drives that are not there as a daemon starts: pulled, or not looked for long enough."""
 
     def outcome(self) -> Outcome:
         """What it came to."""
