@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 from tests.lab.machines.machine import Machine
@@ -89,6 +90,36 @@ class Installed:
             return look(view) if view is not None else None
 
         return self.machine.until(what, found, PATIENCE_S, LOOK_S)
+
+    def bring(self, image: Path, payload: str) -> str:
+        """Plug a stick in and wait until its payload is active; answers its name for `pull`.
+
+        One after the other: who emulates a machine gives way to others, and drives that do not
+        answer for ten seconds count as broken.
+        """
+        stick = self.machine.plug(image)
+        self.until_payload(payload, "active")
+        return stick
+
+    def until_component(self, component: str, state: str) -> View:
+        """Wait until a component is in a state."""
+
+        def found() -> View | None:
+            seen = self.machine.attempt("nondum components --json")
+            rows: list[View] = seen.json() if seen.status == 0 else []
+            states = [row for row in rows if row["component"] == component]
+            return states[0] if states and states[0]["state"] == state else None
+
+        return self.machine.until(f"{component} {state}", found, PATIENCE_S, LOOK_S)
+
+    def until_goal(self, goal: str, state: str) -> View:
+        """Wait until a goal that was given, in PDDL, is in a state."""
+
+        def found(view: View) -> View | None:
+            rows = [row for row in view["goals"] if row["text"] == goal and row["state"] == state]
+            return rows[0] if rows else None
+
+        return self.until(f"{goal} {state}", found)
 
     def until_payload(self, payload: str, state: str) -> View:
         """Wait until a payload is in a state, or shown no more for the state `gone`."""

@@ -70,6 +70,12 @@ class Machine:
         self._qemu.send_signal(signal.SIGKILL)
         self._see_end()
 
+    def reset(self) -> None:
+        """Press its reset button, and wait for the agent: what is plugged in stays so."""
+        self.qmp.do("set-action", reboot="reset")
+        self.qmp.do("system_reset")
+        self.agent.wait_for_boot(BOOT_S)
+
     def shut_down(self, timeout_s: float = BOOT_S) -> None:
         """Have it go down as from its power button's menu."""
         assert self._qemu is not None
@@ -137,7 +143,20 @@ class Machine:
     def pull(self, name: str) -> None:
         """Pull a stick out, whatever it is doing."""
         self.qmp.do("device_del", id=name)
-        self.until("the stick let go", lambda: True if self._let_go(name) else None)
+        self._until_let_go("blockdev-del", node_name=name)
+
+    def plug_line(self) -> str:
+        """Plug a USB serial adapter in, at whose other end nobody is; answers its name."""
+        name = f"line{next(self._plugged)}"
+        self.qmp.do("chardev-add", id=name, backend={"type": "null", "data": {}})
+        adapter = {"chardev": name, "id": name, "bus": "xhci.0", "always_plugged": True}
+        self.qmp.do("device_add", driver="usb-serial", **adapter)
+        return name
+
+    def pull_line(self, name: str) -> None:
+        """Pull a serial adapter out."""
+        self.qmp.do("device_del", id=name)
+        self._until_let_go("chardev-remove", id=name)
 
     # What is left to see
 
@@ -198,14 +217,19 @@ class Machine:
                 time.sleep(POLL_S)
         raise MachineSilent("QEMU does not listen")
 
-    def _let_go(self, name: str) -> bool:
-        try:
-            self.qmp.do("blockdev-del", node_name=name)
-        except QmpError as error:
-            if "in use" in str(error):
-                return False
-            raise
-        return True
+    def _until_let_go(self, command: str, **arguments: str) -> None:
+        """Remove what stood behind a device, once the guest has let go of that."""
+
+        def removed() -> bool | None:
+            try:
+                self.qmp.do(command, **arguments)
+            except QmpError as error:
+                if "in use" in str(error) or "is busy" in str(error):
+                    return None
+                raise
+            return True
+
+        self.until("the device let go", removed)
 
     def _see_end(self) -> None:
         assert self._qemu is not None

@@ -17,13 +17,16 @@ from tests.lab.machines.recipe import HERE
 
 CHECKOUT = Path(__file__).parents[3]
 PLAIN = HERE / "plain"
-DISTRIBUTIONS = ("plugins/sdk", "plugins/planner-pyperplan", ".")
+DISTRIBUTIONS = (
+    *("plugins/sdk", "plugins/planner-pyperplan", "plugins/planner-fast-downward", "."),
+)
 SOURCES = (
     *("pyproject.toml", "host", "planning", "transport", "wheelhouse", "plugins/sdk"),
-    *("plugins/planner-pyperplan", "packaging", "README.md", "LICENSE"),
+    *("plugins/planner-pyperplan", "plugins/planner-fast-downward"),
+    *("packaging", "README.md", "LICENSE"),
 )
 PREFIX = "/opt/nondum"
-DISK_MB = 512
+DISK_MB = 768
 PYTHON = "3.11"
 """Debian 12's, as is its C library below."""
 PLATFORMS = (
@@ -42,7 +45,7 @@ mount -t tmpfs tmpfs "$2/tmp"
 exec chroot "$2" /bin/sh -eu -c '
     python3 -m venv /opt/nondum
     /opt/nondum/bin/pip install -q --no-index --find-links /mnt --no-cache-dir \
-        "nondum[fast]" nondum-planner-pyperplan
+        "nondum[fast]" nondum-planner-pyperplan "nondum-planner-fast-downward[engine]"
 '
 """
 
@@ -109,13 +112,16 @@ def _fetch(machine: Built, own: Path, folder: Path) -> None:
         *(sys.executable, "-m", "pip", "download", "-q", "--only-binary", ":all:"),
         *("--python-version", PYTHON, "--find-links", own, "-d", folder),
         *(f"--platform={name}_{machine.recipe.name}" for name in PLATFORMS),
-        *(
-            f"{wheel}[fast]" if wheel.name.startswith("nondum-") else wheel
-            for wheel in own.iterdir()
-        ),
+        *(f"{wheel}{_extra(wheel)}" for wheel in own.iterdir()),
     )
     for wheel in own.iterdir():
         (folder / wheel.name).unlink(missing_ok=True)
+
+
+def _extra(wheel: Path) -> str:
+    """What is installed with one of our own distributions."""
+    extras = {"nondum": "[fast]", "nondum_planner_fast_downward": "[engine]"}
+    return extras.get(wheel.name.partition("-")[0], "")
 
 
 def _key() -> str:

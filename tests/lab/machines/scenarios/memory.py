@@ -19,9 +19,8 @@ def run(lab: Lab) -> str:
 
 def _at(lab: Lab, level: int) -> str:
     host = lab.host(more=f'{LIMITS}confinement = "{level}"\n')
-    sticks = [host.machine.plug(lab.stick("hogs", hogs())), host.machine.plug(_other(lab))]
-    host.until_payload("org.example.talker", "active")
-    host.until_payload("org.example.hogs", "active")
+    images = {"talker": lab.stick("talker", talker()), "hogs": lab.stick("hogs", hogs())}
+    sticks = [host.bring(image, f"org.example.{name}") for name, image in images.items()]
     daemon = host.shown("MainPID")
     host.machine.run('nondum goal --pddl "(hogs-done self)"', timeout_s=120)
     code = host.machine.until("the worker's end", lambda: _code(host))
@@ -32,10 +31,6 @@ def _at(lab: Lab, level: int) -> str:
     for stick in sticks:
         host.machine.pull(stick)
     return f"level {level}: {code}"
-
-
-def _other(lab: Lab) -> Any:
-    return lab.stick("talker", talker())
 
 
 def _code(host: Installed) -> str | None:
