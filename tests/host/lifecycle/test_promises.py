@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import resource
+import sys
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -14,10 +16,12 @@ from tests.payloads import Part, make_payload
 
 from nondum.host import events
 from nondum.host.catalogue.records import Step
+from nondum.host.lifecycle.installing import install
 from nondum.host.lifecycle.promises import total
 from nondum.host.lifecycle.room import Needs, used_mb
 from nondum.host.workers import Timing
-from nondum.wheelhouse.memory import free_memory_mb
+from nondum.sdk.errors import PayloadRefused
+from nondum.wheelhouse.memory import Promised, free_memory_mb
 
 FIRST, SECOND = "org.example.first", "org.example.second"
 QUICK = Timing(startup_s=5.0, settle_beats=0)
@@ -107,6 +111,28 @@ async def test_what_was_promised_is_promised_again_by_the_next_daemon(tmp_path: 
         host.plug(second, "b")
         await host.until_step(FIRST, Step.ACTIVE)
         await host.until(lambda: is_at(host, SECOND, Step.REFUSED))
+
+
+def test_what_was_promised_while_it_was_copied_counts(tmp_path: Path) -> None:
+    """It is asked once more before anything is stored: between the two, others were let in."""
+    promised = Promised(memory_mb=10**9, unused_mb=10**9)
+    arguments = {
+        "folder": str(greedy(tmp_path, FIRST, 1) / "nondum" / FIRST),
+        "venvs": str(tmp_path / "venvs"),
+        "store": str(tmp_path / "store"),
+        "python": sys.executable,
+        "method": "store",
+        "reserve_mb": 0,
+        "confinement": 0,
+        "allow_unsigned": True,
+        "room": {"promised": asdict(promised), "freed_mb": 0, "freed_gpu_mb": 0},
+    }
+    with pytest.raises(PayloadRefused) as refused:
+        install(arguments, lambda phase, done, total: None)
+    assert [problem.code for problem in refused.value.problems] == ["NO_MEMORY"]
+    assert not (tmp_path / "store").exists()
+    told = install({**arguments, "room": None}, lambda phase, done, total: None)
+    assert told["needs"]["memory_mb"] == 1, "what was let in before is not asked again"
 
 
 def is_at(host: Living, payload_id: str, step: Step) -> bool:
