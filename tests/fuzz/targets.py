@@ -39,11 +39,14 @@ from nondum.transport.peers.keys import PeerKey
 from nondum.wheelhouse import archive, contents, index, lock, manifest, wheel
 from nondum.wheelhouse.contents import Contents, Entry
 from nondum.wheelhouse.trust import sshsig, trust_file
-from nondum.wheelhouse.trust.public_key import PublicKey
+from nondum.wheelhouse.trust.public_key import FIDO, PublicKey
+from nondum.wheelhouse.trust.wire import string
 
 PLUGINS = Path(__file__).parents[2] / "plugins"
 SHA256 = "0123456789abcdef" * 4
 WHERE = "fuzzed"
+TOUCHED = b"\1\0\0\0\7"
+"""What a FIDO token adds to a signature: that a person was there, and its counter."""
 
 
 def of_text(read: Callable[[str], object]) -> Callable[[bytes], object]:
@@ -70,6 +73,24 @@ def _contents() -> list[bytes]:
 def _public_key() -> PublicKey:
     point = base64.b64decode("R0UdCfPvbzM/XVCmWYsjLAMTvOZ5YVsjSEzg1q3PxQE=")
     return PublicKey("ssh-ed25519", point)
+
+
+def _bare_signatures() -> list[bytes]:
+    """What stands between the markers, for a key in a file and one in a token."""
+    return [_bare(_public_key(), b""), _bare(PublicKey(FIDO, _public_key().point, "ssh:"), TOUCHED)]
+
+
+def _bare(key: PublicKey, more: bytes) -> bytes:
+    inner = string(key.kind.encode()) + string(bytes(range(64))) + more
+    parts = (key.blob, sshsig.PAYLOAD.encode(), b"", b"sha512", inner)
+    return sshsig.MAGIC + b"\0\0\0\1" + b"".join(map(string, parts))
+
+
+def _read_bare_signature(data: bytes) -> object:
+    """Armoured as it must be, so that what is inside is what is judged."""
+    text = base64.b64encode(data).decode()
+    lines = [text[at : at + sshsig.LINE] for at in range(0, len(text), sshsig.LINE)]
+    return _read_signature("\n".join([sshsig.BEGIN, *lines, sshsig.END, ""]).encode())
 
 
 def _signatures() -> list[bytes]:
@@ -371,6 +392,13 @@ TARGETS = (
         _read_signature,
         _signatures,
         tokens=(sshsig.BEGIN.encode(), sshsig.END.encode(), b"U1NIU0lH", b"\n"),
+        cases=1_000_000,
+    ),
+    Target(
+        "signature, bare",
+        _read_bare_signature,
+        _bare_signatures,
+        tokens=(b"SSHSIG", b"\0\0\0\1", b"sha512", b"ssh:", b"sk-ssh-ed25519@openssh.com"),
         cases=1_000_000,
     ),
     Target("trust file", of_text(lambda t: trust_file.parse(t, WHERE)), _trust_files, tokens=TOML),
