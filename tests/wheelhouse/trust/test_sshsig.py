@@ -108,6 +108,8 @@ FIELDS = {
     "short signature": blob(
         key=ALICE.public.blob, signature=string(ED25519.encode()) + string(bytes(63))
     ),
+    "long name": blob(namespace=b"a" * 4097, key=ALICE.public.blob, signature=INNER),
+    "more in its key": blob(key=ALICE.public.blob + b"x", signature=INNER),
     "short key": blob(key=ALICE.public.blob[:-1], signature=INNER),
     "key of 31 bytes": blob(
         key=string(ED25519.encode()) + string(bytes(range(31))), signature=INNER
@@ -145,7 +147,8 @@ FILES = {
     "spaces": TEXT.replace("U1NIU0lH", "U1NI U0lH"),
     "not ASCII": TEXT + "é",
     "too many": TEXT * 17,
-    "too long": "\n" * (sshsig.MAX_BYTES + 1),
+    "a second one without end": TEXT + TEXT.replace(sshsig.END, ""),
+    "too long": TEXT + "\n" * sshsig.MAX_BYTES,
 }
 
 
@@ -156,11 +159,10 @@ def test_what_is_no_signature_file_is_malformed(text: str) -> None:
 
 def test_base64_has_one_form_only() -> None:
     """Else two files would be one signature: the last character has bits that nobody reads."""
-    body = base64.b64decode("".join(TEXT.splitlines()[1:-1]))
-    while len(body) % 3 != 1:
-        body += b"\0"
+    body = blob(key=ALICE.public.blob, namespace=b"of-some-length", signature=INNER)
     text = base64.b64encode(body).decode()
     assert text.endswith("==")
+    assert sshsig.parse(armour(body), "")
     other = text[:-3] + chr(ord(text[-3]) + 1) + "=="
     assert base64.b64decode(other) == body
     assert refusal(f"{sshsig.BEGIN}\n{other}\n{sshsig.END}\n".encode()) == "SIG_MALFORMED"

@@ -8,11 +8,11 @@ from datetime import UTC, datetime
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.signing import Key, trust_of
+from tests.signing import MADE, Key, trust_of
 
 from nondum.sdk.errors import Problem, TrustRefused
 from nondum.wheelhouse.trust import trust_file, trust_text
-from nondum.wheelhouse.trust.trust import Bounds, Revocation, Role, Trust
+from nondum.wheelhouse.trust.trust import Bounds, Revocation, Role, Roots, Trust
 
 ALICE, BOB, TOKEN = Key("alice"), Key("bob"), Key("token", fido=True)
 FULL = replace(
@@ -91,6 +91,8 @@ MISTAKES = {
     "threshold above the roots": ("threshold = 1", "threshold = 2", "TRUST_VALUE", 10),
     "a name with spaces": ('name = "maker"', 'name = "the maker"', "TRUST_VALUE", 21),
     "no base64": (ALICE.public.line, "ssh-ed25519 !!", "TRUST_VALUE", 14),
+    "one word": (ALICE.public.line, "ssh-ed25519", "TRUST_VALUE", 14),
+    "a line without end": (ALICE.public.line, ALICE.public.line + " x" * 512, "TRUST_VALUE", 14),
     "another algorithm": ("ssh-ed25519 AAAA", "ssh-rsa AAAA", "TRUST_VALUE", 14),
     "a key of no role's": ('keys = ["bob"]', 'keys = ["eve"]', "TRUST_VALUE", 23),
     "one key twice in a role": ('keys = ["bob"]', 'keys = ["bob", "bob"]', "TRUST_TWICE", 23),
@@ -124,6 +126,57 @@ def test_one_person_with_two_names_is_refused() -> None:
     roots = replace(trust.roots, keys=(*trust.roots.keys, replace(ALICE.trusted(), name="alicia")))
     (problem,) = problems(trust_text.to_text(replace(trust, roots=roots)))
     assert problem.code == "TRUST_TWICE"
+
+
+CONTRADICTIONS = {
+    "a key that ends before it begins": (
+        replace(FULL, keys=(BOB.trusted(MADE, MADE), TOKEN.trusted())),
+        "TRUST_VALUE",
+        "ends before it begins",
+    ),
+    "a role without payloads": (
+        replace(FULL, roles=(*FULL.roles[:1], replace(FULL.roles[1], payloads=()))),
+        "TRUST_VALUE",
+        "payloads: is missing or empty",
+    ),
+    "bounds that nothing is within": (
+        replace(FULL, bounds=(Bounds("org.example.lamp", 9, 3),)),
+        "TRUST_VALUE",
+        "above `most`",
+    ),
+    "two roots of one name": (
+        replace(FULL, roots=Roots((ALICE.trusted(), replace(TOKEN.trusted(), name="alice")), 2)),
+        "TRUST_TWICE",
+        "root 'alice' stands twice",
+    ),
+    "two keys of one name": (
+        replace(FULL, keys=(*FULL.keys, replace(Key("carol").trusted(), name="bob"))),
+        "TRUST_TWICE",
+        "key 'bob' stands twice",
+    ),
+    "two roles of one name": (
+        replace(FULL, roles=(*FULL.roles, FULL.roles[0])),
+        "TRUST_TWICE",
+        "role 'maker' stands twice",
+    ),
+    "two bounds for one payload": (
+        replace(FULL, bounds=(Bounds("org.example.lamp", 3, 9), Bounds("org.example.lamp", 5))),
+        "TRUST_TWICE",
+        "bound for releases of 'org.example.lamp' stands twice",
+    ),
+    "two revocations of one key": (
+        replace(FULL, revoked=FULL.revoked * 2),
+        "TRUST_TWICE",
+        "revocation of",
+    ),
+}
+
+
+@pytest.mark.parametrize(("trust", "code", "told"), CONTRADICTIONS.values(), ids=CONTRADICTIONS)
+def test_what_contradicts_itself_is_refused(trust: Trust, code: str, told: str) -> None:
+    found = problems(trust_text.to_text(trust))
+    assert [problem.code for problem in found] == [code], found
+    assert told in found[0].message
 
 
 def test_a_key_in_a_file_and_in_a_token_is_one_key() -> None:
