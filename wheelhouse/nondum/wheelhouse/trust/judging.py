@@ -49,10 +49,12 @@ def judge(
         return Verdict((), refused.problems)
     keys = tuple(dict.fromkeys(found.key for found in signatures))
     signers = tuple(_name(trust, key) for key in keys)
+    if trust is None:
+        return Verdict(signers, tuple(_untrusted(None, key) for key in keys))
     doubts = [_doubt(trust, key, at.now) for key in keys]
     believed = [doubt.key for doubt in doubts if doubt.key is not None]
     problems = tuple(doubt.problem for doubt in doubts if doubt.problem is not None)
-    if trust is None or not believed:
+    if not believed:
         return Verdict(signers, problems)
     try:
         listed = lists.parse(contents, lists.NAME)
@@ -140,11 +142,11 @@ class _Doubt:
     problem: Problem | None = None
 
 
-def _doubt(trust: Trust | None, key: PublicKey, now: datetime | None) -> _Doubt:
-    if trust is not None and (gone := trust.revocation(key)) is not None:
+def _doubt(trust: Trust, key: PublicKey, now: datetime | None) -> _Doubt:
+    if (gone := trust.revocation(key)) is not None:
         return _Doubt(None, _revoked(_name(trust, key), key, gone.why))
-    known = trust.named(key) if trust is not None else None
-    if trust is None or known is None:
+    known = trust.named(key)
+    if known is None:
         return _Doubt(None, _untrusted(trust, key))
     problem = _out_of_time(trust, known, now)
     return _Doubt(known if problem is None else None, problem)
