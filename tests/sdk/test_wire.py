@@ -96,6 +96,13 @@ def nested(levels: int) -> Any:
     return value
 
 
+def nested_tables(levels: int) -> Any:
+    value: Any = 1
+    for _ in range(levels):
+        value = {"a": value}
+    return value
+
+
 def packed(value: Any) -> bytes:
     data: bytes = msgpack.packb(value)
     return data
@@ -111,6 +118,9 @@ def packed(value: Any) -> bytes:
         pytest.param(b"\xc6\xff\xff\xff\xff", "PACKET_MALFORMED", id="bytes-longer-than-packet"),
         pytest.param(b"\x91" * 60_000 + b"\xc0", "PACKET_MALFORMED", id="deeper-than-the-parser"),
         pytest.param(packed(nested(MAX_DEPTH + 1)), "PACKET_TOO_DEEP", id="too-deep"),
+        pytest.param(
+            packed([1, 1, nested_tables(MAX_DEPTH)]), "PACKET_TOO_DEEP", id="tables-too-deep"
+        ),
         pytest.param(b"\x92\x06\xa2\xff\xfe", "PACKET_MALFORMED", id="bad-utf-8"),
         pytest.param(b"\x92\x06\xd4\x05\x00", "PACKET_MALFORMED", id="extension"),
         pytest.param(b"\x92\x06\xd6\xff\x00\x00\x00\x01", "PACKET_MALFORMED", id="timestamp"),
@@ -132,6 +142,7 @@ def packed(value: Any) -> bytes:
         pytest.param(packed([6, True]), "PACKET_FIELDS", id="id-true"),
         pytest.param(packed([6, MAX_ID + 1]), "PACKET_FIELDS", id="id-too-big"),
         pytest.param(packed([2, 1, "v" * 65, {}]), "PACKET_FIELDS", id="verb-too-long"),
+        pytest.param(packed([2, 1, "", {}]), "PACKET_FIELDS", id="verb-empty"),
         pytest.param(packed([2, 1, [1], {}]), "PACKET_FIELDS", id="verb-no-text"),
         pytest.param(packed([2, 1, "v", []]), "PACKET_FIELDS", id="body-no-table"),
         pytest.param(packed([0, [], "1", 1]), "PACKET_FIELDS", id="no-versions"),
@@ -161,6 +172,7 @@ def test_hostile_packets_are_refused(data: bytes, code: str) -> None:
         pytest.param({"a": "x" * MAX_PACKET}, "PACKET_TOO_LONG", id="too-long"),
         pytest.param({"a": [0] * 10_001}, "PACKET_TOO_LONG", id="too-many-items"),
         pytest.param({"a": nested(MAX_DEPTH)}, "PACKET_TOO_DEEP", id="too-deep"),
+        pytest.param(nested_tables(MAX_DEPTH), "PACKET_TOO_DEEP", id="tables-too-deep"),
         pytest.param({"a": float("nan")}, "PACKET_VALUE", id="nan"),
         pytest.param({"a": 2**64}, "PACKET_VALUE", id="integer-too-big"),
         pytest.param({"a": "\ud800"}, "PACKET_VALUE", id="surrogate"),
