@@ -66,7 +66,8 @@ def _show_confinement(confinement: dict[str, Any]) -> None:
     click.echo(f"workers are confined at level {confinement['level']}: {confinement['name']}")
     for finding in confinement["missing"]:
         mark = f"level {finding['level']} ({finding['name']}): "
-        render.sentence(f"{finding['reason']}; {finding['fix']}", mark=mark)
+        why = "it is to be had, and not asked for" if finding["available"] else finding["reason"]
+        render.sentence("; ".join(filter(None, (why, finding["fix"]))), mark=mark)
 
 
 def _show_payloads(payloads: list[dict[str, Any]]) -> None:
