@@ -106,3 +106,11 @@ async def test_service_that_spins_is_told_of(
     await begin(served, f"{spin}threading.Thread(target=spin, daemon=True).start()")
     strained = await served.until(WorkerStrained)
     assert [problem.code for problem in strained.problems] == ["WORKER_CPU"]
+
+
+async def test_service_that_ends_by_its_full_scratch_folder_says_so(served: House) -> None:
+    """Which is memory of a size of its own, into which the host cannot look."""
+    body = "print(OSError(28, os.strerror(28)), file=sys.stderr, flush=True)\nos._exit(1)"
+    await begin(served, body)
+    exited = await served.until(WorkerExited)
+    assert exited.reason.startswith("SCRATCH_FULL"), exited.reason

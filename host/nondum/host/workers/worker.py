@@ -217,7 +217,10 @@ class Worker:
     def _why_exited(self, status: int) -> Problem:
         holder, said = self._process.service or self._process.cage, tuple(self._tail)
         usage = holder.usage() if holder is not None else Usage()
-        exhausted = problems.exhausted(self.spec.component, self.spec.limits, usage, status, said)
+        exhausted = problems.exhausted(
+            *(self.spec.component, self.spec.limits, usage, status, said),
+            scratch_is_memory=self._process.service is not None,
+        )
         return exhausted or problems.exited(self.spec.component, status, said)
 
     def _close_outputs(self) -> None:
