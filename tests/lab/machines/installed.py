@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -37,6 +38,7 @@ systemctl -q enable nondum.service
 SERVICE = "nondum.service"
 LOOK_S = 2.0
 """Between two looks at the status: each takes a second of an emulated processor."""
+REPLUGS = 3
 T = TypeVar("T")
 View = dict[str, Any]
 
@@ -94,12 +96,15 @@ class Installed:
     def bring(self, image: Path, payload: str) -> str:
         """Plug a stick in and wait until its payload is active; answers its name for `pull`.
 
-        One after the other: who emulates a machine gives way to others, and drives that do not
-        answer for ten seconds count as broken.
+        Drives that do not answer for ten seconds count as broken. Where the emulated processors
+        have to wait that long for real ones, this does as people are told: pulls, and plugs again.
         """
-        stick = self.machine.plug(image)
-        self.until_payload(payload, "active")
-        return stick
+        for _ in range(REPLUGS):
+            stick = self.machine.plug(image)
+            if self.until(f"{payload} or a stalled drive", partial(_active_or_stalled, payload)):
+                return stick
+            self.machine.pull(stick)
+        raise AssertionError(f"the drive of {payload} stalled {REPLUGS} times")
 
     def until_component(self, component: str, state: str) -> View:
         """Wait until a component is in a state."""
@@ -124,15 +129,7 @@ class Installed:
     def until_payload(self, payload: str, state: str) -> View:
         """Wait until a payload is in a state, or shown no more for the state `gone`."""
 
-        def found(view: View) -> View | None:
-            rows = [row for row in view["payloads"] if row["payload"] == payload]
-            if not rows:
-                return {} if state == "gone" else None
-            if rows[0]["state"] in ("refused", "quarantined") and state not in rows[0]["state"]:
-                raise AssertionError(f"{payload} is {rows[0]['state']}: {rows[0]['problems']}")
-            return rows[0] if rows[0]["state"] == state else None
-
-        return self.until(f"{payload} {state}", found)
+        return self.until(f"{payload} {state}", partial(_payload_in, payload, state))
 
     def _first_answer(self) -> View | None:
         if self.shown("NRestarts") != "0":
@@ -147,3 +144,21 @@ class Installed:
     def journal(self) -> str:
         """What systemd's journal has of the service."""
         return self.machine.run(f"journalctl -o short-monotonic -u {SERVICE} --no-pager")
+
+
+def _payload_in(payload: str, state: str, view: View) -> View | None:
+    """The row of a payload that is in a state; an empty one of a payload that is gone."""
+    rows = [row for row in view["payloads"] if row["payload"] == payload]
+    if not rows:
+        return {} if state == "gone" else None
+    if rows[0]["state"] in ("refused", "quarantined") and state not in rows[0]["state"]:
+        raise AssertionError(f"{payload} is {rows[0]['state']}: {rows[0]['problems']}")
+    return rows[0] if rows[0]["state"] == state else None
+
+
+def _active_or_stalled(payload: str, view: View) -> bool | None:
+    """Whether it is active; None while it is neither that nor kept from it by its drive."""
+    if _payload_in(payload, "active", view):
+        return True
+    said = [problem for drive in view["drives"] for problem in drive["problems"]]
+    return False if any(problem.startswith("DRIVE_STALLED") for problem in said) else None

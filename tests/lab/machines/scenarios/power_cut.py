@@ -22,8 +22,7 @@ def run(lab: Lab) -> str:
         machine.cut_power()
         machine.boot()
     host.wait_until_started()
-    machine.plug(image)
-    host.until_payload(PAYLOAD, "active")
+    host.bring(image, PAYLOAD)
     left = machine.run("ls /var/lib/nondum/staging").split()
     assert not left, f"left in staging: {left}"
     recovered = machine.run("nondum journal --limit 1000 --json", timeout_s=120)

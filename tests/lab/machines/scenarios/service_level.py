@@ -26,8 +26,7 @@ def _run(lab: Lab) -> str:
     host = lab.host()
     level = host.until("its level", lambda view: view)["confinement"]["level"]
     assert level == 2, f"level {level}"
-    stick = host.machine.plug(lab.stick("talker", talker()))
-    host.until_payload(PAYLOAD, "active")
+    stick = host.bring(lab.stick("talker", talker()), PAYLOAD)
     (unit,) = _services(host)
     host.machine.run("systemctl kill --kill-who=main -s KILL nondum.service")
     host.machine.until("the service's end", lambda: None if unit in _services(host) else True)

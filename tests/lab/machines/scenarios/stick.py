@@ -12,8 +12,7 @@ PAYLOAD = "org.example.talker"
 def run(lab: Lab) -> None:
     """Plug, look, pull, look."""
     host = lab.host()
-    stick = host.machine.plug(lab.stick("talker", talker()))
-    host.until_payload(PAYLOAD, "active")
+    stick = host.bring(lab.stick("talker", talker()), PAYLOAD)
     host.machine.pull(stick)
     host.until_payload(PAYLOAD, "gone")
     host.machine.until("no mount is left", lambda: None if _mounts(host.machine) else True)
