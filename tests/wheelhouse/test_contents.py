@@ -102,6 +102,7 @@ REFUSED = {
     "hosts-many": ("CONTENTS_HEADER", PLAIN.replace("fleet:", f"fleet:\nhosts:{' a' * 65}")),
     "hosts-oddly-called": ("CONTENTS_HEADER", PLAIN.replace("fleet:", "fleet:\nhosts: a_b")),
     "built": ("CONTENTS_HEADER", PLAIN.replace("00Z", "00")),
+    "built-on-no-day": ("CONTENTS_HEADER", PLAIN.replace("2026-01-01", "2026-02-31")),
     "entry-short-hash": ("CONTENTS_ENTRY", PLAIN.replace(f"{SHA}  12", f"{SHA[1:]}  12")),
     "entry-upper-hash": ("CONTENTS_ENTRY", PLAIN.replace(f"{SHA}  12", f"{SHA.upper()}  12")),
     "entry-size": ("CONTENTS_ENTRY", PLAIN.replace("  12  ", "  012  ")),
