@@ -6,7 +6,6 @@ worker uses; of GPU memory only what all use together.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,8 +14,6 @@ from nondum.sdk.errors import Problem
 from nondum.wheelhouse import gpu
 from nondum.wheelhouse.gpu import Gpu
 from nondum.wheelhouse.manifest import Requires
-
-_MB = 1024 * 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,17 +113,18 @@ def _fix(otherwise: str, promised_mb: int, payload_id: str) -> str:
 
 def look() -> Memory:
     """This machine's memory, of which nothing is known to be promised."""
-    free_mb = free_memory_mb()
-    return Memory(free_mb, gpu.look(free_mb, _pages("SC_PHYS_PAGES")))
+    found = _looked_up()
+    free_mb = found["MemAvailable"]
+    return Memory(free_mb, gpu.look(free_mb, found["MemTotal"]))
 
 
 def free_memory_mb() -> int:
-    """Memory that can be had without swapping (proc_meminfo(5)), in MB."""
-    for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
-        if line.startswith("MemAvailable:"):
-            return int(line.split()[1]) // 1024
-    return _pages("SC_AVPHYS_PAGES")
+    """Memory that can be had without swapping, in MB."""
+    return _looked_up()["MemAvailable"]
 
 
-def _pages(which: str) -> int:
-    return os.sysconf(which) * os.sysconf("SC_PAGE_SIZE") // _MB
+def _looked_up() -> dict[str, int]:
+    """What the kernel tells of memory (proc_meminfo(5)), in MB."""
+    lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+    rows = (line.split() for line in lines)
+    return {name.rstrip(":"): int(size) // 1024 for name, size, *_ in rows}
