@@ -58,6 +58,7 @@ def test_hostile_wheels_are_named_and_many() -> None:
     assert {hostile.code for hostile in WHEELS} == {
         "WHEEL_BOMB",
         "WHEEL_DATA_SCHEME",
+        "WHEEL_MACHINE",
         "WHEEL_METADATA",
         "WHEEL_PATH",
         "WHEEL_RECORD",

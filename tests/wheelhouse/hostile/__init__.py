@@ -12,6 +12,7 @@ from __future__ import annotations
 from tests.wheelhouse.hostile import (
     hooks,
     limits,
+    machines,
     members,
     metadata,
     overlays,
@@ -30,6 +31,7 @@ FAMILIES: dict[str, tuple[HostileWheel, ...]] = {
     "record": records.WHEELS,
     "metadata": metadata.WHEELS,
     "hooks": hooks.WHEELS,
+    "machines": machines.WHEELS,
 }
 WHEELS = tuple(wheel for family in FAMILIES.values() for wheel in family)
 

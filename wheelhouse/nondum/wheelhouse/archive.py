@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 from nondum.sdk.errors import Problem
 from nondum.wheelhouse import outline
-from nondum.wheelhouse.inflate import crc32, inflated
+from nondum.wheelhouse.inflate import beginning, crc32, inflated
 
 Bytes = memoryview
 MAX_MEMBERS = 20_000
@@ -94,6 +94,25 @@ def unpack(data: Bytes, member: Member) -> Iterator[bytes]:
     """The member's bytes in pieces. Raises `ValueError` when they are not whole."""
     raw = data[member.start : member.end]
     yield from _checked(inflated(raw) if member.is_packed else _cut(raw), member)
+
+
+def head(data: Bytes, member: Member, count: int) -> bytes:
+    """The member's first bytes, fewer where it is shorter or damaged, without reading on."""
+    raw = data[member.start : member.end]
+    return beginning(raw, count) if member.is_packed else bytes(raw[:count])
+
+
+def contains(data: Bytes, member: Member, wanted: bytes) -> bool:
+    """Whether some bytes are anywhere in a member; of a damaged one, in what comes before."""
+    before = b""
+    try:
+        for piece in unpack(data, member):
+            if wanted in before + piece:
+                return True
+            before = piece[-len(wanted) :]
+    except ValueError:  # told where its contents are judged
+        pass
+    return False
 
 
 def _cut(raw: Bytes) -> Iterator[bytes]:

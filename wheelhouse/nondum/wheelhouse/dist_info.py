@@ -63,6 +63,14 @@ class WheelName:
         name, version, _, tags = parse_wheel_filename(filename)
         return cls(str(name), version, tags)
 
+    @property
+    def architectures(self) -> frozenset[str]:
+        """The Linux machines that it is for, as `uname -m` says; empty: it runs on any."""
+        platforms = {tag.platform for tag in self.tags}
+        if "any" in platforms:
+            return frozenset()
+        return frozenset(found[1] for name in platforms if (found := _PLATFORM.fullmatch(name)))
+
     def is_folder(self, folder: str, suffix: str) -> bool:
         """Whether `folder` is this wheel's `<name>-<version><suffix>`, however it is written."""
         name, _, version = folder.removesuffix(suffix).rpartition("-")

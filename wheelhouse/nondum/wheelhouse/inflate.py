@@ -13,6 +13,8 @@ _FEED = 256 * 1024
 """Packed bytes given at once. What is not taken is copied every time, so not all of them."""
 _PIECE = 1024 * 1024
 """Most unpacked bytes taken at once."""
+_HEAD_FEED = 4096
+"""Packed bytes that are enough for the first few: what describes a block takes some hundred."""
 
 
 def _library() -> Any:
@@ -41,6 +43,16 @@ def inflated(packed: memoryview, library: Any = _LIBRARY) -> Iterator[bytes]:
         raise ValueError(str(error)) from error
     if not inflate.eof or inflate.unused_data:
         raise ValueError("the packed bytes do not end where the directory says")
+
+
+def beginning(packed: memoryview, count: int, library: Any = _LIBRARY) -> bytes:
+    """The first of some raw deflated bytes; fewer where there are no more, or they are damaged."""
+    inflate = library.decompressobj(-zlib.MAX_WBITS)
+    try:
+        found: bytes = inflate.decompress(packed[:_HEAD_FEED], count)
+    except (library.error, zlib.error):
+        return b""
+    return found
 
 
 def _taken(inflate: Any, fed: Any) -> Iterator[bytes]:

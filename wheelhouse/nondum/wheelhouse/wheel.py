@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
 from nondum.sdk.errors import PayloadRefused, Problem
-from nondum.wheelhouse import archive, dist_info, record
+from nondum.wheelhouse import archive, dist_info, extensions, record
 from nondum.wheelhouse.archive import Bytes, Member
 from nondum.wheelhouse.dist_info import Needs, WheelName
 
@@ -104,6 +104,8 @@ def lay_out(data: Bytes, filename: str) -> Layout:
             row = listed.get(member.path)
             files.append(PlannedFile(target, member, row.sha256 if row else ""))
     problems.extend(_target_problems(files, filename))
+    placed = [(file.target, file.member) for file in files]
+    problems.extend(extensions.problems(data, placed, named, filename))
     return Layout(tuple(files), tuple(left_out), tuple(problems), needs)
 
 

@@ -35,6 +35,13 @@ CODES = (
         ),
     ),
     Code(
+        "WHEEL_MACHINE",
+        "A module in the wheel is machine code for another processor than the wheel's name says.",
+        "get the payload anew; its author builds the wheel on the machine that it is for, or "
+        "names it for the one that it was built on",
+        causes=("a wheel that was cross-built with the wrong compiler, or renamed"),
+    ),
+    Code(
         "WHEEL_METADATA",
         "What the wheel says of itself is missing, cannot be read, or is of another "
         "distribution, version or machine than its name says.",
