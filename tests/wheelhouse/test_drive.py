@@ -86,6 +86,13 @@ def test_another_length_is_refused(folder: Path, tmp_path: Path, data: bytes) ->
     assert refused(folder, tmp_path / "staging") == [("HASH_MISMATCH", "payload.toml")]
 
 
+def test_a_list_that_lies_of_a_size_is_refused(folder: Path, tmp_path: Path) -> None:
+    lie = Entry(LISTED.entries[0].sha256, LISTED.entries[0].size - 1, "payload.toml")
+    assert refused(folder, tmp_path / "staging", listing(lie)) == [
+        ("HASH_MISMATCH", "payload.toml")
+    ]
+
+
 def test_every_wrong_file_is_told(folder: Path, tmp_path: Path) -> None:
     (folder / "payload.toml").unlink()
     (folder / "wheels/a.whl").write_bytes(b"")
