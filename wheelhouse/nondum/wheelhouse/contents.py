@@ -212,10 +212,13 @@ def _collisions(entries: tuple[Entry, ...], where: str) -> Iterator[Problem]:
 
 
 def _is_moment(value: str) -> bool:
+    if not _BUILT.fullmatch(value):
+        return False
     try:
-        return bool(_BUILT.fullmatch(value)) and datetime.fromisoformat(value) is not None
+        datetime.fromisoformat(value)
     except ValueError:
         return False
+    return True
 
 
 def _is_version(value: str) -> bool:
@@ -223,7 +226,7 @@ def _is_version(value: str) -> bool:
         Version(value)
     except InvalidVersion:
         return False
-    return value.isascii()
+    return True
 
 
 def _flaw(code: str, message: str, where: str, fix: str = "") -> Problem:
