@@ -5,7 +5,10 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from packaging.pylock import Package, PackageWheel
 from packaging.tags import Tag, compatible_tags, cpython_tags
+from packaging.utils import canonicalize_name
+from packaging.version import Version
 
 from nondum.sdk.errors import PayloadRefused
 from nondum.wheelhouse import lock
@@ -212,6 +215,40 @@ REFUSED = {
 def test_a_wrong_lock_is_refused(code: str, text: str) -> None:
     assert code in refused(text)
     assert {found.partition("_")[0] for found in refused(text)} <= {"LOCK", "TOO"}
+
+
+def locked(
+    path: str | None = f"wheels/{A}", *, name: str | None = None, version: str | None = "1.0"
+) -> Package:
+    hashes = {"sha256": SHA}
+    return Package(
+        name=canonicalize_name("a"),
+        version=Version(version) if version else None,
+        wheels=[PackageWheel(name=name, path=path, size=3, hashes=hashes)],
+    )
+
+
+@pytest.mark.parametrize(
+    ("package", "code"),
+    [
+        pytest.param(
+            Package(name=canonicalize_name("a"), version=Version("1.0"), wheels=[]),
+            "LOCK_NOT_WHEEL",
+            id="no wheels",
+        ),
+        pytest.param(locked(version=None), "LOCK_INVALID", id="no version"),
+        pytest.param(locked(None), "LOCK_PATH", id="no path"),
+        pytest.param(locked("wheels/a-1.0.zip"), "LOCK_NOT_WHEEL", id="no wheel's name"),
+        pytest.param(locked("wheels/b-1.0-py3-none-any.whl"), "LOCK_INVALID", id="another name"),
+        pytest.param(locked("wheels/a-2-py3-none-any.whl"), "LOCK_INVALID", id="another version"),
+        pytest.param(
+            locked(name="a-1.0-py2-none-any.whl"), "LOCK_INVALID", id="other tags than its path"
+        ),
+    ],
+)
+def test_what_a_library_may_let_through_is_refused(package: Package, code: str) -> None:
+    assert code in [problem.code for problem in lock.flaws(package, "pylock.a.toml")]
+    assert not list(lock.flaws(locked(), "pylock.a.toml"))
 
 
 def test_everything_wrong_is_told_at_once() -> None:

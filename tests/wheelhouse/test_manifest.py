@@ -106,6 +106,7 @@ WRONG = {
     "control-character": ("MANIFEST_VALUE", ":2", PLAIN.replace('"Blinker"', '"B\\u0007linker"')),
     "name-is-list": ("MANIFEST_VALUE", ":2", PLAIN.replace('"Blinker"', '["Blinker"]')),
     "authors-is-string": ("MANIFEST_VALUE", ":4", PLAIN.replace('["A. Author"]', '"A. Author"')),
+    "authors-is-letter": ("MANIFEST_VALUE", ":4", PLAIN.replace('["A. Author"]', '"A"')),
     "author-with-escape": ("MANIFEST_VALUE", ":4", PLAIN.replace("A. Author", "A\\u001b[2J")),
     "requires-is-string": (
         "MANIFEST_VALUE",
@@ -116,6 +117,21 @@ WRONG = {
         "MANIFEST_VALUE",
         "",
         PLAIN.partition("[[component]]")[0] + '[component]\nid = "blinker"\n',
+    ),
+    "components-are-text": (
+        "MANIFEST_VALUE",
+        ":1",
+        'component = ["blinker"]\n' + PLAIN.partition("[[component]]")[0],
+    ),
+    "component-is-empty": (
+        "MANIFEST_VALUE",
+        ":1",
+        "component = {}\n" + PLAIN.partition("[[component]]")[0],
+    ),
+    "no-components": (
+        "MANIFEST_KEY",
+        "",
+        "component = []\n" + PLAIN.partition("[[component]]")[0],
     ),
     "python-not-specifier": ("MANIFEST_VALUE", ":9", PLAIN.replace('">=3.11"', '"newest"')),
     "memory-negative": ("MANIFEST_VALUE", ":10", PLAIN.replace("= 50", "= -50")),
@@ -132,6 +148,11 @@ WRONG = {
         "MANIFEST_VALUE",
         ":20",
         PLAIN.replace('{ ID_VENDOR_ID = "1a86", SUBSYSTEM = "tty" }', "{}"),
+    ),
+    "device-match-is-text": (
+        "MANIFEST_VALUE",
+        ":20",
+        PLAIN.replace('{ ID_VENDOR_ID = "1a86", SUBSYSTEM = "tty" }', '"tty"'),
     ),
     "device-match-number": ("MANIFEST_VALUE", ":20", PLAIN.replace('"1a86"', "1086")),
     "optional-is-text": ("MANIFEST_VALUE", ":21", PLAIN.replace("= true", '= "yes"')),

@@ -7,7 +7,9 @@ import os
 import random
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.payloads import Part, make_payload, make_wheel, seal
@@ -77,6 +79,15 @@ def rewrite(name: str, old: str, new: str) -> Callable[[Path], None]:
     return change
 
 
+def components(change: Callable[[dict[str, Any]], object]) -> Callable[[Path], None]:
+    def changed(folder: Path) -> None:
+        said = json.loads((folder / "index.json").read_text())
+        change(said["components"])
+        (folder / "index.json").write_text(json.dumps(said))
+
+    return changed
+
+
 def replace_wheel(folder: Path) -> None:
     """Another wheel of the same name; the lock still has the hash of the first."""
     (wheel,) = (folder / "wheels").iterdir()
@@ -104,6 +115,11 @@ CONTRADICTIONS = {
         rewrite("index.json", '"behaviours"', '"behaviors"'),
     ),
     "index-component": (("INDEX_INVALID",), rewrite("index.json", '"blinker"', '"other"')),
+    "index-lacks-a-component": (("INDEX_INVALID",), components(lambda said: said.clear())),
+    "index-has-another-component": (
+        ("INDEX_INVALID",),
+        components(lambda said: said.update(other=said["blinker"])),
+    ),
     "wheel-other-than-locked": (("LOCK_PATH",), replace_wheel),
     "locked-but-absent": (("LOCK_PATH",), lambda f: shutil.rmtree(f / "wheels")),
     "lock-size": (("LOCK_PATH",), rewrite("pylock.blinker.toml", "size = ", "size = 1")),
@@ -142,6 +158,18 @@ def test_a_missing_dependency_is_told(tmp_path: Path, facts: HostFacts) -> None:
     (problem,) = check(make_payload(tmp_path / "drive", part), facts)
     assert (problem.code, problem.need, problem.have) == ("LOCK_INCOMPLETE", "absent>=2", "none")
     assert problem.where == "pylock.blinker.toml"
+
+
+def test_wheels_that_unpack_to_more_than_there_is_room_for_are_told(
+    tmp_path: Path, facts: HostFacts
+) -> None:
+    (tmp_path / "w").mkdir()
+    roomy = WheelBuilder(files={"evil/__init__.py": b"", "evil/zeros": bytes(8 * 1024**2)})
+    part = Part("blinker", "X = 1\n", with_sdk=False, wheels=[roomy.write(tmp_path / "w")])
+    payload = staged(make_payload(tmp_path / "drive", part), tmp_path)
+    (problem,) = check_wheels(payload, replace(facts, free_disk_mb=7))
+    assert (problem.code, problem.need, problem.have) == ("DISK_FULL", "8 MB", "7 MB")
+    assert check_wheels(payload, replace(facts, free_disk_mb=8)) == ()
 
 
 def test_preflight_is_part_of_checking(tmp_path: Path, facts: HostFacts) -> None:

@@ -84,7 +84,7 @@ def parse(text: str, where: str) -> Lock:
         _refuse(Problem("LOCK_TOML", f"is not TOML: {error}", where=where))
     except (PylockValidationError, ValueError, TypeError) as error:
         _refuse(Problem("LOCK_INVALID", f"is not a lock (PEP 751): {error}", where=where))
-    problems = [p for package in parsed.packages for p in _flaws(package, where)]
+    problems = [p for package in parsed.packages for p in flaws(package, where)]
     if problems:
         raise PayloadRefused(*problems)
     return Lock(where, parsed, tuple(_wheels(parsed)))
@@ -112,7 +112,9 @@ def select(lock: Lock, environment: Environment, tags: Sequence[Tag]) -> tuple[L
     return tuple(paths[str(wheel.path)] for _, wheel in chosen if hasattr(wheel, "path"))
 
 
-def _flaws(package: Package, where: str) -> Iterator[Problem]:
+def flaws(package: Package, where: str) -> Iterator[Problem]:
+    """What is wrong with a package, whatever of it the library has seen to already: not every
+    version of it sees to the same."""
     name = str(package.name)
     for source in ("vcs", "directory", "archive", "sdist"):
         if getattr(package, source) is not None:

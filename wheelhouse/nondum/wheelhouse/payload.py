@@ -57,9 +57,10 @@ def load(folder: Path, listed: Contents) -> StagedPayload:
     for component in said.components if said else ():
         if parsed := _part(problems, partial(_lock, folder, lock.file_name(component.id))):
             locks[component.id] = parsed
-    if said is None or described is None or problems:
+    if said is None or described is None:
         raise PayloadRefused(*problems)
-    problems.extend(_disagreements(listed, said, locks, described))
+    if not problems:
+        problems.extend(_disagreements(listed, said, locks, described))
     if problems:
         raise PayloadRefused(*problems)
     return StagedPayload(folder, listed, said, locks, described)
