@@ -131,7 +131,7 @@ class Held:
             "sockets": refusals.SOCKETS_OF_THE_HOST[has_network],
         }
         user = None if "user" in self.without else user_for(spec)
-        nodes = (*_existing(INSTRUMENTS if spec.index.devices else ()), *_nodes(spec))
+        nodes = (*(_instruments() if spec.index.devices else ()), *_nodes(spec))
         if user is not None:
             os.chown(spec.scratch, user, user)
         walls = {
@@ -260,6 +260,12 @@ def calls_refused(groups: Mapping[str, tuple[Rule, ...]], without: Collection[st
     if "filter" in without or not refusals.is_known(machine):
         return None
     return base64.b64encode(refusals.filter_of(groups, machine, without=without)).decode()
+
+
+def _instruments() -> Iterator[str]:
+    """The machine's, as far as they are there by now, and those that the helper makes nodes for."""
+    yield from _existing(INSTRUMENTS)
+    yield from (place for place in bubblewrap.places_of_nodes() if place != "/dev")
 
 
 def _nodes(spec: WorkerSpec) -> Iterator[str]:
