@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import shutil
 import struct
 import subprocess
@@ -9,6 +10,7 @@ import sys
 import time
 import zipfile
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -50,6 +52,27 @@ def test_hostile_wheel_is_refused(tmp_path: Path, hostile: HostileWheel) -> None
     assert {p.code for p in problems} == {hostile.code}
     assert all(p.where == hostile.filename and p.message for p in problems)
     assert not (tmp_path / "canary").exists()
+
+
+WORDS = {
+    "parent-folder": "leaves the wheel",
+    "absolute": "leaves the wheel",
+    "backslash": "has characters that paths may not have",
+    "dot-part": "is not in its shortest form",
+    "doubled-slash": "is not in its shortest form",
+    "long-part": "has a part longer than 255 bytes",
+    "dot-at-the-end": "has a name that some systems take for another",
+    "too-big-together": "more than 2147483648",
+}
+"""What is told of some, whatever else would refuse them with the same code."""
+
+
+@pytest.mark.parametrize(("name", "words"), WORDS.items(), ids=WORDS)
+def test_hostile_wheel_is_told_in_the_right_words(tmp_path: Path, name: str, words: str) -> None:
+    (hostile,) = (one for one in WHEELS if one.name == name)
+    path = tmp_path / hostile.filename
+    path.write_bytes(hostile.build(tmp_path / "canary"))
+    assert any(problem.message.endswith(words) for problem in wheel.check(path))
 
 
 def test_hostile_wheels_are_named_and_many() -> None:
@@ -190,6 +213,26 @@ def test_understated_size_is_found_by_reading(tmp_path: Path) -> None:
     assert {p.code for p in wheel.check(builder.write(tmp_path))} == {"WHEEL_RECORD"}
 
 
+@pytest.mark.parametrize("lie", [-1, 1])
+def test_sizes_that_lie_are_found_by_unpacking(lie: int) -> None:
+    """Checksums are made to fit by whoever lies."""
+    data = memoryview(WheelBuilder().bytes())
+    for member in archive.read(data, NAME).members:
+        assert b"".join(archive.unpack(data, member))
+        with pytest.raises(ValueError, match="size or checksum"):
+            list(archive.unpack(data, replace(member, size=member.size + lie)))
+
+
+def test_one_member_that_grows_too_much_is_a_bomb() -> None:
+    """However little it is of the whole."""
+    noise = random.Random(1).randbytes(300_000)
+    plain = ZipBuilder().add("noise", noise)
+    assert not archive.read(memoryview(plain.bytes()), NAME).problems
+    bomb = plain.add("zeros", bytes(17 * 1024**2))
+    (problem,) = archive.read(memoryview(bomb.bytes()), NAME).problems
+    assert problem.message == "'zeros' unpacks to more than 1000 times its size"
+
+
 def test_overlapping_members_are_a_bomb() -> None:
     bomb = ZipBuilder(overlaid=True).add("a", bytes(5000)).add("a2", bytes(5000))
     named = bomb.bytes().replace(b"a2", b"a\0")
@@ -215,7 +258,9 @@ def test_many_members_are_judged_quickly() -> None:
 
 
 @pytest.mark.parametrize(
-    "data", [b"", b"PK", b"not a zip file at all" * 9], ids=["empty", "2", "?"]
+    "data",
+    [b"", b"PK", b"xxPK\x05\x06xxxxxx", b"not a zip file at all" * 9],
+    ids=["empty", "2", "12", "?"],
 )
 def test_no_zip_file_is_refused(tmp_path: Path, data: bytes) -> None:
     (tmp_path / NAME).write_bytes(data)
