@@ -94,7 +94,9 @@ class Questions:
         snapshot = self.catalogue.snapshot()
         payloads = {payload.key: payload for payload in snapshot.payloads}
         own = [
-            component_row(c, snapshot.host, pids.get(c.id), payloads.get(c.payload))
+            component_row(
+                c, snapshot.host, pids.get(c.id), payloads.get(c.payload), self.vouched(c.payload)
+            )
             for c in snapshot.components
         ]
         for row in own:

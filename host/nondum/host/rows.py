@@ -84,6 +84,7 @@ def payload_row(
         "place": place,
         "signers": list(vouched.signers),
         "built": vouched.built,
+        "age_s": vouched.age_s,
         "drive": ", ".join(payload.drives),
         "components": list(payload.components),
         "problems": [str(problem) for problem in payload.problems],
@@ -123,7 +124,11 @@ def peers_device_row(device: str, component: str) -> Row:
 
 
 def component_row(
-    component: ComponentRecord, host: str, pid: int | None, payload: PayloadRecord | None
+    component: ComponentRecord,
+    host: str,
+    pid: int | None,
+    payload: PayloadRecord | None,
+    vouched: Vouched = NOBODY,
 ) -> Row:
     """A component: how it is, and what it brings."""
     described = component.description
@@ -137,6 +142,8 @@ def component_row(
         "payload": component.payload_id,
         "release": payload.release if payload else None,
         "was": payload.was or None if payload else None,
+        "built": vouched.built,
+        "age_s": vouched.age_s,
         "units": [unit.name for unit in described.units],
         "behaviours": [behaviour.name for behaviour in described.behaviours],
         "devices": {claim.name: claim.device for claim in component.devices},
@@ -159,6 +166,8 @@ def offered_row(component: PeerComponent, host: str) -> Row:
         "payload": component.payload_id,
         "release": None,
         "was": None,
+        "built": "",
+        "age_s": None,
         "units": [unit.name for unit in described.units],
         "behaviours": list(component.abilities),
         "devices": {},

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import time
+from datetime import datetime
 from typing import Any
 
 import pytest
@@ -28,6 +30,8 @@ ROWS: dict[str, set[str]] = {
         "scratch",
         "release",
         "was",
+        "built",
+        "age_s",
     },
     "facts": {"fact", "age_s", "source", "value"},
     "journal": {
@@ -79,6 +83,7 @@ PAYLOAD_KEYS = {
     "place",
     "signers",
     "built",
+    "age_s",
     "was",
     "gone_back",
 }
@@ -88,14 +93,14 @@ host panther  revision N  ready
 warning: payloads without a signature are accepted (allow_unsigned)
 workers are confined at level N: WALLS
 
-PAYLOAD             VERSION  STATE   DRIVE               COMPONENTS
-org.example.beacon  1.0      active  org.example.beacon  beacon
+PAYLOAD             VERSION  AGE  STATE   DRIVE               COMPONENTS
+org.example.beacon  1.0      AGE  active  org.example.beacon  beacon
 
 > beacon is here: it can greet, shine
 """
 COMPONENTS = """\
-COMPONENT  STATE  PLUGIN       VERSION  PAYLOAD             UNITS  CONFINEMENT  PROBLEM
-beacon     ready  test-beacon  1.0      org.example.beacon  lamp   N            -
+COMPONENT  STATE  PLUGIN       VERSION  PAYLOAD             AGE  UNITS  CONFINEMENT  PROBLEM
+beacon     ready  test-beacon  1.0      org.example.beacon  AGE  lamp   N            -
 """
 BEHAVIOURS = """\
 BEHAVIOUR  COMPONENT  KIND       RUNNING  PHRASES
@@ -161,6 +166,7 @@ def normalised(text: str) -> str:
     """What a command printed, without what differs from run to run."""
     text = re.sub(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d", "WHEN", text)
     text = re.sub(r"(?<=  )\d+ (?:s|min)(?= )", lambda age: "AGE".ljust(len(age[0])), text)
+    text = re.sub(r"AGE +(?=STATE|UNITS)|(?<=  )\d+ d +", "AGE  ", text)
     text = re.sub(r"(confined at level) \d: .*", r"\1 N: WALLS", text)
     text = re.sub(r"(lamp   )\d( +-)", r"\1N\2", text)
     return re.sub(r"(revision|world model  —|people  —) \d+", r"\1 N", text)
@@ -187,6 +193,14 @@ def test_rows_have_these_keys_in_json(daemon: Daemon, verb: str) -> None:
 @pytest.mark.parametrize("verb", VIEWS)
 def test_views_have_these_keys_in_json(daemon: Daemon, verb: str) -> None:
     assert daemon.run(verb, "--json").ok().json.keys() == VIEWS[verb]
+
+
+@pytest.mark.parametrize("verb", ["status", "components"])
+def test_a_payload_is_as_old_as_it_says(daemon: Daemon, verb: str) -> None:
+    told = daemon.run(verb, "--json").ok().json
+    (row,) = told["payloads"] if verb == "status" else told
+    since = time.time() - datetime.fromisoformat(row["built"]).timestamp()
+    assert 0 <= since - row["age_s"] < 60
 
 
 def test_a_payload_has_these_keys_and_phases(daemon: Daemon) -> None:

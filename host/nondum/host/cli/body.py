@@ -26,14 +26,19 @@ def show(session: Session, rows: list[dict[str, Any]], columns: Sequence[str], e
 def components(session: Session) -> None:
     """What the robot is made of at this moment.
 
+    A component's age is the time since its payload was built; of peers' it is not known.
+
     Example: nondum components
     """
-    columns = ["component", "state", "plugin", "version", "payload", "units"]
+    columns = ["component", "state", "plugin", "version", "payload", "age", "units"]
     columns += ["confinement", "problem"]
     rows = session.ask("components")
-    if any(row["was"] for row in rows) and not session.as_json:
-        rows = [{**row, "release": render.release(row)} for row in rows]
-        columns.insert(columns.index("units"), "release")
+    if any(row["was"] for row in rows):
+        columns.insert(columns.index("age"), "release")
+    if not session.as_json:
+        rows = [
+            {**row, "release": render.release(row), "age": render.age(row["age_s"])} for row in rows
+        ]
     show(session, rows, columns, "no components")
 
 

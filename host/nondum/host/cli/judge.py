@@ -35,7 +35,7 @@ def inspect(session: Session, drive: Path) -> None:
         about = f"{view['id']} {view['version']} (release {view['release']}): {view['summary']}"
         render.sentence(f"{about}  {render.size(view['bytes'])}")
         by = f"signed by {', '.join(view['signers'])}" if view["signers"] else view["unsigned"]
-        render.sentence(f"  built {view['built']} ({render.age_of(view['built'])} ago), {by}")
+        render.sentence(f"  built {view['built']} ({render.age(view['age_s'])} ago), {by}")
         for component in view["components"]:
             can = ", ".join(component["behaviours"]) or "no behaviours"
             render.sentence(f"  component {component['id']}: {can}")
@@ -83,6 +83,8 @@ def _signed(folder: Path) -> dict[str, Any]:
 
 
 def _view(payload: StagedPayload) -> dict[str, Any]:
+    from nondum.host.trust.vouched import age_s
+
     listed = payload.contents
     return {
         "id": listed.payload_id,
@@ -90,6 +92,7 @@ def _view(payload: StagedPayload) -> dict[str, Any]:
         "release": listed.release,
         "fleet": listed.fleet,
         "built": listed.built,
+        "age_s": age_s(listed.built),
         **_signed(payload.folder),
         "summary": payload.manifest.summary,
         "bytes": listed.total_bytes,

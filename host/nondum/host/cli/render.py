@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Mapping
-from datetime import datetime
 from typing import Any
 
 import click
@@ -50,17 +49,6 @@ def age(seconds: float | None) -> str:
         if seconds >= 2 * length:
             return f"{seconds // length:.0f} {unit}"
     return f"{seconds // 1:.0f} s"
-
-
-def age_of(built: str) -> str:
-    """How old a payload is that says when it was built (UTC, ISO 8601).
-
-    >>> age_of(""), age_of("2999-01-01T00:00:00Z")
-    ('', '0 s')
-    """
-    if not built:
-        return ""
-    return age(max(0.0, time.time() - datetime.fromisoformat(built).timestamp()))
 
 
 def size(count: int) -> str:

@@ -20,6 +20,8 @@ LAST_TOLD = 5
 def status(session: Session, follow: bool) -> None:
     """The host, its payloads and its goals at a glance.
 
+    A payload's age is the time since it was built, as it says.
+
     With --follow and --json, each line is all that there is to see: components, streams, plan and
     tree too.
 
@@ -79,17 +81,17 @@ def _show_payloads(payloads: list[dict[str, Any]]) -> None:
             "release": render.release(row),
             "progress": render.progress(row["progress"]),
             "signed by": ", ".join(row["signers"]),
-            "age": render.age_of(row["built"]),
+            "age": render.age(row["age_s"]),
         }
         for row in payloads
     ]
-    columns = ["payload", "version", "state", "drive", "components"]
+    columns = ["payload", "version", "age", "state", "drive", "components"]
     if any(row["was"] or row["state"] == "superseded" for row in rows):
-        columns.insert(2, "release")
+        columns.insert(columns.index("age"), "release")
     if any(row["on"] for row in rows):
         columns.insert(columns.index("drive"), "on")
     if any(row["signers"] for row in rows):
-        columns += ["signed by", "age"]
+        columns.append("signed by")
     if any(row["progress"] for row in rows):
         columns.append("progress")
     table(rows, columns, empty="no payloads")

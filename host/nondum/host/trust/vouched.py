@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
+from datetime import datetime
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,5 +16,22 @@ class Vouched:
     built: str = ""
     """When they say that it was built: UTC, ISO 8601."""
 
+    @property
+    def age_s(self) -> float | None:
+        """Seconds since then; None: nothing is known of it."""
+        return age_s(self.built)
+
 
 NOBODY = Vouched()
+
+
+def age_s(built: str) -> float | None:
+    """Seconds since a payload was built, as it says (UTC, ISO 8601) and as this clock goes; 0 if
+    that is yet to come.
+
+    >>> age_s(""), age_s("2999-01-01T00:00:00Z")
+    (None, 0.0)
+    """
+    if not built:
+        return None
+    return max(0.0, time.time() - datetime.fromisoformat(built).timestamp())
