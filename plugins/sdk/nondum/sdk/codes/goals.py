@@ -47,7 +47,7 @@ CODES = (
     Code(
         "PLANNER_START",
         "A planner does not start.",
-        "see that it is installed; else leave it out of `planners` under [planning]",
+        "`nondum pddl plan --planner NAME` tries it; without it, others plan: pip can uninstall it",
     ),
     Code(
         "PLANNING_FAULT",
