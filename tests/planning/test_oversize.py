@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 import pytest
 from tests.planning.fragments import brings
 from tests.planning.strangers import (
@@ -14,6 +16,7 @@ from tests.planning.strangers import (
     components,
 )
 
+from nondum.planning import standalone
 from nondum.planning.bounds import INSTANCES_LIMIT, TooManyBindings
 from nondum.planning.contribution import Contribution
 from nondum.planning.domain import Merged
@@ -77,6 +80,22 @@ def test_bindings_that_are_looked_at_in_vain_count_too() -> None:
     found = fit([*followers(), in_vain])
     assert set(found.left_out) == {"vain"}
     assert "too many to look at" in found.left_out["vain"].message
+
+
+@pytest.mark.parametrize(("objects", "is_too_much"), [(10, False), (14, True)])
+def test_bindings_that_nobody_asks_for_count_too(objects: int, is_too_much: bool) -> None:
+    """All but one of 1,000 or 2,744: as many as may be looked at, if making one cost nothing."""
+    names = [f"o{number}" for number in range(objects)]
+    domain = """(define (domain knots) (:requirements :strips)
+      (:predicates (rope ?x) (tied ?x ?y ?z))
+      (:action tie :parameters (?x ?y ?z) :precondition (and (rope ?x) (rope ?y) (rope ?z))
+        :effect (tied ?x ?y ?z)))"""
+    problem = f"""(define (problem p) (:domain knots) (:objects {" ".join(names)})
+      (:init {" ".join(f"(rope {name})" for name in names)}) (:goal (tied o0 o0 o0)))"""
+    read = standalone.load(domain, "domain", problem, "problem")
+    with pytest.raises(TooManyBindings) if is_too_much else nullcontext():
+        task = ground(read.merged, read.facts, read.goal, limit=200)
+        assert [action.name for action in task.actions] == ["tie o0 o0 o0"]
 
 
 def test_derived_facts_count_too() -> None:

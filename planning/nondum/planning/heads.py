@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 _WORK_OF_DECIDING = 10
 """What deciding a disjunction or quantifier counts as."""
+_WORK_OF_BINDING = 5
+"""The same of a binding that is made for nobody."""
 
 
 class _Template:
@@ -129,6 +131,7 @@ class ActionHead(Head):
         add = self._add.numbers(values)
         delete = self._delete.numbers(values) - add
         if not (self._changes or self._fixpoint.asks_for(add, delete)):
+            self._fixpoint.work.spend(_WORK_OF_BINDING)
             return
         self._fixpoint.instances[key] = Instance(
             action=self._action,

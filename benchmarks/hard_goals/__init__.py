@@ -1,0 +1,1 @@
+"""Goals that are too much for any planner."""
