@@ -32,7 +32,7 @@ CODES = (
     Code(
         "PLANNER_ANSWER",
         "A planner gave something that is no answer.",
-        "use another planner (`planners` under [planning]); tell its author",
+        "others plan meanwhile: tell its author, or uninstall it (pip)",
     ),
     Code(
         "PLANNER_DIED",
@@ -42,7 +42,7 @@ CODES = (
     Code(
         "PLANNER_RAISED",
         "A planner ended with an error.",
-        "use another planner (`planners` under [planning]); tell its author",
+        "others plan meanwhile: tell its author, or uninstall it (pip)",
     ),
     Code(
         "PLANNER_START",
