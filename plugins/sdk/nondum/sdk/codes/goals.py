@@ -37,7 +37,7 @@ CODES = (
     Code(
         "PLANNER_DIED",
         "A planner ended without an answer.",
-        "it is started again; if it happens often, use another one (`planners` under [planning])",
+        "it is started again; if it happens often, uninstall it (pip)",
     ),
     Code(
         "PLANNER_RAISED",
