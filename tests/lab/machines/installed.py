@@ -10,8 +10,7 @@ from typing import Any, TypeVar
 
 from tests.lab.machines.machine import Machine
 
-PATIENCE_S = 240.0
-"""Emulated processors that others share are slow; nothing here is judged by its time."""
+PATIENCE_S = 400.0
 CONFIGURATION = """
 [host]
 name = "spot"
@@ -19,7 +18,10 @@ name = "spot"
 allow_unsigned = true
 [peers]
 enabled = false
+[workers]
+startup_s = 200
 """
+"""Emulated processors that others share are slow: nothing here is judged by its time."""
 INSTALL = """
 set -eu
 grep -q nondum /etc/fstab || echo 'LABEL=nondum /opt/nondum ext4 ro,nofail 0 0' >>/etc/fstab
@@ -55,7 +57,7 @@ class Installed:
         self.machine.run(INSTALL)
 
     def configure(self, more: str = "") -> None:
-        """Write its configuration, with some lines more."""
+        """Write its configuration, with some more lines of its table `[workers]`."""
         self.machine.put("/etc/nondum/host.toml", CONFIGURATION + more)
 
     def start(self) -> None:

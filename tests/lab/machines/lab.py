@@ -34,7 +34,8 @@ class Lab:
     _numbers: Iterator[int] = field(default_factory=itertools.count)
 
     def host(self, *, more: str = "") -> Installed:
-        """A host that has just started and knows nothing; `more` are lines of its configuration."""
+        """A host that has just started and knows nothing; `more` are lines of its configuration, of the
+        table `[workers]`."""
         host = self.booted_once()
         host.forget()
         host.configure(more)

@@ -16,9 +16,9 @@ from tests.lab.machines.building import Built
 from tests.lab.machines.cache import MODEST, call
 from tests.lab.machines.qmp import Qmp, QmpError
 
-BOOT_S = 240.0
-"""Sixteen seconds on an idle machine; this one may be shared by many."""
-PATIENCE_S = 240.0
+BOOT_S = 400.0
+"""Nine seconds on an idle machine; this one may be shared by many."""
+PATIENCE_S = 400.0
 """How long a program inside may run, unless its caller says otherwise."""
 POLL_S = 0.2
 TICKS_HZ = os.sysconf("SC_CLK_TCK")

@@ -6,7 +6,7 @@ from tests.lab.machines.lab import Lab
 from tests.lab.machines.machine import Machine
 from tests.lab.plugins import talker
 
-AT_LEVEL_2 = '[workers]\nconfinement = "2"\n'
+AT_LEVEL_2 = 'confinement = "2"\n'
 MOST_EXPOSED = {
     "nondum.service": 5.0,
     "nondum-helper.service": 5.0,

@@ -9,7 +9,7 @@ from tests.lab.machines.lab import Lab
 from tests.lab.machines.plugins import hogs
 from tests.lab.plugins import talker
 
-LIMITS = "[workers]\nmemory_mb = 128\n"
+LIMITS = "memory_mb = 128\n"
 
 
 def run(lab: Lab) -> str:

@@ -8,7 +8,7 @@ from tests.lab.machines.installed import Installed
 from tests.lab.machines.lab import Lab
 from tests.lab.machines.plugins import doer
 
-CONFIGURATION = '[workers]\nconfinement = "2"\ntasks = 64\n'
+CONFIGURATION = 'confinement = "2"\ntasks = 64\n'
 FORK = "while True:\n    try:\n        os.fork()\n    except OSError:\n        pass"
 SPIN = """import threading
 def spin():

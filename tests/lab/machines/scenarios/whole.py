@@ -41,7 +41,7 @@ def run(lab: Lab) -> str:
 
 
 def _at(lab: Lab, level: str) -> str:
-    host = lab.host(more=f'[workers]\nconfinement = "{level}"\n')
+    host = lab.host(more=f'confinement = "{level}"\n')
     machine = host.machine
     assert machine.run(f"ps -o user= -p {host.shown('MainPID')}").strip() == "nondum"
     machine.run("modprobe -r ftdi_sio || true")  # its driver is loaded once it is plugged in
