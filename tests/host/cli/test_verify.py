@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.host.cli.daemon import nondum
+from tests.host.cli.daemon import nondum, running
 from tests.payloads import Part, make_payload, make_wheel, seal
 
 ID = "org.example.test"
@@ -75,3 +75,41 @@ def test_another_kind_of_host_is_asked_about(tmp_path: Path) -> None:
     ran = nondum(*asked, "--arch", "x86_64", "--json")
     assert [row["code"] for row in ran.json["problems"]] == ["WHEEL_INCOMPATIBLE"]
     nondum(*asked, "--arch", "sparc").refused(2, "TARGET_UNKNOWN")
+
+
+@pytest.fixture
+def confined(tmp_path: Path) -> Path:
+    """A drive whose payload asks for the highest level."""
+    make_payload(tmp_path / "drive", PLAIN, requires="confinement = 3")
+    return tmp_path / "drive"
+
+
+@pytest.mark.parametrize("verb", ["verify", "check"])
+def test_the_host_that_runs_here_says_how_it_confines(
+    tmp_path: Path, confined: Path, verb: str
+) -> None:
+    unsigned = ("--unsigned",) if verb == "verify" else ()
+    at_none = '[workers]\nconfinement = "0"\nminimum_confinement = 0\n'
+    with running(tmp_path / "host", at_none) as daemon:
+        ran = daemon.run("payload", verb, confined, *unsigned, "--json")
+        (problem,) = ran.json["problems"]
+        assert (problem["code"], problem["have"]) == ("CONFINEMENT", "level 0")
+        daemon.run("payload", verb, confined, *unsigned, "--anywhere").ok()
+
+
+def test_without_a_host_the_best_level_that_is_to_be_had_counts(confined: Path) -> None:
+    levels = nondum("doctor", "confinement", "--json")
+    best = max((row["level"] for row in levels.json["levels"] if row["available"]), default=0)
+    ran = nondum("payload", "check", confined, "--json")
+    assert [row["code"] for row in ran.json["problems"]] == ["CONFINEMENT"] * (best < 3)
+
+
+def test_hosts_of_another_kind_have_enough_of_everything(tmp_path: Path) -> None:
+    greedy = "confinement = 3\nmemory_mb = 99999999\ngpu_memory_mb = 99999999"
+    make_payload(tmp_path / "drive", PLAIN, requires=greedy)
+    asked = ("payload", "verify", tmp_path / "drive", "--unsigned")
+    nondum(*asked, "--arch", "aarch64", "--python", "3.12").ok()
+    assert {row["code"] for row in nondum(*asked, "--json").json["problems"]} >= {
+        "NO_MEMORY",
+        "NO_GPU_MEMORY",
+    }

@@ -12,6 +12,7 @@ from nondum.host.cli import complete, render
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.failure import tell_problem
 from nondum.host.cli.judge import FOLDER
+from nondum.host.cli.machine import this_machine
 from nondum.host.cli.table import table
 from nondum.sdk.errors import GoalRefused, HostUnreachable, Problem
 
@@ -90,12 +91,10 @@ def surroundings(
 
     A bare host where one is named. Raises `HostUnreachable`.
     """
-    from nondum.host.confinement import choice
     from nondum.host.counsel import Surroundings, waiting
     from nondum.host.shelf import Shelved, on_shelf
-    from nondum.wheelhouse import preflight
 
-    facts = preflight.probe(Path.cwd(), reserve_mb=0, confinement=choice.best())
+    facts = this_machine(session)
     told = None if host else _told(session)
     shelf: list[Shelved] = []
     problems: list[Problem] = []

@@ -14,6 +14,7 @@ from nondum.host.cli import render
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.failure import EXIT_PROBLEMS
 from nondum.host.cli.judge import FOLDER, payloads
+from nondum.host.cli.machine import this_machine
 from nondum.host.cli.progress import ProgressLine
 from nondum.sdk.errors import HostUnreachable, PayloadRefused, Problem
 
@@ -49,11 +50,16 @@ def verify(
     All problems are told, also what a host would not come to after the first. Exits with 3 on
     problems. Without a trust file, and where no host runs, the one in /etc/nondum is judged by.
 
+    Whether it fits is asked of this machine as it is now: disk, memory, and the level at which the
+    host that runs here confines workers; where none runs, the best level that you could have. With
+    --arch or --python it is asked of any such host, which has enough of all that; with --anywhere
+    it is not asked.
+
     \b
     Examples: nondum payload verify /media/usb
               nondum payload verify drive --trust trust.toml --arch aarch64 --python 3.12 --json
     """
-    facts = None if anywhere else _facts(arch, python)
+    facts = None if anywhere else _facts(session, arch, python)
     verifier = _verifier(_trusted(session, trust), unsigned=unsigned)
     return _tell(session, drive, verifier, facts)
 
@@ -66,13 +72,13 @@ def verify(
 def check(session: Session, drive: Path, anywhere: bool) -> int:
     """Judge what was built, before it is signed: all that `verify` does but for signatures.
 
-    Exits with 3 on problems.
+    Exits with 3 on problems. Whether it fits is asked of this machine, as `verify` does.
 
     \b
     Examples: nondum payload check /media/usb
               nondum payload check drive --anywhere --json
     """
-    facts = None if anywhere else _facts(None, None)
+    facts = None if anywhere else _facts(session, None, None)
     return _tell(session, drive, _verifier(None, unsigned=True), facts)
 
 
@@ -132,14 +138,13 @@ def _verified(
     )
 
 
-def _facts(arch: str | None, python: str | None) -> HostFacts:
+def _facts(session: Session, arch: str | None, python: str | None) -> HostFacts:
     """The host that is asked about: this machine, or any of the kind that is named."""
-    from nondum.host.confinement import choice
     from nondum.wheelhouse import preflight
     from nondum.wheelhouse.target import Target, targets
 
     if arch is None and python is None:
-        return preflight.probe(Path.cwd(), reserve_mb=0, confinement=choice.best())
+        return this_machine(session)
     here = Target.here()
     (target,) = targets((arch or here.architecture,), (python or here.python,))
     return preflight.of_target(target)
