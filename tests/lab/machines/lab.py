@@ -34,8 +34,8 @@ class Lab:
     _numbers: Iterator[int] = field(default_factory=itertools.count)
 
     def host(self, *, more: str = "") -> Installed:
-        """A host that has just started and knows nothing; `more` are lines of its configuration, of the
-        table `[workers]`."""
+        """A host that has just started and knows nothing; `more` are lines of the table `[workers]`
+        of its configuration."""
         host = self.booted_once()
         host.forget()
         host.configure(more)
