@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import os
 import signal
+import sys
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 from typing import Any
@@ -141,6 +142,20 @@ async def test_work_aside_is_idle_and_ends_with_its_child(tmp_path: Path) -> Non
             await ended.wait()
         await asyncio.wait([job])
         assert not pool.pids()
+
+
+async def test_slow_start_is_not_the_drive_s(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever is wrong with a drive, it is not that this computer is small and has much to do."""
+    slow = tmp_path / "python"
+    first = "import os, sys, time; time.sleep(2)"
+    then = f"os.execv({sys.executable!r}, [{sys.executable!r}, *sys.argv[1:]])"
+    slow.write_text(f"#!{sys.executable} -ISB\n{first}; {then}\n")
+    slow.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(slow))
+    async with children() as pool:
+        assert await pool.run("look", drive(tmp_path), stall_s=1.5) == NOTHING
 
 
 async def test_work_aside_gives_its_answer(tmp_path: Path) -> None:

@@ -55,7 +55,9 @@ def _warm() -> None:
 def _do(job: str, arguments: dict[str, Any], answers: TextIO) -> dict[str, Any]:
     try:
         with allowed(job):
-            return {"result": jobs.find(job)(arguments, _reporter(answers))}
+            do = jobs.find(job)
+            _say(answers, {"begun": job})
+            return {"result": do(arguments, _reporter(answers))}
     except NondumError as error:
         return _failure(type(error).__name__, *error.problems)
     except OSError as error:

@@ -38,6 +38,8 @@ QUIET_S = 30.0
 STALL_S = 60.0
 """Silence that is borne from a child, unless its job is one that says more or less of itself."""
 
+START_S = 60.0
+"""How long a child may take until it begins with its job."""
 ASIDE_STALL_S = 600.0
 """Silence that is borne from a child that works only while nobody else does."""
 
@@ -77,8 +79,9 @@ class Children:
 
         The child is one that worked for no other `owner`, which is whatever the bytes came from;
         without one, it does this job and ends. Raises the `NondumError` that the job did, or
-        `InstallFailed`: CHILD_STALLED when nothing was heard for `stall_s`, CHILD_LIMIT when it
-        used up its processor time, CHILD_DIED when it ended without an answer otherwise.
+        `InstallFailed`: CHILD_STALLED when nothing was heard for `stall_s`, which begin once it has
+        started, CHILD_LIMIT when it used up its processor time, CHILD_DIED when it ended without an
+        answer otherwise.
         """
         child = await self._take(owner)
         self._busy.add(child)
@@ -250,12 +253,16 @@ async def _converse(
     with contextlib.suppress(ConnectionError):  # it died: the answer below is missing
         child.stdin.write(line.encode())
         await child.stdin.drain()
+    patience_s = max(stall_s, START_S)  # on a small computer that has much to do, Python takes long
     while True:
-        deadline.reschedule(loop.time() + stall_s)
+        deadline.reschedule(loop.time() + patience_s)
         heard = await child.stdout.readline()
         if not heard:
             raise _died(job, await child.wait())
         answer: dict[str, Any] = json.loads(heard)
+        patience_s = stall_s
+        if "begun" in answer:
+            continue
         if "progress" not in answer:
             return answer
         if on_progress is not None:
