@@ -8,12 +8,13 @@ from tests.lab.plugins import talker
 
 AT_LEVEL_2 = 'confinement = "2"\n'
 MOST_EXPOSED = {
-    "nondum.service": 5.0,
-    "nondum-helper.service": 5.0,
-    "nondum-warden@": 5.0,
-    "nondum-worker-": 2.5,
+    "nondum.service": 3.8,
+    "nondum-helper.service": 4.3,
+    "nondum-warden@": 1.7,
+    "nondum-worker-": 0.5,
 }
-"""Of units whose names begin so, by `systemd-analyze security`: 0 is safe, 10 is not."""
+"""Of units whose names begin so, by `systemd-analyze security`: 0 is safe, 10 is not. Lower them as
+units get better."""
 
 
 def run(lab: Lab) -> str:
