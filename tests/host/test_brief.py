@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from nondum.host.brief import MOST_CHARACTERS, MOST_PROBLEMS, brief
 from nondum.sdk.errors import Problem
 
-TEXTS = st.text(max_size=2 * MOST_CHARACTERS)
+TEXTS = st.text(st.characters(), max_size=2 * MOST_CHARACTERS)
+"""Half letters are among them."""
 PROBLEMS = st.builds(Problem, st.sampled_from(["A", "B"]), *[TEXTS] * 5)
 
 
@@ -21,6 +22,7 @@ def test_what_is_told_is_short(problems: list[Problem]) -> None:
     assert all(len(text) <= MOST_CHARACTERS + 1 for p in told for text in astuple(p))
     assert {problem.code for problem in told} <= {problem.code for problem in problems}
     assert bool(told) == bool(problems)
+    assert all(text.encode() is not None for p in told for text in astuple(p))
 
 
 def test_what_is_short_is_told_as_it_is() -> None:

@@ -377,6 +377,18 @@ async def test_commit_is_whole_or_not_at_all(tmp_path: Path) -> None:
 
 
 @pytest.mark.anyio
+async def test_half_a_letter_is_no_reason_to_fail(tmp_path: Path) -> None:
+    """JSON and names of files can have what no UTF-8, and so no row, has."""
+    half = replace(PROBLEM, message="half a letter: \ud83e", where="name-\udcff")
+    drive = replace(FULL.drives["a"], id="a", problems=(half,), root=Path("/drives/\udcff"))
+    state = replace(FULL, drives={"a": drive})
+    async with opened(tmp_path) as kept:
+        await kept.commit(state, (replace(entry("\udcff"), problems=(half,)),))
+    async with opened(tmp_path) as again:
+        assert again.state.drives["a"].problems == (half,)
+
+
+@pytest.mark.anyio
 async def test_everything_can_be_asked_in_sql(tmp_path: Path) -> None:
     async with opened(tmp_path) as catalogue:
         await catalogue.commit(FULL, ())

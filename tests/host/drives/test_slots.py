@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import shutil
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -82,6 +83,33 @@ async def test_links_that_lead_nowhere_are_no_drives(tmp_path: Path) -> None:
         (slots / "nowhere").symlink_to(tmp_path / "nothing")
         (slots / "a").mkdir()
         assert await told.get() == DriveInserted("a", slots / "a", "slot")
+
+
+@pytest.mark.parametrize("name", [b"clear\x1b[2J", b"two\nlines", b"bell\x07", b"latin-1 \xff"])
+async def test_entry_whose_name_cannot_be_shown_is_told_and_not_read(
+    tmp_path: Path, name: bytes
+) -> None:
+    """Whoever labels a stick names the folder that it is mounted at."""
+    slots = tmp_path / "slots"
+    async with watched(slots) as told:
+        await told.get()
+        entry = slots / os.fsdecode(name)
+        entry.mkdir()
+        event = await told.get()
+        assert isinstance(event, DriveInserted)
+        assert event.drive.isprintable()
+        assert [problem.code for problem in event.problems] == ["DRIVE_NAME"]
+        entry.rmdir()
+        assert await told.get() == DriveRemoved(event.drive)
+
+
+async def test_label_of_many_letters_is_a_name(tmp_path: Path) -> None:
+    slots = tmp_path / "slots"
+    async with watched(slots) as told:
+        await told.get()
+        for name in ("Ключ, 2", "ü" * 127, "x" * 255):
+            (slots / name).mkdir()
+            assert await told.get() == DriveInserted(name, slots / name, "slot")
 
 
 async def test_slot_folder_that_is_deleted_holds_no_drives(tmp_path: Path) -> None:

@@ -262,7 +262,8 @@ def _replace_parts(
 
 def _insert(connection: sqlite3.Connection, table: str, row: rows.Row) -> None:
     names, marks = ", ".join(row), ", ".join(f":{name}" for name in row)
-    connection.execute(f"INSERT OR REPLACE INTO {table} ({names}) VALUES ({marks})", row)
+    statement = f"INSERT OR REPLACE INTO {table} ({names}) VALUES ({marks})"
+    connection.execute(statement, rows.storable(row))
 
 
 def _upsert(connection: sqlite3.Connection, table: str, key: str, row: rows.Row) -> None:
@@ -272,5 +273,5 @@ def _upsert(connection: sqlite3.Connection, table: str, key: str, row: rows.Row)
     connection.execute(
         f"INSERT INTO {table} ({names}) VALUES ({marks}) "
         f"ON CONFLICT ({key}) DO UPDATE SET {updates}",
-        row,
+        rows.storable(row),
     )

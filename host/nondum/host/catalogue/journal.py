@@ -26,7 +26,7 @@ def append(connection: sqlite3.Connection, entries: Sequence[JournalEntry], keep
         row = rows.entry_row(replace(entry, problems=entry.problems[:PROBLEMS_LIMIT]))
         names, marks = ", ".join(row), ", ".join(f":{name}" for name in row)
         statement = f"INSERT INTO journal ({names}) VALUES ({marks})"
-        last = connection.execute(statement, row).lastrowid or 0
+        last = connection.execute(statement, rows.storable(row)).lastrowid or 0
     if last:
         _let_go(connection, last - max(keep, KEEP_LEAST))
 

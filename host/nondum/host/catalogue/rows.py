@@ -36,6 +36,17 @@ def as_json(value: Any) -> str:
     return json.dumps(plain(value), ensure_ascii=False, separators=(",", ":"))
 
 
+def storable(row: Row) -> Row:
+    """A row that SQLite can have, whatever is in it: a half letter, which UTF-8 has not, is told by
+    its number."""
+    return {
+        name: value.encode("utf-8", "backslashreplace").decode()
+        if isinstance(value, str) and not value.isascii()
+        else value
+        for name, value in row.items()
+    }
+
+
 def _problems(text: str) -> tuple[Problem, ...]:
     return tuple(Problem(**problem) for problem in json.loads(text))
 

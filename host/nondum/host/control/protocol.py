@@ -75,7 +75,8 @@ def decode_answer(line: bytes) -> tuple[Any, tuple[Problem, ...]]:
 
 
 def _line(data: Mapping[str, Any]) -> bytes:
-    return json.dumps(data, ensure_ascii=False, separators=(",", ":")).encode() + b"\n"
+    text = json.dumps(data, ensure_ascii=False, separators=(",", ":"))
+    return text.encode("utf-8", "backslashreplace") + b"\n"  # half a letter is an escape in JSON
 
 
 def _violation(message: str) -> ProtocolViolation:

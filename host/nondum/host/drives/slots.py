@@ -1,6 +1,7 @@
 """Slots: folders whose entries, real folders or symlinks, stand for drives.
 
-Put an entry there by rename or as a symlink, so that it is whole the moment it appears.
+Put an entry there by rename or as a symlink, so that it is whole the moment it appears. What mounts
+drives by their labels lets strangers name entries: names that cannot be shown are not read.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from pathlib import Path
 
 from nondum.host.events import DriveInserted, DriveRemoved, DrivesScanned, Emit
 from nondum.host.inotify import folders_watched
+from nondum.sdk.errors import Problem
 
 _Identity = tuple[Path, int, str]
 """Path, inode and symlink target: an entry that is replaced is another drive."""
@@ -48,7 +50,13 @@ class SlotSource:
         for drive, identity in present.items():
             if drive not in self._seen:
                 self._seen[drive] = identity
-                emit(DriveInserted(drive, identity[0], self.kind))
+                emit(self._inserted(drive, identity[0]))
+
+    def _inserted(self, drive: str, path: Path) -> DriveInserted:
+        if path.name.isprintable():
+            return DriveInserted(drive, path, self.kind)
+        # It is told by the name that can be shown, and nothing is looked for there.
+        return DriveInserted(drive, path.parent / drive, self.kind, problems=(_unnameable(drive),))
 
     def _entries(self) -> Iterator[tuple[str, _Identity]]:
         for folder in self._folders:
@@ -59,7 +67,7 @@ class SlotSource:
                     log.debug("%s is no drive: %s", entry.path, error)
                     continue
                 if identity is not None:
-                    name = entry.name
+                    name = _shown(entry.name)
                     yield name if len(self._folders) == 1 else f"{folder.name}/{name}", identity
 
 
@@ -78,3 +86,22 @@ def _identity(entry: os.DirEntry[str]) -> _Identity | None:
         return None
     target = str(Path(entry.path).readlink()) if entry.is_symlink() else ""
     return Path(entry.path), entry.inode(), target
+
+
+def _shown(name: str) -> str:
+    r"""A name as it is told.
+
+    >>> _shown("stick"), _shown("stick\n")
+    ('stick', 'stick\\n')
+    """
+    return name if name.isprintable() else name.encode("unicode_escape").decode("ascii")
+
+
+def _unnameable(drive: str) -> Problem:
+    return Problem(
+        "DRIVE_NAME",
+        "its name has characters that cannot be shown, and it is not read",
+        where=drive,
+        need="letters, digits, blanks and signs, in UTF-8",
+        fix="give the drive another label, or mount it under another name",
+    )
