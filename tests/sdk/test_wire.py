@@ -146,6 +146,7 @@ def packed(value: Any) -> bytes:
         pytest.param(packed([2, 1, [1], {}]), "PACKET_FIELDS", id="verb-no-text"),
         pytest.param(packed([2, 1, "v", []]), "PACKET_FIELDS", id="body-no-table"),
         pytest.param(packed([0, [], "1", 1]), "PACKET_FIELDS", id="no-versions"),
+        pytest.param(packed([0, b"\1", "1", 1]), "PACKET_FIELDS", id="versions-no-list"),
         pytest.param(packed([4, 1, []]), "PACKET_FIELDS", id="no-problem"),
         pytest.param(packed([4, 1, 7]), "PACKET_FIELDS", id="problems-no-list"),
         pytest.param(packed([4, 1, [7]]), "PACKET_FIELDS", id="problem-no-table"),

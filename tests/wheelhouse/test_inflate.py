@@ -52,6 +52,13 @@ def test_bytes_behind_the_stream_are_refused(library: Any, tail: bytes) -> None:
 
 
 @either_library
+def test_no_more_is_fed_behind_the_stream(library: Any) -> None:
+    packed = memoryview(deflated(b"some") + bytes(MEGABYTE))
+    with pytest.raises(ValueError, match="bytes follow the packed ones"):
+        list(inflated(packed, library))
+
+
+@either_library
 @given(data=st.binary(min_size=1, max_size=2000), cut=st.integers(1, 100))
 def test_cut_streams_are_refused(library: Any, data: bytes, cut: int) -> None:
     packed = deflated(data)

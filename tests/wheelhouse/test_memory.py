@@ -24,22 +24,27 @@ def told(needs: Requires, have: Memory) -> list[str]:
 
 def test_what_is_promised_to_others_is_told_with_what_to_do() -> None:
     needs = Requires(memory_mb=600, gpu_memory_mb=600)
-    have = Memory(1000, Gpu(1000, 1000), Promised(700, 500, 450))
+    have = Memory(1000, Gpu(1000, 1000), Promised(700, 500, 450, ("a",), ("a", "b")))
     short, gpu_short = memory.problems(needs, have, "org.example.x")
     assert (short.code, short.need, short.have) == ("NO_MEMORY", "600 MB", "500 MB")
-    assert short.message == (
-        "there is too little memory, since 500 MB are promised to other payloads"
-    )
-    retry = "pull another payload, then `nondum retry org.example.x`, or use another host"
-    assert short.fix == gpu_short.fix == retry
+    assert short.message == ("there is too little memory, since 500 MB are promised to a")
+    retry = "then `nondum retry org.example.x`, or use another host"
+    assert short.fix == f"pull or uninstall it, {retry}"
+    assert gpu_short.fix == f"pull or uninstall one of them, {retry}"
     assert (gpu_short.code, gpu_short.need, gpu_short.have) == (
         "NO_GPU_MEMORY",
         "600 MB",
         "550 MB",
     )
     assert gpu_short.message == (
-        "there is too little GPU memory, since 450 MB are promised to other payloads"
+        "there is too little GPU memory, since 450 MB are promised to a, b"
     )
+
+
+def test_of_many_who_hold_it_some_are_told() -> None:
+    have = Memory(1000, promised=Promised(900, 900, holders=tuple("abcde")))
+    (short,) = memory.problems(Requires(memory_mb=600), have, "org.example.x")
+    assert short.message.endswith("since 900 MB are promised to a, b, c …")
 
 
 def test_nobody_is_told_to_pull_what_has_no_part_in_it() -> None:

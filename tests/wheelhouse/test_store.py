@@ -128,6 +128,12 @@ def test_another_wheel_than_the_locked_is_refused(store: Store, tmp_path: Path) 
     assert list(store.root.iterdir()) == []
 
 
+def test_what_is_not_there_cannot_be_compiled(store: Store) -> None:
+    with pytest.raises(InstallFailed) as failed:
+        store.compile("0" * 64)
+    assert failed.value.code == "STORE_MISSING"
+
+
 def test_a_hostile_wheel_leaves_nothing(store: Store, tmp_path: Path) -> None:
     record = record_of(
         {"evil/__init__.py": b"?", f"{INFO}/METADATA": b"", f"{INFO}/WHEEL": WHEEL},

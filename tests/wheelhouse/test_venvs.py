@@ -86,11 +86,18 @@ def test_the_same_file_of_two_wheels_is_linked_once(store: Store, tmp_path: Path
     assert (venvs.site_packages(tmp_path / "venv") / "ns/b.py").exists()
 
 
-@pytest.mark.parametrize("other", ["ns/x.py", "ns/x.py/y.py"], ids=["contents", "folder"])
-def test_colliding_wheels_are_refused(store: Store, tmp_path: Path, other: str) -> None:
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        pytest.param("ns/x.py", "ns/x.py", id="contents"),
+        pytest.param("ns/x.py", "ns/x.py/y.py", id="folder where a file is"),
+        pytest.param("ns/x.py/y.py", "ns/x.py", id="file where a folder is"),
+    ],
+)
+def test_colliding_wheels_are_refused(store: Store, tmp_path: Path, one: str, other: str) -> None:
     wheels = stored(
         store,
-        make_wheel(tmp_path, "one", "1", {"ns/x.py": "1"}),
+        make_wheel(tmp_path, "one", "1", {one: "1"}),
         make_wheel(tmp_path, "two", "1", {other: "2"}),
     )
     with pytest.raises(InstallFailed) as failed:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from tests.payloads import Part, make_payload, make_wheel, seal
+from tests.signing import Key, sign_payload, trust_of
 from tests.wheelhouse.hostile import WHEELS, HostileWheel
 from tests.wheelhouse.hostile_wheels import WheelBuilder
 
@@ -17,6 +18,7 @@ from nondum.wheelhouse.verification import Verified, verify
 
 ID = "org.example.test"
 PLAIN = Part("blinker", "X = 1\n", with_sdk=False)
+ALICE = Key("alice")
 NOBODY_TRUSTED = Judging(None, Circumstances())
 
 
@@ -46,6 +48,18 @@ def test_missing_signatures_are_told_first(folder: Path) -> None:
 def test_signatures_that_are_none_are_told(folder: Path) -> None:
     (folder / "CONTENTS.sig").write_text("signed")
     assert codes(verify(folder, NOBODY_TRUSTED)) == ["SIG_MALFORMED"]
+
+
+def test_what_its_signer_may_not_grant_is_told(folder: Path) -> None:
+    manifest = folder / "payload.toml"
+    asking = 'permissions = ["network"]\ndistribution'
+    manifest.write_text(manifest.read_text().replace("distribution", asking, 1))
+    seal(folder, payload_id=ID)
+    sign_payload(folder, ALICE)
+    for permissions, told in (("network",), []), ((), ["PERMISSION_DENIED"]):
+        roles = {"maker": ([ID], [ALICE])}
+        trust = trust_of(roots=[ALICE], roles=roles, permissions=permissions)
+        assert codes(verify(folder, Judging(trust, Circumstances()))) == told
 
 
 def test_what_a_host_would_not_come_to_is_told_too(folder: Path) -> None:

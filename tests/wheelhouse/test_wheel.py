@@ -273,6 +273,11 @@ def test_no_wheel_name_is_refused(tmp_path: Path, name: str) -> None:
     assert [p.code for p in problems] == ["WHEEL_STRUCTURE"]
 
 
+def test_file_in_the_place_of_a_scheme_is_refused(tmp_path: Path) -> None:
+    path = with_file("evil-1.0.data/scripts").write(tmp_path)
+    assert [p.code for p in wheel.check(path)] == ["WHEEL_DATA_SCHEME"]
+
+
 def test_hooks_that_the_manifest_names_are_left_out(tmp_path: Path) -> None:
     path = with_file("evil.pth", b"import evil\n").write(tmp_path)
     assert [p.code for p in wheel.check(path, ["other.pth"])] == ["WHEEL_STARTUP_HOOK"]
