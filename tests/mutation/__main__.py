@@ -1,7 +1,7 @@
 """Remove each step of verification in turn, and see a test fail: `python -m tests.mutation`.
 
-What the page has already is not tried again, unless `--all` is given. Exits with 1 when a step has
-no guard.
+What the page has already is not tried again, unless `--all` is given; then the guard that it names
+is tried first. Exits with 1 when a step has no guard.
 """
 
 from __future__ import annotations
@@ -11,15 +11,16 @@ import os
 import queue
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 
 from tests.mutation import page
 from tests.mutation.guards import GUARDS
 from tests.mutation.page import Key
 from tests.mutation.steps import Step, steps_in
-from tests.mutation.trial import Copy
+from tests.mutation.trial import Copy, copies
 
 ROOT = Path(__file__).parents[2]
 
@@ -27,47 +28,58 @@ ROOT = Path(__file__).parents[2]
 def main() -> int:
     """Try the steps, write the page."""
     options = _options()
-    steps = page.keyed(steps_in(ROOT, tuple(GUARDS)))
     known = page.read(page.PAGE.read_text("utf-8")) if page.PAGE.exists() else {}
-    old = {key: known[key] for key in steps if key in known and known[key] != page.MISSING}
-    due = [
-        key
-        for key in steps
-        if (options.all or key not in old) and (options.only or "") in key.module
-    ]
-    guards = {**old}
-    with tempfile.TemporaryDirectory(prefix="nondum-mutation-") as folder:
-        for number, (key, guard) in enumerate(_tried(Path(folder), steps, due), start=1):
+    known = {key: guard for key, guard in known.items() if guard != page.MISSING}
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="nondum-mutation-")))
+        made = [stack.enter_context(copy) for copy in copies(ROOT, folder, os.cpu_count() or 1)]
+        steps = page.keyed(steps_in(made[0].folder, tuple(GUARDS)))
+        due = [
+            key
+            for key in steps
+            if (options.all or key not in known) and (options.only or "") in key.module
+        ]
+        guards = {key: known[key] for key in steps if key in known}
+        for number, (key, guard) in enumerate(_tried(made, steps, due, known), start=1):
             guards[key] = guard or page.MISSING
             sys.stdout.write(f"{number}/{len(due)} {steps[key].name}: {guards[key]}\n")
             sys.stdout.flush()
             listed = {key: guards[key] for key in steps if key in guards}
             page.PAGE.parent.mkdir(exist_ok=True)
             page.PAGE.write_text(page.written(listed), encoding="utf-8")
-    return 1 if page.MISSING in guards.values() else 0
+    missing = [key for key in due if guards.get(key, page.MISSING) == page.MISSING]
+    sys.stdout.write(f"{len(steps)} steps, {len(due)} tried, {len(missing)} without a guard\n")
+    return 1 if missing else 0
 
 
-def _tried(folder: Path, steps: dict[Key, Step], due: list[Key]) -> Iterator[tuple[Key, str]]:
+def _tried(
+    made: Sequence[Copy], steps: dict[Key, Step], due: list[Key], known: Mapping[Key, str]
+) -> Iterator[tuple[Key, str]]:
     """Each step that is due, with its guard, as they come."""
-    count = os.cpu_count() or 1
-    copies: queue.Queue[Copy] = queue.Queue()
-    for number in range(count):
-        copies.put(Copy(ROOT, folder / str(number)))
-    first = copies.get()
-    for guarding in dict.fromkeys(GUARDS[key.module] for key in due):
-        if failed := first.first_failure(guarding):
-            sys.exit(f"error: fails with every step in place: {failed}")
-    copies.put(first)
+    idle: queue.Queue[Copy] = queue.Queue()
+    for copy in made:
+        idle.put(copy)
+
+    def failure(guards: tuple[str, ...]) -> str:
+        copy = idle.get()
+        try:
+            return copy.first_failure(guards)
+        finally:
+            idle.put(copy)
 
     def tried(key: Key) -> tuple[Key, str]:
-        copy = copies.get()
+        copy = idle.get()
         try:
-            return key, copy.guard_of(steps[key], GUARDS[key.module])
+            return key, copy.guard_of(steps[key], GUARDS[key.module], known.get(key, ""))
         finally:
-            copies.put(copy)
+            idle.put(copy)
 
-    with ThreadPoolExecutor(count) as pool:
-        yield from pool.map(tried, due)
+    with ThreadPoolExecutor(len(made)) as pool:
+        every = tuple(dict.fromkeys(GUARDS[key.module] for key in due))
+        failed = dict(zip(every, pool.map(failure, every), strict=True))
+        for test in filter(None, failed.values()):
+            sys.stdout.write(f"error: fails with every step in place: {test}\n")
+        yield from pool.map(tried, [key for key in due if not failed[GUARDS[key.module]]])
 
 
 def _options() -> argparse.Namespace:

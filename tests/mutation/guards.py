@@ -5,27 +5,141 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 _W, _TW = "wheelhouse/nondum/wheelhouse", "tests/wheelhouse"
+_H, _TH = "host/nondum/host", "tests/host"
+_S, _TS = "plugins/sdk/nondum/sdk", "tests/sdk"
+_WHEELS = (f"{_TW}/test_wheel.py",)
+_BLOCKS = (f"{_TH}/drives/test_blocks.py",)
+_RELEASES = (f"{_TH}/lifecycle/test_releases.py", f"{_TH}/trust/test_releases_of_strangers.py")
+_CONTROL = (f"{_TH}/control/test_arguments.py", f"{_TH}/control/test_control.py")
+_HELPER = (f"{_TH}/helper/test_server.py",)
 
 GUARDS: Mapping[str, tuple[str, ...]] = {
-    f"{_W}/trust/wire.py": (f"{_TW}/trust",),
-    f"{_W}/trust/public_key.py": (f"{_TW}/trust",),
-    f"{_W}/trust/sshsig.py": (f"{_TW}/trust",),
-    f"{_W}/trust/trust_file.py": (f"{_TW}/trust",),
-    f"{_W}/trust/judging.py": (f"{_TW}/trust",),
-    f"{_W}/contents.py": (f"{_TW}/test_contents.py",),
-    f"{_W}/names.py": (f"{_TW}/test_contents.py", f"{_TW}/test_lock.py", f"{_TW}/test_wheel.py"),
+    # Who is believed.
+    f"{_W}/trust/wire.py": (f"{_TW}/trust/test_sshsig.py",),
+    f"{_W}/trust/public_key.py": (f"{_TW}/trust/test_sshsig.py", f"{_TW}/trust/test_trust_file.py"),
+    f"{_W}/trust/sshsig.py": (f"{_TW}/trust/test_sshsig.py",),
+    f"{_W}/trust/trust_file.py": (f"{_TW}/trust/test_trust_file.py",),
+    f"{_W}/trust/judging.py": (f"{_TW}/trust/test_judging.py",),
+    f"{_W}/trust/succession.py": (f"{_TW}/trust/test_succession.py",),
+    f"{_W}/trust/editing.py": (f"{_TW}/trust/test_editing.py",),
+    f"{_W}/trust/owners_folder.py": (f"{_TW}/trust/test_editing.py",),
+    f"{_W}/trust/signing.py": (f"{_TW}/trust/test_signing.py",),
+    f"{_W}/signatures.py": (f"{_TW}/trust/test_judging.py",),
+    f"{_H}/trust/chain.py": (f"{_TH}/trust/test_chain.py",),
+    f"{_H}/trust/payload_trust.py": (f"{_TH}/trust/test_payload_trust.py",),
+    # What drives are, and what is read of them.
+    f"{_H}/drives/blocks.py": _BLOCKS,
+    f"{_H}/drives/mounting.py": _BLOCKS,
+    f"{_H}/drives/nodes.py": _BLOCKS,
+    f"{_H}/drives/usb.py": (f"{_TH}/drives/test_usb.py",),
+    f"{_H}/drives/slots.py": (f"{_TH}/drives/test_slots.py",),
+    f"{_H}/drives/reading.py": (f"{_TH}/drives/test_reading.py",),
+    f"{_H}/drives/reader.py": (f"{_TH}/drives/test_reader.py",),
+    f"{_H}/drives/trial.py": (f"{_TH}/drives/test_trial.py",),
+    f"{_H}/drives/parcel.py": (f"{_TH}/drives/test_parcel.py",),
     f"{_W}/drive.py": (f"{_TW}/test_drive.py",),
-    f"{_W}/tables.py": (f"{_TW}/test_manifest.py",),
+    # What a payload says of itself.
+    f"{_W}/contents.py": (f"{_TW}/test_contents.py",),
+    f"{_W}/names.py": (f"{_TW}/test_names.py",),
+    f"{_W}/tables.py": (f"{_TW}/test_manifest.py", f"{_TW}/trust/test_trust_file.py"),
     f"{_W}/manifest.py": (f"{_TW}/test_manifest.py",),
     f"{_W}/lock.py": (f"{_TW}/test_lock.py",),
-    f"{_W}/index.py": (f"{_TW}/test_payload.py",),
+    f"{_W}/index.py": (f"{_TW}/test_index.py",),
     f"{_W}/payload.py": (f"{_TW}/test_payload.py",),
-    f"{_W}/preflight.py": (f"{_TW}/test_preflight.py",),
-    f"{_W}/archive.py": (f"{_TW}/test_wheel.py", f"{_TW}/hostile"),
-    f"{_W}/wheel.py": (f"{_TW}/test_wheel.py", f"{_TW}/hostile"),
-    f"{_W}/dist_info.py": (f"{_TW}/test_wheel.py", f"{_TW}/hostile"),
-    f"{_W}/record.py": (f"{_TW}/test_wheel.py", f"{_TW}/hostile"),
-    "plugins/sdk/nondum/sdk/wire.py": ("tests/sdk/test_wire.py",),
-    "plugins/sdk/nondum/sdk/wire_fields.py": ("tests/sdk/test_wire.py",),
+    f"{_W}/verification.py": (f"{_TW}/test_verification.py",),
+    f"{_W}/preflight.py": (
+        f"{_TW}/test_preflight.py",
+        f"{_TW}/test_payload.py",
+        f"{_TW}/test_verification.py",
+    ),
+    f"{_W}/memory.py": (f"{_TW}/test_memory.py",),
+    # Its wheels.
+    f"{_W}/archive.py": _WHEELS,
+    f"{_W}/outline.py": (f"{_TW}/test_outline.py", *_WHEELS),
+    f"{_W}/inflate.py": (f"{_TW}/test_inflate.py",),
+    f"{_W}/wheel.py": _WHEELS,
+    f"{_W}/dist_info.py": (f"{_TW}/test_dist_info.py", *_WHEELS),
+    f"{_W}/record.py": (f"{_TW}/test_record.py", *_WHEELS),
+    f"{_W}/extensions.py": (f"{_TW}/test_extensions.py", *_WHEELS),
+    f"{_W}/unpacking.py": (f"{_TW}/test_store.py",),
+    f"{_W}/store.py": (f"{_TW}/test_store.py",),
+    f"{_W}/checking.py": (f"{_TW}/test_checking.py",),
+    f"{_W}/venvs.py": (f"{_TW}/test_venvs.py",),
+    # Whether it may come in, among what is here.
+    f"{_H}/lifecycle/admission.py": _RELEASES,
+    f"{_H}/lifecycle/going_back.py": _RELEASES,
+    f"{_H}/lifecycle/releases.py": _RELEASES,
+    f"{_H}/lifecycle/payload_rules.py": (*_RELEASES, f"{_TH}/lifecycle/test_tries.py"),
+    f"{_H}/lifecycle/drive_rules.py": (f"{_TH}/lifecycle/test_tries.py",),
+    f"{_H}/lifecycle/tries.py": (f"{_TH}/lifecycle/test_tries.py",),
+    f"{_H}/lifecycle/installing.py": (f"{_TH}/lifecycle/test_promises.py",),
+    f"{_H}/lifecycle/rebuilding.py": (f"{_TH}/catalogue/test_backups.py",),
+    # What its workers send, and take.
+    f"{_S}/wire.py": (f"{_TS}/test_wire.py",),
+    f"{_S}/wire_fields.py": (f"{_TS}/test_wire.py",),
+    f"{_H}/workers/index.py": (f"{_TH}/workers/test_index.py",),
+    f"{_H}/workers/news.py": (f"{_TH}/workers/test_news.py", f"{_TH}/test_news.py"),
+    f"{_H}/workers/excess.py": (f"{_TH}/workers/test_excesses.py",),
+    # How they are confined.
+    f"{_H}/confinement/choice.py": ("tests/confinement/test_level.py",),
+    f"{_H}/confinement/level.py": ("tests/confinement/test_level.py",),
+    f"{_H}/confinement/systemd.py": ("tests/confinement/test_systemd.py",),
+    f"{_H}/confinement/systemd_warden.py": ("tests/confinement/test_systemd.py",),
+    f"{_H}/helper/requests.py": (f"{_TH}/helper/test_requests.py",),
+    f"{_H}/helper/disks.py": (f"{_TH}/helper/test_disks.py",),
+    f"{_H}/helper/nodes.py": (f"{_TH}/helper/test_nodes.py",),
+    f"{_H}/helper/service.py": _HELPER,
+    f"{_H}/helper/server.py": _HELPER,
+    f"{_H}/helper/client.py": _HELPER,
+    # What people and programs of this machine ask for.
+    f"{_H}/control/arguments.py": _CONTROL,
+    f"{_H}/control/protocol.py": _CONTROL,
+    f"{_H}/control/server.py": _CONTROL,
 }
-"""Module → tests. The packages of what is plugged in, from its signature to its last wheel."""
+"""Module → tests. What is plugged in, from its signature to its last frame."""
+
+ROOMS = (
+    _W,
+    f"{_H}/trust",
+    f"{_H}/drives",
+    f"{_H}/helper",
+    f"{_H}/confinement",
+    f"{_H}/control",
+    f"{_H}/lifecycle",
+    f"{_H}/workers",
+)
+"""Folders in which every module that refuses something is guarded, or stands aside."""
+
+_BUILDS = "builds payloads, which are judged where they are plugged in"
+_SPEAKS = "finds words for what another has refused"
+_RUNS = "tells how work of this host's own has ended"
+ASIDE: Mapping[str, str] = {
+    f"{_W}/build.py": _BUILDS,
+    f"{_W}/capture.py": _BUILDS,
+    f"{_W}/resolve.py": _BUILDS,
+    f"{_W}/scaffold.py": _BUILDS,
+    f"{_W}/target.py": _BUILDS,
+    f"{_W}/disk.py": _SPEAKS,
+    f"{_H}/drives/steady.py": "tells once of a cable; what is read of a drive is judged elsewhere",
+    f"{_H}/helper/__main__.py": "is started by systemd only",
+    f"{_H}/confinement/systemd_stand_in.py": _RUNS,
+    f"{_H}/control/client.py": "reads what the daemon answers",
+    f"{_H}/control/tap.py": "passes on what the daemon tells",
+    f"{_H}/lifecycle/child.py": _RUNS,
+    f"{_H}/lifecycle/children.py": _RUNS,
+    f"{_H}/lifecycle/compiling.py": _RUNS,
+    f"{_H}/lifecycle/executor.py": _RUNS,
+    f"{_H}/lifecycle/folders.py": "sees that one daemon has the state folder",
+    f"{_H}/lifecycle/installation.py": _RUNS,
+    f"{_H}/lifecycle/installed.py": _RUNS,
+    f"{_H}/lifecycle/recovery.py": _RUNS,
+    f"{_H}/workers/confinements.py": _RUNS,
+    f"{_H}/workers/keeper.py": _RUNS,
+    f"{_H}/workers/leftovers.py": _RUNS,
+    f"{_H}/workers/output.py": _RUNS,
+    f"{_H}/workers/problems.py": _SPEAKS,
+    f"{_H}/workers/supervisor.py": _RUNS,
+    f"{_H}/workers/worker.py": _SPEAKS,
+    f"{_H}/workers/workers.py": _RUNS,
+}
+"""Module → why removing a refusal from it lets nothing in."""

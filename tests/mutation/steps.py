@@ -1,8 +1,14 @@
 """The steps of verification: every condition under which something foreign is refused.
 
-A step is the condition of an `if`, or the guard of a `case`, whose body does nothing but refuse: it
-raises, tells a problem, or returns what is wrong. Of `a or b` each is a step of its own. Without
-the step, the condition never holds.
+Refusing is raising, telling a problem, or returning what is wrong. A step is what leads to it:
+
+- the condition of an `if`, or the guard of a `case`, whose body does nothing but refuse; of
+  `a or b` each is a step of its own, and of `not (a and b)` and `not 0 < a <= 9`, too;
+- the condition that must hold if the refusal that follows, or stands in `else`, is not to come;
+- a `case` or `except` that does nothing but refuse, and the loop that finds what to tell;
+- the call by which the flaws that another function finds are told with the others.
+
+Without the step, the refusal never comes; what its condition reads on the way is still read.
 """
 
 from __future__ import annotations
@@ -12,22 +18,41 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
-_TELLS = re.compile(r"(^|_)(problem|refuse|refused|flaw|violation|malformed|add|unsafe|refusal)s?$")
+_TELLS = re.compile(
+    r"(^|_)(problem|refuse|refused|flaw|violation|malformed|unsafe|refusal|wrong|contradiction)s?$"
+    r"|^_twice$"
+)
 """What a function or class is called that makes or tells a problem."""
+_CHECKS = re.compile(r"\._?(check|verify|require|raise_if|tell_twice|trial\.run)(_|$)|_if_any$")
+"""What one is called that raises or tells what is wrong, and returns nothing."""
+_REFUSALS = re.compile(r"\bProblem\b|Refused|Failed|Gone|Violation|Malformed|NoReturn|NondumError")
+"""What those return that make or tell one, whatever they are called."""
+_TOLD = frozenset({"problem", "problems", "flaw", "flaws"})
+_MACHINE = frozenset({"OSError", "TimeoutError", "subprocess.TimeoutExpired"})
+"""What these tell went wrong in this machine, and not with what was plugged in."""
+_JUDGES = re.compile(r"(flaw|overlap|use|excess|contradiction|twice)s?$")
+"""What functions are called that return what is wrong as text."""
+
+_Function = ast.FunctionDef | ast.AsyncFunctionDef
+_Branch = ast.If | ast.match_case | ast.ExceptHandler
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A condition, and where its test stands in the text."""
+    """What leads to a refusal, and where it stands in the text."""
 
     module: str
     """Path from the root of the checkout."""
     line: int
     condition: str
+    """When it refuses, in the words of the source."""
     start: int
     end: int
     """In characters of the module's text."""
+    instead: str
+    """What stands there without the step."""
 
     @property
     def name(self) -> str:
@@ -36,22 +61,36 @@ class Step:
 
     def removed(self, text: str) -> str:
         """The module without this step."""
-        return f"{text[: self.start]}False{text[self.end :]}"
+        return f"{text[: self.start]}{self.instead}{text[self.end :]}"
+
+
+class _Found(NamedTuple):
+    """A step in the tree: where, what stands there instead, and when it refuses. In both texts `{}`
+    is for the source."""
+
+    start: tuple[int, int]
+    end: tuple[int, int]
+    """Line and column, as the parser counts."""
+    instead: str
+    told: str = "{}"
 
 
 def steps_of(module: str, text: str) -> tuple[Step, ...]:
     """Every step of a module, in order.
 
     >>> steps_of("m.py", "if a > 1:\\n    raise Refused()\\n")[0].removed("if a > 1: …")
-    'if False: …'
+    'if ((a > 1) and False): …'
     """
     starts = _line_starts(text)
-    found = []
-    for test in _conditions(ast.parse(text)):
-        start, end = _span(test, starts, text)
-        condition = " ".join(text[start:end].split())
-        found.append(Step(module, test.lineno, condition, start, end))
-    return tuple(sorted(found, key=lambda step: step.start))
+    steps: dict[tuple[int, int], Step] = {}
+    for from_, to, instead, told in _Finder().found(ast.parse(text)):
+        start, end = _offset(*from_, starts, text), _offset(*to, starts, text)
+        source = text[start:end]
+        condition = " ".join(told.replace("{}", source).split())
+        line = text.count("\n", 0, start) + 1
+        step = Step(module, line, condition, start, end, instead.replace("{}", source))
+        steps.setdefault((start, end), step)
+    return tuple(sorted(steps.values(), key=lambda step: (step.start, -step.end)))
 
 
 def steps_in(root: Path, modules: Sequence[str]) -> tuple[Step, ...]:
@@ -63,60 +102,228 @@ def steps_in(root: Path, modules: Sequence[str]) -> tuple[Step, ...]:
     )
 
 
-def _conditions(tree: ast.AST) -> Iterator[ast.expr]:
-    for node in ast.walk(tree):
+class _Finder:
+    """Goes through a module; knows in which function it is."""
+
+    def __init__(self) -> None:
+        self._function: _Function | None = None
+        self._is_telling = False
+        self._tellers: frozenset[str] = frozenset()
+
+    def found(self, tree: ast.AST) -> Iterator[_Found]:
+        """The steps in and below a node."""
+        if isinstance(tree, ast.Module):
+            self._tellers = frozenset(_tellers(tree))
+        outside = self._function, self._is_telling
+        if isinstance(tree, _Function):
+            self._function = tree
+        yield from self._at(tree)
+        self._is_telling |= isinstance(tree, _Branch) and self._refuses(tree.body)
+        for node in ast.iter_child_nodes(tree):
+            yield from self.found(node)
+        self._function, self._is_telling = outside
+
+    def _at(self, node: ast.AST) -> Iterator[_Found]:
         match node:
-            case ast.If(test=test, body=body) if _refuses(body):
+            case ast.If(test=test, body=body) if self._refuses(body):
                 yield from _alternatives(test)
-            case ast.match_case(guard=ast.expr() as guard, body=body) if _refuses(body):
+            case ast.If(test=test, orelse=orelse) if self._refuses(orelse):
+                yield from _necessities(test)
+            case ast.IfExp(test=test, body=body) if self._makes_problem(body):
+                yield from _alternatives(test)
+            case ast.IfExp(test=test, orelse=orelse) if self._makes_problem(orelse):
+                yield from _necessities(test)
+            case ast.match_case(guard=ast.expr() as guard, body=body) if self._refuses(body):
                 yield from _alternatives(guard)
+            case ast.match_case(guard=None, pattern=pattern, body=body) if self._refuses(body):
+                yield _whole(pattern, "{} if False", "case {}")
+            case ast.ExceptHandler(type=ast.expr() as kind, body=body) if (
+                self._refuses(body) and ast.unparse(kind) not in _MACHINE
+            ):
+                yield _whole(kind, "()", "except {}")
+            case ast.For(iter=each, body=body) if self._refuses(body):
+                yield _whole(each, "()", "for … in {}")
+            case (
+                ast.GeneratorExp(elt=made, generators=parts)
+                | ast.ListComp(elt=made, generators=parts)
+            ) if self._makes_problem(made):
+                conditions = [condition for part in parts for condition in part.ifs]
+                for condition in conditions:
+                    yield from _alternatives(condition)
+                if not conditions and not self._is_telling:
+                    yield _whole(parts[-1].iter, "()", "for … in {}")
+            case (
+                ast.Starred(value=ast.Call() as call)
+                | ast.YieldFrom(value=ast.Call() as call)
+                | ast.AugAssign(op=ast.Add(), value=ast.Call() as call)
+                | ast.Call(func=ast.Attribute(attr="extend"), args=[ast.Call() as call])
+            ) if self._is_teller(call):
+                yield _whole(call, "()")
+            case ast.Expr(value=ast.Call(func=ast.Attribute(value=ast.Name(), attr="end")) as call):
+                if not call.args:  # of a reader, that nothing is left
+                    yield _whole(call, "None")
+            case ast.Expr(value=ast.Call() as call) if _is_check(call):
+                yield _whole(call, "None")
+            case ast.Return(value=ast.expr() as value) if self._is_judge(ast.Constant(value=False)):
+                if not isinstance(value, ast.Constant | ast.Name):
+                    yield from _necessities(value)
+        yield from self._before_refusals(node)
+
+    def _before_refusals(self, node: ast.AST) -> Iterator[_Found]:
+        """Conditions that must hold, or what stands next refuses."""
+        for part in (getattr(node, "body", None), getattr(node, "orelse", None)):
+            block: list[ast.stmt] = part if isinstance(part, list) else []
+            for index, statement in enumerate(block):
+                match statement:
+                    case ast.If(test=test, body=[*_, ast.Return() | ast.Continue()], orelse=[]):
+                        if not self._refuses(statement.body) and self._refuses(block[index + 1 :]):
+                            yield from _necessities(test)
+
+    def _refuses(self, body: Sequence[ast.stmt]) -> bool:
+        """Whether a body does nothing but refuse, in words of its own."""
+        others = (ast.Assign, ast.Expr, ast.Continue, ast.Break, ast.Return)
+        refusals = [self._is_refusal(one) for one in body]
+        return any(refusals) and all(
+            refuses or isinstance(one, others) for refuses, one in zip(refusals, body, strict=True)
+        )
+
+    def _is_refusal(self, statement: ast.stmt) -> bool:
+        match statement:
+            case ast.Raise(exc=ast.expr() as raised):
+                return not (isinstance(raised, ast.Call) and _name(raised) in _MACHINE)
+            case ast.Return(value=ast.expr() as value):
+                return self._makes_problem(value) or _tells_some(value) or self._is_judge(value)
+            case ast.Expr(value=ast.Yield(value=ast.expr() as value)):
+                return self._makes_problem(value) or self._is_judge(value)
+            case ast.Expr(value=ast.Call() as value):
+                return self._makes_problem(value) and not _is_check(value)
+        return False
+
+    def _is_judge(self, said: ast.expr) -> bool:
+        """Whether the function that says it says what is wrong by that, or that something is."""
+        if self._function is None:
+            return False
+        match said:
+            case ast.Constant(value=False):
+                return _is_bool(self._function)
+            case ast.Constant(value=str(text)):
+                return bool(text) and bool(_JUDGES.search(self._function.name))
+            case ast.JoinedStr() | ast.Tuple(elts=[ast.Constant(value=str()), *_]):
+                return bool(_JUDGES.search(self._function.name))
+        return False
+
+    def _makes_problem(self, value: ast.AST) -> bool:
+        """Whether a value is made by what makes problems."""
+        return any(
+            isinstance(node, ast.Call)
+            and (self._is_teller(node) or ast.unparse(node.func).endswith("report.add"))
+            for node in ast.walk(value)
+        )
+
+    def _is_teller(self, call: ast.Call) -> bool:
+        name = _name(call)
+        return bool(_TELLS.search(name.lower())) or name in self._tellers
 
 
-def _alternatives(test: ast.expr) -> Iterator[ast.expr]:
-    """Each of the conditions that suffices by itself."""
-    if isinstance(test, ast.BoolOp) and isinstance(test.op, ast.Or):
-        for value in test.values:
-            yield from _alternatives(value)
-    else:
-        yield test
-
-
-def _refuses(body: Sequence[ast.stmt]) -> bool:
-    """Whether a body ends in a refusal, with nothing before it but words."""
-    *before, last = body
-    return all(isinstance(one, ast.Assign) for one in before) and _is_refusal(last)
-
-
-def _is_refusal(statement: ast.stmt) -> bool:
-    match statement:
-        case ast.Raise(exc=ast.expr()):
-            return True
-        case ast.Return(value=ast.Constant(value=str(said))):
-            return bool(said)
-        case ast.Return(value=ast.JoinedStr()):
-            return True
-        case ast.Return(value=ast.expr() as value) | ast.Expr(value=ast.expr() as value):
-            return any(_TELLS.search(name) for name in _called(value))
-    return False
-
-
-def _called(value: ast.expr) -> Iterator[str]:
-    for node in ast.walk(value):
-        match node:
-            case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name)):
-                yield name.lower()
-
-
-def _span(node: ast.expr, starts: Sequence[int], text: str) -> tuple[int, int]:
-    """Where an expression stands, in characters; the parser counts UTF-8 bytes."""
-    assert node.end_lineno is not None and node.end_col_offset is not None
+def _is_bool(function: _Function) -> bool:
+    """Whether a function says False of what is not good, and where."""
     return (
-        _offset(node.lineno, node.col_offset, starts, text),
-        _offset(node.end_lineno, node.end_col_offset, starts, text),
+        isinstance(function.returns, ast.Name)
+        and function.returns.id == "bool"
+        and any(
+            isinstance(node, ast.Return)
+            and isinstance(node.value, ast.Constant)
+            and node.value.value is False
+            for node in ast.walk(function)
+        )
     )
 
 
+def _is_check(call: ast.Call) -> bool:
+    """Whether a call raises or tells by itself when something is wrong."""
+    return bool(_CHECKS.search(f".{ast.unparse(call.func)}"))
+
+
+def _alternatives(test: ast.expr) -> Iterator[_Found]:
+    """Each of the conditions that suffices by itself, so that it never holds."""
+    match test:
+        case ast.BoolOp(op=ast.Or(), values=values):
+            for value in values:
+                yield from _alternatives(value)
+        case ast.NamedExpr(value=ast.BoolOp(op=ast.Or(), values=values)):
+            for value in values:
+                yield _whole(value, "(({}) and None)")
+        case ast.UnaryOp(op=ast.Not(), operand=ast.BoolOp(op=ast.And()) as all_of):
+            yield from _necessities(all_of)
+        case ast.UnaryOp(op=ast.Not(), operand=ast.Compare(ops=[_, _]) as between):
+            yield from _bounds(between)
+        case _:
+            yield _whole(test, "(({}) and False)")
+
+
+def _necessities(test: ast.expr) -> Iterator[_Found]:
+    """Each of the conditions that must hold, so that it always does."""
+    match test:
+        case ast.BoolOp(op=ast.And(), values=values):
+            for value in values:
+                yield from _necessities(value)
+        case ast.UnaryOp(op=ast.Not(), operand=operand):
+            yield from _alternatives(operand)
+        case ast.Compare(ops=[_, _]):
+            yield from _bounds(test)
+        case _:
+            yield _whole(test, "(({}) or True)", "not ({})")
+
+
+def _bounds(between: ast.Compare) -> Iterator[_Found]:
+    """Of `low < middle <= high`, each half."""
+    low, middle, high = between.left, *between.comparators
+    below, above = between.ops
+    lower = ast.Compare(left=low, ops=[below], comparators=[middle])
+    upper = ast.Compare(left=middle, ops=[above], comparators=[high])
+    yield _Found(_start(low), _start(middle), "", f"not {ast.unparse(lower)}")
+    yield _Found(_end(middle), _end(high), "", f"not {ast.unparse(upper)}")
+
+
+def _whole(node: ast.expr | ast.pattern, instead: str, told: str = "{}") -> _Found:
+    return _Found(_start(node), _end(node), instead, told)
+
+
+def _start(node: ast.expr | ast.pattern) -> tuple[int, int]:
+    return node.lineno, node.col_offset
+
+
+def _end(node: ast.expr | ast.pattern) -> tuple[int, int]:
+    assert node.end_lineno is not None and node.end_col_offset is not None
+    return node.end_lineno, node.end_col_offset
+
+
+def _tellers(module: ast.Module) -> Iterator[str]:
+    """Functions of a module that return nothing but problems, or never."""
+    for node in ast.walk(module):
+        if isinstance(node, _Function) and node.returns is not None:
+            returns = ast.unparse(node.returns)
+            if _REFUSALS.search(returns) and "None" not in returns:
+                yield node.name
+
+
+def _tells_some(value: ast.expr) -> bool:
+    return any(
+        isinstance(node, ast.Name | ast.Attribute)
+        and (node.id if isinstance(node, ast.Name) else node.attr) in _TOLD
+        for node in ast.walk(value)
+    )
+
+
+def _name(call: ast.Call) -> str:
+    match call.func:
+        case ast.Name(id=name) | ast.Attribute(attr=name):
+            return name
+    return ""
+
+
 def _offset(line: int, column: int, starts: Sequence[int], text: str) -> int:
+    """In characters; the parser counts UTF-8 bytes."""
     start = starts[line - 1]
     end = starts[line] if line < len(starts) else len(text)
     return start + len(text[start:end].encode()[:column].decode())

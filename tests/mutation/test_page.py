@@ -2,55 +2,87 @@
 
 from __future__ import annotations
 
+import ast
 from pathlib import Path
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.mutation import page
-from tests.mutation.guards import GUARDS
+from tests.mutation.guards import ASIDE, GUARDS, ROOMS
 from tests.mutation.page import Key
 from tests.mutation.steps import steps_in, steps_of
 
 ROOT = Path(__file__).parents[2]
 
-SOURCE = """\
-def check(size, kind, name):
-    if size > 10 or kind is None:
-        raise Refused("too long")
-    if name:
-        count = len(name)
-        yield Problem("NAME", f"{count}")
-    match kind:
-        case "dür" if not name:
-            return "has no name"
-        case _:
-            size = 3
-    if size == 3:
-        size = 4
-"""
 
-
-def test_every_step_of_the_modules_on_the_page_has_a_test_that_is_there() -> None:
+def test_the_page_has_every_step_and_a_test_that_guards_it() -> None:
     listed = page.read(page.PAGE.read_text(encoding="utf-8"))
-    modules = tuple({key.module for key in listed} & GUARDS.keys())
-    assert modules
-    missing = page.keyed(steps_in(ROOT, modules)).keys() - listed.keys()
-    assert not missing, "run `python -m tests.mutation`: the page lacks what is refused here"
+    steps = page.keyed(steps_in(ROOT, tuple(GUARDS)))
+    assert listed.keys() == steps.keys(), "run `python -m tests.mutation`"
     assert page.MISSING not in listed.values()
-    files = {guard.partition("::")[0] for guard in listed.values()}
-    assert [file for file in sorted(files) if not (ROOT / file).is_file()] == []
+    for guard in sorted({guard.partition("[")[0] for guard in listed.values()}):
+        file, _, test = guard.partition("::")
+        assert f"def {test}(" in (ROOT / file).read_text(encoding="utf-8"), guard
 
 
-def test_each_condition_that_suffices_is_a_step() -> None:
-    steps = steps_of("m.py", SOURCE)
-    assert [step.condition for step in steps] == ["size > 10", "kind is None", "name", "not name"]
+@pytest.mark.parametrize("room", ROOMS)
+def test_no_module_that_refuses_anything_is_left_out(room: str) -> None:
+    for path in sorted((ROOT / room).rglob("*.py")):
+        module = path.relative_to(ROOT).as_posix()
+        if "template" not in path.parts:
+            refuses = bool(steps_of(module, path.read_text(encoding="utf-8")))
+            assert refuses == (module in GUARDS.keys() | ASIDE.keys()), module
 
 
-def test_a_step_that_is_removed_leaves_all_else() -> None:
-    for step in steps_of("m.py", SOURCE):
-        without = step.removed(SOURCE)
-        assert without.count("False") == 1
-        assert without.replace("False", step.condition) == SOURCE
+def test_what_stands_aside_is_not_guarded() -> None:
+    assert not GUARDS.keys() & ASIDE.keys()
+
+
+@pytest.mark.parametrize(
+    ("source", "conditions"),
+    [
+        ("if a > 1 or not b:\n    raise Refused()", ["a > 1", "not b"]),
+        ("if not 0 < a <= 9:\n    raise Refused()", ["not 0 < a", "not a <= 9"]),
+        ("if not (a and b):\n    raise Refused()", ["not (a)", "not (b)"]),
+        ("if a:\n    text = f'{a}'\n    yield Problem('A', text)", ["a"]),
+        ("if flaw := one(a) or two(a):\n    yield Problem('A', flaw)", ["one(a)", "two(a)"]),
+        ("if a:\n    close(b)\n    raise Refused()", ["a"]),
+        ("if a:\n    b = 1", []),
+        ("if a:\n    raise OSError()", []),
+        ("if a:\n    b = 1\nelse:\n    raise Refused()", ["not (a)"]),
+        ("def f():\n    if a and b:\n        return 1\n    raise No()", ["not (a)", "not (b)"]),
+        ("def flaw(a):\n    if a:\n        return 'is none'", ["a"]),
+        ("def name(a):\n    if a:\n        return 'A'", []),
+        ("def is_good(a) -> bool:\n    if a:\n        return False\n    return b == 1",
+         ["a", "not (b == 1)"]),
+        ("match a:\n    case 1 if not b:\n        raise Refused()", ["not b"]),
+        ("match a:\n    case _:\n        raise Refused()", ["case _"]),
+        ("try:\n    a()\nexcept ValueError:\n    raise Refused()", ["except ValueError"]),
+        ("try:\n    a()\nexcept OSError:\n    raise Refused()", []),
+        ("for one in found:\n    yield Problem('A', one)", ["for … in found"]),
+        ("told = [Problem('A', one) for one in found if one > 1]", ["one > 1"]),
+        ("problems.extend(_size_flaws(a))", ["_size_flaws(a)"]),
+        ("check_signed(a)", ["check_signed(a)"]),
+        ("refuse_if_any(a.problems())", ["refuse_if_any(a.problems())"]),
+        ("reader.end()", ["reader.end()"]),
+        ("def gone() -> Problem: ...\nif a:\n    yield gone()", ["a"]),
+    ],
+)  # fmt: skip
+def test_a_step_is_what_leads_to_a_refusal(source: str, conditions: list[str]) -> None:
+    steps = steps_of("m.py", source)
+    assert [step.condition for step in steps] == conditions
+    for step in steps:
+        without = step.removed(source)
+        ast.parse(without)
+        assert without[: step.start] == source[: step.start]
+        assert without.endswith(source[step.end :])
+        assert without != source
+
+
+def test_steps_are_found_behind_letters_of_many_bytes() -> None:
+    source = 'said = "dür"\nif "dür" in a or "é" in a:\n    raise Refused()'
+    assert [step.condition for step in steps_of("m.py", source)] == ['"dür" in a', '"é" in a']
 
 
 KEYS = st.builds(Key, st.just("a/b.py"), st.text("ab |`\\", min_size=1).map(str.strip), st.just(1))

@@ -3,59 +3,73 @@
 from __future__ import annotations
 
 import itertools
+import json
 import os
-import re
 import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Self
 
 from tests.mutation.steps import Step
 
-ROOMS = ("host", "planning", "transport", "wheelhouse", "plugins/sdk")
-LIMIT_S = 300
-_FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)
+_ROOMS = ("host", "planning", "transport", "wheelhouse", "plugins/sdk")
+
+
+def copies(root: Path, folder: Path, count: int) -> list[Copy]:
+    """Copies of what git would take from a checkout, all the same even if somebody works in it."""
+    listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    names = subprocess.run(listed, cwd=root, check=True, capture_output=True).stdout
+    folders = [folder / str(number) for number in range(count)]
+    for name in names.decode().split("\0"):
+        if name and (root / name).is_file():
+            (folders[0] / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(root / name, folders[0] / name)
+    for other in folders[1:]:
+        shutil.copytree(folders[0], other)
+    return [Copy(one) for one in folders]
 
 
 class Copy:
-    """A copy of the checkout, in which one step at a time is missing."""
+    """A copy of the checkout, in which one step at a time is missing. To be used in `with`."""
 
-    def __init__(self, root: Path, folder: Path) -> None:
-        self._root, self._folder = root, folder
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
         self._moments = itertools.count(1_000_000_000, 10)
-        if folder.exists():
-            shutil.rmtree(folder)
-        listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-        names = subprocess.run(listed, cwd=root, check=True, capture_output=True).stdout
-        for name in names.decode().split("\0"):
-            if name and (root / name).is_file():
-                (folder / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy2(root / name, folder / name)
-
-    def first_failure(self, guards: Sequence[str]) -> str:
-        """The first test that fails as the copy is now; empty when all pass."""
-        paths = os.pathsep.join(str(self._folder / room) for room in ROOMS)
-        done = subprocess.run(
-            [*(sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider"), *guards],
-            cwd=self._folder,
+        paths = os.pathsep.join(str(folder / room) for room in _ROOMS)
+        self._runner = subprocess.Popen(
+            ["nice", "-n", "5", sys.executable, "-m", "tests.mutation.runner"],
+            cwd=folder,
             env={**os.environ, "PYTHONPATH": paths},
-            capture_output=True,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
             text=True,
-            timeout=LIMIT_S,
-            check=False,
         )
-        if done.returncode == 0:
-            return ""
-        failed = _FAILED.search(done.stdout)
-        return failed[1] if failed else "the tests do not begin"
 
-    def guard_of(self, step: Step, guards: Sequence[str]) -> str:
-        """The first test that fails without a step; empty when none misses it."""
-        file = self._folder / step.module
-        whole = (self._root / step.module).read_text(encoding="utf-8")
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._runner.communicate()
+
+    def first_failure(self, tests: Sequence[str]) -> str:
+        """The first test that fails as the copy is now; empty when all pass."""
+        assert self._runner.stdin is not None and self._runner.stdout is not None
+        self._runner.stdin.write(json.dumps(tests) + "\n")
+        self._runner.stdin.flush()
+        failed: str | None = json.loads(self._runner.stdout.readline())
+        return failed or ""
+
+    def guard_of(self, step: Step, guards: Sequence[str], known: str = "") -> str:
+        """The first test that fails without a step, the known one before all; empty when none."""
+        file = self.folder / step.module
+        whole = file.read_text(encoding="utf-8")
         try:
             self._write(file, step.removed(whole))
+            if known and self.first_failure([known]) == known:
+                return known
             return self.first_failure(guards)
         finally:
             self._write(file, whole)
