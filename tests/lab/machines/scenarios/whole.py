@@ -49,7 +49,7 @@ def _at(lab: Lab, level: str) -> str:
     host.until_component("gauge", "waits for gauge")
     line = machine.plug_line()
     _see_granted(host)
-    machine.run(f'nondum goal --pddl "{GOAL}"')
+    machine.run(f'nondum goal --maintain --pddl "{GOAL}"')
     host.until_goal(GOAL, "holds")
     machine.run("pgrep -u nondum -f planner_child")  # who planned it is kept
     machine.pull_line(line)
