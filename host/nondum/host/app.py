@@ -13,7 +13,7 @@ import signal
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from nondum.host import verbs
+from nondum.host import heap, verbs
 from nondum.host.announcements import announced
 from nondum.host.catalogue import backups, opening
 from nondum.host.catalogue.catalogue import Catalogue
@@ -66,6 +66,7 @@ async def run_host(config: HostConfig, *, more_drives: Sequence[DriveSource] = (
     """
     stop = _told_to_stop()
     watch_without_threads()
+    heap.give_back_what_is_big()
     _make_slots(config)
     folders = Folders(config.host.state)
     held = claim(folders)
@@ -193,7 +194,7 @@ async def _neighbours(
         bus.emit,
         mind,
         executor.children,
-        lambda: executor.trust.arguments,
+        executor.judged_by,
     )
 
 
