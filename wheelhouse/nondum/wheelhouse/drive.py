@@ -34,6 +34,8 @@ _OPEN_ROOT = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
 _OPEN_FOLDER = _OPEN_ROOT | os.O_NOFOLLOW
 _OPEN_FILE = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 _GONE = frozenset({errno.EIO, errno.ENODEV, errno.ENXIO, errno.ENOMEDIUM, errno.ESTALE})
+_DAMAGED = frozenset({errno.EUCLEAN, errno.EBADMSG})
+"""What ext4 and xfs say of structures that cannot be, and of checksums that do not fit."""
 _FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
 _COPY_AGAIN = "copy the payload to the drive again"
 
@@ -256,6 +258,8 @@ def _step(name: str, flags: int, folder: int) -> int:
             raise _Unsafe("leads through a link") from error
         if error.errno in (errno.ENOTDIR, errno.ENXIO, errno.ENODEV):
             raise _Unsafe("is no regular file in regular folders") from error
+        if error.errno == errno.ENAMETOOLONG:  # as of the signature beside a very long name
+            raise FileNotFoundError(errno.ENOENT, "no file can be called so", name) from error
         raise
 
 
@@ -284,7 +288,12 @@ def read_small(folder: Path, name: str, limit: int) -> bytes | None:
     return data
 
 
-def _gone(folder: Path, error: OSError) -> DriveGone:
+def _gone(folder: Path, error: OSError) -> DriveGone | PayloadRefused:
+    """What is told of a drive of which something cannot be read."""
+    if error.errno in _DAMAGED:
+        text = f"its file system is damaged ({error.strerror})"
+        fix = "check the drive on another computer"
+        return PayloadRefused(Problem("FS_ERROR", text, where=str(folder), fix=fix))
     why = "was pulled" if error.errno in _GONE or not folder.exists() else "cannot be read"
     return DriveGone(
         Problem(

@@ -1,7 +1,8 @@
 """Mount and unmount of drives, by mount(2) itself; needs root.
 
 Read-only, without set-uid, devices, execution or symlinks; a dirty ext4 journal is not replayed,
-and the device itself takes no writes any more.
+and the device itself takes no writes any more. What becomes of a file system that is found damaged is
+not left to its own word: that of ext4 can be that the kernel is to panic (ext4(5), errors=).
 """
 
 from __future__ import annotations
@@ -29,9 +30,9 @@ FLAGS = MS_RDONLY | MS_NOSUID | MS_NODEV | MS_NOEXEC | MS_NOSYMFOLLOW
 FILESYSTEMS: Mapping[str, str] = {
     "vfat": "utf8",
     "exfat": "",
-    "ext4": "noload",
-    "ext3": "noload",
-    "ext2": "",
+    "ext4": "noload,errors=remount-ro",
+    "ext3": "noload,errors=remount-ro",
+    "ext2": "errors=remount-ro",
 }
 """File systems that drives may have, and their options. No other type is ever guessed."""
 

@@ -3,7 +3,8 @@
     <drive>/nondum-trust/<any>.toml        a version of the trust file
     <drive>/nondum-trust/<any>.toml.sig    its roots' signatures
 
-A drive may carry many versions, for robots that have not seen one for long.
+A drive may carry many versions, for robots that have not seen one for long. Names that begin with a
+dot are what systems leave on sticks (`._<any>.toml`), and mean nothing.
 """
 
 from __future__ import annotations
@@ -52,4 +53,5 @@ def _names(folder: Path) -> Iterator[str]:
             names = sorted(entry.name for entry in itertools.islice(entries, MOST_ENTRIES))
     except OSError:  # most drives have none
         return
-    yield from (n for n in names if n.endswith(SUFFIX) and n.isascii() and n.isprintable())
+    shown = (n for n in names if n.isascii() and n.isprintable() and not n.startswith("."))
+    yield from (n for n in shown if n.endswith(SUFFIX))
