@@ -130,6 +130,12 @@ def test_node_of_another_device_is_seen_through(stick: Machine) -> None:
     refused(stick, "another device's")
 
 
+def test_node_of_another_kind_is_seen_through(stick: Machine) -> None:
+    (stick.root / "dev/sdb1").unlink()
+    os.mknod(stick.root / "dev/sdb1", stat.S_IFCHR | 0o600, os.makedev(*NUMBER))
+    refused(stick, "another device's")
+
+
 def test_loop_devices_are_drives_only_where_root_says_so(tmp_path: Path) -> None:
     loop = machine(tmp_path, "devices/virtual/block/loop0")
     refused(loop, "does not hang on USB")

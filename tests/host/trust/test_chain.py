@@ -65,6 +65,7 @@ def test_file_that_is_too_long_is_not_parsed(anchor: Path, suffix: str, size: in
     path.write_bytes(b"\n" * (size + 1) + (path.read_bytes() if path.exists() else b""))
     said = load(anchor)
     assert (said["text"], codes(said)) == (None, ["TOO_LARGE"])
+    assert said["problems"][0]["fix"] == "put the genuine file there"
 
 
 def test_next_version_is_kept_and_followed_only_if_its_roots_signed_it(
