@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from tests.payloads import Part, make_payload, seal
 from nondum.host.drives import parcel
 from nondum.sdk.errors import NondumError
 from nondum.wheelhouse import payload
+from nondum.wheelhouse.memory import Promised
 
 LAMP = """
 from nondum.sdk import Unit, hookimpl
@@ -47,7 +49,8 @@ def hand_over(folder: Path, target: Path, **more: Any) -> dict[str, Any]:
 
 def judge(folder: Path, state: Path, **more: Any) -> dict[str, Any]:
     rules = {"confinement": 0, "method": "store", "reserve_mb": 0, "allow_unsigned": True}
-    given = {"folder": str(folder), "store": str(state / "store"), **rules}
+    room = {"promised": asdict(Promised()), "freed_mb": 0, "freed_gpu_mb": 0}
+    given = {"folder": str(folder), "store": str(state / "store"), "room": room, **rules}
     return parcel.judge(given | more, told)
 
 
@@ -127,6 +130,14 @@ def test_metadata_is_enough_to_judge_by(tmp_path: Path) -> None:
 )
 def test_what_does_not_fit_is_refused(tmp_path: Path, requires: str, refusal: str) -> None:
     assert code(judge, lamp(tmp_path / "drive", requires=requires), tmp_path) == refusal
+
+
+def test_what_is_promised_to_others_is_not_there(tmp_path: Path) -> None:
+    folder = lamp(tmp_path / "drive", requires="memory_mb = 1")
+    promised = asdict(Promised(10**9, 10**9, holders=("org.example.other",)))
+    room = {"promised": promised, "freed_mb": 0, "freed_gpu_mb": 0}
+    assert judge(folder, tmp_path)
+    assert code(judge, folder, tmp_path, room=room) == "NO_MEMORY"
 
 
 def test_more_than_is_read_to_judge_is_refused(tmp_path: Path) -> None:

@@ -58,8 +58,8 @@ async def test_second_payload_that_counts_on_the_same_memory_is_refused(tmp_path
         assert refused is not None
         (problem,) = refused.problems
         assert (problem.code, problem.need) == ("NO_MEMORY", f"{asked_mb} MB")
-        assert "MB are promised to other payloads" in problem.message
-        assert problem.fix.startswith(f"pull another payload, then `nondum retry {SECOND}`")
+        assert problem.message.endswith(f"MB are promised to {FIRST}")
+        assert problem.fix.startswith(f"pull or uninstall it, then `nondum retry {SECOND}`")
         assert is_at(host, FIRST, Step.ACTIVE)
         host.pull("a")
         await host.until_gone(FIRST)
@@ -145,10 +145,12 @@ def test_what_one_payload_uses_is_not_another_ones(
     promised: dict[str, int], used: dict[str, int]
 ) -> None:
     """Whoever takes more than was promised to it takes nothing from what others were promised."""
-    made = {key: Needs(memory_mb=mb) for key, mb in promised.items()}
+    made = {key: Needs(f"id-{key}", mb) for key, mb in promised.items()}
     whole = total(made, used)
     alone = [total({key: needs}, used).unused_mb for key, needs in made.items()]
     assert whole.unused_mb == sum(alone) <= whole.memory_mb == sum(promised.values())
+    held = {key for key, mb in promised.items() if mb > used.get(key, 0)}
+    assert set(whole.holders) == {f"id-{key}" for key in held}
     assert all(0 <= one <= promised[key] for key, one in zip(made, alone, strict=True))
 
 

@@ -6,14 +6,18 @@ worker uses; of GPU memory only what all use together.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from nondum.sdk.errors import Problem
 from nondum.wheelhouse import gpu
 from nondum.wheelhouse.gpu import Gpu
 from nondum.wheelhouse.manifest import Requires
+
+MAX_TOLD = 3
+"""Payloads that are told by name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +28,16 @@ class Promised:
     unused_mb: int = 0
     """Of `memory_mb`, what they do not use yet."""
     gpu_memory_mb: int = 0
+    holders: tuple[str, ...] = ()
+    """Payloads that have memory which they do not use yet."""
+    gpu_holders: tuple[str, ...] = ()
+    """Payloads that were promised GPU memory."""
+
+    @classmethod
+    def parse(cls, said: Mapping[str, Any]) -> Promised:
+        """Read what a daemon tells its children."""
+        holders, gpu_holders = tuple(said["holders"]), tuple(said["gpu_holders"])
+        return cls(**{**said, "holders": holders, "gpu_holders": gpu_holders})
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +79,9 @@ class Memory:
     def with_freed(self, memory_mb: int, gpu_memory_mb: int) -> Memory:
         """As it is once somebody has ended who uses so much; of the GPU's, at most so much.
 
-        >>> Memory(1000, Gpu(3000, 4000)).with_freed(100, 1500)
-        Memory(free_mb=1100, gpu=Gpu(free_mb=4000, total_mb=4000, is_shared=False), \
-promised=Promised(memory_mb=0, unused_mb=0, gpu_memory_mb=0))
+        >>> after = Memory(1000, Gpu(3000, 4000)).with_freed(100, 1500)
+        >>> after.free_mb, after.gpu
+        (1100, Gpu(free_mb=4000, total_mb=4000, is_shared=False))
         """
         gpu = self.gpu
         if gpu is None:
@@ -81,34 +95,35 @@ def problems(needs: Requires, have: Memory, payload_id: str) -> Iterator[Problem
     """What there is too little of for a payload: NO_MEMORY, NO_GPU_MEMORY."""
     left_mb, gpu_left_mb = have.left_mb(), have.gpu_left_mb(needs.memory_mb)
     if needs.memory_mb > left_mb:
-        promised_mb = have.promised.unused_mb
+        why, fix = _because(have.promised.unused_mb, have.promised.holders, payload_id)
         yield Problem(
             "NO_MEMORY",
-            f"there is too little memory{_since(promised_mb)}",
+            f"there is too little memory{why}",
             where=payload_id,
             need=f"{needs.memory_mb} MB",
             have=f"{left_mb} MB",
-            fix=_fix("free some memory", promised_mb, payload_id),
+            fix=fix or "free some memory, or use another host",
         )
     if needs.gpu_memory_mb > gpu_left_mb:
-        promised_mb = have.promised.gpu_memory_mb
+        why, fix = _because(have.promised.gpu_memory_mb, have.promised.gpu_holders, payload_id)
         yield Problem(
             "NO_GPU_MEMORY",
-            f"there is too little GPU memory{_since(promised_mb)}",
+            f"there is too little GPU memory{why}",
             where=payload_id,
             need=f"{needs.gpu_memory_mb} MB",
             have=f"{gpu_left_mb} MB",
-            fix=_fix("free some GPU memory", promised_mb, payload_id),
+            fix=fix or "free some GPU memory, or use another host",
         )
 
 
-def _since(promised_mb: int) -> str:
-    return f", since {promised_mb} MB are promised to other payloads" if promised_mb else ""
-
-
-def _fix(otherwise: str, promised_mb: int, payload_id: str) -> str:
-    pull = f"pull another payload, then `nondum retry {payload_id}`"
-    return f"{pull if promised_mb else otherwise}, or use another host"
+def _because(promised_mb: int, holders: Sequence[str], payload_id: str) -> tuple[str, str]:
+    """Why there is too little and what to do, where others were promised some; else nothing."""
+    if not promised_mb:
+        return "", ""
+    names = ", ".join(holders[:MAX_TOLD]) + (" …" if len(holders) > MAX_TOLD else "")
+    which = "one of them" if len(holders) > 1 else "it"
+    again = f"pull or uninstall {which}, then `nondum retry {payload_id}`, or use another host"
+    return f", since {promised_mb} MB are promised to {names}", again
 
 
 def look() -> Memory:

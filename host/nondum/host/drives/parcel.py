@@ -75,6 +75,7 @@ def judge(arguments: Arguments, report: Report) -> dict[str, Any]:
     staged = payload.load(folder, listed)
     chain.grant_of_kept({**arguments, "demand_trust": True}, folder, staged.manifest)
     facts = reader.facts_of(arguments)
+    facts = replace(facts, memory=reader.memory_for(arguments, facts))
     problems = preflight.preflight(
         staged.manifest, staged.locks, facts, minimum_nondum=listed.minimum_nondum
     )

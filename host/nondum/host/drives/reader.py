@@ -147,7 +147,7 @@ def memory_for(arguments: Arguments, facts: HostFacts) -> Memory:
     """This host's memory for a payload: with that of a release which it takes over from, and less
     what others were promised."""
     room = arguments["room"]
-    have = replace(facts.memory, promised=Promised(**room["promised"]))
+    have = replace(facts.memory, promised=Promised.parse(room["promised"]))
     return have.with_freed(room["freed_mb"], room["freed_gpu_mb"])
 
 

@@ -110,6 +110,11 @@ class Executor:
         if payloads := payload_rules.kept(state):
             self.start(effects.JudgePayloads(payloads))
 
+    async def judged_by(self, beside: str) -> Mapping[str, Any]:
+        """What a payload that is not here yet is judged by now, for child processes: whose are let
+        in, and what memory there is for it, `beside` a release of it or ""."""
+        return {**self.trust.arguments, "room": await self.installation.room(beside)}
+
     def adopt(self, state: HostState) -> None:
         """Have the workers stand for components that the catalogue says."""
         self._workers.take_over({id: c.payload for id, c in state.components.items()})

@@ -256,6 +256,11 @@ class Installation:
         )
         return rows
 
+    async def room(self, beside: str) -> dict[str, Any]:
+        """What children are told of the memory that there is for a payload that is not here yet,
+        which may take over from a release of it."""
+        return await self._promises.room("", beside)
+
     async def _install(self, key: str, *, admit_beside: str | None = None) -> int:
         """Run the job `install`; says how many wheels the store did not have.
 

@@ -54,7 +54,12 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
     if not by_pip:
         shutil.rmtree(folder / "wheels", ignore_errors=True)  # the store has them now
     components = [_told(staged, component, root) for component in staged.manifest.components]
-    needs = {name: getattr(requires, name) for name in ("memory_mb", "gpu_memory_mb", "alone")}
+    needs = {
+        "payload_id": staged.manifest.id,
+        "memory_mb": requires.memory_mb,
+        "gpu_memory_mb": requires.gpu_memory_mb,
+        "alone": requires.alone,
+    }
     gpu = facts.memory.gpu
     return {
         "fresh": fresh,

@@ -71,12 +71,22 @@ class Promises:
 def total(made: Mapping[str, Needs], used_mb: Mapping[str, int]) -> Promised:
     """Promises together; `used_mb` is what the workers of each payload use now.
 
-    >>> made = {"a": Needs(memory_mb=500), "b": Needs(memory_mb=100, gpu_memory_mb=50)}
-    >>> total(made, {"a": 200, "b": 300})
-    Promised(memory_mb=600, unused_mb=300, gpu_memory_mb=50)
+    >>> made = {"1": Needs("a", memory_mb=500), "2": Needs("b", memory_mb=100, gpu_memory_mb=50)}
+    >>> total(made, {"1": 200, "2": 300})
+    Promised(memory_mb=600, unused_mb=300, gpu_memory_mb=50, holders=('a',), gpu_holders=('b',))
     """
+    unused = {key: max(0, n.memory_mb - used_mb.get(key, 0)) for key, n in made.items()}
+    gpu = {key: needs.gpu_memory_mb for key, needs in made.items()}
     return Promised(
         memory_mb=sum(needs.memory_mb for needs in made.values()),
-        unused_mb=sum(max(0, n.memory_mb - used_mb.get(key, 0)) for key, n in made.items()),
-        gpu_memory_mb=sum(needs.gpu_memory_mb for needs in made.values()),
+        unused_mb=sum(unused.values()),
+        gpu_memory_mb=sum(gpu.values()),
+        holders=_holders(made, unused),
+        gpu_holders=_holders(made, gpu),
     )
+
+
+def _holders(made: Mapping[str, Needs], held_mb: Mapping[str, int]) -> tuple[str, ...]:
+    """Who holds some of it, most first."""
+    most_first = sorted(held_mb, key=lambda key: (-held_mb[key], key))
+    return tuple(dict.fromkeys(made[key].payload_id for key in most_first if held_mb[key]))

@@ -19,6 +19,7 @@ _PAGE_KB = os.sysconf("SC_PAGE_SIZE") // 1024
 class Needs:
     """What a payload's manifest says of the room that it takes."""
 
+    payload_id: str = ""
     memory_mb: int = 0
     gpu_memory_mb: int = 0
     alone: bool = False
@@ -27,7 +28,7 @@ class Needs:
     @classmethod
     def parse(cls, said: Mapping[str, Any]) -> Needs:
         """Read what the job `install` told. It comes from our own child and is trusted."""
-        return cls(said["memory_mb"], said["gpu_memory_mb"], said["alone"])
+        return cls(**said)
 
 
 def why_not_beside(needs: Needs, used_mb: int, have: Memory) -> str:

@@ -147,7 +147,7 @@ class Neighbourhood:
         emit: Emit,
         mind: Callable[[], Mind],
         children: Children,
-        judged_by: Callable[[], Mapping[str, Any]],
+        judged_by: Callable[[str], Awaitable[Mapping[str, Any]]],
     ) -> Neighbourhood:
         """Read keys and trust, and look at this machine; `judged_by` is what payloads are judged by
         now. Raises `PeerRefused`."""

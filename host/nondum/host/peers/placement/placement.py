@@ -36,7 +36,7 @@ class Placement:
         pins: Pins,
         compute: Compute,
         confinement: int,
-        judged_by: Callable[[], Mapping[str, Any]],
+        judged_by: Callable[[str], Awaitable[Mapping[str, Any]]],
         known: Callable[[], Iterable[str]],
     ) -> None:
         """`confinement` is the level at which workers run; `judged_by` what payloads are judged

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from functools import partial
 from typing import Any, NoReturn
 
@@ -62,12 +62,13 @@ class Taking:
         emit: Emit,
         *,
         rules: Mapping[str, Any],
-        judged_by: Callable[[], Mapping[str, Any]],
+        judged_by: Callable[[str], Awaitable[Mapping[str, Any]]],
         is_open: bool,
     ) -> None:
         """`rules` are what the children go by: where the store is, what is left free; `judged_by`,
-        whose payloads are let in now: peers bring nothing in that drives may not. `is_open`:
-        whether any payload of others is taken."""
+        whose payloads are let in now, and what memory there is for one beside a release of it:
+        peers bring nothing in that drives may not. `is_open`: whether any payload of others is
+        taken."""
         self._fleet, self._state, self._folders = fleet, state, folders
         self._children, self._emit = children, emit
         self._rules, self._judged_by, self._is_open = rules, judged_by, is_open
@@ -133,12 +134,19 @@ class Taking:
             await self._fetch_contents(guest, fetching)
             for row in await self._run(guest, "outline", {}):
                 await fetching.fetch(Listed(*row))
-            judged = await self._run(guest, "judge", {**self._rules, **self._judged_by()})
+            judged = await self._run(guest, "judge", await self._judged(guest))
             self._check_components(guest, tuple(judged["components"]))
             await self._fetch_wheels(guest, fetching, [Listed(*row) for row in judged["needed"]])
         except OSError as error:
             told = f"what is fetched cannot be written: {error.strerror}"
             raise InstallFailed(Problem("IO_ERROR", told, where=guest.offer.payload_id)) from error
+
+    async def _judged(self, guest: Guest) -> dict[str, Any]:
+        """What children judge a payload by: a release of it that is in force makes room for it."""
+        active = (p for p in self._state().payloads.values() if p.step is Step.ACTIVE)
+        same = (p.key for p in active if p.payload_id == guest.offer.payload_id)
+        beside = next(same, "")
+        return {**self._rules, **await self._judged_by(beside)}
 
     async def _run(self, guest: Guest, job: str, arguments: Mapping[str, Any]) -> Any:
         """Have a child that reads nothing but this guest do a job with its folder."""
@@ -153,7 +161,7 @@ class Taking:
             signature = guest.folder / contents.SIGNATURE_NAME
             await in_thread(signature.write_bytes, offer.signature)
         arguments = {"kind": PLACED, "root": str(guest.root), "node": None}
-        arguments |= {**self._rules, **self._judged_by()}
+        arguments |= await self._judged(guest)
         (said,) = (await self._run(guest, "look", arguments))["payloads"]
         found = PayloadFound(
             said["payload"],
