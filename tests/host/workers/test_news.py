@@ -50,6 +50,39 @@ def test_each_kind_is_read() -> None:
     assert log == WorkerLogged("g", "info", "a\\x1b\nb")
 
 
+FACT = {"predicate": "p", "arguments": ["a"]}
+FLOW = {"stream": "s", "flowing": True}
+
+
+@pytest.mark.parametrize(
+    ("name", "body", "code"),
+    [
+        pytest.param("boast", {}, "EVENT_UNKNOWN", id="no such event"),
+        pytest.param("know", {"predicate": "p"}, "EVENT_INVALID", id="no arguments"),
+        pytest.param("know", {**FACT, "predicate": 1}, "EVENT_INVALID", id="a number as name"),
+        pytest.param("know", {**FACT, "arguments": [1]}, "EVENT_INVALID", id="no words"),
+        pytest.param("forget", {**FACT, "predicate": ""}, "EVENT_INVALID", id="empty"),
+        pytest.param("forget", {**FACT, "arguments": ["a" * 257]}, "EVENT_INVALID", id="long"),
+        pytest.param("know", {**FACT, "arguments": ["a\n"]}, "EVENT_INVALID", id="unprintable"),
+        pytest.param("know", {**FACT, "value": {"a": 1}}, "RESULT_INVALID", id="no value"),
+        pytest.param("flow", {**FLOW, "stream": "other"}, "RESULT_INVALID", id="other's stream"),
+        pytest.param("flow", {**FLOW, "flowing": 1}, "EVENT_INVALID", id="almost true"),
+        pytest.param("log", {"level": "info"}, "EVENT_INVALID", id="no message"),
+    ],
+)
+def test_what_is_no_news_is_refused(name: str, body: dict[str, Any], code: str) -> None:
+    with pytest.raises(ProtocolViolation) as violation:
+        parse_news("guest", {"s"}, name, body)
+    assert violation.value.code == code
+
+
+@pytest.mark.parametrize("body", [{}, {"fraction": 1}, {"fraction": "1", "text": ""}])
+def test_what_is_no_progress_is_refused(body: dict[str, Any]) -> None:
+    with pytest.raises(ProtocolViolation) as violation:
+        parse_progress(body)
+    assert violation.value.code == "EVENT_INVALID"
+
+
 def test_claims_follow_the_news() -> None:
     claims = Claims()
     claims.take(FactKnown("g", "p", ("a",)))
@@ -66,3 +99,10 @@ def test_claims_are_bounded() -> None:
     with pytest.raises(ProtocolViolation, match=str(MAX_CLAIMS)):
         for number in range(MAX_CLAIMS + 1):
             claims.take(FactKnown("g", "p", (str(number),)))
+
+
+def test_what_claims_take_is_bounded() -> None:
+    claims = Claims()
+    with pytest.raises(ProtocolViolation, match="bytes"):
+        for number in range(MAX_CLAIMS):
+            claims.take(FactKnown("g", "p", (str(number),), "x" * 100_000))

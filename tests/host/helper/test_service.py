@@ -1,0 +1,74 @@
+"""What root's end refuses, whoever got past its door."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+from tests.host.helper.test_disks import Machine, machine
+
+from nondum.host.cgroups.cages import NoTree
+from nondum.host.helper import requests, service
+from nondum.host.helper.nodes import Nodes
+from nondum.host.helper.requests import Request
+from nondum.host.helper.service import Service
+from nondum.sdk.errors import NondumError
+
+pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="making device nodes needs root")
+NOBODY = 65534
+STICK = requests.Mount("sdb1", 7, "ext4", "read")
+
+
+@pytest.fixture
+def stick(tmp_path: Path) -> Machine:
+    return machine(tmp_path)
+
+
+@pytest.fixture
+def root(stick: Machine, tmp_path: Path) -> Service:
+    nodes = Nodes(tmp_path / "nodes", NOBODY, sys=tmp_path / "sys")
+    return Service(NOBODY, tmp_path / "mounts", stick.disks, nodes, NoTree())
+
+
+def refused(root: Service, request: Request) -> str:
+    with pytest.raises(NondumError) as error:
+        root.serve(request)
+    assert error.value.code == "HELPER_REFUSED"
+    return error.value.problems[0].message
+
+
+def test_nodes_of_nobody_are_not_made(root: Service) -> None:
+    assert refused(root, requests.PutNode("", "line", 188, 0)) == "a node is some component's"
+
+
+def test_drives_are_mounted_once(root: Service) -> None:
+    (root.mounts / "sdb1-7").mkdir(parents=True)
+    assert "mounted already" in refused(root, STICK)
+    assert (root.mounts / "sdb1-7").is_dir()
+
+
+def test_so_many_drives_are_mounted_and_no_more(root: Service) -> None:
+    for number in range(service.MOST_DRIVES):
+        (root.mounts / str(number)).mkdir(parents=True)
+    assert refused(root, STICK) == f"{service.MOST_DRIVES} drives are mounted already"
+
+
+def test_so_many_cages_are_made_and_no_more(root: Service, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(service, "MOST_CAGES", 0)
+    assert refused(root, requests.MakeCage("a.1")) == "there are 0 cages already"
+
+
+@pytest.mark.parametrize("pid", [0, 1])
+def test_processes_of_the_system_s_own_are_not_caged(root: Service, pid: int) -> None:
+    assert refused(root, requests.FillCage("a.1", pid)) == "that is no process of yours"
+
+
+def test_processes_of_others_are_not_caged(root: Service) -> None:
+    with subprocess.Popen(["sleep", "60"], user=NOBODY - 1) as somebody:
+        assert "no process of yours" in refused(root, requests.FillCage("a.1", somebody.pid))
+        somebody.kill()
+    with subprocess.Popen(["sleep", "60"], user=NOBODY) as served:
+        root.serve(requests.FillCage("a.1", served.pid))
+        served.kill()
