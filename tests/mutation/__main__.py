@@ -11,7 +11,8 @@ import os
 import queue
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
@@ -28,7 +29,8 @@ ROOT = Path(__file__).parents[2]
 def main() -> int:
     """Try the steps, write the page."""
     options = _options()
-    known = page.read(page.PAGE.read_text("utf-8")) if page.PAGE.exists() else {}
+    before = page.PAGE.read_text("utf-8") if page.PAGE.exists() else ""
+    known, began_s = page.read(before), time.monotonic()
     known = {key: guard for key, guard in known.items() if guard != page.MISSING}
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="nondum-mutation-")))
@@ -44,12 +46,19 @@ def main() -> int:
             guards[key] = guard or page.MISSING
             sys.stdout.write(f"{number}/{len(due)} {steps[key].name}: {guards[key]}\n")
             sys.stdout.flush()
-            listed = {key: guards[key] for key in steps if key in guards}
-            page.PAGE.parent.mkdir(exist_ok=True)
-            page.PAGE.write_text(page.written(listed), encoding="utf-8")
+            _write(steps, guards, page.took(before))
+        if options.all and not options.only:
+            minutes = round((time.monotonic() - began_s) / 60)
+            told = f"All of them took {minutes} minutes on {len(made)} processors."
+            _write(steps, guards, told)
     missing = [key for key in due if guards.get(key, page.MISSING) == page.MISSING]
     sys.stdout.write(f"{len(steps)} steps, {len(due)} tried, {len(missing)} without a guard\n")
     return 1 if missing else 0
+
+
+def _write(steps: Iterable[Key], guards: Mapping[Key, str], took: str) -> None:
+    listed = {key: guards[key] for key in steps if key in guards}
+    page.PAGE.write_text(page.written(listed, took), encoding="utf-8")
 
 
 def _tried(

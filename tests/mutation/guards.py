@@ -8,7 +8,23 @@ _W, _TW = "wheelhouse/nondum/wheelhouse", "tests/wheelhouse"
 _H, _TH = "host/nondum/host", "tests/host"
 _S, _TS = "plugins/sdk/nondum/sdk", "tests/sdk"
 _WHEELS = (f"{_TW}/test_wheel.py",)
-_BLOCKS = (f"{_TH}/drives/test_blocks.py",)
+_MOUNTED = tuple(
+    f"{_TH}/drives/test_blocks.py::{test}"
+    for test in (
+        "test_wrong_file_system_is_told",
+        "test_file_system_that_the_kernel_does_not_know_is_told",
+        "test_drive_that_came_in_place_of_another_is_not_taken_for_it",
+        "test_unknown_file_system_is_refused_by_name",
+    )
+)
+_BROUGHT = tuple(
+    f"{_TH}/trust/test_payload_trust.py::{test}"
+    for test in (
+        "test_a_first_file_that_is_none_is_told",
+        "test_false_trust_files_are_told_and_change_nothing",
+        "test_people_bring_the_next_trust_file_too",
+    )
+)
 _RELEASES = (f"{_TH}/lifecycle/test_releases.py", f"{_TH}/trust/test_releases_of_strangers.py")
 _CONTROL = (f"{_TH}/control/test_arguments.py", f"{_TH}/control/test_control.py")
 _HELPER = (f"{_TH}/helper/test_server.py",)
@@ -26,14 +42,16 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_W}/trust/signing.py": (f"{_TW}/trust/test_signing.py",),
     f"{_W}/signatures.py": (f"{_TW}/trust/test_judging.py",),
     f"{_H}/trust/chain.py": (f"{_TH}/trust/test_chain.py",),
-    f"{_H}/trust/payload_trust.py": (f"{_TH}/trust/test_payload_trust.py",),
+    f"{_H}/trust/payload_trust.py": _BROUGHT,
     # What drives are, and what is read of them.
-    f"{_H}/drives/blocks.py": _BLOCKS,
-    f"{_H}/drives/mounting.py": _BLOCKS,
-    f"{_H}/drives/nodes.py": _BLOCKS,
+    f"{_H}/drives/mounting.py": _MOUNTED,
+    f"{_H}/drives/nodes.py": _MOUNTED,
     f"{_H}/drives/usb.py": (f"{_TH}/drives/test_usb.py",),
     f"{_H}/drives/slots.py": (f"{_TH}/drives/test_slots.py",),
-    f"{_H}/drives/reading.py": (f"{_TH}/drives/test_reading.py",),
+    f"{_H}/drives/reading.py": (
+        f"{_TH}/drives/test_reading.py::test_payloads_of_one_drive_are_judged_each_alone",
+        *_BROUGHT,
+    ),
     f"{_H}/drives/reader.py": (f"{_TH}/drives/test_reader.py",),
     f"{_H}/drives/trial.py": (f"{_TH}/drives/test_trial.py",),
     f"{_H}/drives/parcel.py": (f"{_TH}/drives/test_parcel.py",),
@@ -72,14 +90,25 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/lifecycle/payload_rules.py": (*_RELEASES, f"{_TH}/lifecycle/test_tries.py"),
     f"{_H}/lifecycle/drive_rules.py": (f"{_TH}/lifecycle/test_tries.py",),
     f"{_H}/lifecycle/tries.py": (f"{_TH}/lifecycle/test_tries.py",),
-    f"{_H}/lifecycle/installing.py": (f"{_TH}/lifecycle/test_promises.py",),
+    f"{_H}/lifecycle/installing.py": (
+        f"{_TH}/lifecycle/test_promises.py::test_what_was_promised_while_it_was_copied_counts",
+    ),
     f"{_H}/lifecycle/rebuilding.py": (f"{_TH}/catalogue/test_backups.py",),
     # What its workers send, and take.
+    f"{_S}/packets.py": (f"{_TS}/test_link.py",),
+    f"{_S}/link.py": (f"{_TS}/test_link.py",),
     f"{_S}/wire.py": (f"{_TS}/test_wire.py",),
     f"{_S}/wire_fields.py": (f"{_TS}/test_wire.py",),
+    f"{_S}/description.py": (f"{_TS}/test_plugin.py", f"{_TW}/test_index.py"),
+    f"{_S}/signature.py": (f"{_TS}/test_signature.py",),
+    f"{_S}/messages/__init__.py": (f"{_TS}/test_messages.py",),
+    f"{_S}/messages/fields.py": (f"{_TS}/test_messages.py",),
+    "planning/nondum/planning/parse.py": ("tests/planning/test_parse.py",),
     f"{_H}/workers/index.py": (f"{_TH}/workers/test_index.py",),
     f"{_H}/workers/news.py": (f"{_TH}/workers/test_news.py", f"{_TH}/test_news.py"),
-    f"{_H}/workers/excess.py": (f"{_TH}/workers/test_excesses.py",),
+    f"{_H}/workers/excess.py": (
+        f"{_TH}/workers/test_excesses.py::test_too_much_ends_that_worker_alone",
+    ),
     # How they are confined.
     f"{_H}/confinement/choice.py": ("tests/confinement/test_level.py",),
     f"{_H}/confinement/level.py": ("tests/confinement/test_level.py",),
@@ -88,7 +117,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/helper/requests.py": (f"{_TH}/helper/test_requests.py",),
     f"{_H}/helper/disks.py": (f"{_TH}/helper/test_disks.py",),
     f"{_H}/helper/nodes.py": (f"{_TH}/helper/test_nodes.py",),
-    f"{_H}/helper/service.py": _HELPER,
+    f"{_H}/helper/service.py": (f"{_TH}/helper/test_service.py", *_HELPER),
     f"{_H}/helper/server.py": _HELPER,
     f"{_H}/helper/client.py": _HELPER,
     # What people and programs of this machine ask for.
@@ -120,6 +149,7 @@ ASIDE: Mapping[str, str] = {
     f"{_W}/scaffold.py": _BUILDS,
     f"{_W}/target.py": _BUILDS,
     f"{_W}/disk.py": _SPEAKS,
+    f"{_H}/drives/blocks.py": "finds drives; what is on them is judged as it is read",
     f"{_H}/drives/steady.py": "tells once of a cable; what is read of a drive is judged elsewhere",
     f"{_H}/helper/__main__.py": "is started by systemd only",
     f"{_H}/confinement/systemd_stand_in.py": _RUNS,

@@ -14,11 +14,19 @@ HEAD = """\
 # Steps of verification, and the tests that guard them
 
 Written by `python -m tests.mutation`, which removes one step after the other from a copy of the
-source and runs the tests: each must make one fail. A step is a condition under which something that
-was plugged in, or a frame that a worker sent, is refused; with each stands the first test that
-misses it.
+source and runs the tests nearest to it: each must make one fail. With each stands the first test
+that misses it. (`--only wheel.py` tries a part, `--all` what is here already, too.)
+
+A step is what leads to a refusal of something that was plugged in, or that a worker, or a program
+of this machine, has sent: a condition, of `a or b` each, and each bound of two; a condition that
+must hold, or what follows refuses; a kind of error that is answered with a refusal; the loop or
+call by which flaws that were found are told. What limits of this machine do (a full disk) is no
+step. Tests of properties (Hypothesis) count only if they fail with each of three seeds. Modules
+that refuse something and stand aside are in `tests/mutation/guards.py`, with the reason; a test
+sees that no module is in neither list.
 """
 MISSING = "**no test misses it**"
+_TOOK = re.compile(r"All of them took .*$", re.MULTILINE)
 _SECTION = re.compile(r"^## `(.+)`$", re.MULTILINE)
 _ROW = re.compile(r"^\| `` (.+) `` \| (.+) \|$", re.MULTILINE)
 
@@ -55,9 +63,16 @@ def read(text: str) -> dict[Key, str]:
     return guards
 
 
-def written(guards: Mapping[Key, str]) -> str:
-    """The page."""
-    lines = [HEAD]
+def took(text: str) -> str:
+    """What a page says of the last run that tried every step."""
+    found = _TOOK.search(text)
+    return found[0] if found else ""
+
+
+def written(guards: Mapping[Key, str], took: str = "") -> str:
+    """The page; `took` is a sentence about the last run that tried every step."""
+    modules = len({key.module for key in guards})
+    lines = [HEAD, f"Here are {len(guards)} steps in {modules} modules. {took}".strip() + "\n"]
     for module in dict.fromkeys(key.module for key in guards):
         lines += [f"## `{module}`\n", "| refused when | guarded by |", "|---|---|"]
         for key, guard in guards.items():
