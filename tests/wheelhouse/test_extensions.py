@@ -14,7 +14,7 @@ from tests.payloads import installed_wheel
 from tests.wheelhouse.hostile.machines import ARM, ARM_32, MODULE, X86, X86_32, elf, native
 
 from nondum.sdk.errors import Problem
-from nondum.wheelhouse import wheel
+from nondum.wheelhouse import extensions, wheel
 from nondum.wheelhouse.elf import ARCHITECTURES, HEAD_BYTES, Elf
 from nondum.wheelhouse.extensions import MAX_TOLD
 
@@ -39,6 +39,16 @@ def test_refusal_tells_both_machines(tmp_path: Path) -> None:
 def test_many_are_told_shortly(tmp_path: Path) -> None:
     held = {f"evil/m{n}.abi3.so": elf(ARM, f"\0PyInit_m{n}\0".encode()) for n in range(99)}
     assert len(judged(tmp_path, held)) == MAX_TOLD
+
+
+def test_a_wheel_of_nothing_but_foreign_files_takes_no_long_search(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is not found in so many bytes is not looked for any further."""
+    held = {"evil/a.so": elf(ARM, bytes(3000)), "evil/b.so": elf(ARM, b"\0PyInit_b\0")}
+    assert [p.code for p in judged(tmp_path, held)] == ["WHEEL_MACHINE"]
+    monkeypatch.setattr(extensions, "MAX_SEARCHED", 3000)
+    assert judged(tmp_path, held) == ()
 
 
 HARMLESS = {

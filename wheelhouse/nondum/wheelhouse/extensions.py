@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
@@ -22,6 +22,9 @@ from nondum.wheelhouse.elf import ARCHITECTURES, HEAD_BYTES, Elf
 
 MAX_TOLD = 10
 """Files that are told when they are wrong."""
+MAX_SEARCHED = 256 * 1024**2
+"""Bytes of foreign files that are searched for what modules are begun by: all honest wheels have
+fewer, and others are not to take long."""
 
 _EXTENSION = re.compile(r"(?P<module>\w+)(\.cpython-\w+-(?P<machine>\w+)-linux-\w+|\.abi3|)\.so")
 _LIBRARY = re.compile(r".+\.so(\.\d+)*")
@@ -55,10 +58,9 @@ def problems(
         for target, member in files
         if ".so" in target
     ]
-    foreign = [one for one in found if one.elf is not None and one.elf not in wanted]
+    foreign = (one for one in found if one.elf is not None and one.elf not in wanted)
     own = {one.name for one in found if one.elf in wanted}
-    loaded = (one for one in foreign if _is_loaded(data, one, architectures, own))
-    for one in itertools.islice(loaded, MAX_TOLD):
+    for one in itertools.islice(_loaded(data, foreign, architectures, own), MAX_TOLD):
         yield Problem(
             "WHEEL_MACHINE",
             f"{one.target!r} is machine code for another processor",
@@ -69,18 +71,31 @@ def problems(
         )
 
 
-def _is_loaded(
-    data: Bytes, one: _Placed, architectures: AbstractSet[str], own: AbstractSet[str]
-) -> bool:
-    """Whether an interpreter would load a file, going by where it is and what it is called; where
-    that tells too little, by what it holds."""
+def _loaded(
+    data: Bytes, foreign: Iterable[_Placed], architectures: AbstractSet[str], own: AbstractSet[str]
+) -> Iterator[_Placed]:
+    """Those of the files for other machines that an interpreter would load; `own` are the names of
+    those for its own."""
+    left = MAX_SEARCHED
+    for one in foreign:
+        begun_by = _begun_by(one, architectures)
+        if begun_by and one.name not in own:
+            left -= one.member.size
+            if left >= 0 and archive.contains(data, one.member, begun_by):
+                yield one
+        elif begun_by == b"":
+            yield one
+
+
+def _begun_by(one: _Placed, architectures: AbstractSet[str]) -> bytes | None:
+    """The function that a file would have to export to be loaded, where its place and name do not
+    settle it; empty: it would be loaded; None: it would not."""
     folders = one.target.split("/")[:-1]
     if len(folders) == 1 and folders[0].endswith(".libs"):
-        return bool(_LIBRARY.fullmatch(one.name))
+        return b"" if _LIBRARY.fullmatch(one.name) else None
     named = _EXTENSION.fullmatch(one.name)
     if named is None or not all(name.isidentifier() for name in (*folders, named["module"])):
-        return False
+        return None
     if named["machine"]:
-        return named["machine"] in {_TRIPLETS.get(name, name) for name in architectures}
-    begin = f"PyInit_{named['module']}".encode()
-    return one.name not in own and archive.contains(data, one.member, begin)
+        return b"" if named["machine"] in {_TRIPLETS.get(a, a) for a in architectures} else None
+    return f"PyInit_{named['module']}".encode()
