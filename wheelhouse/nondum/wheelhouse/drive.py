@@ -34,8 +34,10 @@ _OPEN_ROOT = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
 _OPEN_FOLDER = _OPEN_ROOT | os.O_NOFOLLOW
 _OPEN_FILE = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 _GONE = frozenset({errno.EIO, errno.ENODEV, errno.ENXIO, errno.ENOMEDIUM, errno.ESTALE})
-_DAMAGED = frozenset({errno.EUCLEAN, errno.EBADMSG})
-"""What ext4 and xfs say of structures that cannot be, and of checksums that do not fit."""
+_DAMAGED = frozenset({errno.EUCLEAN, errno.EBADMSG, errno.ENODATA, errno.EINVAL, errno.EOVERFLOW})
+"""What file systems say of structures that cannot be, and of checksums that do not fit."""
+_CLOSED = frozenset({errno.EACCES, errno.EPERM, errno.ENOKEY, errno.EOPNOTSUPP})
+"""Encrypted, sealed, or somebody else's."""
 _FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
 _COPY_AGAIN = "copy the payload to the drive again"
 
@@ -283,16 +285,17 @@ def read_small(folder: Path, name: str, limit: int) -> bytes | None:
     if len(data) > limit:
         where = f"{folder.name}/{name}"
         text = f"is longer than {limit} bytes"
-        fix = "build the payload with fewer files in it"
+        fix = "make it again, with less in it"
         raise PayloadRefused(Problem("TOO_LARGE", text, where=where, fix=fix))
     return data
 
 
 def _gone(folder: Path, error: OSError) -> DriveGone | PayloadRefused:
     """What is told of a drive of which something cannot be read."""
-    if error.errno in _DAMAGED:
-        text = f"its file system is damaged ({error.strerror})"
-        fix = "check the drive on another computer"
+    if error.errno in _DAMAGED | _CLOSED:
+        what = "its file system is damaged" if error.errno in _DAMAGED else "it cannot be read"
+        fix = "check the drive on another computer, or format it and copy the payload anew"
+        text = f"{what} ({error.strerror})"
         return PayloadRefused(Problem("FS_ERROR", text, where=str(folder), fix=fix))
     why = "was pulled" if error.errno in _GONE or not folder.exists() else "cannot be read"
     return DriveGone(

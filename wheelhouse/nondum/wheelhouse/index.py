@@ -25,8 +25,10 @@ def parse(data: bytes, where: str) -> Index:
         raise _refused("TOO_LARGE", f"is longer than {MAX_BYTES} bytes", where)
     try:
         document = json.loads(data)
-        # JSON can say half a letter, which no UTF-8 has: it could not be kept or told.
         json.dumps(document, ensure_ascii=False).encode()
+    except UnicodeEncodeError as error:  # JSON can say it, and nobody could keep or tell it
+        text = f"has half a letter in it: {error.object[error.start : error.end]!r}"
+        raise _refused("INDEX_INVALID", text, where) from error
     except (ValueError, RecursionError) as error:
         raise _refused("INDEX_INVALID", f"is not JSON: {error}", where) from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:

@@ -1,8 +1,8 @@
 """Mount and unmount of drives, by mount(2) itself; needs root.
 
 Read-only, without set-uid, devices, execution or symlinks; a dirty ext4 journal is not replayed,
-and the device itself takes no writes any more. What becomes of a file system that is found damaged is
-not left to its own word: that of ext4 can be that the kernel is to panic (ext4(5), errors=).
+and the device itself takes no writes any more. What becomes of a file system that turns out damaged
+is not left to its own word: that of ext4 can be that the kernel is to panic (ext4(5), errors=).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import ctypes
 import errno
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from nondum.host.drives import filesystems, nodes
@@ -57,7 +57,8 @@ def mount(node: Path, target: Path, filesystem: str, *, drive: str = "") -> None
             return
         target.rmdir()
         if error == errno.ENODEV and not _is_known_to_kernel(filesystem):
-            raise _unsupported(node, "this host's kernel does not read its file system", filesystem)
+            text = "this host's kernel does not read its file system"
+            raise _unsupported(node, text, filesystem, filter(_is_known_to_kernel, FILESYSTEMS))
         raise _unmountable(node, filesystem, error)
 
 
@@ -110,8 +111,11 @@ def _is_known_to_kernel(filesystem: str) -> bool:
     return f"\t{filesystem}\n" in Path("/proc/filesystems").read_text(encoding="ascii")
 
 
-def _unsupported(node: Path, text: str, have: str) -> PayloadRefused:
-    need, fix = " or ".join(sorted(FILESYSTEMS)), "format the drive as exFAT, FAT32 or ext4"
+def _unsupported(
+    node: Path, text: str, have: str, known: Iterable[str] = FILESYSTEMS
+) -> PayloadRefused:
+    need = " or ".join(sorted(known))
+    fix = "format the drive as one of them"
     return PayloadRefused(Problem("FS_UNSUPPORTED", text, str(node), need, have, fix))
 
 
