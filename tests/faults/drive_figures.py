@@ -36,6 +36,10 @@ CROWD, WITHIN_S = 100, 10.0
 SLOPES = ("rss_mb", "pss_mb", "descriptors", "files", "catalogue_mb")
 FLAWS = ("wrong", "without_remedy", "canaries", "strays", "touched", "controls")
 REFUSED_S = 2.0
+COLUMNS = (
+    "| | resident | share | descriptors | threads | processes | zombies | mounts | files "
+    "| catalogue |"
+)
 
 Figures = dict[str, Any]
 
@@ -129,9 +133,10 @@ def _page(found: Mapping[str, Figures | None]) -> Iterator[str]:
 
 def _hostile(told: Figures) -> Iterator[str]:
     drives = sum(told["families"].values())
-    memory, descriptors = told["memory_mb"], told["descriptors"]
-    growth, more = max(memory[1:]) - memory[0], descriptors[-1] - descriptors[0]
-    seconds = sorted(told["seconds"])
+    late = sum(second > REFUSED_S for second in told["seconds"].values())
+    seconds = sorted(told["seconds"].values())
+    before, *rounds = told["footprints"]
+    first, last = rounds[0], rounds[-1]
     yield "## Hostile drives"
     yield ""
     yield f"{drives} different drives, each {told['rounds']} times through one daemon that demands"
@@ -149,14 +154,51 @@ def _hostile(told: Figures) -> Iterator[str]:
     yield f"| drives told | {told['drives']} | {drives * told['rounds']} |"
     yield f"| told with another code than theirs | {len(told['wrong'])} | 0 |"
     yield f"| daemons that it took | {told['pids']} | 1 |"
-    yield f"| memory of the daemon | {memory[0]:.1f} MB, {growth:+.1f} MB at most | +10 MB |"
-    yield f"| descriptors | {descriptors[0]}, {more:+d} after | +0 |"
+    yield f"| told without what to do | {len(told['without_remedy'])} | 0 |"
+    growth = last["rss_mb"] - before["rss_mb"]
+    yield f"| memory of the daemon, from before until after all | {growth:+.1f} MB | +10 MB |"
+    yield f"| the same, from the first round on | {_grown(first, last, 'rss_mb'):+.1f} MB | |"
+    yield f"| descriptors, likewise | {_grown(before, last, 'descriptors'):+d} | 0 |"
     yield f"| canaries that ran | {told['canaries']} | 0 |"
     yield f"| files outside the state folder | {len(told['strays'])} | 0 |"
+    yield f"| drives that were changed | {len(told['touched'])} | 0 |"
+    yield f"| control characters in the log | {told['controls']} | 0 |"
     yield f"| told after, median (p95, longest) | {_spread(seconds)} | 2 s |"
+    yield f"| told after more than 2 s | {late} of {len(seconds)} | 0 |"
     if told["wrong"]:
         yield ""
         yield "Told with another code: " + "; ".join(sorted(set(told["wrong"]))) + "."
+    yield ""
+    yield "At rest, before and after each round; the catalogue is that of a journal which keeps its"
+    yield "last 20,000 entries."
+    yield ""
+    yield from _footprints(told["footprints"], told["slopes"])
+    slow = sorted(told["seconds"].items(), key=lambda item: -item[1])[:8]
+    yield ""
+    shown = (f"{name} {second:.1f} s" for name, second in slow)
+    yield f"Those that took longest: {', '.join(shown)}."
+
+
+def _grown(before: Figures, after: Figures, of: str) -> Any:
+    return after[of] - before[of]
+
+
+def _footprints(rows: Sequence[Figures], slopes: Figures) -> Iterator[str]:
+    """What a daemon took, look by look, and how fast that grew after the first round."""
+    yield COLUMNS
+    yield "|---" * (COLUMNS.count("|") - 1) + "|"
+    for number, row in enumerate(rows):
+        yield (
+            f"| {number} | {row['rss_mb']:.1f} MB | {row['pss_mb']:.1f} MB | {row['descriptors']} "
+            f"| {row['threads']} | {row['processes']} | {row['zombies']} | {row['mounts']} "
+            f"| {row['files']} | {row['catalogue_mb']:.1f} MB |"
+        )
+    yield ""
+    yield (
+        f"Slopes: resident memory {slopes['rss_mb']:+.2f} MB an hour, its share "
+        f"{slopes['pss_mb']:+.2f} MB an hour, descriptors {slopes['descriptors']:+.2f} an hour, "
+        f"files {slopes['files']:+.2f} an hour."
+    )
 
 
 def _yanks(told: Figures) -> Iterator[str]:

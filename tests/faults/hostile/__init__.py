@@ -10,6 +10,7 @@ All are made from words here; none is stored. Where code of theirs could run, it
 from __future__ import annotations
 
 from tests.faults.hostile import (
+    beside,
     changes,
     envelope,
     folders,
@@ -34,6 +35,7 @@ FAMILIES: dict[str, tuple[HostileDrive, ...]] = {
     "locks": locks.DRIVES,
     "indexes": indexes.DRIVES,
     "folders": folders.DRIVES,
+    "beside payloads": beside.DRIVES,
     "file systems": images.DRIVES,
     "wheels": wheels.DRIVES,
 }

@@ -69,11 +69,15 @@ class HostileDrive:
     """It is made as a file `<drive>.img`, for a block device."""
     also: frozenset[str] = frozenset()
     """Further codes that may be told, since that is wrong with it, too."""
+    beside: int = 0
+    """How many sound payloads lie beside what is wrong, and must be let in."""
 
-    def is_right(self, codes: Collection[str]) -> bool:
-        """Whether these codes, and no others, are what it is to be told with."""
+    def is_right(self, codes: Collection[str], active: int) -> bool:
+        """Whether these codes, and no others, are what it is to be told with, and whether as many
+        payloads were let in as should be."""
         told = set(codes)
-        return told - self.also == ({self.code} if self.code else set())
+        is_told = told - self.also == ({self.code} if self.code else set())
+        return is_told and active == (self.beside if self.code else max(1, self.beside))
 
 
 Spoil = Callable[[Draft], Draft]

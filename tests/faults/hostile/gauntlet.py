@@ -30,6 +30,7 @@ PLANNERS = "/nondum-fast-downward-"
 OVER = ("refused", "quarantined", "active")
 REMEDY = "→ "
 """Stands before what to do, in each problem that is told."""
+CODES = re.compile(r"\b[A-Z]+_[A-Z_]+\b")
 CONTROLS = re.compile(rb"[\x00-\x08\x0b-\x1f\x7f]")
 """What a terminal would do something with, but for line ends and tabs."""
 MORE = "[workers]\nstartup_s = 5.0\n"
@@ -62,7 +63,8 @@ class Plugged:
     def is_called(self, drive: str) -> bool:
         """Whether the daemon means this one."""
         if self.node is not None:
-            return drive.split("-")[0] == self.node.name
+            name, node = drive.split("-")[0], self.node.name
+            return name == node or name.startswith(f"{node}p")
         return drive == self.folder.name
 
 
@@ -135,8 +137,8 @@ class Gauntlet:
             told = [self._judged(drive) for drive in batch]
             if at_once == 1:
                 self.outcome.seconds[batch[0].case.name] = time.monotonic() - began
-            for drive, problems in zip(batch, told, strict=True):
-                self._judge(drive.case, problems)
+            for drive, (problems, active) in zip(batch, told, strict=True):
+                self._judge(drive.case, problems, active)
             for drive in batch:
                 self._pull(drive)
             for drive in batch:
@@ -170,22 +172,24 @@ class Gauntlet:
         else:
             detach(drive.node)
 
-    def _judge(self, case: HostileDrive, problems: Sequence[str]) -> None:
-        """Note whether it was told what it should be."""
+    def _judge(self, case: HostileDrive, problems: Sequence[str], active: int) -> None:
+        """Note whether it was told what it should be, and let in what it should have."""
         codes = [problem.split(" ")[0] for problem in problems]
         self.outcome.drives += 1
-        if not case.is_right(codes):
-            self.outcome.wrong.append(f"{case.name}: {', '.join(codes) or 'nothing'}")
+        if not case.is_right(codes, active):
+            told = ", ".join(codes) or "nothing"
+            self.outcome.wrong.append(f"{case.name}: {told}, {active} active")
         if not all(REMEDY in problem for problem in problems):
             self.outcome.without_remedy.append(case.name)
 
     def _is_as_made(self, drive: Plugged) -> bool:
         return drive.fingerprint() == self._made[drive.case.name]
 
-    def _judged(self, drive: Plugged) -> tuple[str, ...]:
-        """The problems that it is told with, once there is nothing more to be told."""
+    def _judged(self, drive: Plugged) -> tuple[tuple[str, ...], int]:
+        """The problems that it is told with, once there is nothing more to be told, and how many
+        of its payloads are active."""
 
-        def found(view: Row) -> tuple[str, ...] | None:
+        def found(view: Row) -> tuple[tuple[str, ...], int] | None:
             rows = [row for row in view["drives"] if drive.is_called(row["drive"])]
             if not rows or any(row["state"] != "idle" for row in rows):
                 return None
@@ -194,9 +198,18 @@ class Gauntlet:
             if any(row["state"] not in OVER for row in payloads):
                 return None
             problems = [problem for row in (*rows, *payloads) for problem in row["problems"]]
-            return tuple(problems) if problems or payloads else None
+            problems += self._told_of_trust(drive)
+            active = sum(row["state"] == "active" for row in payloads)
+            return (tuple(problems), active) if problems or payloads else None
 
         return self.host.until(f"{drive.case.name} judged", found, timeout_s=JUDGED_S)
+
+    def _told_of_trust(self, drive: Plugged) -> list[str]:
+        """The problems of trust files that it brought: the drive and its payloads have none."""
+        begin = f"a trust file from {drive.folder.name} is not taken: "
+        said = {row["text"] for view in self.host.views for row in view["told"]}
+        texts = [text.removeprefix(begin) for text in said if text.startswith(begin)]
+        return [f"{code} {text}" for text in texts for code in CODES.findall(text)]
 
     def _gone(self, drive: Plugged) -> None:
         def is_gone(view: Row) -> bool:
@@ -223,7 +236,8 @@ class Gauntlet:
         ]
 
     def _at_work(self) -> list[Row]:
-        return [row for row in self.host.ask("components") if row["component"] in HEALTHY]
+        rows = (row for row in self.host.ask("components") if row["component"] in HEALTHY)
+        return [{key: value for key, value in row.items() if key != "age_s"} for row in rows]
 
     def measure(self) -> None:
         """Note what the daemon takes when it is at rest."""

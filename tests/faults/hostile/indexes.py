@@ -9,6 +9,8 @@ from typing import Any
 from tests.faults.hostile.case import INDEX, HostileDrive, spoilt
 
 INVALID, DESCRIPTION = "INDEX_INVALID", "DESCRIPTION_INVALID"
+HALF = "\ud83e"
+"""Half of a letter beyond the first 65,536: JSON can say it, and no file can hold it."""
 
 
 def whole(name: str, code: str, data: str | bytes) -> HostileDrive:
@@ -61,6 +63,22 @@ DRIVES: tuple[HostileDrive, ...] = (
     many("units-of-lists", "units", []),
     many("phrases-of-nothing", "phrases", {}),
     many("streams-of-words", "streams", "video"),
+    said("name-half-a-letter", INVALID, lambda good: {**good, "name": HALF}),
+    said("word-half-a-letter", INVALID, lambda good: {**good, HALF: True}),
+    said("version-half-a-letter", INVALID, lambda good: {**good, "version": f"1.0{HALF}"}),
+    said("version-no-number", DESCRIPTION, lambda good: {**good, "version": float("nan")}),
+    said(
+        "unit-half-a-letter",
+        INVALID,
+        lambda good: {**good, "units": [{"name": HALF, "type": "lamp"}]},
+    ),
+    spoilt(
+        "component-half-a-letter",
+        INVALID,
+        lambda made: made.with_index(
+            lambda index: {**index, "components": {**index["components"], HALF: {}}}
+        ),
+    ),
     said(
         "nested-deep",
         DESCRIPTION,
