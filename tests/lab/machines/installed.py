@@ -120,11 +120,13 @@ class Installed:
         return self.machine.until(f"{component} {state}", found, PATIENCE_S, LOOK_S)
 
     def until_goal(self, goal: str, state: str) -> View:
-        """Wait until a goal that was given, in PDDL, is in a state."""
+        """Wait until a goal, in PDDL, is in a state; one that is kept and true `holds`."""
 
         def found(view: View) -> View | None:
-            rows = [row for row in view["goals"] if row["text"] == goal and row["state"] == state]
-            return rows[0] if rows else None
+            rows = [row for row in view["goals"] if row["text"] == goal]
+            holds = [row for row in rows if row["state"] == "active" and row["holds"]]
+            wanted = holds if state == "holds" else [row for row in rows if row["state"] == state]
+            return wanted[0] if wanted else None
 
         return self.until(f"{goal} {state}", found)
 
