@@ -107,6 +107,7 @@ WRONG = {
     "name-is-list": ("MANIFEST_VALUE", ":2", PLAIN.replace('"Blinker"', '["Blinker"]')),
     "authors-is-string": ("MANIFEST_VALUE", ":4", PLAIN.replace('["A. Author"]', '"A. Author"')),
     "authors-is-letter": ("MANIFEST_VALUE", ":4", PLAIN.replace('["A. Author"]', '"A"')),
+    "author-is-number": ("MANIFEST_VALUE", ":4", PLAIN.replace('"A. Author"', '"A. Author", 1')),
     "author-with-escape": ("MANIFEST_VALUE", ":4", PLAIN.replace("A. Author", "A\\u001b[2J")),
     "requires-is-string": (
         "MANIFEST_VALUE",

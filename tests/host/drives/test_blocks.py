@@ -181,6 +181,25 @@ def test_file_system_that_the_kernel_does_not_know_is_told(
     assert refused.value.code == "FS_UNSUPPORTED"
 
 
+def test_drive_that_goes_while_it_is_mounted_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Kernel:
+        """One that finds the device gone."""
+
+        def mount(self, *_: object) -> int:
+            (tmp_path / "node").unlink()
+            ctypes.set_errno(errno.EIO)
+            return -1
+
+    with attached(image(tmp_path, Part("lamp", LAMP))) as node:
+        (tmp_path / "node").symlink_to(node)
+        monkeypatch.setattr(mounting, "_libc", Kernel())
+        with pytest.raises(DriveGone) as gone:
+            mounting.mount(tmp_path / "node", tmp_path / "mount", "ext4")
+    assert gone.value.code == "DRIVE_GONE"
+
+
 def attribute(node: Path, name: str) -> int:
     """What sysfs says of a block device."""
     return int(Path(f"/sys/block/{node.name}/{name}").read_text())

@@ -146,3 +146,40 @@ def test_more_than_is_read_to_judge_is_refused(tmp_path: Path) -> None:
         leaflet.truncate(payload.MAX_METADATA)
     seal(folder, payload_id=PAYLOAD)
     assert code(parcel.outline, {"folder": str(folder)}, told) == "TOO_LARGE"
+
+
+def test_metadata_that_is_endless_to_read_is_read_in_a_copy_first(tmp_path: Path) -> None:
+    folder = lamp(tmp_path / "drive")
+    (folder / "pylock.lamp.toml").write_text("a" + ".a" * 120_000 + " = 1")
+    seal(folder, payload_id=PAYLOAD)
+    assert code(judge, folder, tmp_path) == "METADATA_LIMIT"
+
+
+def test_payload_for_a_newer_nondum_is_not_fetched(tmp_path: Path) -> None:
+    contents = lamp(tmp_path / "drive") / "CONTENTS"
+    said = contents.read_text()
+    contents.write_text(said.replace("minimum-nondum: 0.1", "minimum-nondum: 99"))
+    assert code(judge, contents.parent, tmp_path) == "NONDUM_VERSION"
+
+
+def test_what_is_fetched_needs_room_beside_what_is_made_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = lamp(tmp_path / "drive", requires="disk_mb = 100")
+    (wheel,) = (folder / "wheels").glob("test_lamp*")
+    listed = (folder / "CONTENTS").read_text()
+    entry = next(line for line in listed.splitlines() if line.endswith(wheel.name))
+    size = entry.split("  ")[1]
+    lock = (folder / "pylock.lamp.toml").read_text()
+    (folder / "pylock.lamp.toml").write_text(lock.replace(f"size = {size}", "size = 9000000"))
+    seal(folder, payload_id=PAYLOAD)
+    listed = (folder / "CONTENTS").read_text()
+    (folder / "CONTENTS").write_text(listed.replace(f"  {size}  ", "  9000000  "))
+    real = shutil.disk_usage(tmp_path)
+    for free_mb, told in ((99, "DISK_FULL"), (107, "DISK_FULL"), (115, "")):
+        disk = real._replace(free=free_mb * 2**20)
+        monkeypatch.setattr(shutil, "disk_usage", lambda _, disk=disk: disk)
+        if told:
+            assert code(judge, folder, tmp_path) == told
+        else:
+            assert judge(folder, tmp_path)["needed"]

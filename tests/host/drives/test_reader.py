@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,11 @@ from tests.wheelhouse.hostile_wheels import WheelBuilder
 
 from nondum.host.drives import reader
 from nondum.wheelhouse import payload
+from nondum.wheelhouse.memory import Promised
 from nondum.wheelhouse.trust import trust_text
 
 ALICE = Key("alice")
-ROOM = {"promised": {}, "freed_mb": 0, "freed_gpu_mb": 0}
+ROOM = {"promised": asdict(Promised()), "freed_mb": 0, "freed_gpu_mb": 0}
 
 
 def rules(tmp_path: Path) -> dict[str, Any]:

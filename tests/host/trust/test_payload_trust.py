@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -24,7 +25,7 @@ from tests.host.trust.trusted import (
 from tests.signing import Key, sign_payload, signed
 
 from nondum.host.catalogue.records import Step
-from nondum.host.events import TrustChanged, TrustFileRefused
+from nondum.host.events import PayloadFound, TrustChanged, TrustFileRefused
 from nondum.sdk.errors import TrustRefused
 from nondum.wheelhouse.trust.trust import Bounds, Revocation
 
@@ -57,6 +58,18 @@ async def test_what_nobody_trusted_signed_is_refused(tmp_path: Path) -> None:
         sign_payload(tmp_path / "drive/nondum" / LAMP_ID, MALLORY)
         host.plug(tmp_path / "drive")
         assert await refusal(host) == ["SIG_UNTRUSTED"]
+
+
+async def test_what_is_wrong_or_doubtful_is_told_as_a_drive_is_read(tmp_path: Path) -> None:
+    later = replace(FIRST, made=datetime(2100, 1, 1, tzinfo=UTC))
+    async with trusting(tmp_path, later) as host:
+        host.plug(lamp(tmp_path / "drive", ALICE), "good")
+        host.plug(lamp(tmp_path / "other", text="# unsigned"), "bad")
+        await until_read(host, "good")
+        await until_read(host, "bad")
+        found = [event for event in host.heard if isinstance(event, PayloadFound)]
+        told = {(one.drive[-3:], p.code) for one in found for p in (*one.problems, *one.warnings)}
+        assert told == {("ood", "CLOCK_UNSURE"), ("bad", "SIG_MISSING")}
 
 
 async def test_a_host_that_trusts_nobody_runs_nothing(tmp_path: Path) -> None:
