@@ -57,12 +57,11 @@ def load(folder: Path, listed: Contents) -> StagedPayload:
     for component in said.components if said else ():
         if parsed := _part(problems, partial(_lock, folder, lock.file_name(component.id))):
             locks[component.id] = parsed
-    if said is None or described is None:
-        raise PayloadRefused(*problems)
-    if not problems:
-        problems.extend(_disagreements(listed, said, locks, described))
     if problems:
         raise PayloadRefused(*problems)
+    assert said is not None and described is not None  # else that was told
+    if disagreements := tuple(_disagreements(listed, said, locks, described)):
+        raise PayloadRefused(*disagreements)
     return StagedPayload(folder, listed, said, locks, described)
 
 
