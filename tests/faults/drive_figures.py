@@ -1,8 +1,9 @@
 """The long form of the tests of drives: `python -m tests.faults.drive_figures WHAT…`.
 
 `hostile`: the whole corpus ten times through one daemon. `yanks`: 500 drives yanked at any moment.
-`crowd`: a hundred drives in ten seconds. Each is written to a folder when it is done, and
-docs/reliability/drives.md from all that are there. Exits with 1 if anything was wrong.
+`crowd`: a hundred drives in ten seconds. `soak`: good and hostile drives by turns, for long.
+Each is written to a folder when it is done, and docs/reliability/drives.md from all that are there.
+Exits with 1 if anything was wrong.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from typing import Any
 
 from tests.faults import crowds
 from tests.faults.footprint import slope
-from tests.faults.hostile import FAMILIES
+from tests.faults.hostile import FAMILIES, Bench, HostileDrive
 from tests.faults.hostile.gauntlet import gauntlet
 from tests.faults.yanks import PHASES, bench, yank_all
 from tests.lab.running_host import running
@@ -33,6 +34,10 @@ FOLDER = Path("build/drives")
 PAGE = Path("docs/reliability/drives.md")
 AT_ONCE = 16
 CROWD, WITHIN_S = 100, 10.0
+TURNS = 40
+"""Good drives, and as many hostile ones, between two looks at the daemon while it soaks."""
+CYCLES_AN_HOUR = 360
+"""As many as 8,640 a day are."""
 SLOPES = ("rss_mb", "pss_mb", "descriptors", "files", "catalogue_mb")
 FLAWS = ("wrong", "without_remedy", "canaries", "strays", "touched", "controls")
 REFUSED_S = 2.0
@@ -86,10 +91,28 @@ def crowd(root: Path, options: argparse.Namespace) -> Figures:
     return {**asdict(told), "is_wrong": told.most_at_once > 2}
 
 
+def soak(root: Path, options: argparse.Namespace) -> Figures:
+    """Good and hostile drives by turns, two at a time, and a look at the daemon now and then."""
+    hostile = [case for cases in FAMILIES.values() for case in cases[::11]][:TURNS]
+    good = [HostileDrive(f"good-{number}", "", Bench.sound) for number in range(len(hostile))]
+    with gauntlet(root) as run:
+        drives = run.make([case for pair in zip(good, hostile, strict=True) for case in pair])
+        while run.outcome.drives < options.cycles:
+            run.round(drives, at_once=2)
+            rest()
+            run.measure()
+            say(f"{run.outcome.drives} cycles: {run.outcome.footprints[-1]}, {run.outcome.wrong}")
+        slopes = {of: slope(run.outcome.footprints, of) for of in SLOPES}
+        told = asdict(run.outcome)
+    told["pids"], told["slopes"] = len(told["pids"]), slopes
+    return {**told, "is_wrong": any(told[flaw] for flaw in FLAWS)}
+
+
 WHAT: Mapping[str, Callable[[Path, argparse.Namespace], Figures]] = {
     "hostile": hostile,
     "yanks": yanks,
     "crowd": crowd,
+    "soak": soak,
 }
 
 
@@ -121,8 +144,9 @@ def say(line: str) -> None:
 def _page(found: Mapping[str, Figures | None]) -> Iterator[str]:
     yield "# Drives: what was tried, and what it came to"
     yield ""
-    yield "Written by `python -m tests.faults.drive_figures hostile yanks crowd`."
-    for name, show in (("hostile", _hostile), ("yanks", _yanks), ("crowd", _crowd)):
+    yield "Written by `python -m tests.faults.drive_figures hostile yanks crowd soak`."
+    shown = {"hostile": _hostile, "yanks": _yanks, "crowd": _crowd, "soak": _soak}
+    for name, show in shown.items():
         figures = found[name]
         if figures is not None:
             yield ""
@@ -246,6 +270,33 @@ def _crowd(told: Figures) -> Iterator[str]:
     yield f"| drives and payloads that were shown as waiting | {told['queued']} | |"
 
 
+def _soak(told: Figures) -> Iterator[str]:
+    first, *_, last = told["footprints"]
+    hours = (last["at_s"] - first["at_s"]) / 3600
+    cycles = told["drives"] - told["drives"] / len(told["footprints"])
+    growth = _grown(first, last, "rss_mb")
+    yield "## Soak"
+    yield ""
+    yield f"{told['drives']} times a drive was plugged in, told or taken in, and pulled: good ones"
+    yield "and hostile ones by turns, two at a time, through one daemon. It was looked at, at rest,"
+    yield f"each {2 * TURNS} cycles, the first time after as many; from the first look to the last"
+    yield f"were {hours * 60:.0f} minutes."
+    yield ""
+    yield "| | reached | aim |"
+    yield "|---|---|---|"
+    yield f"| told otherwise than they should be | {len(told['wrong'])} | 0 |"
+    yield f"| daemons that it took | {told['pids']} | 1 |"
+    yield f"| descriptors, first to last look | {_grown(first, last, 'descriptors'):+d} | 0 |"
+    yield f"| resident memory, first to last look | {growth:+.1f} MB | |"
+    paced = growth / cycles * CYCLES_AN_HOUR
+    yield f"| the same, for each {CYCLES_AN_HOUR} cycles | {paced:+.2f} MB | 1 MB |"
+    yield f"| canaries that ran | {told['canaries']} | 0 |"
+    yield ""
+    yield f"The aim is 1 MB an hour with 8,640 cycles a day, which are {CYCLES_AN_HOUR} an hour."
+    yield ""
+    yield from _footprints(told["footprints"], told["slopes"])
+
+
 def _spread(ordered: Sequence[float]) -> str:
     if not ordered:
         return "-"
@@ -270,6 +321,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("what", nargs="*", choices=[*WHAT, []], help="nothing: only the page")
     parser.add_argument("--rounds", type=int, default=10, help="of hostile drives")
     parser.add_argument("--points", type=int, default=500, help="yanks")
+    parser.add_argument("--cycles", type=int, default=500, help="of the soak")
     parser.add_argument("--folder", type=Path, default=FOLDER, help="what was measured so far")
     return parser.parse_args()
 
