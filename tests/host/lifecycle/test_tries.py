@@ -165,6 +165,12 @@ def test_daemon_that_lives_on_clears_what_is_active_for_long_enough() -> None:
     assert not advance(back, events.HostSteady("spot"), LATER).state.tries
 
 
+@pytest.mark.parametrize(("step", "is_kept"), [(Step.STORED, True), (Step.REFUSED, False)])
+def test_what_is_still_begun_stays_counted(step: Step, is_kept: bool) -> None:
+    state = replace(on(at_step(step), events.DriveRead("a", ("k1",))), tries={"k1": 1})
+    assert on(state, events.HostSteady("spot")).tries == ({"k1": 1} if is_kept else {})
+
+
 def test_nothing_is_cleared_while_a_drive_is_being_read() -> None:
     state = replace(on(HostState("spot"), drive()), tries={"k9": 3})
     assert on(state, events.HostSteady("spot")).tries == {"k9": 3}

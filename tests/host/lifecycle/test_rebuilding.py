@@ -1,0 +1,50 @@
+"""Without a catalogue, payloads are known by what lies on disk, if that is what it was."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.host.drives.test_parcel import PAYLOAD, lamp, told
+
+from nondum.host.drives.reader import KEY_DIGITS
+from nondum.host.lifecycle import rebuilding
+
+
+@pytest.fixture
+def kept(tmp_path: Path) -> Path:
+    """A payload as it is kept, and the note that tells of it."""
+    folder = lamp(tmp_path / "drive")
+    key = hashlib.sha256((folder / "CONTENTS").read_bytes()).hexdigest()[:KEY_DIGITS]
+    copied = shutil.copytree(folder, tmp_path / "payloads" / key)
+    (tmp_path / "notes").mkdir()
+    note = json.dumps({"drive": "a", "folder": str(folder)})
+    (tmp_path / f"notes/{key}.json").write_text(note)
+    return copied
+
+
+def found(tmp_path: Path) -> list[dict[str, Any]]:
+    places = {"notes": str(tmp_path / "notes"), "payloads": str(tmp_path / "payloads")}
+    return rebuilding.found(places, told)
+
+
+def test_payload_that_is_whole_is_found(kept: Path, tmp_path: Path) -> None:
+    (said,) = found(tmp_path)
+    assert (said["key"], said["payload_id"], said["drive"]) == (kept.name, PAYLOAD, "a")
+    assert said["components"] == ["lamp"]
+
+
+def test_payload_under_another_s_name_is_not_brought_back(kept: Path, tmp_path: Path) -> None:
+    kept.rename(kept.with_name("0" * KEY_DIGITS))
+    (tmp_path / f"notes/{kept.name}.json").rename(tmp_path / f"notes/{'0' * KEY_DIGITS}.json")
+    assert found(tmp_path) == []
+
+
+def test_payload_whose_metadata_changed_is_not_brought_back(kept: Path, tmp_path: Path) -> None:
+    with (kept / "payload.toml").open("a") as manifest:
+        manifest.write("# changed\n")
+    assert found(tmp_path) == []
