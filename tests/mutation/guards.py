@@ -12,6 +12,7 @@ _MOUNTED = tuple(
     f"{_TH}/drives/test_blocks.py::{test}"
     for test in (
         "test_wrong_file_system_is_told",
+        "test_drive_that_goes_while_it_is_mounted_is_told",
         "test_file_system_that_the_kernel_does_not_know_is_told",
         "test_drive_that_came_in_place_of_another_is_not_taken_for_it",
         "test_unknown_file_system_is_refused_by_name",
@@ -49,7 +50,8 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/drives/usb.py": (f"{_TH}/drives/test_usb.py",),
     f"{_H}/drives/slots.py": (f"{_TH}/drives/test_slots.py",),
     f"{_H}/drives/reading.py": (
-        f"{_TH}/drives/test_reading.py::test_payloads_of_one_drive_are_judged_each_alone",
+        f"{_TH}/trust/test_payload_trust.py"
+        "::test_what_is_wrong_or_doubtful_is_told_as_a_drive_is_read",
         *_BROUGHT,
     ),
     f"{_H}/drives/reader.py": (f"{_TH}/drives/test_reader.py",),
@@ -85,15 +87,14 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_W}/venvs.py": (f"{_TW}/test_venvs.py",),
     # Whether it may come in, among what is here.
     f"{_H}/lifecycle/admission.py": _RELEASES,
-    f"{_H}/lifecycle/going_back.py": _RELEASES,
-    f"{_H}/lifecycle/releases.py": _RELEASES,
     f"{_H}/lifecycle/payload_rules.py": (*_RELEASES, f"{_TH}/lifecycle/test_tries.py"),
     f"{_H}/lifecycle/drive_rules.py": (f"{_TH}/lifecycle/test_tries.py",),
     f"{_H}/lifecycle/tries.py": (f"{_TH}/lifecycle/test_tries.py",),
     f"{_H}/lifecycle/installing.py": (
         f"{_TH}/lifecycle/test_promises.py::test_what_was_promised_while_it_was_copied_counts",
+        f"{_TH}/lifecycle/test_installing.py",
     ),
-    f"{_H}/lifecycle/rebuilding.py": (f"{_TH}/catalogue/test_backups.py",),
+    f"{_H}/lifecycle/rebuilding.py": (f"{_TH}/lifecycle/test_rebuilding.py",),
     # What its workers send, and take.
     f"{_S}/packets.py": (f"{_TS}/test_link.py",),
     f"{_S}/link.py": (f"{_TS}/test_link.py",),
@@ -161,8 +162,10 @@ ASIDE: Mapping[str, str] = {
     f"{_H}/lifecycle/executor.py": _RUNS,
     f"{_H}/lifecycle/folders.py": "sees that one daemon has the state folder",
     f"{_H}/lifecycle/installation.py": _RUNS,
+    f"{_H}/lifecycle/going_back.py": "has a person's wish fulfilled by what was admitted",
     f"{_H}/lifecycle/installed.py": _RUNS,
     f"{_H}/lifecycle/recovery.py": _RUNS,
+    f"{_H}/lifecycle/releases.py": "puts what was admitted in order",
     f"{_H}/workers/confinements.py": _RUNS,
     f"{_H}/workers/keeper.py": _RUNS,
     f"{_H}/workers/leftovers.py": _RUNS,
