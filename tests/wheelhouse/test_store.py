@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from tests.payloads import make_wheel, sha256
-from tests.wheelhouse.hostile_wheels import INFO, WHEEL, Lie, WheelBuilder, record_of
+from tests.wheelhouse.hostile_wheels import INFO, METADATA, WHEEL, Lie, WheelBuilder, record_of
 from tests.wheelhouse.test_drive import file_system, needs_mount
 
 from nondum.sdk.errors import InstallFailed, PayloadRefused
@@ -145,6 +145,22 @@ def test_a_hostile_wheel_leaves_nothing(store: Store, tmp_path: Path) -> None:
             added(store, path)
     assert list(store.root.iterdir()) == []
     assert not (tmp_path / "out.py").exists()
+
+
+@pytest.mark.parametrize("harm", ["digest", "checksum"])
+def test_bytes_that_are_not_what_they_were_said_to_be_are_not_stored(
+    store: Store, tmp_path: Path, harm: str
+) -> None:
+    files = {"evil/__init__.py": b"Y = 2\n", f"{INFO}/METADATA": METADATA, f"{INFO}/WHEEL": WHEEL}
+    record = record_of(files, f"{INFO}/RECORD")
+    builder = WheelBuilder(record=record)
+    if harm == "checksum":
+        builder = WheelBuilder(lies={"evil/__init__.py": Lie(crc=1)})
+    path = builder.write(tmp_path)
+    with pytest.raises(PayloadRefused) as refused:
+        added(store, path)
+    assert [problem.code for problem in refused.value.problems] == ["WHEEL_RECORD"]
+    assert list(store.root.iterdir()) == []
 
 
 def test_half_done_work_is_swept(store: Store, tmp_path: Path) -> None:
