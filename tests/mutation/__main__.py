@@ -41,6 +41,7 @@ def main() -> int:
             for key in steps
             if (options.all or key not in known) and (options.only or "") in key.module
         ]
+        due.sort(key=lambda key: key in known)
         guards = {key: known[key] for key in steps if key in known}
         for number, (key, guard) in enumerate(_tried(made, steps, due, known), start=1):
             guards[key] = guard or page.MISSING

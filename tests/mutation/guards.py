@@ -160,7 +160,6 @@ ASIDE: Mapping[str, str] = {
     f"{_H}/lifecycle/children.py": _RUNS,
     f"{_H}/lifecycle/compiling.py": _RUNS,
     f"{_H}/lifecycle/executor.py": _RUNS,
-    f"{_H}/lifecycle/folders.py": "sees that one daemon has the state folder",
     f"{_H}/lifecycle/installation.py": _RUNS,
     f"{_H}/lifecycle/going_back.py": "has a person's wish fulfilled by what was admitted",
     f"{_H}/lifecycle/installed.py": _RUNS,

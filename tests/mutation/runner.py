@@ -26,7 +26,10 @@ UNTOLD = "the tests do not begin or end"
 """In the place of a test."""
 IMPORTED = "ignore::pytest.PytestAssertRewriteWarning"
 """What is loaded before pytest begins keeps its assertions as they are."""
-OPTIONS = ("-x", "-q", "-p", "no:cacheprovider", "-W", IMPORTED, "--hypothesis-profile=mutation")
+OPTIONS = (
+    *("-x", "-q", "-p", "no:cacheprovider", "-W", IMPORTED),
+    *("--hypothesis-profile=mutation", "--timeout=60"),
+)
 SEEDS = (1, 2, 3)
 
 

@@ -30,7 +30,9 @@ _CHECKS = re.compile(r"\._?(check|verify|require|raise_if|tell_twice|trial\.run)
 _REFUSALS = re.compile(r"\bProblem\b|Refused|Failed|Gone|Violation|Malformed|NoReturn|NondumError")
 """What those return that make or tell one, whatever they are called."""
 _TOLD = frozenset({"problem", "problems", "flaw", "flaws"})
-_MACHINE = frozenset({"OSError", "TimeoutError", "subprocess.TimeoutExpired"})
+_MACHINE = frozenset(
+    {"OSError", "TimeoutError", "BlockingIOError", "InterruptedError", "subprocess.TimeoutExpired"}
+)
 """What these tell went wrong in this machine, and not with what was plugged in."""
 _JUDGES = re.compile(r"(flaw|overlap|use|excess|contradiction|twice)s?$")
 """What functions are called that return what is wrong as text."""
@@ -137,9 +139,9 @@ class _Finder:
                 yield from _alternatives(guard)
             case ast.match_case(guard=None, pattern=pattern, body=body) if self._refuses(body):
                 yield _whole(pattern, "{} if False", "case {}")
-            case ast.ExceptHandler(type=ast.expr() as kind, body=body) if (
-                self._refuses(body) and ast.unparse(kind) not in _MACHINE
-            ):
+            case ast.ExceptHandler(type=ast.expr() as kind, body=body) if self._refuses(
+                body
+            ) and not _is_of_machine(kind):
                 yield _whole(kind, "()", "except {}")
             case ast.For(iter=each, body=body) if self._refuses(body):
                 yield _whole(each, "()", "for … in {}")
@@ -237,6 +239,11 @@ def _is_bool(function: _Function) -> bool:
             for node in ast.walk(function)
         )
     )
+
+
+def _is_of_machine(kind: ast.expr) -> bool:
+    kinds = kind.elts if isinstance(kind, ast.Tuple) else [kind]
+    return all(ast.unparse(one) in _MACHINE for one in kinds)
 
 
 def _is_check(call: ast.Call) -> bool:

@@ -59,7 +59,7 @@ def test_what_stands_aside_is_not_guarded() -> None:
         ("match a:\n    case 1 if not b:\n        raise Refused()", ["not b"]),
         ("match a:\n    case _:\n        raise Refused()", ["case _"]),
         ("try:\n    a()\nexcept ValueError:\n    raise Refused()", ["except ValueError"]),
-        ("try:\n    a()\nexcept OSError:\n    raise Refused()", []),
+        ("try:\n    a()\nexcept (OSError, TimeoutError):\n    raise Refused()", []),
         ("for one in found:\n    yield Problem('A', one)", ["for … in found"]),
         ("told = [Problem('A', one) for one in found if one > 1]", ["one > 1"]),
         ("problems.extend(_size_flaws(a))", ["_size_flaws(a)"]),
