@@ -56,6 +56,7 @@ HARMLESS = {
     "a program for a board": {"evil/firmware/flasher": elf(ARM_32)},
     "a library for a board": {"evil/data/libevil.so": elf(ARM, LIBRARY)},
     "a library with a version": {"evil/data/libevil.so.3": elf(ARM)},
+    "something that is no library beside libraries": {"evil.libs/flasher.socket": elf(ARM)},
     "a module for an app, not importable": {"evil/lib-arm64/_core.so": elf(ARM)},
     "a module of the same name for another machine": {
         "evil/arm/_core.so": elf(ARM),
