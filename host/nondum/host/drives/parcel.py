@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.drives import reader, trial
+from nondum.host.drives.pace import paced
 from nondum.host.drives.reader import Arguments, Report
 from nondum.host.helper import privileged
 from nondum.host.trust import chain
@@ -42,7 +43,9 @@ def hand_over(arguments: Arguments, report: Report) -> dict[str, Any]:
     _check_room(target, wanted, arguments["reserve_mb"])
     for entry in wanted:  # what a former attempt left
         (target / entry.path).unlink(missing_ok=True)
-    drive.copy(folder, listed, target, report, wanted=lambda entry: entry in wanted)
+    drive.copy(
+        folder, listed, target, paced(report, str(folder)), wanted=lambda entry: entry in wanted
+    )
     if arguments["wanted"] is None:
         (target / contents.NAME).write_bytes(data)
         signature = drive.read_signature(folder)

@@ -17,6 +17,7 @@ from packaging.version import Version
 
 from nondum.host.brief import brief
 from nondum.host.drives import trial
+from nondum.host.drives.pace import paced
 from nondum.host.helper import privileged
 from nondum.host.trust.chain import packed
 from nondum.host.trust.on_drives import trust_files_on
@@ -107,7 +108,8 @@ def copy(arguments: Arguments, report: Report) -> dict[str, int]:
     needed = chosen(staged, facts)
     known = known_wheels(arguments, staged, facts)
     missing = {locked.path for locked in needed if locked.sha256 not in known}
-    copied = drive.copy(folder, listed, staging, report, wanted=lambda e: e.path in missing)
+    pace = paced(report, str(folder))
+    copied = drive.copy(folder, listed, staging, pace, wanted=lambda e: e.path in missing)
     known_bytes = sum(locked.size for locked in needed if locked.sha256 in known)
     return {"copied": copied, "known": known_bytes}
 
