@@ -48,6 +48,8 @@ class FuseDrive:
     """Where it can be read."""
     answers: dict[str, Answer] = field(default_factory=dict)
     """Path → what is answered to whoever reads it."""
+    endless: set[str] = field(default_factory=set)
+    """Folders that have more and more names."""
     reads: dict[str, int] = field(default_factory=dict)
     """Path → how often it was opened."""
     listed: set[str] = field(default_factory=set)
@@ -130,7 +132,11 @@ class FuseDrive:
         return _ATTR.pack(node, found.st_size, 8, *times, kind, 1, 0, 0, 0, 512, 0)
 
     def _names(self, path: str, offset: int) -> bytes:
-        listed, packed = sorted(p.name for p in (self.root / path).iterdir()), b""
+        if path in self.endless:
+            listed = [f"{number:08}" for number in range(offset + 100)]
+        else:
+            listed = sorted(p.name for p in (self.root / path).iterdir())
+        packed = b""
         for number, name in list(enumerate(listed, start=1))[offset:]:
             raw = os.fsencode(name)
             entry = struct.pack("<QQII", number + 1, number, len(raw), 0) + raw

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import threading
+import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -160,6 +161,44 @@ async def test_file_without_end_is_read_no_further_than_listed(tmp_path: Path) -
         assert [problem.code for problem in record.problems] == ["HASH_MISMATCH"]
         listed = len(bytes_of(tmp_path, wheel(tmp_path)))
         assert max(told) <= listed + 2 * 2**20  # the kernel asks for what one read may take
+
+
+@pytest.mark.parametrize("name", ["nondum", "nondum-trust", "nondum-peers"])
+async def test_folder_without_end_is_read_no_further_than_a_person_fills_it(
+    tmp_path: Path, name: str
+) -> None:
+    root = tmp_path / "root"
+    async with living(tmp_path) as host:
+        make_payload(root, Part("lamp", LAMP), payload_id=LAMP_ID)
+        (root / name).mkdir(exist_ok=True)
+        with served(root, tmp_path / "fuse") as drive:
+            drive.endless.add(name)
+            host.plug(drive.mount)
+            if name == "nondum":
+                await unreadable(host, "TOO_MANY_FILES")
+            else:
+                await host.until_step(LAMP_ID, Step.ACTIVE)
+            host.pull()
+            await host.until(lambda: not host.snapshot.drives)
+
+
+async def test_list_that_grows_while_it_is_read_is_given_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is as long as it says, and a byte longer each time that somebody has come to its end."""
+    monkeypatch.setattr(reading, "LOOK_S", 4.0)
+    told: list[int] = []
+
+    def answer(opening: int, offset: int, size: int) -> bytes:
+        told.append(offset)
+        data = bytes_of(tmp_path, LIST)
+        if offset >= len(data):
+            time.sleep(0.01)  # so does a device that takes its time
+        return data[offset : offset + size] or b"x"
+
+    async with lying(tmp_path, answers={LIST: answer}) as (host, _):
+        await unreadable(host, "DRIVE_STALLED")
+    assert max(told) <= 256 * 1024
 
 
 @pytest.mark.parametrize("path", ["list", "wheel"])

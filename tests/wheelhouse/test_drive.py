@@ -259,6 +259,11 @@ def test_long_lists_and_signatures_are_refused(folder: Path, name: str) -> None:
     assert found.value.code == "TOO_LARGE"
 
 
+def test_name_that_no_file_can_have_is_no_file(folder: Path) -> None:
+    """As that of the signature beside the longest name that there is."""
+    assert drive.read_small(folder, "n" * 300, 100) is None
+
+
 def test_linked_contents_are_refused(folder: Path, tmp_path: Path) -> None:
     as_symlink(folder / contents.NAME, tmp_path)
     with pytest.raises(PayloadRefused) as found:

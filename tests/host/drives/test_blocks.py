@@ -129,6 +129,40 @@ async def test_unknown_file_system_is_refused_by_name(tmp_path: Path) -> None:
             assert [problem.code for problem in drive.problems] == ["FS_UNSUPPORTED"]
 
 
+def options_of(target: Path) -> set[str]:
+    """Those of a mount and of its file system, as the kernel tells them."""
+    lines = Path("/proc/self/mountinfo").read_text().splitlines()
+    (line,) = (line.split() for line in lines if line.split()[4] == str(target))
+    return {*line[5].split(","), *line[-1].split(",")}
+
+
+@pytest.mark.parametrize("panics", [True, False], ids=["wants-a-panic", "as-it-is-made"])
+def test_drive_has_no_say_in_how_it_is_mounted(tmp_path: Path, panics: bool) -> None:
+    """The superblock of an ext4 can say that the kernel is to panic once it finds an error."""
+    file, target = image(tmp_path, Part("lamp", LAMP)), tmp_path / "mount"
+    if panics:
+        _run("tune2fs", "-e", "panic", "-o", "debug,user_xattr,acl", str(file))
+    with attached(file) as node:
+        mounting.mount(node, target, "ext4")
+        try:
+            given = options_of(target)
+        finally:
+            mounting.unmount(target)
+    assert {"ro", "nosuid", "nodev", "noexec", "nosymfollow"} <= given
+    assert "errors=panic" not in given
+
+
+async def test_file_system_that_tears_under_a_reader_is_told_as_that(tmp_path: Path) -> None:
+    """Its list lies, by its own word, where the device has no bytes."""
+    file = image(tmp_path, Part("lamp", LAMP))
+    _run("debugfs", "-w", "-R", f"sif /nondum/{LAMP_ID}/CONTENTS block[5] 999999999", str(file))
+    async with living(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
+        with attached(file):
+            await host.until(lambda: bool(host.snapshot.payloads))
+            record = await host.until_step(LAMP_ID, Step.REFUSED)
+            assert [problem.code for problem in record.problems] == ["FS_ERROR"]
+
+
 async def test_mounts_left_by_a_killed_daemon_are_undone(tmp_path: Path) -> None:
     folders = Folders(tmp_path / "state")
     with attached(image(tmp_path, Part("lamp", LAMP))) as node:
