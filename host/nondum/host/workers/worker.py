@@ -50,6 +50,8 @@ class Worker:
         self._beaten = asyncio.Event()
         self._loop = asyncio.get_running_loop()
         self._calls: dict[int, Call] = {}
+        self._reached: set[str] = set()
+        """Needs of which a node may have been made for it, to be removed with it."""
         self._tail: deque[str] = deque(maxlen=TAIL_LINES)
         self._ending: asyncio.Task[None] | None = None
         self._watchdog: asyncio.TimerHandle | None = None
@@ -109,6 +111,7 @@ class Worker:
             await self.link.request("detach", {"device": need})
         finally:
             await self._process.revoke(need)
+            self._reached.discard(need)
             await asyncio.to_thread(withdrawn, self.spec.component, need)
 
     async def look(self) -> tuple[Problem, ...]:
@@ -179,6 +182,8 @@ class Worker:
         if self._process.cage is not None:
             self._process.cage.end()
         end_leftovers(self.spec.scratch)
+        for need in tuple(self._reached):
+            withdrawn(self.spec.component, need)
         if problem.code == problems.SCRATCH_FULL:  # the next worker is to have room, and the host
             scratch.empty(self.spec.scratch)
 
@@ -195,6 +200,7 @@ class Worker:
         """Have a device where the worker can open it; what it is told of that."""
         node = device["node"]
         if self._process.service is None:  # a service has a user of its own, and the node's group
+            self._reached.add(need)
             node = await asyncio.to_thread(reachable, self.spec.component, need, node)
         try:
             await self._process.grant(need, node)
