@@ -12,6 +12,8 @@ from nondum.host.mind.composition import Composition
 from nondum.host.mind.frames import mount_warnings
 
 MAX_SENTENCES = 1000
+MAX_CHARACTERS = 4096
+"""Of a sentence: strangers' payloads can be wrong at great length."""
 
 _Component: TypeAlias = ComponentRecord | PeerComponent
 
@@ -51,7 +53,8 @@ class People:
     def tell(self, text: str) -> None:
         """Say a sentence."""
         self._number += 1
-        self._told.append(Told(self._number, self._wall_s(), text))
+        kept = text if len(text) <= MAX_CHARACTERS else f"{text[:MAX_CHARACTERS]}…"
+        self._told.append(Told(self._number, self._wall_s(), kept))
 
 
 def recomposed(old: Composition | None, new: Composition) -> list[str]:
