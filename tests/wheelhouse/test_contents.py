@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from nondum.sdk.errors import PayloadRefused
@@ -64,6 +64,7 @@ def test_noise_is_refused_and_nothing_else_raised(noise: bytes) -> None:
 
 
 @given(st.integers(0, len(PLAIN) - 1), st.characters(codec="latin-1"))
+@example(PLAIN.index(" 1.0"), "\r")
 def test_a_changed_byte_never_passes_unnoticed(at: int, byte: str) -> None:
     changed = PLAIN[:at] + byte + PLAIN[at + 1 :]
     try:

@@ -145,8 +145,10 @@ def _header(lines: list[str], where: str, problems: list[Problem]) -> tuple[dict
                 _flaw("CONTENTS_HEADER", f"unexpected header {line[:60]!r}", f"{where}:{number}")
             )
             continue
-        header[key] = value.strip()
-        if flaw := _header_flaw(key, header[key]):
+        header[key] = " ".join(value.split())
+        wanted = f" {header[key]}".rstrip()
+        flaw = _header_flaw(key, header[key]) if value == wanted else "is not set off by one space"
+        if flaw:
             problems.append(_flaw("CONTENTS_HEADER", f"{key}: {flaw}", f"{where}:{number}"))
     for key in HEADER_KEYS:
         if key not in header:
