@@ -19,6 +19,7 @@ PLAIN = b'{"format": 1, "components": {}}'
         pytest.param(b"[]", "INDEX_INVALID", id="a list"),
         pytest.param(PLAIN.replace(b"1", b"2"), "INDEX_INVALID", id="another format"),
         pytest.param(PLAIN.replace(b"{}", b"[]"), "INDEX_INVALID", id="no table"),
+        pytest.param(PLAIN.replace(b"{}", b'{"\\ud83e": {}}'), "INDEX_INVALID", id="half a letter"),
         pytest.param(PLAIN.replace(b"{}", b'{"a": 1}'), "DESCRIPTION_INVALID", id="no description"),
     ],
 )
