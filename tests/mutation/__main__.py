@@ -34,6 +34,7 @@ def main() -> int:
     known = {key: guard for key, guard in known.items() if guard != page.MISSING}
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="nondum-mutation-")))
+        folder.chmod(0o755)  # some tests are other users
         made = [stack.enter_context(copy) for copy in copies(ROOT, folder, os.cpu_count() or 1)]
         steps = page.keyed(steps_in(made[0].folder, tuple(GUARDS)))
         due = [

@@ -51,6 +51,7 @@ def test_what_is_sound_is_read(reader: str, value: Any, read: Any) -> None:
         ("text", 3, "not 3"),
         ("choice", "perhaps", "achieve or maintain, not 'perhaps'"),
         ("number", 10, "from 0 to 9"),
+        ("number", -1, "from 0 to 9"),
         ("number", True, "not True"),
         ("number", "5", "not '5'"),
         ("flag", 1, "true or false"),

@@ -249,6 +249,25 @@ def test_requests_survive_the_wire(verb: str, arguments: dict[str, Any]) -> None
     assert protocol.decode_request(protocol.encode_request(request)) == request
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"",
+        b"{",
+        b"[" * 100_000,
+        b"[]",
+        b"{}",
+        b'{"verb": 1}',
+        b'{"verb": "status", "arguments": []}',
+    ],
+    ids=["nothing", "cut off", "too deep", "a list", "no verb", "a number", "no table"],
+)
+def test_what_is_no_request_is_a_violation(line: bytes) -> None:
+    with pytest.raises(ProtocolViolation) as violation:
+        protocol.decode_request(line)
+    assert violation.value.code == "CONTROL_REQUEST"
+
+
 @given(st.binary())
 def test_any_bytes_are_a_request_or_a_violation(line: bytes) -> None:
     try:
