@@ -13,7 +13,10 @@ from nondum.wheelhouse.manifest import Requires
 
 ROOT = Path(__file__).parent.parent.parent
 TEXT = (ROOT / "docs/payload-format.md").read_text(encoding="utf-8")
-READING = ("archive", "contents", "drive", "index", "lock", "manifest", "payload", "preflight")
+READING = (
+    *("archive", "contents", "drive", "extensions", "index", "lock", "manifest", "memory"),
+    *("payload", "preflight"),
+)
 CODE = re.compile(r'"((?!SC_)[A-Z][A-Z0-9]+_[A-Z_0-9]+)"')
 KEYS = (
     *contents.HEADER_KEYS,
