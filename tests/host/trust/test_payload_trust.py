@@ -27,6 +27,8 @@ from tests.signing import Key, sign_payload, signed
 from nondum.host.catalogue.records import Step
 from nondum.host.events import PayloadFound, TrustChanged, TrustFileRefused
 from nondum.sdk.errors import TrustRefused
+from nondum.wheelhouse.trust import trust_file
+from nondum.wheelhouse.trust.succession import SignedFile
 from nondum.wheelhouse.trust.trust import Bounds, Revocation
 
 pytestmark = pytest.mark.anyio
@@ -64,12 +66,16 @@ async def test_what_is_wrong_or_doubtful_is_told_as_a_drive_is_read(tmp_path: Pa
     later = replace(FIRST, made=datetime(2100, 1, 1, tzinfo=UTC))
     async with trusting(tmp_path, later) as host:
         host.plug(lamp(tmp_path / "drive", ALICE), "good")
-        host.plug(lamp(tmp_path / "other", text="# unsigned"), "bad")
+        endless = SignedFile(b"#" * (trust_file.MAX_BYTES + 1), None)
+        bad = with_trust(lamp(tmp_path / "other", text="# unsigned"), endless)
+        host.plug(bad, "bad")
         await until_read(host, "good")
         await until_read(host, "bad")
         found = [event for event in host.heard if isinstance(event, PayloadFound)]
         told = {(one.drive[-3:], p.code) for one in found for p in (*one.problems, *one.warnings)}
         assert told == {("ood", "CLOCK_UNSURE"), ("bad", "SIG_MISSING")}
+        files = [event for event in host.heard if isinstance(event, TrustFileRefused)]
+        assert [event.problems[0].code for event in files] == ["TOO_LARGE"]
 
 
 async def test_a_host_that_trusts_nobody_runs_nothing(tmp_path: Path) -> None:
