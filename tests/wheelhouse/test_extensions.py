@@ -134,6 +134,18 @@ def test_any_bytes_are_an_elf_file_or_none(head: bytes) -> None:
     assert found is None or str(found)
 
 
+FILENAME, BUILDER = native({MODULE: elf(X86), "evil/_core.so": elf(ARM, bytes(999))})
+WHOLE = BUILDER.bytes()
+
+
+@given(st.integers(0, len(WHOLE) - 1), st.binary(min_size=1, max_size=9))
+def test_damaged_machine_code_is_judged_like_any_other(at: int, noise: bytes) -> None:
+    """Whatever is wrong with it is told where contents are judged; nothing else is raised."""
+    damaged = (WHOLE[:at] + noise + WHOLE[at + len(noise) :])[: len(WHOLE)]
+    found = wheel.lay_out(memoryview(damaged), FILENAME).problems
+    assert all(problem.code.startswith("WHEEL_") for problem in found)
+
+
 @given(st.sampled_from(list(ARCHITECTURES)))
 def test_every_known_machine_is_read_as_it_is_written(name: str) -> None:
     assert Elf.parse(elf(ARCHITECTURES[name])) == ARCHITECTURES[name]
