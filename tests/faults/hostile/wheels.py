@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from packaging.tags import sys_tags
 from packaging.utils import InvalidWheelFilename, parse_wheel_filename
 from tests.faults.hostile.case import Bench, HostileDrive
 from tests.faults.hostile.changes import wheel_of
@@ -24,8 +25,15 @@ def carrying(wheel: HostileWheel) -> HostileDrive:
 
     # What its metadata asks for may be missing in the lock as well.
     return HostileDrive(
-        f"wheel-{wheel.name}", wheel.code, make, also=frozenset({"LOCK_INCOMPLETE"})
+        f"wheel-{wheel.name}", code_here(wheel), make, also=frozenset({"LOCK_INCOMPLETE"})
     )
+
+
+def code_here(wheel: HostileWheel) -> str:
+    """What a host tells: one that is built for another machine by its name is not looked into."""
+    tags = parse_wheel_filename(wheel.filename)[3]
+    is_foreign = wheel.code == "WHEEL_MACHINE" and tags.isdisjoint(sys_tags())
+    return "WHEEL_INCOMPATIBLE" if is_foreign else wheel.code
 
 
 def can_be_locked(wheel: HostileWheel) -> bool:
