@@ -259,6 +259,7 @@ async def test_worker_that_welcomes_is_refused(hostile: Pair) -> None:
 HOSTILE = {
     "garbage": ([b"\xff\xff\xff"], "PACKET_MALFORMED"),
     "too long": ([bytes(MAX_PACKET + 1)], "PACKET_TOO_LONG"),
+    "much too long": ([bytes(2 * MAX_PACKET)], "PACKET_TOO_LONG"),
     "reply to nobody": ([encode(Reply(1, {}))], "UNKNOWN_CALL"),
     "handshake twice": ([encode(Hello((1,), "1", 1))] * 2, "HANDSHAKE"),
     "call twice": ([encode(Request(1, "wait", {}))] * 2, "CALL_TWICE"),

@@ -236,6 +236,19 @@ def test_a_pulled_drive_is_told(tmp_path: Path) -> None:
         assert gone.value.code == "DRIVE_GONE"
 
 
+@pytest.mark.skipif(os.geteuid() != 0, reason="becoming somebody else needs root")
+def test_what_cannot_be_read_is_the_drive_s_fault(folder: Path) -> None:
+    folder.chmod(0o700)
+    os.seteuid(65534)
+    try:
+        with pytest.raises(PayloadRefused) as closed:
+            drive.read_contents(folder)
+    finally:
+        os.seteuid(0)
+    assert closed.value.code == "FS_ERROR"
+    assert "another computer" in closed.value.problems[0].fix
+
+
 def test_contents_are_read_as_they_are(folder: Path) -> None:
     assert drive.read_contents(folder) == LISTED.to_bytes()
     assert drive.read_signature(folder) is None

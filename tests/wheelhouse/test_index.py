@@ -28,3 +28,9 @@ def test_what_is_no_index_is_refused(data: bytes, code: str) -> None:
     with pytest.raises(PayloadRefused) as refused:
         index.parse(data, "index.json")
     assert refused.value.code == code
+
+
+def test_half_a_letter_is_told() -> None:
+    with pytest.raises(PayloadRefused) as refused:
+        index.parse(PLAIN.replace(b"{}", b'{"\\ud800": {}}'), "index.json")
+    assert "half a letter" in refused.value.problems[0].message
