@@ -131,6 +131,12 @@ def long_names(bench: Bench) -> None:
         (folder / "/".join("d" * 100)).mkdir(parents=True)
 
 
+def folders(bench: Bench) -> None:
+    """What may lie beside payloads, and is empty."""
+    for name in ("nondum-peers", "nondum-trust"):
+        (bench.drive / name).mkdir()
+
+
 def attributes(bench: Bench) -> None:
     """As much as a file can have beside its bytes."""
     for path in (bench.folder, bench.folder / "CONTENTS"):
@@ -213,6 +219,14 @@ DRIVES: tuple[HostileDrive, ...] = (
         "ext4-whose-list-is-the-journal",
         code=ERROR,
         tampers=["unlink FOLDER/CONTENTS", "ln <8> FOLDER/CONTENTS"],
+    ),
+    sound(
+        "ext4-of-torn-certificates", beside=folders, tampers=["sif /nondum-peers flags 0x40080000"]
+    ),
+    sound(
+        "ext4-of-a-torn-trust-folder",
+        beside=folders,
+        tampers=["sif /nondum-trust flags 0x40080000"],
     ),
     HostileDrive("device-within-a-drive", NO_PAYLOAD, a_device_within, is_image=True),
     HostileDrive(

@@ -69,12 +69,19 @@ def look(arguments: Arguments, report: Report) -> dict[str, list[Any]]:
 
 
 def _certificates(root: Path) -> Iterator[str]:
-    if (root / CERTIFICATES).is_dir():  # few drives have any: what reads them is big
+    if _is_folder(root / CERTIFICATES):  # few drives have any: what reads them is big
         from nondum.host.peers.drive_certificates import certificates_on
 
         for data in certificates_on(root):
             if data.isascii():
                 yield data.decode("ascii")
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except OSError:  # the file system is torn there; the payloads may be well
+        return False
 
 
 def copy(arguments: Arguments, report: Report) -> dict[str, int]:
