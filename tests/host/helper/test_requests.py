@@ -100,3 +100,21 @@ def test_what_is_nearly_a_request_is_refused(body: dict[str, Any]) -> None:
         parse(json.dumps(body).encode())
     assert refused.value.code == "HELPER_REFUSED"
     assert refused.value.problems[0].fix
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        pytest.param(encode(requests.UnmountAll()) + b" " * MAX_BYTES, id="too long"),
+        pytest.param(b"{", id="cut off"),
+        pytest.param(b"[" * (MAX_BYTES - 1), id="too deep"),
+        pytest.param(b"[]", id="a list"),
+        pytest.param(b'{"verb": 1}', id="no word"),
+        pytest.param(b'{"verb": "FillCage", "cage": "a.1", "pid": 9223372036854775808}', id="huge"),
+    ],
+)
+def test_packets_that_hold_no_request_are_refused(data: bytes) -> None:
+    assert parse(encode(requests.UnmountAll())) == requests.UnmountAll()
+    with pytest.raises(NondumError) as refused:
+        parse(data)
+    assert refused.value.code == "HELPER_REFUSED"
