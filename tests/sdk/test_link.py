@@ -213,11 +213,13 @@ async def test_full_socket_is_back_pressure(hostile: Pair) -> None:
     end.link.close()
 
 
-async def test_end_that_never_reads_is_given_up(hostile: Pair) -> None:
+@pytest.mark.parametrize(("count", "size"), [(MAX_WAITING + 1000, 10), (100, 60_000)])
+async def test_end_that_never_reads_is_given_up(hostile: Pair, count: int, size: int) -> None:
+    """Be what waits for it many packets or long ones."""
     _, other = hostile
     end = End(other)
-    for _ in range(MAX_WAITING + 1000):
-        end.link.send_event("fill", {"text": "x" * 1000})
+    for _ in range(count):
+        end.link.send_event("fill", {"text": "x" * size})
     assert end.violations == ["LINK_CONGESTED"]
     assert end.closed.is_set()
 
@@ -245,6 +247,15 @@ async def test_handshake_goes_first() -> None:
     assert await greeting == Welcome(1, {"host": "robot"})
     host.link.close()
     worker.link.close()
+
+
+async def test_host_that_says_hello_is_refused(hostile: Pair) -> None:
+    raw, other = hostile
+    end = End(other)
+    raw.send(encode(Hello((1,), "1", 1)))
+    with pytest.raises(ProtocolViolation, match="HANDSHAKE"):
+        await end.link.greet(Hello((1,), "1", 1))
+    end.link.close()
 
 
 async def test_worker_that_welcomes_is_refused(hostile: Pair) -> None:
