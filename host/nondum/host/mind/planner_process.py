@@ -15,8 +15,8 @@ from nondum.host.mind import planner_wire as wire
 from nondum.sdk.errors import PlannerFailed, Problem
 from nondum.sdk.planner import Answer, GaveUp, PlanText
 
-START_S = 20.0
-"""How long a planner may take to load."""
+START_S = 60.0
+"""How long a planner may take to load: on a small computer that is just starting, a while."""
 GRACE_S = 0.5
 """How much longer than its deadline a planner may take before it is killed."""
 AT_ONCE = 2_000
