@@ -14,7 +14,7 @@ MATCH = {"ID_MODEL": "QEMU_USB_SERIAL", "SUBSYSTEM": "tty"}
 
 def run(lab: Lab) -> str:
     """The device comes after the payload, is pulled, comes again; the stick is pulled."""
-    return f"levels {', '.join(_at(lab, level) for level in '321')}"
+    return f"levels {', '.join(_at(lab, level) for level in '231')}"
 
 
 def _at(lab: Lab, level: str) -> str:
