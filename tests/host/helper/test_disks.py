@@ -130,6 +130,11 @@ def test_node_of_another_device_is_seen_through(stick: Machine) -> None:
     refused(stick, "another device's")
 
 
+def test_what_goes_while_it_is_looked_at_is_refused(stick: Machine) -> None:
+    (stick.disk / "sdb1/dev").unlink()
+    refused(stick, "just gone")
+
+
 def test_node_of_another_kind_is_seen_through(stick: Machine) -> None:
     (stick.root / "dev/sdb1").unlink()
     os.mknod(stick.root / "dev/sdb1", stat.S_IFCHR | 0o600, os.makedev(*NUMBER))

@@ -12,6 +12,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -174,6 +175,25 @@ def test_who_connects_and_says_nothing_keeps_nobody_out(helper: Helper) -> None:
         silent.close()
 
 
+def test_so_much_is_done_at_once_and_no_more(helper: Helper) -> None:
+    def crowd() -> str:
+        silent = [
+            socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(MOST_CHILDREN)
+        ]
+        for one in silent:
+            one.connect(str(helper.socket))
+        try:
+            helper.client.ask(requests.ListCages())
+        except NondumError as error:
+            return error.code
+        finally:
+            for one in silent:
+                one.close()
+        return ""
+
+    assert served(crowd) == "HELPER_BUSY"
+
+
 def test_flood_is_answered_or_turned_away(helper: Helper) -> None:
     def flood() -> list[str]:
         asked = []
@@ -319,3 +339,15 @@ def test_missing_helper_is_told(tmp_path: Path) -> None:
         HelperClient(tmp_path / "none").ask(requests.ListCages())
     assert silent.value.code == "HELPER_SILENT"
     assert "systemctl" in silent.value.problems[0].fix
+
+
+def test_helper_that_hangs_up_is_told(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening:
+        listening.bind(str(tmp_path / "s"))
+        listening.listen()
+        hanging_up = threading.Thread(target=lambda: listening.accept()[0].close())
+        hanging_up.start()
+        with pytest.raises(NondumError) as silent:
+            HelperClient(tmp_path / "s").ask(requests.ListCages())
+        hanging_up.join()
+    assert silent.value.code == "HELPER_SILENT"
