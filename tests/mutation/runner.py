@@ -14,6 +14,7 @@ import os
 import signal
 import sys
 import threading
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -21,8 +22,11 @@ from hypothesis import is_hypothesis_test, settings
 
 WARM = ("anyio", "cryptography.hazmat.primitives.asymmetric.ed25519", "packaging.pylock", "msgpack")
 """What most tests load, too."""
-LIMIT_S = 300
-UNTOLD = "the tests do not begin or end"
+LIMIT_S = 150
+"""A test that is still at it then has failed: nothing else could end it."""
+STARTED = Path(".mutation-started")
+"""Where the test is noted that runs, in the copy."""
+UNTOLD = "the tests do not begin"
 """In the place of a test."""
 IMPORTED = "ignore::pytest.PytestAssertRewriteWarning"
 """What is loaded before pytest begins keeps its assertions as they are."""
@@ -42,6 +46,9 @@ class _Listener:
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         items[:] = [item for item in items if _is_property(item) == self._properties]
+
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        STARTED.write_text(nodeid)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.failed and self.failed is None:
@@ -112,7 +119,7 @@ def _in_child(tests: list[str]) -> str | None:
         os.killpg(child, signal.SIGKILL)
     heard = os.read(receiver, 65536)
     os.close(receiver)
-    answer: str | None = json.loads(heard or json.dumps(UNTOLD))
+    answer: str | None = json.loads(heard) if heard else STARTED.read_text()
     return answer
 
 

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Self
 
+from tests.mutation.runner import UNTOLD
 from tests.mutation.steps import Step
 
 _ROOMS = ("host", "planning", "transport", "wheelhouse", "plugins/sdk")
@@ -70,7 +71,8 @@ class Copy:
             self._write(file, step.removed(whole))
             if known and self.first_failure([known]) == known:
                 return known
-            return self.first_failure(guards)
+            failed = self.first_failure(guards)
+            return failed if failed != UNTOLD else ""
         finally:
             self._write(file, whole)
 
