@@ -73,6 +73,40 @@ def test_a_warden_refuses(lie: dict[str, Any]) -> None:
         systemd.parse(json.dumps({**asdict(REQUEST), **lie}).encode(), PLACES)
 
 
+@pytest.mark.parametrize(
+    ("lie", "words"),
+    [
+        ({"user": "root"}, "other parts"),
+        ({"code": "/etc"}, "a list is expected"),
+        ({"permissions": "network"}, "a list is expected"),
+        ({"component": "a b"}, "no component"),
+        ({"component": 7}, "expected"),
+        ({"scratch": "scratch"}, "not a folder of a worker"),
+        ({"code": ["/var/lib/nondum/other/a/b/c"]}, "code from elsewhere"),
+        ({"scratch": "/usr/lib/nondum/scratch"}, "hide the system"),
+        ({"permissions": ["root"]}, "no such permission"),
+        ({"has_devices": 1}, "true or false"),
+        ({"memory_mb": 0}, "no number that can be held to"),
+        ({"tasks": 2**30 + 1}, "no number that can be held to"),
+        ({"cpu_weight": 1.0}, "no number that can be held to"),
+        ({"processors": 1}, "no number of processors"),
+        ({"processors": -1.0}, "no number of processors"),
+        ({"processors": 10_001.0}, "no number of processors"),
+    ],
+    ids=str,
+)
+def test_a_warden_says_what_it_refuses(lie: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        systemd.parse(json.dumps({**asdict(REQUEST), **lie}).encode(), PLACES)
+
+
+def test_what_is_no_request_at_all_is_told() -> None:
+    with pytest.raises(ValueError, match="brackets"):
+        systemd.parse(b"[" * systemd.MAX_BYTES, PLACES)
+    with pytest.raises(ValueError, match="other parts"):
+        systemd.parse(b"[]", PLACES)
+
+
 @given(st.binary(max_size=200) | st.just(b"[" * systemd.MAX_BYTES))
 def test_garbage_is_no_request(data: bytes) -> None:
     with pytest.raises(ValueError, match=r"."):
