@@ -243,6 +243,9 @@ def _yanks(told: Figures) -> Iterator[str]:
     yield ""
     yield f"- mounts left over: {told['stuck_mounts']}"
     yield f"- folders and processes left over: {len(told['left_over'])}"
+    if told["left_over"]:
+        yield "  (seen at the moment that all was taken to be over; the next drive came once they"
+        yield "  had gone)"
     yield f"- times that the benign payload beside it noticed: {told['disturbed']}"
 
 
