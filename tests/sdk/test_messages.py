@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -222,6 +223,12 @@ def test_values_of_facts_cannot_be_bulky() -> None:
         value_to_wire(Image(Header(), 1, 1, "mono8", 1, b"x"))
     with pytest.raises(MessageInvalid):
         value_from_wire(["bearing"])
+    with pytest.raises(MessageInvalid, match="length 1"):
+        value_to_wire(Bearing(Header(), (1.0, 1.0, 0.0), 0.1))
+
+
+def test_messages_that_are_none_are_not_there() -> None:
+    assert not hasattr(import_module("nondum.sdk.messages"), "Picture")
 
 
 def test_every_type_is_registered_under_its_own_name() -> None:

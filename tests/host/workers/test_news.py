@@ -103,6 +103,6 @@ def test_claims_are_bounded() -> None:
 
 def test_what_claims_take_is_bounded() -> None:
     claims = Claims()
-    with pytest.raises(ProtocolViolation, match="bytes"):
+    with pytest.raises(ProtocolViolation, match="the values of a worker's facts"):
         for number in range(MAX_CLAIMS):
-            claims.take(FactKnown("g", "p", (str(number),), "x" * 100_000))
+            claims.take(FactKnown("g", "p", (str(number),), "x" * 10_000))
