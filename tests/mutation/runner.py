@@ -42,12 +42,14 @@ class _Listener:
 
     def __init__(self, *, properties: bool) -> None:
         self._properties = properties
+        self.started: str | None = None
         self.failed: str | None = None
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         items[:] = [item for item in items if _is_property(item) == self._properties]
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
+        self.started = nodeid
         STARTED.write_text(nodeid)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
@@ -78,7 +80,7 @@ def _run(arguments: list[str], *, properties: bool) -> tuple[str | None, bool]:
     status = pytest.main([*OPTIONS, *arguments], plugins=[listener])
     if status in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
         return None, status == pytest.ExitCode.OK
-    return listener.failed or UNTOLD, True
+    return listener.failed or listener.started or UNTOLD, True
 
 
 def _is_property(item: Any) -> bool:

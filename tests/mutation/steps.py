@@ -229,16 +229,17 @@ class _Finder:
 
 def _is_bool(function: _Function) -> bool:
     """Whether a function says False of what is not good, and where."""
-    return (
-        isinstance(function.returns, ast.Name)
-        and function.returns.id == "bool"
-        and any(
-            isinstance(node, ast.Return)
-            and isinstance(node.value, ast.Constant)
-            and node.value.value is False
-            for node in ast.walk(function)
-        )
-    )
+    returns = function.returns
+    return isinstance(returns, ast.Name) and returns.id == "bool" and _says_false(function)
+
+
+def _says_false(node: ast.AST) -> bool:
+    match node:
+        case ast.Return(value=ast.Constant(value=False)):
+            return True
+        case ast.ExceptHandler(type=ast.expr() as kind) if _is_of_machine(kind):
+            return False
+    return any(_says_false(inner) for inner in ast.iter_child_nodes(node))
 
 
 def _is_of_machine(kind: ast.expr) -> bool:
