@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from nondum.host.confinement import choice, landlock, probe, sight
+from nondum.host.confinement import choice, landlock, level, probe, sight
 from nondum.host.confinement.level import Finding, Level, Standing
 from nondum.sdk.errors import ConfigRefused
 
@@ -119,6 +119,15 @@ def test_level_that_is_not_there_is_refused(no_bwrap: None) -> None:
     assert problem.code == "CONFINEMENT_UNAVAILABLE"
     assert (problem.need, problem.have) == ("level 3", "level 0")
     assert problem.fix and "apt install bubblewrap" in problem.fix
+
+
+def test_level_that_is_wanted_is_had_or_refused_whatever_the_minimum() -> None:
+    box = Finding(Level.BOX, is_available=False, reason="no bwrap", fix="install it")
+    (problem,) = level.refusals((box,), Level.BOX, Level.LIMITS)
+    assert "no bwrap" in str(problem)
+    assert not list(level.refusals((box,), Level.LIMITS, Level.LIMITS))
+    (problem,) = level.refusals((box,), None, Level.KERNEL)
+    assert "minimum_confinement" in problem.where
 
 
 def test_host_does_not_start_below_its_minimum(
