@@ -295,9 +295,9 @@ def _soak(told: Figures) -> Iterator[str]:
     yield f"| the same, for each {CYCLES_AN_HOUR} cycles | {paced:+.2f} MB | 1 MB |"
     yield f"| canaries that ran | {told['canaries']} | 0 |"
     yield ""
-    yield f"The aim is 1 MB an hour with 8,640 cycles a day, which are {CYCLES_AN_HOUR} an hour. Until"
-    yield "the last thousand sentences, SQLite's cache (2 MB) and the journal are full, some growth is"
-    yield "meant: the rounds of hostile drives above go on for longer."
+    yield f"The aim is 1 MB an hour with 8,640 cycles a day, which are {CYCLES_AN_HOUR} an hour."
+    yield "Until the last thousand sentences, SQLite's cache (2 MB) and the journal are full, some"
+    yield "growth is meant: the rounds of hostile drives above go on for longer."
     yield ""
     yield from _footprints(told["footprints"], told["slopes"])
 
