@@ -66,9 +66,12 @@ def test_processes_of_the_system_s_own_are_not_caged(root: Service, pid: int) ->
 
 
 def test_processes_of_others_are_not_caged(root: Service) -> None:
-    with subprocess.Popen(["sleep", "60"], user=NOBODY - 1) as somebody:
+    somebody = subprocess.Popen(["sleep", "60"], user=NOBODY - 1)
+    served = subprocess.Popen(["sleep", "60"], user=NOBODY)
+    try:
         assert "no process of yours" in refused(root, requests.FillCage("a.1", somebody.pid))
-        somebody.kill()
-    with subprocess.Popen(["sleep", "60"], user=NOBODY) as served:
         root.serve(requests.FillCage("a.1", served.pid))
-        served.kill()
+    finally:
+        for process in (somebody, served):
+            process.kill()
+            process.wait()
