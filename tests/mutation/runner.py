@@ -77,7 +77,10 @@ def first_failure(tests: list[str]) -> str | None:
 def _run(arguments: list[str], *, properties: bool) -> tuple[str | None, bool]:
     """What has failed, and whether there was anything to run."""
     listener = _Listener(properties=properties)
-    status = pytest.main([*OPTIONS, *arguments], plugins=[listener])
+    try:
+        status = pytest.main([*OPTIONS, *arguments], plugins=[listener])
+    except Exception:  # what a test has left open is told when all is over
+        status = pytest.ExitCode.INTERNAL_ERROR
     if status in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
         return None, status == pytest.ExitCode.OK
     return listener.failed or listener.started or UNTOLD, True
