@@ -36,6 +36,11 @@ CODES = (
         causes=("it was pulled; a loose plug or a bad cable; a stick that fails"),
     ),
     Code(
+        "DRIVE_NAME",
+        "The drive's name has characters that cannot be shown, so it is not read.",
+        "give the drive another label, or mount it under another name",
+    ),
+    Code(
         "DRIVE_NOT_PAYLOAD",
         "The drive or folder carries no payload.",
         "put a payload on it with `nondum payload build … -o DRIVE`; a drive has folders "
