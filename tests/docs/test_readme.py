@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -36,29 +37,36 @@ def is_as_shown(shown: str, printed: str) -> bool:
 
 
 @pytest.fixture
-def environment(tmp_path: Path) -> dict[str, str]:
+def folder() -> Iterator[Path]:
+    """One with a short name, as homes have: the path of a socket may have 107 characters."""
+    with tempfile.TemporaryDirectory(prefix="nd-") as name:
+        yield Path(name)
+
+
+@pytest.fixture
+def environment(folder: Path) -> dict[str, str]:
     """A checkout, a user's home, and the environment that the set-up makes."""
-    (tmp_path / "plugins").symlink_to(ROOT / "plugins")
-    (tmp_path / "home").mkdir()
+    (folder / "plugins").symlink_to(ROOT / "plugins")
+    (folder / "home").mkdir()
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     kept = {
         name: value
         for name, value in os.environ.items()
         if not name.startswith(("XDG_", "PYTEST_"))
     }
-    return kept | {"HOME": str(tmp_path / "home"), "PATH": path, "PYTHONUNBUFFERED": "1"}
+    return kept | {"HOME": str(folder / "home"), "PATH": path, "PYTHONUNBUFFERED": "1"}
 
 
-def test_the_session_goes_as_it_is_printed(tmp_path: Path, environment: dict[str, str]) -> None:
+def test_the_session_goes_as_it_is_printed(folder: Path, environment: dict[str, str]) -> None:
     host: subprocess.Popen[str] | None = None
     try:
         for command, shown in session():
             if "activate" in command:
                 continue
             if command.startswith("nondum host run"):
-                host = start(command, shown, tmp_path, environment)
+                host = start(command, shown, folder, environment)
             else:
-                follow(command, shown, tmp_path, environment)
+                follow(command, shown, folder, environment)
         assert host is not None
     finally:
         if host is not None:
