@@ -9,7 +9,12 @@ from tests.lab.machines.lab import Lab
 from tests.lab.machines.plugins import doer
 
 CONFIGURATION = 'confinement = "2"\ntasks = 64\n'
-FORK = "while True:\n    try:\n        os.fork()\n    except OSError:\n        pass"
+FORK = """while True:
+    try:
+        if os.fork() == 0:
+            time.sleep(3600)
+    except OSError:
+        await asyncio.sleep(0.001)"""
 SPIN = """import threading
 def spin():
     while True:
