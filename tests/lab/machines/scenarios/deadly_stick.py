@@ -47,6 +47,7 @@ def _killed(host: Installed) -> int:
 
 def _see_left_alone(host: Installed) -> str:
     """What people are told of it, and what to do about it; answers its code."""
+    host.machine.until("the stick has been looked at", lambda: _has_looked(host))
     said = host.machine.until("it is told", lambda: _told(host))
     assert "5 daemons in a row ended while they were at it, so it is left alone" in said, said
     assert "pull it and plug it in again" in said, said
@@ -56,6 +57,12 @@ def _see_left_alone(host: Installed) -> str:
     assert "QUARANTINED" in journal, "the journal does not tell"
     assert not host.machine.run("ls /var/lib/nondum/venvs").split(), "something was installed"
     return "QUARANTINED"
+
+
+def _has_looked(host: Installed) -> bool | None:
+    """Whether this daemon has: what is pulled before that is forgotten only after a while."""
+    journal = host.machine.attempt("nondum journal --limit 1000").out
+    return True if "DriveRead" in journal.rpartition("HostStarted")[2] else None
 
 
 def _told(host: Installed) -> str | None:
