@@ -163,7 +163,7 @@ class Machine:
     @property
     def cpu_s(self) -> float:
         """Processor time that it took of the machine it stands on, over all boots."""
-        if self._qemu is None:
+        if self._qemu is None or self._qemu.poll() is not None:
             return self._cpu_s
         line = Path(f"/proc/{self._qemu.pid}/stat").read_text(encoding="ascii")
         user, system = line.rpartition(")")[2].split()[11:13]
