@@ -109,9 +109,14 @@ class RunningHost(Robot):
 
     # What people see
 
+    def components(self) -> list[Row]:
+        """All components when they are asked for, but for their ages."""
+        return [_ageless(row) for row in self.ask("components")]
+
     def component(self, id: str) -> Row | None:
-        """A component as it is shown now."""
-        return _one(self.view["components"], "component", id)
+        """A component as it is shown now, but for its age."""
+        row = _one(self.view["components"], "component", id)
+        return row and _ageless(row)
 
     def payload(self, name: str) -> Row | None:
         """A payload of a drive that `drive` wrote, as it is shown now."""
@@ -134,11 +139,11 @@ class RunningHost(Robot):
         self.until(f"{name}: gone", lambda v: payload(v, name) is None, timeout_s=GONE_S)
 
     def until_component(self, id: str, state: str) -> Row:
-        """Wait until a component is in a state."""
+        """Wait until a component is in a state; without its age."""
 
         def found(view: View) -> Row | None:
             row = _one(view["components"], "component", id)
-            return row if row is not None and row["state"] == state else None
+            return _ageless(row) if row is not None and row["state"] == state else None
 
         return self.until(f"{id}: {state}", found, timeout_s=READY_S)
 
@@ -260,3 +265,8 @@ def until_ended(pid: int, timeout_s: float = END_S) -> None:
 
 def _one(rows: Sequence[Row], key: str, value: str) -> Row | None:
     return next((row for row in rows if row[key] == value), None)
+
+
+def _ageless(row: Row) -> Row:
+    """Without what is another at each look."""
+    return {key: value for key, value in row.items() if key != "age_s"}

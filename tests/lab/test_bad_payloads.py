@@ -89,6 +89,5 @@ def bad_one(view: Row) -> Row | None:
 
 
 def healthy(host: RunningHost) -> list[Row]:
-    """The healthy components, with their processes, but for their ages."""
-    rows = [row for row in host.ask("components") if row["component"] in HEALTHY]
-    return [{key: value for key, value in row.items() if key != "age_s"} for row in rows]
+    """The healthy components, with their processes."""
+    return [row for row in host.components() if row["component"] in HEALTHY]

@@ -30,5 +30,5 @@ def made_of(host: RunningHost) -> tuple[Any, ...]:
     """Bring two payloads; what the host is then made of, but for processes."""
     host.bring("talk", talker())
     host.bring("write", scribe())
-    components = [{**row, "pid": None} for row in host.ask("components")]
+    components = [{**row, "pid": None} for row in host.components()]
     return components, host.ask("units"), host.ask("behaviours")
