@@ -62,7 +62,7 @@ class Children:
         """Owner → the child that worked for it, and for nobody else; the last ones last."""
         self._busy: set[Process] = set()
         self._left_behind: set[Process] = set()
-        """Those that could not be killed, as long as they are there."""
+        """Those that were killed and have not ended yet: a disk may hold one for ever."""
         self._warming: asyncio.Task[None] | None = None
         self._shrinking: asyncio.Task[None] | None = None
 
@@ -202,14 +202,14 @@ class Children:
 
     async def _end(self, child: Process) -> None:
         self._busy.discard(child)
-        self._left_behind = {other for other in self._left_behind if other.returncode is None}
+        self._left_behind.add(child)  # whoever waits here may be cancelled: then `close` waits
         with contextlib.suppress(ProcessLookupError):
             child.kill()
         try:
             await asyncio.wait_for(child.wait(), END_S)
         except TimeoutError:
             log.warning("child %d hangs in its disk and is left behind", child.pid)
-            self._left_behind.add(child)
+        self._left_behind = {other for other in self._left_behind if other.returncode is None}
 
 
 def watch_without_threads() -> None:

@@ -13,7 +13,7 @@ from nondum.host.cgroups import Cage
 from nondum.host.cgroups.services import ServiceGroup
 from nondum.host.workers.keeper import Keeper, node_of
 
-DETACH_S = 1.0
+DETACH_S = 2.0
 """How long a process that was killed is waited for; one in the kernel's hands may never end."""
 
 
