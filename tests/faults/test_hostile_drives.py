@@ -19,7 +19,7 @@ pytestmark = [pytest.mark.lab, pytest.mark.beside, pytest.mark.timeout(300)]
 
 AT_ONCE = 16
 MOST_GROWTH_MB = 20.0
-"""In the first round, where all is loaded and kept that ever is; the long form judges the others."""
+"""In a first round, where all is loaded that is ever kept; the long form judges the others."""
 OF_A_CHILD = 4
 """Descriptors."""
 
