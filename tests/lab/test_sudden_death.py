@@ -88,7 +88,7 @@ def kill_worker(host: RunningHost, component: str) -> None:
 
 def without_pids(host: RunningHost) -> list[Row]:
     """All components, as two daemons may both show them."""
-    return sorted(({**row, "pid": None} for row in host.view["components"]), key=str)
+    return sorted(({**row, "pid": None} for row in host.components()), key=str)
 
 
 def places(traces: Traces) -> tuple[object, ...]:
