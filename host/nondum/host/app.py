@@ -275,6 +275,7 @@ class _Listener:
 def _install_options(config: HostConfig) -> InstallOptions:
     return InstallOptions(
         allow_unsigned=config.drives.allow_unsigned,
+        look_s=config.drives.look_s,
         trust=TrustOptions(config.trust.file, stop=config.trust.on_revoke == "stop"),
         method=config.install.method,
         reserve_mb=config.install.reserve_mb,

@@ -9,8 +9,12 @@ from __future__ import annotations
 import hashlib
 import shutil
 import sys
+import zipfile
+from collections.abc import Iterator
+from email import message_from_bytes
 from pathlib import Path
 
+from packaging.requirements import Requirement
 from tests.lab.machines.building import Built, make_disk
 from tests.lab.machines.cache import call, kept
 from tests.lab.machines.recipe import HERE
@@ -25,6 +29,8 @@ SOURCES = (
     *("plugins/planner-pyperplan", "plugins/planner-fast-downward"),
     *("packaging", "README.md", "LICENSE"),
 )
+EXTRAS = {"nondum": "fast", "nondum_planner_fast_downward": "engine"}
+"""What is installed with our own distributions."""
 PREFIX = "/opt/nondum"
 DISK_MB = 768
 PYTHON = "3.11"
@@ -110,18 +116,25 @@ def _dependencies(machine: Built, source: Path, own: Path) -> Path:
 def _fetch(machine: Built, own: Path, folder: Path) -> None:
     call(
         *(sys.executable, "-m", "pip", "download", "-q", "--only-binary", ":all:"),
-        *("--python-version", PYTHON, "--find-links", own, "-d", folder),
+        *("--python-version", PYTHON, "-d", folder),
         *(f"--platform={name}_{machine.recipe.name}" for name in PLATFORMS),
-        *(f"{wheel}{_extra(wheel)}" for wheel in own.iterdir()),
+        *sorted({need for wheel in own.iterdir() for need in _needs(machine, wheel)}),
     )
-    for wheel in own.iterdir():
-        (folder / wheel.name).unlink(missing_ok=True)
 
 
-def _extra(wheel: Path) -> str:
-    """What is installed with one of our own distributions."""
-    extras = {"nondum": "[fast]", "nondum_planner_fast_downward": "[engine]"}
-    return extras.get(wheel.name.partition("-")[0], "")
+def _needs(machine: Built, wheel: Path) -> Iterator[str]:
+    """What one of our own wheels needs of others' on that machine. (pip would ask the markers of
+    what is needed there of the machine that it runs on.)"""
+    there = {"platform_machine": machine.recipe.name, "python_version": PYTHON}
+    extras = EXTRAS.get(wheel.name.partition("-")[0], "")
+    with zipfile.ZipFile(wheel) as archive:
+        (metadata,) = (n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
+        said = message_from_bytes(archive.read(metadata)).get_all("Requires-Dist", [])
+    for requirement in map(Requirement, said):
+        marker = requirement.marker
+        is_needed = marker is None or marker.evaluate({**there, "extra": extras})
+        if is_needed and not requirement.name.startswith("nondum"):
+            yield f"{requirement.name}{requirement.specifier}"
 
 
 def _key() -> str:
