@@ -95,14 +95,14 @@ class Installed:
 
         return self.machine.until(what, found, PATIENCE_S, LOOK_S)
 
-    def bring(self, image: Path, payload: str) -> str:
+    def bring(self, image: Path, payload: str, *, port: str | None = None) -> str:
         """Plug a stick in and wait until its payload is active; answers its name for `pull`.
 
         Drives that do not answer for ten seconds count as broken. Where the emulated processors
         have to wait that long for real ones, this does as people are told: pulls, and plugs again.
         """
         for _ in range(REPLUGS):
-            stick = self.machine.plug(image)
+            stick = self.machine.plug(image, port=port)
             if self.until(f"{payload} or a stalled drive", partial(_active_or_stalled, payload)):
                 return stick
             self.machine.pull(stick)
