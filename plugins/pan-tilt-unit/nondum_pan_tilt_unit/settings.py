@@ -8,7 +8,6 @@ from dataclasses import dataclass, fields
 
 from nondum.sdk.errors import ConfigRefused, Problem
 
-
 _POSITIVE = ("speed_deg_s", "answer_s")
 
 
