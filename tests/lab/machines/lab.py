@@ -12,7 +12,7 @@ from typing import Any
 from tests.lab.machines.building import Built
 from tests.lab.machines.drives import fat_stick
 from tests.lab.machines.installed import Installed
-from tests.lab.machines.machine import Machine
+from tests.lab.machines.machine import OURS, Machine
 from tests.payloads import Part, make_payload
 
 
@@ -50,11 +50,10 @@ class Lab:
             self.machines.append(self._shared.machine)
         return self._shared
 
-    def booted(self) -> Installed:
+    def booted(self, *, clock: tuple[str, ...] = OURS) -> Installed:
         """A machine of the scenario's own, switched on, with nondum installed but not started."""
-        machine = Machine(
-            self.built, self.work / f"m{next(self._numbers)}", drives=(self.software,)
-        )
+        work = self.work / f"m{next(self._numbers)}"
+        machine = Machine(self.built, work, drives=(self.software,), clock=clock)
         self.machines.append(machine)
         self.all_machines.append(machine)
         self.boots_s.append(machine.boot())

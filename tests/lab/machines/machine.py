@@ -24,17 +24,29 @@ an x86_64, and multiplied by the recipe's slowness."""
 POLL_S = 0.2
 TICKS_HZ = os.sysconf("SC_CLK_TCK")
 T = TypeVar("T")
+OURS = ("-accel", "tcg,thread=multi,tb-size=512")
+"""A clock that goes with ours: where a processor has to wait for a real one, time passes for it."""
+ITS_OWN = ("-accel", "tcg,thread=single,tb-size=512", "-icount", "shift=1,sleep=on")
+"""A clock that goes by instructions, 500 million a second, and with ours while there is nothing to
+do: however slow the emulation is, and whoever shares the real processors, it is a computer of one
+speed. It takes half as much again."""
 
 
 class Machine:
     """A machine with a disk of its own, which outlives its boots. Call `close` at last."""
 
     def __init__(
-        self, built: Built, work: Path, *, memory_mb: int = 2048, drives: tuple[Path, ...] = ()
+        self,
+        built: Built,
+        work: Path,
+        *,
+        memory_mb: int = 2048,
+        drives: tuple[Path, ...] = (),
+        clock: tuple[str, ...] = OURS,
     ) -> None:
         """`work` keeps its disk, console and sockets (a short path: see unix(7)); `drives` are
-        read-only disks that it has for good, `/dev/vdb` and on."""
-        self.built, self.work = built, work
+        read-only disks that it has for good, `/dev/vdb` and on; `clock` is what its time is."""
+        self.built, self.work, self._clock = built, work, clock
         self._memory_mb, self._drives = memory_mb, drives
         self._qemu: subprocess.Popen[bytes] | None = None
         self._cpu_s = 0.0
@@ -201,7 +213,8 @@ class Machine:
         return [
             *("setpriv", "--pdeathsig", "KILL", *MODEST, recipe.program),
             *("-nodefaults", "-display", "none", "-no-reboot"),
-            *("-accel", "tcg,thread=multi,tb-size=512", *recipe.machine),
+            *self._clock,
+            *recipe.machine,
             *("-smp", "2", "-m", str(self._memory_mb)),
             *("-kernel", self.built.kernel, "-initrd", self.built.initramfs),
             *("-append", f"console={recipe.terminal} panic=-1 quiet {more}".strip()),
