@@ -13,6 +13,8 @@ from demo.maker import Maker
 from demo.robot import nondum
 
 PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
+HERE = ("--python", PYTHON)
+"""Makes drives for the machine and the Python that they are built with."""
 
 
 def build(
@@ -21,15 +23,17 @@ def build(
     libraries: Sequence[Path],
     cache: Path,
     maker: Maker | None = None,
+    fits: Sequence[str] = HERE,
 ) -> dict[str, Path]:
     """Build one drive per plugin folder, or take it from the cache while its sources are the same.
 
     `libraries` are folders of distributions that plugins depend on and no index has; `maker` signs,
-    if there is one. Returns the drive of each plugin by the folder's name.
+    if there is one; `fits` are options of `nondum payload build`: for which machines and Pythons.
+    Returns the drive of each plugin by the folder's name.
     """
     drives = {}
     for plugin in plugins:
-        digest = _digest([plugin, *libraries], maker)
+        digest = _digest([plugin, *libraries], maker, fits)
         drive = cache / f"{plugin.name}-{digest[:12]}"
         if not drive.exists():
             unfinished = drive.with_suffix(".part")
@@ -40,8 +44,7 @@ def build(
                 plugin,
                 "-o",
                 unfinished,
-                "--python",
-                PYTHON,
+                *fits,
             ]
             for library in libraries:
                 command += ["--library", library]
@@ -59,8 +62,8 @@ def payload_id(drive: Path) -> str:
     return str(payload["id"])
 
 
-def _digest(folders: Sequence[Path], maker: Maker | None) -> str:
-    total = hashlib.sha256(PYTHON.encode())
+def _digest(folders: Sequence[Path], maker: Maker | None, fits: Sequence[str]) -> str:
+    total = hashlib.sha256(" ".join(fits).encode())
     total.update(maker.public if maker is not None else b"")
     for folder in folders:
         for path in sorted(folder.rglob("*")):

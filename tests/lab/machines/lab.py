@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,8 +12,10 @@ from typing import Any
 
 from tests.lab.machines.building import Built
 from tests.lab.machines.drives import fat_stick
+from tests.lab.machines.fleet import Fleet
 from tests.lab.machines.installed import Installed
 from tests.lab.machines.machine import Machine
+from tests.lab.machines.network import Lan
 from tests.payloads import Part, make_payload
 
 
@@ -31,6 +34,7 @@ class Lab:
     boots_s: list[float] = field(default_factory=list)
     """How long each boot took."""
     _shared: Installed | None = None
+    _lans: list[Lan] = field(default_factory=list)
     _numbers: Iterator[int] = field(default_factory=itertools.count)
 
     def host(self, *, more: str = "") -> Installed:
@@ -52,16 +56,40 @@ class Lab:
 
     def booted(self) -> Installed:
         """A machine of the scenario's own, switched on, with nondum installed but not started."""
-        machine = Machine(
-            self.built, self.work / f"m{next(self._numbers)}", drives=(self.software,)
-        )
-        self.machines.append(machine)
-        self.all_machines.append(machine)
-        self.boots_s.append(machine.boot())
-        machine.wait_for_system()
-        installed = Installed(machine)
-        installed.install()
-        return installed
+        (host,) = self._switched_on({"spot": {}})
+        return host
+
+    def fleet(self, *names: str, memory_mb: int = 1024) -> dict[str, Installed]:
+        """Machines of the scenario's own on one network, each with a host of that name; all are
+        started, and certified by one fleet, by which they let each other in."""
+        lan = Lan()
+        self._lans.append(lan)
+        wanted = {name: {"memory_mb": memory_mb, "socket": lan.socket()} for name in names}
+        hosts = self._switched_on(wanted)
+        fleet = Fleet(self.work / f"fleet-{next(self._numbers)}")
+        for host in hosts:
+            host.begin_to_start()
+        for host in hosts:
+            host.start()
+            fleet.admit(host)
+        return dict(zip(names, hosts, strict=True))
+
+    def _switched_on(self, wanted: Mapping[str, Mapping[str, Any]]) -> list[Installed]:
+        """Machines, by the names of their hosts; they boot together."""
+        hosts, began_s = [], time.monotonic()
+        for name, options in wanted.items():
+            work = self.work / f"m{next(self._numbers)}"
+            machine = Machine(self.built, work, drives=(self.software,), **options)
+            self.machines.append(machine)
+            self.all_machines.append(machine)
+            machine.switch_on()
+            hosts.append(Installed(machine, name))
+        for host in hosts:
+            host.machine.until_booted()
+            self.boots_s.append(time.monotonic() - began_s)
+            host.machine.wait_for_system()
+            host.install()
+        return hosts
 
     def cpu_s(self) -> float:
         """Processor time that all machines took so far."""
@@ -86,6 +114,7 @@ class Lab:
         for machine in self.machines:
             if self._shared is None or machine is not self._shared.machine:
                 machine.close()
+        self._remove_lans()
 
     def close(self) -> None:
         """Switch everything off."""
@@ -93,3 +122,8 @@ class Lab:
         for machine in (*self.machines, *shared):
             machine.close()
         self._shared = None
+        self._remove_lans()
+
+    def _remove_lans(self) -> None:
+        while self._lans:
+            self._lans.pop().close()

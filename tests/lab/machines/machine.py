@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import itertools
 import os
 import signal
@@ -14,6 +15,7 @@ from typing import TypeVar
 from tests.lab.machines.agent import Agent, CommandFailed, MachineSilent, Outcome
 from tests.lab.machines.building import Built
 from tests.lab.machines.cache import MODEST, call
+from tests.lab.machines.network import FIND, PREFIX, Socket
 from tests.lab.machines.qmp import Qmp, QmpError
 
 BOOT_S = 400.0
@@ -29,11 +31,18 @@ class Machine:
     """A machine with a disk of its own, which outlives its boots. Call `close` at last."""
 
     def __init__(
-        self, built: Built, work: Path, *, memory_mb: int = 2048, drives: tuple[Path, ...] = ()
+        self,
+        built: Built,
+        work: Path,
+        *,
+        memory_mb: int = 2048,
+        drives: tuple[Path, ...] = (),
+        socket: Socket | None = None,
     ) -> None:
         """`work` keeps its disk, console and sockets (a short path: see unix(7)); `drives` are
-        read-only disks that it has for good, `/dev/vdb` and on."""
-        self.built, self.work = built, work
+        read-only disks that it has for good, `/dev/vdb` and on; `socket` is where it is plugged
+        into a network, if it has one."""
+        self.built, self.work, self.socket = built, work, socket
         self._memory_mb, self._drives = memory_mb, drives
         self._qemu: subprocess.Popen[bytes] | None = None
         self._plugged = itertools.count(1)
@@ -51,17 +60,27 @@ class Machine:
         `more` goes on the kernel's command line. Raises `MachineSilent` with its console's end.
         """
         began = time.monotonic()
+        self.switch_on(more=more)
+        self.until_booted()
+        return time.monotonic() - began
+
+    def switch_on(self, *, more: str = "") -> None:
+        """The first half of `boot`, so that several boot at once: `until_booted` must follow."""
         with (self.work / "qemu.log").open("ab") as log:
             self._qemu = subprocess.Popen(
                 self._command(more), stdin=subprocess.DEVNULL, stdout=log, stderr=log
             )
+
+    def until_booted(self) -> None:
+        """The second half of `boot`. Raises `MachineSilent`."""
         try:
             self.qmp = self._connected(lambda: Qmp(self.work / "qmp"))
             self.agent = self._connected(lambda: Agent(self.work / "agent"))
             self.agent.wait_for_boot(BOOT_S)
         except MachineSilent as error:
             raise MachineSilent(f"{error}\n{self.last_words()}") from None
-        return time.monotonic() - began
+        if self.socket is not None:
+            self._join(self.socket)
 
     def cut_power(self) -> None:
         """End it at once: what its disk was not told to keep is lost."""
@@ -109,6 +128,13 @@ class Machine:
         """Write a file inside."""
         data = content.encode() if isinstance(content, str) else content
         self.agent.put(path, data, mode)
+
+    def get(self, path: str) -> bytes:
+        """Read a file inside. Raises `CommandFailed`."""
+        outcome = self.agent.run("base64", path, timeout_s=PATIENCE_S)
+        if outcome.status != 0:
+            raise CommandFailed(str(outcome))
+        return base64.b64decode(outcome.out)
 
     def until(
         self,
@@ -158,6 +184,16 @@ class Machine:
         self.qmp.do("device_del", id=name)
         self._until_let_go("chardev-remove", id=name)
 
+    def cut_cable(self) -> None:
+        """Part it from its network, without a word to either."""
+        assert self.socket is not None
+        self.socket.pull()
+
+    def plug_cable(self) -> None:
+        """Join it to its network again."""
+        assert self.socket is not None
+        self.socket.put_back()
+
     # What is left to see
 
     @property
@@ -186,10 +222,11 @@ class Machine:
         recipe = self.built.recipe
         serial = f"file,id=console,path={self.console},append=on"
         disks: list[str] = []
+        around, card = (self.socket.around, self.socket.card) if self.socket else ((), ())
         for image in self._drives:
             disks += ["-drive", f"file={image},format=raw,if=virtio,readonly=on"]
         return [
-            *("setpriv", "--pdeathsig", "KILL", *MODEST, recipe.program),
+            *("setpriv", "--pdeathsig", "KILL", *around, *MODEST, recipe.program),
             *("-nodefaults", "-display", "none", "-no-reboot"),
             *("-accel", "tcg,thread=multi,tb-size=512", *recipe.machine),
             *("-smp", "2", "-m", str(self._memory_mb)),
@@ -202,8 +239,16 @@ class Machine:
             *("-device", "virtio-serial"),
             *("-device", "virtserialport,chardev=agent,name=org.nondum.lab"),
             *("-device", "qemu-xhci,id=xhci,p2=8,p3=8"),
-            *("-device", "virtio-rng"),
+            *("-device", "virtio-rng", *card),
         ]
+
+    def _join(self, socket: Socket) -> None:
+        """Give its network card its address: nothing else there would."""
+        card = self.until("a network card", lambda: self._card(socket) or None)
+        self.run(f"ip link set {card} up && ip addr replace {socket.address}/{PREFIX} dev {card}")
+
+    def _card(self, socket: Socket) -> str:
+        return self.attempt(FIND.format(mac=socket.mac)).out.strip()
 
     def _connected(self, connect: Callable[[], T]) -> T:
         deadline = time.monotonic() + BOOT_S
@@ -235,5 +280,6 @@ class Machine:
         assert self._qemu is not None
         self._qemu.wait()
         self._qemu = None
-        self.agent.close()
-        self.qmp.close()
+        for line in (getattr(self, "agent", None), getattr(self, "qmp", None)):
+            if line is not None:  # it was not heard of before its end
+                line.close()

@@ -17,6 +17,8 @@ from tests.lab.machines.machine import Machine
 
 FOLDER = Path(__file__).parent / "scenarios"
 PACKAGE = "tests.lab.machines.scenarios"
+SHORT = ("starts", "stick", "yank", "neighbours")
+"""Those that every change is tried with (`./run tests`): some four minutes of two processors."""
 
 
 @dataclass(frozen=True, slots=True)
