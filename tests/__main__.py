@@ -46,7 +46,7 @@ def _of_plugin(folder: Path) -> int:
     done = subprocess.run(
         [*PYTEST, "-q"], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
-    print(f"{folder.name}\n{done.stdout}", end="", flush=True)
+    sys.stdout.write(f"{folder.name}\n{done.stdout}")
     return done.returncode
 
 

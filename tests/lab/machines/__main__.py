@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tests.lab.machines.building import built
 from tests.lab.machines.lab import Lab
-from tests.lab.machines.recipe import X86_64
+from tests.lab.machines.recipe import RECIPES, X86_64
 from tests.lab.machines.scenario import SHORT, Result, Scenario, keep, run_all, scenarios
 from tests.lab.machines.shell import talk
 from tests.lab.machines.software import software
@@ -28,13 +28,13 @@ def main(words: Sequence[str]) -> int:
         print(*(f"{s.name:{width}}  {s.sentence}" for s in known.values()), sep="\n")
         return 0
     began = time.monotonic()
-    machine = built(X86_64)
+    machine = built(RECIPES[asked.arch])
     _told("the machine is built", began)
     began = time.monotonic()
     disk = software(machine, asked.commit)
     _told("nondum is built for it", began)
     work = Path(tempfile.mkdtemp(prefix="nondum-lab-"))
-    lab = Lab(machine, disk, work)
+    lab = Lab(machine, disk, asked.commit, work)
     try:
         if asked.shell:
             return talk(lab)
@@ -51,7 +51,7 @@ def _run(lab: Lab, wanted: Sequence[Scenario], asked: argparse.Namespace) -> int
         results.append(result)
         _show(result)
         if asked.keep and result.kept is None:
-            print(f"    kept: {keep(result.scenario.name, lab.machines)}")
+            print(f"    kept: {keep(result.scenario.name, lab)}")
     failed = sum(1 for r in results if r.failure)
     for result in results:
         if result.failure:
@@ -75,6 +75,9 @@ def _arguments(known: dict[str, Scenario], words: Sequence[str]) -> argparse.Nam
     parser = argparse.ArgumentParser(prog="./run lab", description="Whole machines under test.")
     parser.add_argument(
         "scenario", nargs="*", metavar="SCENARIO", help="which ones (all)", choices=[*known, []]
+    )
+    parser.add_argument(
+        "--arch", choices=RECIPES, default=X86_64.name, help="its processor (%(default)s)"
     )
     parser.add_argument("--list", action="store_true", help="tell which scenarios there are")
     parser.add_argument("--short", action="store_true", help=f"only {', '.join(SHORT)}")

@@ -38,6 +38,7 @@ systemctl daemon-reload
 systemctl -q enable nondum.service
 """
 SERVICE = "nondum.service"
+NAME = "spot"
 LOOK_S = 2.0
 """Between two looks at the status: each takes a second of an emulated processor."""
 REPLUGS = 3
@@ -48,7 +49,7 @@ View = dict[str, Any]
 class Installed:
     """The nondum of one machine."""
 
-    def __init__(self, machine: Machine, name: str = "spot") -> None:
+    def __init__(self, machine: Machine, name: str = NAME) -> None:
         """`name` is what the host is called; it looks for others where it has a network."""
         self.machine, self.name = machine, name
 
@@ -102,14 +103,14 @@ class Installed:
 
         return self.machine.until(what, found, PATIENCE_S, LOOK_S)
 
-    def bring(self, image: Path, payload: str) -> str:
+    def bring(self, image: Path, payload: str, *, port: str | None = None) -> str:
         """Plug a stick in and wait until its payload is active; answers its name for `pull`.
 
         Drives that do not answer for ten seconds count as broken. Where the emulated processors
         have to wait that long for real ones, this does as people are told: pulls, and plugs again.
         """
         for _ in range(REPLUGS):
-            stick = self.machine.plug(image)
+            stick = self.machine.plug(image, port=port)
             if self.until(f"{payload} or a stalled drive", partial(active_or_stalled, payload)):
                 return stick
             self.machine.pull(stick)

@@ -10,12 +10,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tests.lab.machines.building import Built
+from tests.lab.machines.building import Built, built
 from tests.lab.machines.drives import fat_stick
 from tests.lab.machines.fleet import Fleet
-from tests.lab.machines.installed import Installed
+from tests.lab.machines.installed import NAME, Installed
 from tests.lab.machines.machine import Machine
 from tests.lab.machines.network import Lan
+from tests.lab.machines.recipe import RECIPES
+from tests.lab.machines.software import software
 from tests.payloads import Part, make_payload
 
 
@@ -26,6 +28,8 @@ class Lab:
     built: Built
     software: Path
     """The disk with nondum on it."""
+    commit: str | None
+    """What nondum is as of; None: as the checkout is now."""
     work: Path
     """A folder with a short path, for all that is made on the way."""
     machines: list[Machine] = field(default_factory=list)
@@ -56,16 +60,23 @@ class Lab:
 
     def booted(self) -> Installed:
         """A machine of the scenario's own, switched on, with nondum installed but not started."""
-        (host,) = self._switched_on({"spot": {}})
+        machine = self._machine(self.built, self.software)
+        (host,) = self._switched_on({NAME: machine})
         return host
 
-    def fleet(self, *names: str, memory_mb: int = 1024) -> dict[str, Installed]:
+    def fleet(
+        self, *names: str, memory_mb: int = 1024, of: Mapping[str, str] | None = None
+    ) -> dict[str, Installed]:
         """Machines of the scenario's own on one network, each with a host of that name; all are
-        started, and certified by one fleet, by which they let each other in."""
+        started, and certified by one fleet, by which they let each other in. `of`: the architecture
+        of those that are not of the run's."""
         lan = Lan()
         self._lans.append(lan)
-        wanted = {name: {"memory_mb": memory_mb, "socket": lan.socket()} for name in names}
-        hosts = self._switched_on(wanted)
+        machines = {}
+        for name in names:
+            root, disk = self._made((of or {}).get(name, self.built.recipe.name))
+            machines[name] = self._machine(root, disk, memory_mb=memory_mb, socket=lan.socket())
+        hosts = self._switched_on(machines)
         fleet = Fleet(self.work / f"fleet-{next(self._numbers)}")
         for host in hosts:
             host.begin_to_start()
@@ -74,16 +85,26 @@ class Lab:
             fleet.admit(host)
         return dict(zip(names, hosts, strict=True))
 
-    def _switched_on(self, wanted: Mapping[str, Mapping[str, Any]]) -> list[Installed]:
+    def _made(self, architecture: str) -> tuple[Built, Path]:
+        """What a machine is started from, and the disk with nondum on it."""
+        if architecture == self.built.recipe.name:
+            return self.built, self.software
+        other = built(RECIPES[architecture])
+        return other, software(other, self.commit)
+
+    def _machine(self, root: Built, disk: Path, **options: Any) -> Machine:
+        work = self.work / f"m{next(self._numbers)}"
+        machine = Machine(root, work, drives=(disk,), **options)
+        self.machines.append(machine)
+        self.all_machines.append(machine)
+        return machine
+
+    def _switched_on(self, machines: Mapping[str, Machine]) -> list[Installed]:
         """Machines, by the names of their hosts; they boot together."""
-        hosts, began_s = [], time.monotonic()
-        for name, options in wanted.items():
-            work = self.work / f"m{next(self._numbers)}"
-            machine = Machine(self.built, work, drives=(self.software,), **options)
-            self.machines.append(machine)
-            self.all_machines.append(machine)
+        began_s = time.monotonic()
+        for machine in machines.values():
             machine.switch_on()
-            hosts.append(Installed(machine, name))
+        hosts = [Installed(machine, name) for name, machine in machines.items()]
         for host in hosts:
             host.machine.until_booted()
             self.boots_s.append(time.monotonic() - began_s)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import itertools
 import os
 import signal
 import subprocess
@@ -16,12 +15,14 @@ from tests.lab.machines.agent import Agent, CommandFailed, MachineSilent, Outcom
 from tests.lab.machines.building import Built
 from tests.lab.machines.cache import MODEST, call
 from tests.lab.machines.network import FIND, PREFIX, Socket
-from tests.lab.machines.qmp import Qmp, QmpError
+from tests.lab.machines.qmp import Qmp
+from tests.lab.machines.usb import CONTROLLER, Usb
 
 BOOT_S = 400.0
 """Nine seconds on an idle machine; this one may be shared by many."""
 PATIENCE_S = 400.0
-"""How long a program inside may run, unless its caller says otherwise."""
+"""How long a program inside may run, unless its caller says otherwise. All time-outs are those of
+an x86_64, and multiplied by the recipe's slowness."""
 POLL_S = 0.2
 TICKS_HZ = os.sysconf("SC_CLK_TCK")
 T = TypeVar("T")
@@ -45,7 +46,6 @@ class Machine:
         self.built, self.work, self.socket = built, work, socket
         self._memory_mb, self._drives = memory_mb, drives
         self._qemu: subprocess.Popen[bytes] | None = None
-        self._plugged = itertools.count(1)
         self._cpu_s = 0.0
         work.mkdir(parents=True, exist_ok=True)
         self._disk = work / "disk.qcow2"
@@ -75,8 +75,9 @@ class Machine:
         """The second half of `boot`. Raises `MachineSilent`."""
         try:
             self.qmp = self._connected(lambda: Qmp(self.work / "qmp"))
+            self._usb = Usb(self.qmp, self.until)
             self.agent = self._connected(lambda: Agent(self.work / "agent"))
-            self.agent.wait_for_boot(BOOT_S)
+            self.agent.wait_for_boot(BOOT_S * self.slowness)
         except MachineSilent as error:
             raise MachineSilent(f"{error}\n{self.last_words()}") from None
         if self.socket is not None:
@@ -93,14 +94,14 @@ class Machine:
         """Press its reset button, and wait for the agent: what is plugged in stays so."""
         self.qmp.do("set-action", reboot="reset")
         self.qmp.do("system_reset")
-        self.agent.wait_for_boot(BOOT_S)
+        self.agent.wait_for_boot(BOOT_S * self.slowness)
 
     def shut_down(self, timeout_s: float = BOOT_S) -> None:
         """Have it go down as from its power button's menu."""
         assert self._qemu is not None
         self.agent.run("systemctl", "--no-block", "poweroff")
         self._cpu_s = self.cpu_s
-        self._qemu.wait(timeout_s)
+        self._qemu.wait(timeout_s * self.slowness)
         self._see_end()
 
     def close(self) -> None:
@@ -119,7 +120,7 @@ class Machine:
 
     def attempt(self, command: str, *, timeout_s: float = PATIENCE_S) -> Outcome:
         """Run a line of shell as root, whatever comes of it."""
-        outcome = self.agent.run("/bin/sh", "-c", command, timeout_s=timeout_s)
+        outcome = self.agent.run("/bin/sh", "-c", command, timeout_s=timeout_s * self.slowness)
         with (self.work / "commands.log").open("a", encoding="utf-8") as log:
             log.write(f"$ {command}\n{outcome.out}{outcome.err}[{outcome.status}]\n")
         return outcome
@@ -144,7 +145,7 @@ class Machine:
         every_s: float = POLL_S,
     ) -> T:
         """Look until there is something to see. Raises `AssertionError` when there is not."""
-        deadline = time.monotonic() + timeout_s
+        deadline = time.monotonic() + timeout_s * self.slowness
         while (seen := look()) is None:
             if time.monotonic() > deadline:
                 raise AssertionError(f"not seen in {timeout_s:.0f} s: {what}")
@@ -157,32 +158,36 @@ class Machine:
 
     # What happens outside
 
-    def plug(self, image: Path) -> str:
-        """Plug a USB stick in; answers its name for `pull`."""
-        name = f"stick{next(self._plugged)}"
-        file = {"driver": "file", "filename": str(image)}
-        self.qmp.do("blockdev-add", driver="raw", node_name=name, file=file)
-        stick = {"drive": name, "id": name, "bus": "xhci.0", "removable": True}
-        self.qmp.do("device_add", driver="usb-storage", **stick)
-        return name
+    def plug(self, image: Path, *, port: str | None = None) -> str:
+        """Plug a USB stick in, at a free port if none is given (see `usb.py`); answers its name
+        for `pull`."""
+        return self._usb.plug_stick(image, port)
 
     def pull(self, name: str) -> None:
         """Pull a stick out, whatever it is doing."""
-        self.qmp.do("device_del", id=name)
-        self._until_let_go("blockdev-del", node_name=name)
+        self._usb.pull(name)
 
-    def plug_line(self) -> str:
-        """Plug a USB serial adapter in, at whose other end nobody is; answers its name."""
-        name = f"line{next(self._plugged)}"
-        self.qmp.do("chardev-add", id=name, backend={"type": "null", "data": {}})
-        adapter = {"chardev": name, "id": name, "bus": "xhci.0", "always_plugged": True}
-        self.qmp.do("device_add", driver="usb-serial", **adapter)
-        return name
+    def plug_hub(self, port: str | None = None) -> str:
+        """Plug a USB hub in, whose ports are then `<port>.1` and on; answers its name."""
+        return self._usb.plug_hub(port)
+
+    def unplug(self, name: str) -> None:
+        """Pull a hub out, and with it all that is plugged into it."""
+        self._usb.pull(name)
+
+    def plug_line(
+        self, path: Path | None = None, *, port: str | None = None, serial: str | None = None
+    ) -> str:
+        """Plug a USB serial adapter in (an FTDI, 0403:6001); answers its name for `pull_line`.
+
+        `path` is the unix socket at which an emulated instrument listens; it is called again
+        whenever it hangs up. None: nobody is at the other end.
+        """
+        return self._usb.plug_line(path, port, serial)
 
     def pull_line(self, name: str) -> None:
         """Pull a serial adapter out."""
-        self.qmp.do("device_del", id=name)
-        self._until_let_go("chardev-remove", id=name)
+        self._usb.pull(name)
 
     def cut_cable(self) -> None:
         """Part it from its network, without a word to either."""
@@ -195,6 +200,11 @@ class Machine:
         self.socket.put_back()
 
     # What is left to see
+
+    @property
+    def slowness(self) -> float:
+        """What all time-outs are multiplied by (see `Recipe.slowness`)."""
+        return self.built.recipe.slowness
 
     @property
     def cpu_s(self) -> float:
@@ -238,7 +248,7 @@ class Machine:
             *("-chardev", f"socket,id=agent,path={self.work / 'agent'},server=on,wait=off"),
             *("-device", "virtio-serial"),
             *("-device", "virtserialport,chardev=agent,name=org.nondum.lab"),
-            *("-device", "qemu-xhci,id=xhci,p2=8,p3=8"),
+            *CONTROLLER,
             *("-device", "virtio-rng", *card),
         ]
 
@@ -251,7 +261,7 @@ class Machine:
         return self.attempt(FIND.format(mac=socket.mac)).out.strip()
 
     def _connected(self, connect: Callable[[], T]) -> T:
-        deadline = time.monotonic() + BOOT_S
+        deadline = time.monotonic() + BOOT_S * self.slowness
         while time.monotonic() < deadline:
             assert self._qemu is not None
             if self._qemu.poll() is not None:
@@ -261,20 +271,6 @@ class Machine:
             except OSError:
                 time.sleep(POLL_S)
         raise MachineSilent("QEMU does not listen")
-
-    def _until_let_go(self, command: str, **arguments: str) -> None:
-        """Remove what stood behind a device, once the guest has let go of that."""
-
-        def removed() -> bool | None:
-            try:
-                self.qmp.do(command, **arguments)
-            except QmpError as error:
-                if "in use" in str(error) or "is busy" in str(error):
-                    return None
-                raise
-            return True
-
-        self.until("the device let go", removed)
 
     def _see_end(self) -> None:
         assert self._qemu is not None

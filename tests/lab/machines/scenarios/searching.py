@@ -26,6 +26,7 @@ from demo.search.three_hosts import (
 )
 from demo.stage import PLAN_S, Mark, Stage
 from tests.lab.machines.lab import Lab
+from tests.lab.machines.recipe import X86_64
 from tests.lab.machines.robot import MachineRobot
 
 EVERY_FRAME = 'pace = "every-frame"\n'
@@ -33,7 +34,8 @@ EVERY_FRAME = 'pace = "every-frame"\n'
 
 
 def run(lab: Lab) -> str:
-    """The second demonstration, with sticks, kernels and cables; its times are an emulation's."""
+    """The second demonstration, with sticks, kernels and cables; its times are an emulation's. The
+    small robot is of the run's architecture, with 2 GB as the others."""
     kit = search_kit(
         lab.work / "sources",
         fits=("--python", "3.11", "--arch", "x86_64", "--arch", "aarch64"),
@@ -41,7 +43,8 @@ def run(lab: Lab) -> str:
     )
     person = Person(lab.work / "person", expects=(ALERT, *OTHER_SENTENCES))
     payloads = {kit.drives[name].name: id for name, id in kit.payloads.items()}
-    hosts = lab.fleet(ROBOT, NODE, SMALL, memory_mb=2048)
+    others = dict.fromkeys((ROBOT, NODE), X86_64.name)
+    hosts = lab.fleet(ROBOT, NODE, SMALL, memory_mb=2048, of=others)
     robots = {name: MachineRobot(host, payloads) for name, host in hosts.items()}
     node, robot, small = robots[NODE], robots[ROBOT], robots[SMALL]
     for one in robots.values():
