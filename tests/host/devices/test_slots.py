@@ -32,7 +32,7 @@ async def watching(*folders: Path) -> AsyncIterator[asyncio.Queue[Event]]:
 
 
 async def heard(told: asyncio.Queue[Event]) -> Event:
-    return await asyncio.wait_for(told.get(), 5.0)
+    return await asyncio.wait_for(told.get(), 30.0)
 
 
 @pytest.mark.anyio
