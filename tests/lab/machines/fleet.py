@@ -30,4 +30,4 @@ class Fleet:
         call(*NONDUM, "keys", "fleet", "sign", key, "--fleet", self._folder, "-o", certificate)
         machine.put(CERTIFICATE, certificate.read_bytes())
         machine.put(PUBLIC, (self._folder / "fleet.pub").read_bytes())
-        machine.run(f"nondum peers certify {CERTIFICATE} && nondum peers trust-fleet {PUBLIC}")
+        machine.run(f"nondum peers trust-fleet {PUBLIC} && nondum peers certify {CERTIFICATE}")

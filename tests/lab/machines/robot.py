@@ -54,6 +54,11 @@ class MachineRobot(Robot):
 
     # Drives
 
+    def trust(self, file: Path) -> None:
+        """Have it go by a trust file, its first one."""
+        self.machine.put("/run/lab/trust.toml", file.read_bytes())
+        self.nondum("keys", "trust", "--yes", "/run/lab/trust.toml")
+
     def install(self, drive: Path) -> None:
         """Have its payload for good."""
         packed = io.BytesIO()

@@ -50,6 +50,7 @@ def run(lab: Lab) -> str:
     for one in robots.values():
         threading.Thread(target=one.watch, daemon=True).start()
         one.until("the first view", bool, timeout_s=PLAN_S)
+        one.trust(kit.trust)
     for one in (robot, small):
         one.install(kit.drives[BASE])
 
