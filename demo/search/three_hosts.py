@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from demo import live, stages
-from demo.drives import HERE
+from demo.drives import HERE, Target
 from demo.follow_me import follow_me
 from demo.following import Reference
 from demo.kit import PLUGINS, Kit
@@ -140,13 +140,10 @@ def _switched_on(
     )
 
 
-def search_kit(
-    work: Path, *, fits: Sequence[str] = HERE, settings: Mapping[str, str] = SETTINGS
-) -> Kit:
-    """The drives of this demonstration; `fits` says for which machines, and `settings` are lines of
-    plugins' settings, by name."""
+def search_kit(work: Path, *, target: Target = HERE, settings: Mapping[str, str] = SETTINGS) -> Kit:
+    """The drives of this demonstration; `settings` are lines of plugins' settings, by name."""
     folders = {name: _copy(name, work / "sources", text) for name, text in settings.items()}
-    return Kit.built((BASE, CAMERA, *FOR_NODE), libraries=LIBRARIES, folders=folders, fits=fits)
+    return Kit.built((BASE, CAMERA, *FOR_NODE), libraries=LIBRARIES, folders=folders, target=target)
 
 
 def _copy(name: str, sources: Path, settings: str) -> Path:

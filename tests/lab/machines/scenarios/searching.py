@@ -7,6 +7,7 @@ import time
 from collections.abc import Mapping
 
 from demo import stages
+from demo.drives import Target
 from demo.fall import Fall
 from demo.robot import View
 from demo.search import losing
@@ -26,11 +27,21 @@ from demo.search.three_hosts import (
 )
 from demo.stage import PLAN_S, Mark, Stage
 from tests.lab.machines.lab import Lab
-from tests.lab.machines.recipe import X86_64
+from tests.lab.machines.recipe import RECIPES, X86_64
 from tests.lab.machines.robot import MachineRobot
+from tests.lab.machines.software import PYTHON
 
-EVERY_FRAME = 'pace = "every-frame"\n'
-"""A recording that waits for whoever looks at it: emulated processors fall behind for ever."""
+SPEED = 0.1
+"""Of the recording: an emulated processor finds people in an image a second or two."""
+SLOW = {
+    CAMERA: f'pace = "every-frame"\nspeed = {SPEED}\n',
+    "people-detector": "scale = 1.1\n",
+    "visual-tracker": (
+        f"turn_gain = {2.5 * SPEED}\ncoast_s = {1.5 / SPEED}\n"
+        f"stop_s = {3.0 / SPEED}\ngive_up_s = {60.0 / SPEED}\n"
+    ),
+}
+"""Lines of plugins' settings."""
 
 
 def run(lab: Lab) -> str:
@@ -38,8 +49,8 @@ def run(lab: Lab) -> str:
     small robot is of the run's architecture, with 2 GB as the others."""
     kit = search_kit(
         lab.work / "sources",
-        fits=("--python", "3.11", "--arch", "x86_64", "--arch", "aarch64"),
-        settings={**SETTINGS, CAMERA: EVERY_FRAME},
+        target=Target((PYTHON,), tuple(RECIPES)),
+        settings={**SETTINGS, **SLOW},
     )
     person = Person(lab.work / "person", expects=(ALERT, *OTHER_SENTENCES))
     payloads = {kit.drives[name].name: id for name, id in kit.payloads.items()}
