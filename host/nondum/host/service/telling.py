@@ -7,7 +7,19 @@ from collections.abc import Callable, Iterator, Sequence
 
 from nondum.host.announcements import announced
 from nondum.host.catalogue.records import Snapshot
-from nondum.host.events import Event, WorkerLogged
+from nondum.host.events import (
+    DriveInserted,
+    DriveRemoved,
+    Event,
+    GoalEnded,
+    GoalGiven,
+    GoalReached,
+    HostStarted,
+    HostStopped,
+    PayloadActivated,
+    WorkerExited,
+    WorkerLogged,
+)
 from nondum.sdk.errors import Problem
 
 FIELDS = ("component", "payload", "drive", "device", "goal")
@@ -33,11 +45,35 @@ class Telling:
             return
         snapshot = self._snapshot()
         problems: Sequence[Problem] = getattr(event, "problems", ())
-        said = announced(event, snapshot) or "; ".join(map(str, problems))
-        if said or event.name.startswith("Host"):
+        said = announced(event, snapshot) or _logged(event) or "; ".join(map(str, problems))
+        if said:
             level = logging.WARNING if problems else logging.INFO
             extra = {"journal": [*fields_of(event, snapshot)]}
-            log.log(level, "%s", said or event.name, extra=extra)
+            log.log(level, "%s", said, extra=extra)
+
+
+def _logged(event: Event) -> str:
+    """What nobody needs to be told as it happens, and may look for later."""
+    match event:
+        case DriveInserted():
+            return f"drive {event.drive} was plugged in"
+        case DriveRemoved():
+            return f"drive {event.drive} was pulled"
+        case PayloadActivated():
+            return f"at work: {', '.join(component.id for component in event.components)}"
+        case WorkerExited():
+            return f"{event.component} ended: {event.reason}"
+        case GoalGiven():
+            return f"goal {event.goal}: {event.text}"
+        case GoalReached():
+            return f"goal {event.goal} is reached"
+        case GoalEnded():
+            return f"goal {event.goal} has ended: {event.reason}"
+        case HostStarted():
+            return f"host {event.host} has started"
+        case HostStopped():
+            return f"host {event.host} ends as it was told to"
+    return ""
 
 
 def fields_of(event: Event, snapshot: Snapshot) -> Iterator[tuple[str, str]]:
