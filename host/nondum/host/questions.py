@@ -222,9 +222,9 @@ class Questions:
 
     async def watch(self, arguments: Arguments) -> AsyncIterator[Row]:
         """Everything at a glance, now and whenever the host looks different."""
-        version = (-1, -1)
+        version = None
         while True:
-            version = await self._changed(version)
+            version = await self.changed(version)
             yield {
                 **await self.status(arguments),
                 "components": await self.components(arguments),
@@ -233,8 +233,9 @@ class Questions:
                 "tree": self.mind.views.tree(),
             }
 
-    async def _changed(self, since: Version) -> Version:
-        """Wait for either the mind or the news to be at another version."""
+    async def changed(self, since: Version | None = None) -> Version:
+        """Wait for either the mind or the news to be at another version, and give it."""
+        since = since or (-1, -1)
         waiting = [
             asyncio.create_task(self.mind.changed(since[0])),
             asyncio.create_task(self.news.changed(since[1])),
