@@ -52,16 +52,18 @@ class Lab:
 
     def booted(self) -> Installed:
         """A machine of the scenario's own, switched on, with nondum installed but not started."""
-        machine = Machine(
-            self.built, self.work / f"m{next(self._numbers)}", drives=(self.software,)
-        )
+        installed = Installed(self.bare(self.software))
+        installed.install()
+        return installed
+
+    def bare(self, *disks: Path) -> Machine:
+        """A machine of the scenario's own, switched on, without nondum: the disks are all it has."""
+        machine = Machine(self.built, self.work / f"m{next(self._numbers)}", drives=disks)
         self.machines.append(machine)
         self.all_machines.append(machine)
         self.boots_s.append(machine.boot())
         machine.wait_for_system()
-        installed = Installed(machine)
-        installed.install()
-        return installed
+        return machine
 
     def cpu_s(self) -> float:
         """Processor time that all machines took so far."""
