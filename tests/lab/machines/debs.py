@@ -17,7 +17,7 @@ DISK_MB = 96
 
 
 def debs(machine: Built) -> Path:
-    """The image of a disk with both packages for a machine, from the cache or made now (a minute)."""
+    """The image of a disk with both packages for a machine, cached or made now."""
     kind = f"debs-{machine.recipe.name}"
     return kept(f"{kind}-{sources_key()}", lambda folder: _make(machine, folder)) / "disk.img"
 

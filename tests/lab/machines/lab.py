@@ -57,7 +57,7 @@ class Lab:
         return installed
 
     def bare(self, *disks: Path) -> Machine:
-        """A machine of the scenario's own, switched on, without nondum: the disks are all it has."""
+        """A machine of the scenario's own, switched on, with nothing but these disks."""
         machine = Machine(self.built, self.work / f"m{next(self._numbers)}", drives=disks)
         self.machines.append(machine)
         self.all_machines.append(machine)

@@ -1,4 +1,4 @@
-"""The Debian package: installed it runs, upgraded it remembers, removed it stops, purged it was not."""
+"""The Debian package installs, upgrades, is removed and purged as its operator expects."""
 
 from __future__ import annotations
 
