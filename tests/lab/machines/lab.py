@@ -64,6 +64,13 @@ class Lab:
         (host,) = self._switched_on({NAME: machine})
         return host
 
+    def bare(self, *disks: Path) -> Machine:
+        """A machine of the scenario's own, switched on, with nothing but these disks."""
+        machine = self._machine(self.built, *disks)
+        self.boots_s.append(machine.boot())
+        machine.wait_for_system()
+        return machine
+
     def fleet(
         self, *names: str, memory_mb: int = 1024, of: Mapping[str, str] | None = None
     ) -> dict[str, Installed]:
@@ -92,9 +99,9 @@ class Lab:
         other = built(RECIPES[architecture])
         return other, software(other, self.commit)
 
-    def _machine(self, root: Built, disk: Path, **options: Any) -> Machine:
+    def _machine(self, root: Built, *disks: Path, **options: Any) -> Machine:
         work = self.work / f"m{next(self._numbers)}"
-        machine = Machine(root, work, drives=(disk,), **options)
+        machine = Machine(root, work, drives=disks, **options)
         self.machines.append(machine)
         self.all_machines.append(machine)
         return machine
