@@ -8,11 +8,13 @@ from typing import Any
 from tests.lab.machines.installed import LOOK_S, PATIENCE_S, Installed
 
 LOOK = """
-echo mounts $(grep -cE '/nondum-helper/mounts|/nondum/mounts' /proc/mounts)
-echo staged $(ls /var/lib/nondum/staging 2>/dev/null | wc -l)
-echo workers $(pgrep -cf 'nondum[.]?.*host[/.]inside')
-echo folders $(ls /run/nondum-helper/mounts 2>/dev/null | wc -l)
+cd /var/lib/nondum
+grep -E ' (/run/nondum-helper/mounts|/var/lib/nondum/mounts)/' /proc/mounts
+ls -d /run/nondum-helper/mounts/* staging/* payloads/* venvs/* scratch/* mounts/* 2>/dev/null
+for process in $(grep -zls ^NONDUM_WORKER= /proc/[0-9]*/environ); do echo worker; done
+true
 """
+"""Mounts, folders and processes that are there for payloads; the same as `tests.lab.traces` has."""
 
 
 @dataclass(frozen=True)
@@ -21,8 +23,8 @@ class Seen:
 
     daemon: str
     """Its process."""
-    counts: str
-    """Mounts, staged payloads, workers."""
+    traces: str
+    """Mounts, folders, workers."""
     payloads: tuple[str, ...]
     components: tuple[str, ...]
     drives: tuple[str, ...]
@@ -33,12 +35,14 @@ def seen(host: Installed) -> Seen | None:
     view = host.status()
     if view is None:
         return None
-    counts = host.machine.attempt(LOOK).out
+    components = host.machine.attempt("nondum components --json")
+    if components.status != 0:
+        return None
     return Seen(
         daemon=host.shown("MainPID"),
-        counts=counts,
+        traces=host.machine.run(LOOK),
         payloads=_names(view["payloads"], "payload"),
-        components=_names(view["components"], "component"),
+        components=_names(components.json(), "component"),
         drives=_names(view["drives"], "drive"),
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -36,6 +37,20 @@ class Machine:
     def blocks(self) -> list[Block]:
         """The block devices there are."""
         return sorted(self._blocks(), key=lambda block: block.name)
+
+    def sectors(self, name: str) -> int:
+        """The size of a block device, in sectors of 512 bytes; 0: it has no medium, or is gone."""
+        text = _text(self.sys / "class/block" / name / "size").strip()
+        return int(text) if text.isdigit() else 0
+
+    def is_on_usb(self, name: str) -> bool:
+        """Whether a block device hangs on USB."""
+        return any(re.fullmatch("usb[0-9]+", part) for part in self.place(name))
+
+    def place(self, name: str) -> tuple[str, ...]:
+        """The folders of sysfs that lead to a block device."""
+        folder = (self.sys / "class/block" / name).resolve()
+        return folder.relative_to(self.sys.resolve()).parts
 
     def _blocks(self) -> Iterator[Block]:
         try:

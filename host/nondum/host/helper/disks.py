@@ -30,7 +30,7 @@ class Disks:
         if not place.is_dir():
             raise refused("there is no such block device", device)
         folder = place.resolve()
-        if not self._is_pluggable(folder):
+        if not self._is_pluggable(device):
             raise refused("it does not hang on USB: the machine's own disks are not drives", device)
         if _diskseq(folder) != diskseq:
             raise refused("it is not the one that was plugged in then", device)
@@ -47,15 +47,12 @@ class Disks:
             raise refused("its node is another device's", device)
         return node
 
-    def _is_pluggable(self, folder: Path) -> bool:
-        parts = folder.relative_to(self.machine.sys.resolve()).parts
-        if any(part.startswith("usb") and part[3:].isdigit() for part in parts):
+    def _is_pluggable(self, device: str) -> bool:
+        if self.machine.is_on_usb(device):
             return True
-        return (
-            self.allow_loop
-            and parts[:3] == ("devices", "virtual", "block")
-            and (parts[3].startswith("loop"))
-        )
+        parts = self.machine.place(device)
+        is_virtual = parts[:3] == ("devices", "virtual", "block")
+        return self.allow_loop and is_virtual and parts[3].startswith("loop")
 
 
 def _diskseq(folder: Path) -> int | None:

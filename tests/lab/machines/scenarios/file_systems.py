@@ -27,9 +27,7 @@ def run(lab: Lab) -> str:
     return f"{len(whole) + len(tables)} drives, one of several partitions; told: {codes}"
 
 
-def see_at_work(
-    host: Installed, drives: dict[str, Path], payloads: dict[str, list[str]]
-) -> None:
+def see_at_work(host: Installed, drives: dict[str, Path], payloads: dict[str, list[str]]) -> None:
     """Plug drives in, wait for their payloads, and have all gone again."""
     plugged = [host.machine.plug(image) for image in drives.values()]
     ids = [f"org.example.{name}" for names in payloads.values() for name in names]
