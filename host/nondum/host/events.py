@@ -106,6 +106,14 @@ class DriveFlapping(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class DriveLeftAlone(Event):
+    """A disk that could be plugged in is this machine's own: it is never read."""
+
+    drive: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class DriveRemoved(Event):
     """A drive was pulled, or its source says that it is not there."""
 

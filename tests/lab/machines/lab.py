@@ -125,9 +125,20 @@ class Lab:
 
     def stick(self, name: str, *parts: Part, **options: Any) -> Path:
         """The image of a stick that carries one payload, `org.example.<name>`."""
+        content = self.payload(name, *parts, **options)
+        return fat_stick(content.parent / "stick.img", content)
+
+    def payload(self, name: str, *parts: Part, **options: Any) -> Path:
+        """What is on such a stick: a folder, in a folder of its own."""
+        content = self.folder() / "files"
+        make_payload(content, *parts, payload_id=f"org.example.{name}", **options)
+        return content
+
+    def folder(self) -> Path:
+        """A new folder, for what is made on the way."""
         folder = self.work / f"stick-{next(self._numbers)}"
-        make_payload(folder / "files", *parts, payload_id=f"org.example.{name}", **options)
-        return fat_stick(folder / "stick.img", folder / "files")
+        folder.mkdir(parents=True)
+        return folder
 
     @contextmanager
     def scenario(self) -> Iterator[None]:

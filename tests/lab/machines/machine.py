@@ -249,7 +249,7 @@ class Machine:
             *recipe.machine,
             *("-smp", "2", "-m", str(self._memory_mb)),
             *("-kernel", self.built.kernel, "-initrd", self.built.initramfs),
-            *("-append", f"console={recipe.terminal} panic=-1 quiet {more}".strip()),
+            *("-append", f"console={recipe.terminal} panic=-1 quiet no_timer_check {more}".strip()),
             *("-drive", f"file={self._disk},format=qcow2,if=virtio", *disks),
             *("-chardev", serial, "-serial", "chardev:console"),
             *("-qmp", f"unix:{self.work / 'qmp'},server=on,wait=off"),
