@@ -36,6 +36,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "host": ("host", "Run the daemon."),
     "journal": ("past", "What happened on this host, oldest first."),
     "keys": ("keys", "Whose payloads robots run, and which hosts a fleet certifies."),
+    "lab": ("lab", "Plug a payload into an emulated computer, and tell what became of it."),
     "logs": ("past", "What components have written."),
     "mount": ("act", "Tell where on the body a unit is mounted."),
     "payload": ("payload", "Make, judge and install payloads."),
