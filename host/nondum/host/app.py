@@ -30,6 +30,7 @@ from nondum.host.drives.slots import SlotSource
 from nondum.host.drives.source import DriveSource
 from nondum.host.drives.steady import Steady
 from nondum.host.events import Event, HostStarted, Recomposed
+from nondum.host.feedback import parts as feedback_parts
 from nondum.host.helper import privileged
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.lifecycle.children import watch_without_threads
@@ -148,14 +149,35 @@ async def _run(
             *executor.trust.warnings,
             *_warnings(catalogue),
             *standing.warnings(),
+            *feedback.warnings,
             *map(str, cages.problems()),
             *of_peers,
         )
 
     places = neighbours.placement.places if neighbours else dict
     vouched = executor.trust.vouched
+    conversation = Conversation(mind, workers.plugins, workers.pids, _take(neighbours))
+    feedback = feedback_parts.made(
+        config.feedback,
+        folders.root,
+        catalogue,
+        mind,
+        places,
+        conversation,
+        news.look_again,
+    )
+    bus.subscribe(feedback.on_event)
     questions = Questions(
-        catalogue, mind, workers, standing, news, listing, warnings, places, vouched
+        catalogue,
+        mind,
+        workers,
+        standing,
+        news,
+        listing,
+        warnings,
+        places,
+        vouched,
+        feedback.to_dict,
     )
     trust = TrustOrders(executor.trust, bus.emit)
     orders = Orders(catalogue, mind, workers, news, bus, config.planning.translate_s)
@@ -185,7 +207,8 @@ async def _run(
                 lambda: words(catalogue.snapshot(), mind.views.given(), places(), warnings()),
                 questions.changed,
             ),
-            Conversation(mind, workers.plugins, workers.pids, _take(neighbours)).run(),
+            conversation.run(),
+            feedback.run(),
             *(source.watch(bus.emit) for source in device_sources(config)),
         )
     finally:

@@ -133,6 +133,14 @@ class DriveRead(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class DriveReleased(Event):
+    """A drive was let go of: nothing of it is mounted, and nothing is read from it."""
+
+    JOURNALLED: ClassVar[bool] = False
+    drive: str
+
+
+@dataclass(frozen=True, slots=True)
 class DriveUnreadable(Event):
     """A drive could not be mounted or looked through, or carries no payload."""
 
