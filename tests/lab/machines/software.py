@@ -50,7 +50,7 @@ mount --bind "$3" "$2/mnt"
 mount -t tmpfs tmpfs "$2/tmp"
 exec chroot "$2" /bin/sh -eu -c '
     python3 -m venv --without-pip /opt/nondum
-    /opt/nondum/bin/python /usr/share/python-wheels/pip-*.whl/pip install \
+    /opt/nondum/bin/python "$(echo /usr/share/python-wheels/pip-*.whl)/pip" install \
         -q --no-index --find-links /mnt --no-cache-dir --no-compile \
         "nondum[fast]" nondum-planner-pyperplan "nondum-planner-fast-downward[engine]"
 '
