@@ -29,7 +29,7 @@ class CameraSettings:
     pace: Literal["real-time", "every-frame"] = "real-time"
     """`real-time` leaves frames out when the machine is slow; `every-frame` slows down."""
     speed: float = 1.0
-    """How fast the recording is played: 0.1 is slow motion, for who sees only one image a second."""
+    """How fast the recording is played: 0.1 is slow motion, for who sees an image a second."""
 
     def __post_init__(self) -> None:
         self.view  # noqa: B018  # refuses impossible views when the settings are made

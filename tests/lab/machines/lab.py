@@ -14,7 +14,7 @@ from tests.lab.machines.building import Built, built
 from tests.lab.machines.drives import fat_stick
 from tests.lab.machines.fleet import Fleet
 from tests.lab.machines.installed import NAME, Installed
-from tests.lab.machines.machine import Machine
+from tests.lab.machines.machine import OURS, Machine
 from tests.lab.machines.network import Lan
 from tests.lab.machines.recipe import RECIPES
 from tests.lab.machines.software import software
@@ -58,11 +58,18 @@ class Lab:
             self.machines.append(self._shared.machine)
         return self._shared
 
-    def booted(self) -> Installed:
+    def booted(self, *, clock: tuple[str, ...] = OURS) -> Installed:
         """A machine of the scenario's own, switched on, with nondum installed but not started."""
-        machine = self._machine(self.built, self.software)
+        machine = self._machine(self.built, self.software, clock=clock)
         (host,) = self._switched_on({NAME: machine})
         return host
+
+    def bare(self, *disks: Path) -> Machine:
+        """A machine of the scenario's own, switched on, with nothing but these disks."""
+        machine = self._machine(self.built, *disks)
+        self.boots_s.append(machine.boot())
+        machine.wait_for_system()
+        return machine
 
     def fleet(
         self, *names: str, memory_mb: int = 1024, of: Mapping[str, str] | None = None
@@ -92,9 +99,9 @@ class Lab:
         other = built(RECIPES[architecture])
         return other, software(other, self.commit)
 
-    def _machine(self, root: Built, disk: Path, **options: Any) -> Machine:
+    def _machine(self, root: Built, *disks: Path, **options: Any) -> Machine:
         work = self.work / f"m{next(self._numbers)}"
-        machine = Machine(root, work, drives=(disk,), **options)
+        machine = Machine(root, work, drives=disks, **options)
         self.machines.append(machine)
         self.all_machines.append(machine)
         return machine
@@ -118,9 +125,20 @@ class Lab:
 
     def stick(self, name: str, *parts: Part, **options: Any) -> Path:
         """The image of a stick that carries one payload, `org.example.<name>`."""
+        content = self.payload(name, *parts, **options)
+        return fat_stick(content.parent / "stick.img", content)
+
+    def payload(self, name: str, *parts: Part, **options: Any) -> Path:
+        """What is on such a stick: a folder, in a folder of its own."""
+        content = self.folder() / "files"
+        make_payload(content, *parts, payload_id=f"org.example.{name}", **options)
+        return content
+
+    def folder(self) -> Path:
+        """A new folder, for what is made on the way."""
         folder = self.work / f"stick-{next(self._numbers)}"
-        make_payload(folder / "files", *parts, payload_id=f"org.example.{name}", **options)
-        return fat_stick(folder / "stick.img", folder / "files")
+        folder.mkdir(parents=True)
+        return folder
 
     @contextmanager
     def scenario(self) -> Iterator[None]:
