@@ -60,7 +60,7 @@ def workers(state: Path) -> Iterator[tuple[int, str]]:
                     yield pid, value
 
 
-def until_unmounted(folder: Path, timeout_s: float = 10.0) -> None:
+def until_unmounted(folder: Path, timeout_s: float = 60.0) -> None:
     """Wait until nothing is mounted below a folder. Raises `TimeoutError`."""
     with Path("/proc/self/mountinfo").open() as changes:  # see proc(5): polls as an exception
         poll = select.poll()
