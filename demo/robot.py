@@ -107,7 +107,9 @@ class Robot:
         told = self.view.get("told", ())
         return tuple(row["text"] for row in told if row["number"] > number)
 
-    def until(self, what: str, found: Callable[[View], _T | None], *, timeout_s: float) -> _T:
+    def until(
+        self, what: str, found: Callable[[View], _T | None], *, timeout_s: float = 60.0
+    ) -> _T:
         """Wait until a view satisfies `found`, and return what it found. Raises `TooLate`."""
         result: list[_T] = []
 
@@ -134,14 +136,14 @@ class Robot:
     def watch(self) -> None:
         """Keep `view` fresh until the host leaves; runs in a thread of its own."""
         try:
-            for view in self.views():
+            for view in self.shown():
                 self.see(view)
         finally:
             with self._changed:
                 self._watching = False
                 self._changed.notify_all()
 
-    def views(self) -> Iterator[View]:
+    def shown(self) -> Iterator[View]:
         """What is to be seen, whenever it changes, until the host leaves."""
         try:
             with ControlClient(self.control, timeout_s=None) as client:

@@ -134,7 +134,7 @@ class MachineRobot(Robot):
 
     # What is seen of it
 
-    def views(self) -> Iterator[View]:
+    def shown(self) -> Iterator[View]:
         """What is to be seen, until the machine is silent."""
         seen = ""
         with suppress(MachineSilent):

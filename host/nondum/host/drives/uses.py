@@ -6,7 +6,7 @@ import re
 import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from nondum.host.drives import own
 from nondum.host.drives.mounts import Mount, device_number, mounts
@@ -76,7 +76,7 @@ class Machine:
             yield from self._numbered(named.path, Use(named.why))
 
     def _mounted(self, ours: Path) -> Iterator[tuple[int, Use]]:
-        for mount, use in own.mounted(_mounts(self.proc), ours.resolve()):
+        for mount, use in own.mounted(_mounts(self.proc), PurePosixPath(ours.resolve())):
             yield mount.number, use
             if mount.source.startswith("/dev/"):
                 yield from self._numbered(mount.source, use)
