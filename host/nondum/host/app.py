@@ -23,6 +23,7 @@ from nondum.host.confinement import choice
 from nondum.host.control.server import ControlServer
 from nondum.host.conversation import Conversation, Take
 from nondum.host.devices.slots import DeviceSlotSource
+from nondum.host.devices.software import Software
 from nondum.host.devices.source import DeviceSource
 from nondum.host.devices.udev import UdevSource
 from nondum.host.drives.blocks import BlockSource
@@ -121,6 +122,8 @@ async def _run(
         bus.subscribe(neighbours.on_event)
     news = News()
     bus.subscribe(news.on_event)
+    software = Software(catalogue.snapshot, mind.people.tell)
+    bus.subscribe(software.on_event)
     listing = executor.installation.listing
 
     def warnings() -> tuple[str, ...]:
@@ -156,6 +159,7 @@ async def _run(
             manager.run(),
             mind.run(),
             backups.keep(catalogue.backups, lambda: catalogue.revision, config.backups.every_s),
+            software.run(),
             Conversation(mind, workers.plugins, workers.pids, _take(neighbours)).run(),
             *(source.watch(bus.emit) for source in device_sources(config)),
         )
