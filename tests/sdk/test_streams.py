@@ -80,7 +80,7 @@ class Reader:
 
     async def line(self) -> list[str]:
         assert self._process.stdout is not None
-        return (await asyncio.wait_for(self._process.stdout.readline(), 10)).decode().split()
+        return (await asyncio.wait_for(self._process.stdout.readline(), 60)).decode().split()
 
     def signal(self, number: int) -> None:
         self._process.send_signal(number)

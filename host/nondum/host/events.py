@@ -106,6 +106,14 @@ class DriveFlapping(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class DriveLeftAlone(Event):
+    """A disk that could be plugged in is this machine's own: it is never read."""
+
+    drive: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class DriveRemoved(Event):
     """A drive was pulled, or its source says that it is not there."""
 
@@ -122,6 +130,14 @@ class DriveRead(Event):
     """How many certificates of hosts it carries."""
     trust_files: int = 0
     """How many versions of trust files it carries."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveReleased(Event):
+    """A drive was let go of: nothing of it is mounted, and nothing is read from it."""
+
+    JOURNALLED: ClassVar[bool] = False
+    drive: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from nondum.host.catalogue.records import PayloadRecord, Step
 from nondum.host.confinement.level import SCRATCH, Level, Standing
 from nondum.host.control.arguments import Arguments
 from nondum.host.devices import view
+from nondum.host.feedback.state import NOTHING
 from nondum.host.mind.mind import Mind
 from nondum.host.news import News
 from nondum.host.rows import (
@@ -57,6 +58,8 @@ class Questions:
     """Payload key → the peer that runs it, for those that run elsewhere."""
     vouched: Callable[[str], Vouched] = lambda _: NOBODY
     """Payload key → who vouches for it."""
+    shown: Callable[[], Row] = NOTHING.to_dict
+    """What people without a screen are shown."""
 
     async def status(self, arguments: Arguments) -> Row:
         """The host, its payloads and its goals at a glance."""
@@ -70,6 +73,7 @@ class Questions:
                 *map(_kept_out, self.mind.views.kept_out()),
                 *map(_gone_back, gone_back(snapshot)),
             ],
+            "feedback": self.shown(),
             "confinement": self.standing.to_dict(),
             "payloads": [
                 payload_row(
@@ -228,9 +232,9 @@ class Questions:
 
     async def watch(self, arguments: Arguments) -> AsyncIterator[Row]:
         """Everything at a glance, now and whenever the host looks different."""
-        version = (-1, -1)
+        version = None
         while True:
-            version = await self._changed(version)
+            version = await self.changed(version)
             yield {
                 **await self.status(arguments),
                 "components": await self.components(arguments),
@@ -239,8 +243,9 @@ class Questions:
                 "tree": self.mind.views.tree(),
             }
 
-    async def _changed(self, since: Version) -> Version:
-        """Wait for either the mind or the news to be at another version."""
+    async def changed(self, since: Version | None = None) -> Version:
+        """Wait for either the mind or the news to be at another version, and give it."""
+        since = since or (-1, -1)
         waiting = [
             asyncio.create_task(self.mind.changed(since[0])),
             asyncio.create_task(self.news.changed(since[1])),

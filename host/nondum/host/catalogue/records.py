@@ -49,6 +49,17 @@ class Step(Enum):
     """Not on this host, or not any more."""
 
 
+class Safety(Enum):
+    """Which payloads a daemon leaves alone, since daemons before it died, or a person says so."""
+
+    OFF = "off"
+    """None: it is as always."""
+    INITIAL = "initial"
+    """What drives and other hosts bring: only what was installed for good may be at work."""
+    NOTHING = "nothing"
+    """All of them."""
+
+
 class DriveState(Enum):
     """How far a drive has been read."""
 
@@ -392,6 +403,7 @@ class Snapshot:
     """Those that left first come first."""
     peers: tuple[PeerRecord, ...] = ()
     """By name."""
+    safety: Safety = Safety.OFF
 
     def everyone(self) -> Iterator[tuple[str, ComponentRecord | PeerComponent]]:
         """Each component, this host's own first, with the name of its host."""

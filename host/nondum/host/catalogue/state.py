@@ -16,6 +16,7 @@ from nondum.host.catalogue.records import (
     PayloadRecord,
     PeerRecord,
     Rollback,
+    Safety,
     Snapshot,
 )
 
@@ -57,6 +58,8 @@ class HostState:
     """Whether the daemon that wrote this ended because it was told to."""
     peers: Mapping[str, PeerRecord] = field(default_factory=dict)
     """Key → a peer that is there. Not kept when the daemon ends: who is there is found out anew."""
+    safety: Safety = Safety.OFF
+    """Which payloads are left alone. Not kept either: each daemon finds that out as it starts."""
 
     def snapshot(self) -> Snapshot:
         """The state as readers get it."""
@@ -73,4 +76,5 @@ class HostState:
             goals=tuple(self.goals.values()),
             former=tuple(self.former.values()),
             peers=tuple(sorted(self.peers.values(), key=lambda p: p.name)),
+            safety=self.safety,
         )
