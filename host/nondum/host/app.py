@@ -23,6 +23,7 @@ from nondum.host.confinement import choice
 from nondum.host.control.server import ControlServer
 from nondum.host.conversation import Conversation, Take
 from nondum.host.devices.slots import DeviceSlotSource
+from nondum.host.devices.software import Software
 from nondum.host.devices.source import DeviceSource
 from nondum.host.devices.udev import UdevSource
 from nondum.host.drives.blocks import BlockSource
@@ -138,6 +139,8 @@ async def _run(
         bus.subscribe(neighbours.on_event)
     news = News()
     bus.subscribe(news.on_event)
+    software = Software(catalogue.snapshot, mind.people.tell)
+    bus.subscribe(software.on_event)
     bus.subscribe(service.on_event)
     if journal.is_in_use():
         bus.subscribe(Telling(catalogue.snapshot).on_event)
@@ -197,6 +200,7 @@ async def _run(
             manager.run(),
             mind.run(),
             backups.keep(catalogue.backups, lambda: catalogue.revision, config.backups.every_s),
+            software.run(),
             service.watched(
                 (
                     Part("the component manager", lambda: bus.taken, lambda: bus.followed),
