@@ -48,6 +48,11 @@ from nondum.host.mind.system_tree import load_system_tree
 from nondum.host.news import News
 from nondum.host.orders import Orders
 from nondum.host.questions import Questions
+from nondum.host.service import journal
+from nondum.host.service.notify import Notifier
+from nondum.host.service.service import Part, Service
+from nondum.host.service.telling import Telling
+from nondum.host.service.words import words
 from nondum.host.trust.orders import TrustOrders
 from nondum.host.trust.payload_trust import TrustOptions
 from nondum.host.workers.launcher import WorkerLauncher
@@ -68,6 +73,16 @@ async def run_host(config: HostConfig, *, more_drives: Sequence[DriveSource] = (
     Raises `ConfigRefused` (ALREADY_RUNNING, SYSTEM_TREE, …) before anything has begun.
     """
     stop = _told_to_stop()
+    async with Service(Notifier.from_environment(os.environ)) as service:
+        await _run_as(service, config, more_drives, stop)
+
+
+async def _run_as(
+    service: Service,
+    config: HostConfig,
+    more_drives: Sequence[DriveSource],
+    stop: asyncio.Event,
+) -> None:
     watch_without_threads()
     heap.give_back_what_is_big()
     _make_slots(config)
@@ -77,7 +92,7 @@ async def run_host(config: HostConfig, *, more_drives: Sequence[DriveSource] = (
         keep = config.journal.keep
         catalogue = await Catalogue.open(folders.catalogue, config.host.name, keep=keep)
         try:
-            await _run(config, folders, catalogue, more_drives, stop)
+            await _run(service, config, folders, catalogue, more_drives, stop)
         finally:
             await catalogue.close()
     finally:
@@ -85,6 +100,7 @@ async def run_host(config: HostConfig, *, more_drives: Sequence[DriveSource] = (
 
 
 async def _run(
+    service: Service,
     config: HostConfig,
     folders: Folders,
     catalogue: Catalogue,
@@ -124,6 +140,9 @@ async def _run(
         bus.subscribe(neighbours.on_event)
     news = News()
     bus.subscribe(news.on_event)
+    bus.subscribe(service.on_event)
+    if journal.is_in_use():
+        bus.subscribe(Telling(catalogue.snapshot).on_event)
     listing = executor.installation.listing
 
     def warnings() -> tuple[str, ...]:
@@ -185,6 +204,16 @@ async def _run(
             manager.run(),
             mind.run(),
             backups.keep(catalogue.backups, lambda: catalogue.revision, config.backups.every_s),
+            service.watched(
+                (
+                    Part("the component manager", lambda: bus.taken, lambda: bus.followed),
+                    Part("the mind", lambda: mind.ticks + 1, lambda: mind.ticks),
+                )
+            ),
+            service.told(
+                lambda: words(catalogue.snapshot(), mind.views.given(), places(), warnings()),
+                questions.changed,
+            ),
             conversation.run(),
             feedback.run(),
             goal_files.run(),

@@ -26,7 +26,7 @@ DEVICE = re.compile(r"[a-z][a-z0-9]{1,31}")
 DRIVE = re.compile(r"[a-z][a-z0-9]{1,31}(-[0-9]{1,19})?")
 USE = re.compile("read|handover")
 COMPONENT = re.compile(r"[a-z0-9][a-z0-9-]{0,62}")
-NEED = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}")
+NEED = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}(\.[A-Za-z0-9][A-Za-z0-9_-]{0,62})?")
 FILESYSTEM = re.compile(r"[a-z0-9]{0,16}")
 STATE = re.compile("|".join(state.value for state in State))
 
