@@ -106,7 +106,7 @@ def test_every_unit_and_rule_of_the_checkout_is_in_it(
 ) -> None:
     names = {path.name for path in _files(trees[architecture])}
     folders = (f for f in (ROOT / "packaging").iterdir() if f.name != "debian")
-    assert {path.name for folder in folders for path in folder.iterdir()} <= names
+    assert {path.name for folder in folders for path in _files(folder)} <= names
 
 
 @both
