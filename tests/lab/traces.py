@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from nondum.host.drives.mounting import mounted_below
+from nondum.host.drives.mounts import mounted_below
 
 FOLDERS = ("staging", "payloads", "venvs", "scratch", "mounts")
 LASTING = {"host", "highwater", "former", "journal"}

@@ -30,6 +30,7 @@ from nondum.host.drives.slots import SlotSource
 from nondum.host.drives.source import DriveSource
 from nondum.host.drives.steady import Steady
 from nondum.host.events import Event, HostStarted, Recomposed
+from nondum.host.feedback import parts as feedback_parts
 from nondum.host.helper import privileged
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.lifecycle.children import watch_without_threads
@@ -45,6 +46,11 @@ from nondum.host.mind.system_tree import load_system_tree
 from nondum.host.news import News
 from nondum.host.orders import Orders
 from nondum.host.questions import Questions
+from nondum.host.service import journal
+from nondum.host.service.notify import Notifier
+from nondum.host.service.service import Part, Service
+from nondum.host.service.telling import Telling
+from nondum.host.service.words import words
 from nondum.host.trust.orders import TrustOrders
 from nondum.host.trust.payload_trust import TrustOptions
 from nondum.host.workers.launcher import WorkerLauncher
@@ -65,6 +71,16 @@ async def run_host(config: HostConfig, *, more_drives: Sequence[DriveSource] = (
     Raises `ConfigRefused` (ALREADY_RUNNING, SYSTEM_TREE, …) before anything has begun.
     """
     stop = _told_to_stop()
+    async with Service(Notifier.from_environment(os.environ)) as service:
+        await _run_as(service, config, more_drives, stop)
+
+
+async def _run_as(
+    service: Service,
+    config: HostConfig,
+    more_drives: Sequence[DriveSource],
+    stop: asyncio.Event,
+) -> None:
     watch_without_threads()
     heap.give_back_what_is_big()
     _make_slots(config)
@@ -74,7 +90,7 @@ async def run_host(config: HostConfig, *, more_drives: Sequence[DriveSource] = (
         keep = config.journal.keep
         catalogue = await Catalogue.open(folders.catalogue, config.host.name, keep=keep)
         try:
-            await _run(config, folders, catalogue, more_drives, stop)
+            await _run(service, config, folders, catalogue, more_drives, stop)
         finally:
             await catalogue.close()
     finally:
@@ -82,6 +98,7 @@ async def run_host(config: HostConfig, *, more_drives: Sequence[DriveSource] = (
 
 
 async def _run(
+    service: Service,
     config: HostConfig,
     folders: Folders,
     catalogue: Catalogue,
@@ -121,6 +138,9 @@ async def _run(
         bus.subscribe(neighbours.on_event)
     news = News()
     bus.subscribe(news.on_event)
+    bus.subscribe(service.on_event)
+    if journal.is_in_use():
+        bus.subscribe(Telling(catalogue.snapshot).on_event)
     listing = executor.installation.listing
 
     def warnings() -> tuple[str, ...]:
@@ -129,14 +149,35 @@ async def _run(
             *executor.trust.warnings,
             *_warnings(catalogue),
             *standing.warnings(),
+            *feedback.warnings,
             *map(str, cages.problems()),
             *of_peers,
         )
 
     places = neighbours.placement.places if neighbours else dict
     vouched = executor.trust.vouched
+    conversation = Conversation(mind, workers.plugins, workers.pids, _take(neighbours))
+    feedback = feedback_parts.made(
+        config.feedback,
+        folders.root,
+        catalogue,
+        mind,
+        places,
+        conversation,
+        news.look_again,
+    )
+    bus.subscribe(feedback.on_event)
     questions = Questions(
-        catalogue, mind, workers, standing, news, listing, warnings, places, vouched
+        catalogue,
+        mind,
+        workers,
+        standing,
+        news,
+        listing,
+        warnings,
+        places,
+        vouched,
+        feedback.to_dict,
     )
     trust = TrustOrders(executor.trust, bus.emit)
     orders = Orders(catalogue, mind, workers, news, bus, config.planning.translate_s)
@@ -156,7 +197,18 @@ async def _run(
             manager.run(),
             mind.run(),
             backups.keep(catalogue.backups, lambda: catalogue.revision, config.backups.every_s),
-            Conversation(mind, workers.plugins, workers.pids, _take(neighbours)).run(),
+            service.watched(
+                (
+                    Part("the component manager", lambda: bus.taken, lambda: bus.followed),
+                    Part("the mind", lambda: mind.ticks + 1, lambda: mind.ticks),
+                )
+            ),
+            service.told(
+                lambda: words(catalogue.snapshot(), mind.views.given(), places(), warnings()),
+                questions.changed,
+            ),
+            conversation.run(),
+            feedback.run(),
             *(source.watch(bus.emit) for source in device_sources(config)),
         )
     finally:

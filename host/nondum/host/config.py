@@ -13,6 +13,8 @@ from pathlib import Path
 from types import GenericAlias
 from typing import Any, get_args, get_type_hints
 
+from nondum.host.feedback import section as feedback_section
+from nondum.host.feedback.section import FeedbackSection
 from nondum.sdk.errors import ConfigRefused, Problem
 
 SYSTEM_FILE = Path("/etc/nondum/host.toml")
@@ -199,6 +201,7 @@ class HostConfig:
     planning: PlanningSection = field(default_factory=PlanningSection)
     peers: PeersSection = field(default_factory=PeersSection)
     router: RouterSection = field(default_factory=RouterSection)
+    feedback: FeedbackSection = field(default_factory=FeedbackSection)
 
 
 def default_name(hostname: str) -> str:
@@ -263,6 +266,7 @@ def parse(text: str, where: str, defaults: HostConfig) -> HostConfig:
     problems.extend(
         _contradictions(sections["host"], sections["install"], sections["workers"], where)
     )
+    problems.extend(feedback_section.problems(sections["feedback"], where))
     if problems:
         raise ConfigRefused(*problems)
     return HostConfig(**sections)

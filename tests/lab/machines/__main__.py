@@ -14,7 +14,7 @@ from pathlib import Path
 from tests.lab.machines.building import built
 from tests.lab.machines.lab import Lab
 from tests.lab.machines.recipe import RECIPES, X86_64
-from tests.lab.machines.scenario import Result, Scenario, keep, run_all, scenarios
+from tests.lab.machines.scenario import SHORT, Result, Scenario, keep, run_all, scenarios
 from tests.lab.machines.shell import talk
 from tests.lab.machines.software import software
 
@@ -34,11 +34,12 @@ def main(words: Sequence[str]) -> int:
     disk = software(machine, asked.commit)
     _told("nondum is built for it", began)
     work = Path(tempfile.mkdtemp(prefix="nondum-lab-"))
-    lab = Lab(machine, disk, work)
+    lab = Lab(machine, disk, asked.commit, work)
     try:
         if asked.shell:
             return talk(lab)
-        return _run(lab, [known[name] for name in asked.scenario or known], asked)
+        names = asked.scenario or (SHORT if asked.short else known)
+        return _run(lab, [known[name] for name in names], asked)
     finally:
         lab.close()
         shutil.rmtree(work)
@@ -79,6 +80,7 @@ def _arguments(known: dict[str, Scenario], words: Sequence[str]) -> argparse.Nam
         "--arch", choices=RECIPES, default=X86_64.name, help="its processor (%(default)s)"
     )
     parser.add_argument("--list", action="store_true", help="tell which scenarios there are")
+    parser.add_argument("--short", action="store_true", help=f"only {', '.join(SHORT)}")
     parser.add_argument("--keep", action="store_true", help="keep consoles and journals of all")
     parser.add_argument("--commit", help="nondum as of a commit, not as the checkout is now")
     parser.add_argument("--shell", action="store_true", help="boot one and run what you type")

@@ -13,11 +13,11 @@ from tests.lab.machines.machine import Machine
 PATIENCE_S = 400.0
 CONFIGURATION = """
 [host]
-name = "spot"
+name = "{name}"
 [drives]
 allow_unsigned = true
 [peers]
-enabled = false
+enabled = {has_peers}
 [workers]
 startup_s = 200
 """
@@ -38,6 +38,7 @@ systemctl daemon-reload
 systemctl -q enable nondum.service
 """
 SERVICE = "nondum.service"
+NAME = "spot"
 LOOK_S = 2.0
 """Between two looks at the status: each takes a second of an emulated processor."""
 REPLUGS = 3
@@ -48,8 +49,9 @@ View = dict[str, Any]
 class Installed:
     """The nondum of one machine."""
 
-    def __init__(self, machine: Machine) -> None:
-        self.machine = machine
+    def __init__(self, machine: Machine, name: str = NAME) -> None:
+        """`name` is what the host is called; it looks for others where it has a network."""
+        self.machine, self.name = machine, name
 
     def install(self) -> None:
         """Install it from the machine's first further disk; nothing is started."""
@@ -58,7 +60,9 @@ class Installed:
 
     def configure(self, more: str = "") -> None:
         """Write its configuration, with some more lines of its table `[workers]`."""
-        self.machine.put("/etc/nondum/host.toml", CONFIGURATION + more)
+        has_peers = "true" if self.machine.socket else "false"
+        text = CONFIGURATION.format(name=self.name, has_peers=has_peers)
+        self.machine.put("/etc/nondum/host.toml", text + more)
 
     def start(self) -> None:
         """Start the service and wait until its command line is answered.
@@ -67,6 +71,10 @@ class Installed:
         """
         self.machine.run(f"systemctl start {SERVICE}", timeout_s=PATIENCE_S)
         self.machine.until("an answer", self._first_answer, PATIENCE_S)
+
+    def begin_to_start(self) -> None:
+        """Have systemd start the service, and wait for nothing: `start` must follow."""
+        self.machine.run(f"systemctl start --no-block {SERVICE}", timeout_s=PATIENCE_S)
 
     def wait_until_started(self) -> None:
         """Wait until somebody answers, whoever started the service."""
@@ -103,21 +111,36 @@ class Installed:
         """
         for _ in range(REPLUGS):
             stick = self.machine.plug(image, port=port)
-            if self.until(f"{payload} or a stalled drive", partial(_active_or_stalled, payload)):
+            if self.until(f"{payload} or a stalled drive", partial(active_or_stalled, payload)):
                 return stick
             self.machine.pull(stick)
         raise AssertionError(f"the drive of {payload} stalled {REPLUGS} times")
+
+    def components(self) -> list[View]:
+        """What `nondum components --json` shows, peers' components too; nothing while nobody
+        answers."""
+        seen = self.machine.attempt("nondum components --json", timeout_s=PATIENCE_S)
+        rows: list[View] = seen.json() if seen.status == 0 else []
+        return rows
 
     def until_component(self, component: str, state: str) -> View:
         """Wait until a component is in a state."""
 
         def found() -> View | None:
-            seen = self.machine.attempt("nondum components --json")
-            rows: list[View] = seen.json() if seen.status == 0 else []
-            states = [row for row in rows if row["component"] == component]
+            states = [row for row in self.components() if row["component"] == component]
             return states[0] if states and states[0]["state"] == state else None
 
         return self.machine.until(f"{component} {state}", found, PATIENCE_S, LOOK_S)
+
+    def until_peer(self, peer: str, state: str) -> View:
+        """Wait until another host is `here` or `away`."""
+
+        def found() -> View | None:
+            seen = self.machine.attempt("nondum peers --json", timeout_s=PATIENCE_S)
+            rows: list[View] = seen.json() if seen.status == 0 else []
+            return next((r for r in rows if (r["peer"], r["state"]) == (peer, state)), None)
+
+        return self.machine.until(f"{peer} {state}", found, PATIENCE_S, LOOK_S)
 
     def until_goal(self, goal: str, state: str) -> View:
         """Wait until a goal, in PDDL, is in a state; one that is kept and true `holds`."""
@@ -160,7 +183,7 @@ def _payload_in(payload: str, state: str, view: View) -> View | None:
     return rows[0] if rows[0]["state"] == state else None
 
 
-def _active_or_stalled(payload: str, view: View) -> bool | None:
+def active_or_stalled(payload: str, view: View) -> bool | None:
     """Whether it is active; None while it is neither that nor kept from it by its drive."""
     if _payload_in(payload, "active", view):
         return True

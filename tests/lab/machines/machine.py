@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import os
 import signal
 import subprocess
@@ -13,6 +14,7 @@ from typing import TypeVar
 from tests.lab.machines.agent import Agent, CommandFailed, MachineSilent, Outcome
 from tests.lab.machines.building import Built
 from tests.lab.machines.cache import MODEST, call
+from tests.lab.machines.network import FIND, PREFIX, Socket
 from tests.lab.machines.qmp import Qmp
 from tests.lab.machines.usb import CONTROLLER, Usb
 
@@ -43,10 +45,12 @@ class Machine:
         memory_mb: int = 2048,
         drives: tuple[Path, ...] = (),
         clock: tuple[str, ...] = OURS,
+        socket: Socket | None = None,
     ) -> None:
         """`work` keeps its disk, console and sockets (a short path: see unix(7)); `drives` are
-        read-only disks that it has for good, `/dev/vdb` and on; `clock` is what its time is."""
-        self.built, self.work, self._clock = built, work, clock
+        read-only disks that it has for good, `/dev/vdb` and on; `clock` is what its time is;
+        `socket` is where it is plugged into a network, if it has one."""
+        self.built, self.work, self.socket, self._clock = built, work, socket, clock
         self._memory_mb, self._drives = memory_mb, drives
         self._qemu: subprocess.Popen[bytes] | None = None
         self._cpu_s = 0.0
@@ -63,10 +67,19 @@ class Machine:
         `more` goes on the kernel's command line. Raises `MachineSilent` with its console's end.
         """
         began = time.monotonic()
+        self.switch_on(more=more)
+        self.until_booted()
+        return time.monotonic() - began
+
+    def switch_on(self, *, more: str = "") -> None:
+        """The first half of `boot`, so that several boot at once: `until_booted` must follow."""
         with (self.work / "qemu.log").open("ab") as log:
             self._qemu = subprocess.Popen(
                 self._command(more), stdin=subprocess.DEVNULL, stdout=log, stderr=log
             )
+
+    def until_booted(self) -> None:
+        """The second half of `boot`. Raises `MachineSilent`."""
         try:
             self.qmp = self._connected(lambda: Qmp(self.work / "qmp"))
             self._usb = Usb(self.qmp, self.until)
@@ -74,7 +87,8 @@ class Machine:
             self.agent.wait_for_boot(BOOT_S * self.slowness)
         except MachineSilent as error:
             raise MachineSilent(f"{error}\n{self.last_words()}") from None
-        return time.monotonic() - began
+        if self.socket is not None:
+            self._join(self.socket)
 
     def cut_power(self) -> None:
         """End it at once: what its disk was not told to keep is lost."""
@@ -122,6 +136,13 @@ class Machine:
         """Write a file inside."""
         data = content.encode() if isinstance(content, str) else content
         self.agent.put(path, data, mode)
+
+    def get(self, path: str) -> bytes:
+        """Read a file inside. Raises `CommandFailed`."""
+        outcome = self.agent.run("base64", path, timeout_s=PATIENCE_S)
+        if outcome.status != 0:
+            raise CommandFailed(str(outcome))
+        return base64.b64decode(outcome.out)
 
     def until(
         self,
@@ -175,6 +196,16 @@ class Machine:
         """Pull a serial adapter out."""
         self._usb.pull(name)
 
+    def cut_cable(self) -> None:
+        """Part it from its network, without a word to either."""
+        assert self.socket is not None
+        self.socket.pull()
+
+    def plug_cable(self) -> None:
+        """Join it to its network again."""
+        assert self.socket is not None
+        self.socket.put_back()
+
     # What is left to see
 
     @property
@@ -208,16 +239,17 @@ class Machine:
         recipe = self.built.recipe
         serial = f"file,id=console,path={self.console},append=on"
         disks: list[str] = []
+        around, card = (self.socket.around, self.socket.card) if self.socket else ((), ())
         for image in self._drives:
             disks += ["-drive", f"file={image},format=raw,if=virtio,readonly=on"]
         return [
-            *("setpriv", "--pdeathsig", "KILL", *MODEST, recipe.program),
+            *("setpriv", "--pdeathsig", "KILL", *around, *MODEST, recipe.program),
             *("-nodefaults", "-display", "none", "-no-reboot"),
             *self._clock,
             *recipe.machine,
             *("-smp", "2", "-m", str(self._memory_mb)),
             *("-kernel", self.built.kernel, "-initrd", self.built.initramfs),
-            *("-append", f"console={recipe.terminal} panic=-1 quiet {more}".strip()),
+            *("-append", f"console={recipe.terminal} panic=-1 quiet no_timer_check {more}".strip()),
             *("-drive", f"file={self._disk},format=qcow2,if=virtio", *disks),
             *("-chardev", serial, "-serial", "chardev:console"),
             *("-qmp", f"unix:{self.work / 'qmp'},server=on,wait=off"),
@@ -225,8 +257,16 @@ class Machine:
             *("-device", "virtio-serial"),
             *("-device", "virtserialport,chardev=agent,name=org.nondum.lab"),
             *CONTROLLER,
-            *("-device", "virtio-rng"),
+            *("-device", "virtio-rng", *card),
         ]
+
+    def _join(self, socket: Socket) -> None:
+        """Give its network card its address: nothing else there would."""
+        card = self.until("a network card", lambda: self._card(socket) or None)
+        self.run(f"ip link set {card} up && ip addr replace {socket.address}/{PREFIX} dev {card}")
+
+    def _card(self, socket: Socket) -> str:
+        return self.attempt(FIND.format(mac=socket.mac)).out.strip()
 
     def _connected(self, connect: Callable[[], T]) -> T:
         deadline = time.monotonic() + BOOT_S * self.slowness
@@ -244,5 +284,6 @@ class Machine:
         assert self._qemu is not None
         self._qemu.wait()
         self._qemu = None
-        self.agent.close()
-        self.qmp.close()
+        for line in (getattr(self, "agent", None), getattr(self, "qmp", None)):
+            if line is not None:  # it was not heard of before its end
+                line.close()

@@ -11,10 +11,12 @@ from nondum.host.catalogue.records import (
     DriveRecord,
     FormerPayload,
     GoalRecord,
+    KnownDevice,
     MountPose,
     PayloadRecord,
     PeerRecord,
     Rollback,
+    Safety,
     Snapshot,
 )
 
@@ -39,6 +41,8 @@ class HostState:
     payloads: Mapping[str, PayloadRecord] = field(default_factory=dict)
     components: Mapping[str, ComponentRecord] = field(default_factory=dict)
     devices: Mapping[str, DeviceRecord] = field(default_factory=dict)
+    known_devices: Mapping[str, KnownDevice] = field(default_factory=dict)
+    """Identity → a device that was ever here, as far as is remembered; last seen last."""
     mounts: Mapping[str, MountPose] = field(default_factory=dict)
     highwater: Mapping[tuple[str, str], Highwater] = field(default_factory=dict)
     """(fleet, payload id) → newest release."""
@@ -54,6 +58,8 @@ class HostState:
     """Whether the daemon that wrote this ended because it was told to."""
     peers: Mapping[str, PeerRecord] = field(default_factory=dict)
     """Key → a peer that is there. Not kept when the daemon ends: who is there is found out anew."""
+    safety: Safety = Safety.OFF
+    """Which payloads are left alone. Not kept either: each daemon finds that out as it starts."""
 
     def snapshot(self) -> Snapshot:
         """The state as readers get it."""
@@ -64,9 +70,11 @@ class HostState:
             payloads=tuple(self.payloads.values()),
             drives=tuple(self.drives.values()),
             devices=tuple(self.devices.values()),
+            known_devices=tuple(self.known_devices.values()),
             mounts=tuple(self.mounts.values()),
             rollbacks=tuple(rollback.digest for rollback in self.rollbacks.values()),
             goals=tuple(self.goals.values()),
             former=tuple(self.former.values()),
             peers=tuple(sorted(self.peers.values(), key=lambda p: p.name)),
+            safety=self.safety,
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import dataclasses
+import faulthandler
 import logging
 from pathlib import Path
 
@@ -48,10 +49,7 @@ def run(
               nondum host run --config /etc/nondum/host.toml
               nondum host run --user --peer 10.0.0.7
     """
-    logging.basicConfig(
-        level=logging.DEBUG if verbose else logging.INFO,
-        format="%(levelname)s %(name)s: %(message)s",
-    )
+    _log(logging.DEBUG if verbose else logging.INFO)
     chosen = _config(config_file, is_user=user)
     if name is not None:
         host_config.check_name(name, where="--name")
@@ -64,6 +62,20 @@ def run(
     from nondum.host.app import run_host
 
     asyncio.run(run_host(chosen))
+
+
+def _log(level: int) -> None:
+    """To systemd's journal with all its fields, where standard error is that, else as text there.
+
+    What hangs until systemd ends it (SIGABRT) says first where it was.
+    """
+    from nondum.host.service import journal
+
+    faulthandler.enable()
+    if journal.is_in_use():
+        logging.basicConfig(level=level, format="%(message)s", handlers=[journal.JournalHandler()])
+    else:
+        logging.basicConfig(level=level, format="%(levelname)s %(name)s: %(message)s")
 
 
 def _config(config_file: Path | None, *, is_user: bool) -> HostConfig:

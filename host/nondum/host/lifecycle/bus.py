@@ -23,6 +23,11 @@ class Bus:
         self.clock = clock
         self._queue: asyncio.Queue[Stamped] = asyncio.Queue()
         self._listeners: list[Emit] = []
+        self.taken = 0
+        """Events that were taken in for the manager."""
+        self._given = 0
+        self.followed = 0
+        """Of those, how many it is through with: it has come back for more."""
 
     def emit(self, event: Event) -> None:
         """Take an event in. Call it on the loop's thread; it never blocks."""
@@ -30,6 +35,7 @@ class Bus:
             self.tell((event,))
         if event.JOURNALLED or type(event) in RULES:
             self._queue.put_nowait((event, self.clock()))
+            self.taken += 1
 
     def subscribe(self, listener: Emit) -> Callable[[], None]:
         """Have every event told to `listener`, on the loop's thread; returns how to end that.
@@ -40,10 +46,12 @@ class Bus:
         return lambda: self._listeners.remove(listener)
 
     async def batch(self) -> list[Stamped]:
-        """Wait for events; all that are there then."""
+        """Wait for events; all that are there then. Who asks is through with those before."""
+        self.followed = self._given
         batch = [await self._queue.get()]
         while not self._queue.empty():
             batch.append(self._queue.get_nowait())
+        self._given += len(batch)
         return batch
 
     def tell(self, events: Sequence[Event]) -> None:
