@@ -30,6 +30,8 @@ from nondum.host.events import (
     PlaceLost,
     PlaceMissing,
     RollbackAsked,
+    SafeModeEntered,
+    SafeModeLeft,
     TrustChanged,
     TrustFileRefused,
     WheelsStored,
@@ -93,7 +95,9 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return f"a trust file from {event.source} is not taken: {_joined(event.problems)}"
         case DriveUnreadable():
             return f"drive {event.drive} cannot be used: {_joined(event.problems)}"
-        case CatalogueUnwritten() | CatalogueSetAside():
+        case SafeModeLeft():
+            return "safe mode is left: payloads are taken in again"
+        case CatalogueUnwritten() | CatalogueSetAside() | SafeModeEntered():
             return _joined(event.problems)
         case CatalogueWritten():
             return "the catalogue is written again, with all that happened meanwhile"

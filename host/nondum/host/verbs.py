@@ -49,6 +49,7 @@ def answering(
         "goals": questions.goals,
         "halt": orders.halt,
         "journal": questions.journal,
+        "leave_safe_mode": orders.leave_safe_mode,
         "logs": questions.logs,
         "mount": orders.mount,
         "plan": questions.plan,

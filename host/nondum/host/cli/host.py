@@ -9,7 +9,10 @@ from pathlib import Path
 
 import click
 
+from nondum.host.catalogue.records import Safety
+from nondum.host.cli import render
 from nondum.host.cli.config import asked_options
+from nondum.host.cli.connection import Session, json_option
 from nondum.host.configuration.effective import Asked, effective
 
 
@@ -23,9 +26,21 @@ def host() -> None:
 
 @host.command()
 @asked_options
+@click.option(
+    "--safe",
+    type=click.Choice([Safety.INITIAL.value, Safety.NOTHING.value]),
+    is_flag=False,
+    flag_value=Safety.INITIAL.value,
+    help="Safe mode: only what was installed for good may be at work, or nothing.",
+)
 @click.option("--verbose", "-v", is_flag=True, help="Log more.")
 def run(
-    user: bool, config_file: Path | None, name: str | None, peers: tuple[str, ...], verbose: bool
+    user: bool,
+    config_file: Path | None,
+    name: str | None,
+    peers: tuple[str, ...],
+    safe: str | None,
+    verbose: bool,
 ) -> None:
     """Run a host until it is told to stop (SIGTERM, or Ctrl-C).
 
@@ -33,12 +48,28 @@ def run(
     Examples: nondum host run --user
               nondum host run --config /etc/nondum/host.toml
               nondum host run --user --peer 10.0.0.7
+              nondum host run --safe
     """
     _log(logging.DEBUG if verbose else logging.INFO)
     chosen = effective(Asked(user, config_file, name, peers))
     from nondum.host.app import run_host
 
-    asyncio.run(run_host(chosen))
+    asyncio.run(run_host(chosen, safety=Safety(safe) if safe else Safety.OFF))
+
+
+@host.command()
+@json_option
+@click.pass_obj
+def resume(session: Session) -> None:
+    """Leave safe mode: take in again the drives and payloads that were left alone.
+
+    Example: nondum host resume
+    """
+    answer = session.ask("leave_safe_mode")
+    if session.as_json:
+        render.as_json(answer)
+    else:
+        click.echo("safe mode is left; `nondum status` shows what comes")
 
 
 def _log(level: int) -> None:
