@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import NamedTuple
 
 from tests.lab.machines.installed import Installed
@@ -9,6 +10,7 @@ from tests.lab.machines.lab import Lab
 from tests.lab.plugins import talker
 
 PAYLOAD = "org.example.talker"
+USB_DEVICE = re.compile(r"\d+-[\d.]+")
 
 
 class Place(NamedTuple):
@@ -46,5 +48,5 @@ def _seen(host: Installed) -> Place:
     node = view["drives"][0]["drive"].partition("-")[0]
     path = host.machine.run(f"udevadm info -q path -n /dev/{node}")
     said = host.machine.run(f"udevadm info -q property --property ID_SERIAL_SHORT -n /dev/{node}")
-    address = [part for part in path.split("/") if "-" in part and part[0].isdigit()][-1]
-    return Place(address, said.strip(), view["payloads"][0]["key"])
+    addresses = [part for part in path.split("/") if USB_DEVICE.fullmatch(part)]
+    return Place(addresses[-1], said.strip(), view["payloads"][0]["key"])
