@@ -114,7 +114,8 @@ class DriveReading:
         files = unpacked(found["trust"])
         flaws = tuple(Problem(**problem) for problem in found["trust_problems"])
         changed = await self._trust.offer(effect.drive, files, flaws)
-        read = DriveRead(effect.drive, keys, len(certificates), len(files))
+        loose = tuple(Problem(**problem) for problem in found["flaws"])
+        read = DriveRead(effect.drive, keys, len(certificates), len(files), loose)
         return *changed, *brought, *payloads, read
 
     async def _look(self, drive: str, arguments: Mapping[str, Any]) -> dict[str, Any]:

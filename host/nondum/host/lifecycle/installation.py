@@ -98,6 +98,7 @@ class Installation:
         self._host, self._folders, self._options = host, folders, options
         self._trust = trust
         self._grants: dict[str, Grant] = {}
+        self._goals: dict[str, tuple[str, ...]] = {}
         self._workers, self._children, self._emit = workers, children, emit
         self._prepared: dict[str, tuple[Prepared, ...]] = {}
         self._needs: dict[str, Needs] = {}
@@ -208,6 +209,7 @@ class Installation:
                 tuple(component.record(effect.payload) for component in prepared),
                 tuple(pose for component in prepared for pose in component.poses(self._host)),
                 self._grants[effect.payload],
+                self._goals[effect.payload],
             ),
         )
 
@@ -285,6 +287,7 @@ class Installation:
             for said in told["components"]
         )
         self._grants[key] = Grant.parse(told["grant"])
+        self._goals[key] = tuple(told["goals"])
         return int(told["fresh"])
 
     def _tell_queued(self, payload: str, ahead: int) -> None:
@@ -313,6 +316,7 @@ class Installation:
         self._needs.pop(effect.payload, None)
         self._promises.give_up(effect.payload)
         self._grants.pop(effect.payload, None)
+        self._goals.pop(effect.payload, None)
         self._uncompiled.discard(effect.payload)
         scratches = self._folders.scratches_of(effect.payload)
         await in_thread(end_leftovers, scratches)
