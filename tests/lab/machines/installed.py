@@ -16,6 +16,7 @@ CONFIGURATION = """
 name = "{name}"
 [drives]
 allow_unsigned = true
+look_s = 60.0
 [peers]
 enabled = {has_peers}
 [workers]

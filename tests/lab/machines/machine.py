@@ -206,6 +206,10 @@ class Machine:
         """
         return self._usb.plug_line(path, port, serial)
 
+    def plug_device(self, driver: str, *, port: str | None = None) -> str:
+        """Plug in what QEMU calls `usb-tablet`, `usb-audio` …; answers its name for `unplug`."""
+        return self._usb.plug_device(driver, port)
+
     def pull_line(self, name: str) -> None:
         """Pull a serial adapter out."""
         self._usb.pull(name)
