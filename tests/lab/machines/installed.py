@@ -38,6 +38,8 @@ systemd-tmpfiles --create
 systemctl daemon-reload
 systemctl -q enable nondum.service
 """
+PATIENT = "/etc/systemd/system/nondum.service.d/lab.conf"
+PATIENCE = "[Service]\nTimeoutStartSec={start:.0f}\nWatchdogSec={alive:.0f}\n"
 SERVICE = "nondum.service"
 NAME = "spot"
 LOOK_S = 2.0
@@ -57,6 +59,8 @@ class Installed:
     def install(self) -> None:
         """Install it from the machine's first further disk; nothing is started."""
         self.configure()
+        slowness = self.machine.slowness
+        self.machine.put(PATIENT, PATIENCE.format(start=600 * slowness, alive=60 * slowness))
         self.machine.run(INSTALL)
 
     def configure(self, more: str = "") -> None:
