@@ -23,6 +23,7 @@ from nondum.host.confinement import choice
 from nondum.host.control.server import ControlServer
 from nondum.host.conversation import Conversation, Take
 from nondum.host.devices.slots import DeviceSlotSource
+from nondum.host.devices.software import Software
 from nondum.host.devices.source import DeviceSource
 from nondum.host.devices.udev import UdevSource
 from nondum.host.drives.blocks import BlockSource
@@ -31,6 +32,8 @@ from nondum.host.drives.source import DriveSource
 from nondum.host.drives.steady import Steady
 from nondum.host.events import Event, HostStarted, Recomposed
 from nondum.host.feedback import parts as feedback_parts
+from nondum.host.feedback.feedback import Feedback
+from nondum.host.goal_files import GoalFiles, of_people
 from nondum.host.helper import privileged
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.lifecycle.children import watch_without_threads
@@ -138,6 +141,8 @@ async def _run(
         bus.subscribe(neighbours.on_event)
     news = News()
     bus.subscribe(news.on_event)
+    software = Software(catalogue.snapshot, mind.people.tell)
+    bus.subscribe(software.on_event)
     bus.subscribe(service.on_event)
     if journal.is_in_use():
         bus.subscribe(Telling(catalogue.snapshot).on_event)
@@ -157,12 +162,13 @@ async def _run(
     places = neighbours.placement.places if neighbours else dict
     vouched = executor.trust.vouched
     conversation = Conversation(mind, workers.plugins, workers.pids, _take(neighbours))
-    feedback = feedback_parts.made(
+    feedback: Feedback = feedback_parts.made(
         config.feedback,
         folders.root,
         catalogue,
         mind,
         places,
+        lambda: goal_files.concerns,
         conversation,
         news.look_again,
     )
@@ -181,6 +187,10 @@ async def _run(
     )
     trust = TrustOrders(executor.trust, bus.emit)
     orders = Orders(catalogue, mind, workers, news, bus, config.planning.translate_s)
+    goal_files = GoalFiles(
+        catalogue.snapshot, mind, orders.translated, bus.emit, on_change=feedback.wake
+    )
+    bus.subscribe(goal_files.on_event)
     control = ControlServer(
         config.host.control,
         verbs.answering(questions, orders, trust, neighbours),
@@ -197,6 +207,7 @@ async def _run(
             manager.run(),
             mind.run(),
             backups.keep(catalogue.backups, lambda: catalogue.revision, config.backups.every_s),
+            software.run(),
             service.watched(
                 (
                     Part("the component manager", lambda: bus.taken, lambda: bus.followed),
@@ -209,6 +220,7 @@ async def _run(
             ),
             conversation.run(),
             feedback.run(),
+            goal_files.run(),
             *(source.watch(bus.emit) for source in device_sources(config)),
         )
     finally:
@@ -316,7 +328,7 @@ class _Listener:
             self._workers.remount(mounts_of_all(snapshot))
             self._mind.see(snapshot)
             if isinstance(event, HostStarted):
-                self._mind.restore(snapshot.goals)
+                self._mind.restore(of_people(snapshot.goals))
             return
         sentence = announced(event, self._catalogue.snapshot())
         if sentence is not None:
@@ -327,6 +339,7 @@ class _Listener:
 def _install_options(config: HostConfig) -> InstallOptions:
     return InstallOptions(
         allow_unsigned=config.drives.allow_unsigned,
+        look_s=config.drives.look_s,
         trust=TrustOptions(config.trust.file, stop=config.trust.on_revoke == "stop"),
         method=config.install.method,
         reserve_mb=config.install.reserve_mb,

@@ -120,6 +120,11 @@ CODES = (
         "see the log, and report it with what it says",
     ),
     Code(
+        "LAB_MISSING",
+        "The laboratory, which is in nondum's sources, is not here.",
+        "stand in a checkout of nondum's sources, or name one by the variable NONDUM_LAB",
+    ),
+    Code(
         "STATE_UNWRITABLE",
         "The state folder cannot be used.",
         "see to it that the disk works, has room, and that this user may write there",
