@@ -40,6 +40,7 @@ systemctl -q enable nondum.service
 """
 PATIENT = "/etc/systemd/system/nondum.service.d/lab.conf"
 PATIENCE = "[Service]\nTimeoutStartSec={start:.0f}\nWatchdogSec={alive:.0f}\n"
+"""Machines whose processors are emulated, and shared, get more time than real ones."""
 SERVICE = "nondum.service"
 NAME = "spot"
 LOOK_S = 2.0
