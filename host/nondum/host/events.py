@@ -443,6 +443,22 @@ class HostStopped(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class SafeModeEntered(Event):
+    """The daemon leaves payloads alone, as it has started."""
+
+    host: str
+    problems: tuple[Problem, ...]
+    """Which, and why."""
+
+
+@dataclass(frozen=True, slots=True)
+class SafeModeLeft(Event):
+    """A person asked that payloads be taken in again."""
+
+    host: str
+
+
+@dataclass(frozen=True, slots=True)
 class HostSteady(Event):
     """The daemon has lived for a while beside what others had died of."""
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import cast
 
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.catalogue.records import MountPose, PayloadRecord, Snapshot, Step
+from nondum.host.catalogue.records import MountPose, PayloadRecord, Safety, Snapshot, Step
 from nondum.host.control.arguments import Arguments, Triple
-from nondum.host.events import ForgetAsked, MountSet, RetryAsked
+from nondum.host.events import ForgetAsked, MountSet, RetryAsked, SafeModeLeft
 from nondum.host.lifecycle import going_back, installed
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.mind import translation
@@ -124,6 +124,15 @@ class Orders:
         for payload in troubled:
             self.bus.emit(RetryAsked(payload.key))
         return {"payloads": [payload.payload_id for payload in troubled]}
+
+    async def leave_safe_mode(self, arguments: Arguments) -> Row:
+        """Take in what was left alone. Raises `NondumError` (SAFE_MODE_OFF)."""
+        snapshot = self.catalogue.snapshot()
+        if snapshot.safety is Safety.OFF:
+            raise NondumError(Problem("SAFE_MODE_OFF", "this host is not in safe mode"))
+        self.bus.emit(SafeModeLeft(snapshot.host))
+        await self._until(lambda snapshot: snapshot.safety is Safety.OFF)
+        return {"was": snapshot.safety.value}
 
     async def forget(self, arguments: Arguments) -> Row:
         """Forget a payload that was here. Raises `InstallFailed` (FORGET_UNKNOWN)."""

@@ -15,7 +15,7 @@ from nondum.host.events import (
     DriveUnreadable,
     PayloadWithdrawn,
 )
-from nondum.host.lifecycle import releases, tries
+from nondum.host.lifecycle import releases, safe_mode, tries
 from nondum.host.lifecycle.turn import Turn
 from nondum.sdk.errors import Problem
 
@@ -36,7 +36,11 @@ def on_drive_inserted(turn: Turn, event: DriveInserted) -> None:
         since=turn.at,
         mark=event.mark,
     )
-    if problems := (*event.problems, *tries.drive_problems(turn.state, drive)):
+    if problems := (
+        *event.problems,
+        *tries.drive_problems(turn.state, drive),
+        *safe_mode.drive_problems(turn.state, drive.kind, drive.id),
+    ):
         turn.put_drive(drive)
         turn.pending.append(DriveUnreadable(event.drive, problems))
     else:

@@ -16,7 +16,7 @@ from typing import Any
 from nondum.host import effects
 from nondum.host.catalogue.records import Moment
 from nondum.host.catalogue.state import HostState
-from nondum.host.drives.reading import telling_stalls
+from nondum.host.drives.reading import LOOK_S, telling_stalls
 from nondum.host.events import (
     BesideRefused,
     ComponentsProbed,
@@ -69,6 +69,8 @@ class InstallOptions:
     """How payloads are judged and installed on this host."""
 
     allow_unsigned: bool = False
+    look_s: float = LOOK_S
+    """A drive that cannot be mounted and listed in this time hangs."""
     method: str = "store"
     """`store`: links to the store. `pip`: pip itself."""
     reserve_mb: int = 64
