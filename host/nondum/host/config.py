@@ -275,7 +275,7 @@ def parse(text: str, where: str, defaults: HostConfig) -> HostConfig:
         else:
             sections[name] = _section(name, sections[name], table, places, problems)
     problems.extend(_contradictions(HostConfig(**sections), places))
-    problems.extend(feedback_section.problems(sections["feedback"], places.of))
+    problems.extend(feedback_section.problems(sections["feedback"], places))
     if problems:
         raise ConfigRefused(*problems)
     return HostConfig(**sections)

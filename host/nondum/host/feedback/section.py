@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from nondum.host.configuration.places import Places
@@ -33,18 +33,20 @@ class FeedbackSection:
     """How long it is shown that a drive may be pulled."""
 
 
-def problems(section: FeedbackSection, place: Callable[[str, str], str]) -> Iterator[Problem]:
-    """What is wrong with its values; `place` says where a key of a section stands."""
+def problems(section: FeedbackSection, places: Places) -> Iterator[Problem]:
+    """What is wrong with its values."""
     for name in section.lamps:
         if not LAMP.fullmatch(name):
-            yield _wrong("lamps", name, "a name in /sys/class/leds", place)
+            yield _wrong("lamps", name, "a name in /sys/class/leds", places)
     for key, command in (("hook", section.hook), ("player", section.player)):
         if command and not command[0].startswith("/"):
-            yield _wrong(key, command[0], "a program by its full path, such as /usr/bin/env", place)
+            yield _wrong(
+                key, command[0], "a program by its full path, such as /usr/bin/env", places
+            )
         if any("\0" in word for word in command):
-            yield _wrong(key, list(command), "words without NUL", place)
+            yield _wrong(key, list(command), "words without NUL", places)
 
 
-def _wrong(key: str, value: object, expected: str, place: Callable[[str, str], str]) -> Problem:
+def _wrong(key: str, value: object, expected: str, places: Places) -> Problem:
     text = f"[feedback] {key} = {value!r}: expected {expected}"
-    return Problem("CONFIG_VALUE", text, where=place("feedback", key))
+    return Problem("CONFIG_VALUE", text, where=places.of("feedback", key))
