@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-FOLDER = Path(__file__).with_name("measured")
+FOLDER = Path(__file__).with_name("figures")
 
 
 @dataclass(frozen=True, slots=True)
