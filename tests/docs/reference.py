@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import ast
 import inspect
+import json
 import textwrap
 from collections.abc import Callable, Iterator
+from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import click
 from tests.docs import codes
@@ -20,11 +22,15 @@ from tests.docs import codes
 from nondum.host import config
 from nondum.host.cli import explain
 from nondum.host.cli.main import cli
+from nondum.host.configuration import reference as keys_of
+from nondum.host.configuration.effective import as_toml
 from nondum.sdk import hooks
 
 DOCS = Path(__file__).parents[2] / "docs"
 TOLD = Path(explain.__file__).with_name(explain.TOLD)
 """What `nondum explain` quotes; it ships with nondum, which does not read its own sources."""
+KEYS = Path(keys_of.__file__).with_name(keys_of.KEYS)
+"""What `nondum config explain` quotes."""
 MARK = "<!-- What follows is written by `python -m tests.docs.reference`. -->\n"
 
 
@@ -64,6 +70,22 @@ def configuration() -> str:
         meaning = _field_docs(kind)[key]
         rows.setdefault(section, []).append(f"| `{key}` | {_shown(default)} | {meaning} |")
     return "\n".join(_section(section, found) for section, found in rows.items())
+
+
+def configuration_keys() -> str:
+    """What `nondum config explain` tells, as JSON."""
+    hints = {f.name: get_type_hints(f.default_factory) for f in fields(config.HostConfig)}
+    told = {}
+    for section, key, default in config.documented():
+        name, shown = f"{section}.{key}", as_toml(default)
+        told[name] = {
+            "meaning": _field_docs(type(getattr(config.HostConfig(), section)))[key],
+            "kind": config.KINDS[hints[section][key]],
+            "unit": keys_of.unit_of(key),
+            "default": shown,
+            "example": keys_of.EXAMPLES.get(name, shown),
+        }
+    return json.dumps(told, ensure_ascii=False, indent=1) + "\n"
 
 
 def hook_signatures() -> str:
@@ -125,14 +147,8 @@ def _shown(default: Any) -> str:
     match default:
         case None:
             return "from the machine's"
-        case bool():
-            return f"`{str(default).lower()}`"
-        case int() | float():
-            return f"`{default}`"
-        case ():
-            return "`[]`"
         case _:
-            return f'`"{default}"`'
+            return f"`{as_toml(default)}`"
 
 
 def _hook(name: str) -> str:
@@ -148,6 +164,7 @@ def main() -> None:
         path = DOCS / name
         words = path.read_text(encoding="utf-8").partition(MARK)[0]
         path.write_text(f"{words}{MARK}\n{make()}", encoding="utf-8")
+    KEYS.write_text(configuration_keys(), encoding="utf-8")
     TOLD.write_text(codes.told_words(), encoding="utf-8")
 
 

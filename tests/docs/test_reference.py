@@ -9,10 +9,11 @@ from pathlib import Path
 
 import click
 import pytest
-from tests.docs.reference import DOCS, DOCUMENTS, MARK, all_commands
+from tests.docs.reference import DOCS, DOCUMENTS, KEYS, MARK, all_commands, configuration_keys
 
 from nondum.host import config
 from nondum.host.cli.main import cli
+from nondum.host.configuration import reference
 from nondum.sdk import hooks
 
 ROOT = DOCS.parent
@@ -44,6 +45,18 @@ def test_every_key_of_the_configuration_has_a_row_with_its_meaning() -> None:
     for section, key, _ in config.documented():
         part = written.partition(f"\n## [{section}]\n")[2].partition("\n## ")[0]
         assert re.search(rf"^\| `{key}` \| \S.* \| \S.* \|$", part, re.MULTILINE), (section, key)
+
+
+def test_what_is_explained_of_keys_is_what_the_code_says() -> None:
+    written = KEYS.read_text(encoding="utf-8")
+    assert written == configuration_keys(), "run: python -m tests.docs.reference"
+
+
+def test_every_example_of_a_key_is_taken() -> None:
+    for name, told in reference.keys().items():
+        section, _, key = name.partition(".")
+        assert told["example"], name
+        config.parse(f"[{section}]\n{key} = {told['example']}\n", name, config.HostConfig())
 
 
 def test_every_hook_is_documented() -> None:

@@ -41,22 +41,24 @@ def test_all_mistakes_are_told_at_once() -> None:
         '[host]\nname = "Spot 7"\nstat = "/x"\n[drives]\nslots = "/a"\n[dirves]\n'
         '[install]\nmethod = "conda"\nreserve_mb = true\n'
     ) == [
-        "CONFIG_KEY host.toml [host]: unknown key 'stat' → did you mean 'state'?",
-        "CONFIG_VALUE host.toml: [drives] slots = '/a': expected a list of paths" + remedy,
-        "CONFIG_KEY host.toml: unknown key 'dirves' → did you mean 'drives'?",
-        "CONFIG_VALUE host.toml: [install] reserve_mb = True: expected a whole number of at "
+        "CONFIG_KEY host.toml:3 [host]: unknown key 'stat' → did you mean 'state'?",
+        "CONFIG_VALUE host.toml:5: [drives] slots = '/a': expected a list of paths" + remedy,
+        "CONFIG_KEY host.toml:6: unknown key 'dirves' → did you mean 'drives'?",
+        "CONFIG_VALUE host.toml:9: [install] reserve_mb = True: expected a whole number of at "
         "least 0" + remedy,
-        "CONFIG_VALUE host.toml: [host] name = 'Spot 7' is not a host name → lower-case letters, "
+        "CONFIG_VALUE host.toml:2: [host] name = 'Spot 7' is not a host name → lower-case letters, "
         "digits and single hyphens: 'spot-7'",
-        'CONFIG_VALUE host.toml: [install] method = \'conda\': expected "store" or "pip"' + remedy,
+        'CONFIG_VALUE host.toml:8: [install] method = \'conda\': expected "store" or "pip"'
+        + remedy,
     ]
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("[host", "CONFIG_TOML host.toml: Expected ']'"),
-        ("host = 3", "CONFIG_VALUE host.toml: [host] = 3: expected a table"),
+        ("[host", "CONFIG_TOML host.toml:1: Expected ']'"),
+        ("\na = 1\na = 2", "CONFIG_TOML host.toml:3: Cannot overwrite"),
+        ("host = 3", "CONFIG_VALUE host.toml:1: [host] = 3: expected a table"),
         ('[host]\nsystem_tree = "tree"', 'expected "package:function"'),
         ("[planning]\ndeadline_s = 0", "expected a number above 0"),
     ],

@@ -31,6 +31,8 @@ from nondum.host.events import (
     PlaceLost,
     PlaceMissing,
     RollbackAsked,
+    SafeModeEntered,
+    SafeModeLeft,
     TrustChanged,
     TrustFileRefused,
     WheelsStored,
@@ -94,7 +96,9 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return f"a trust file from {event.source} is not taken: {_joined(event.problems)}"
         case DriveUnreadable():
             return f"drive {event.drive} cannot be used: {_joined(event.problems)}"
-        case CatalogueUnwritten() | CatalogueSetAside():
+        case SafeModeLeft():
+            return "safe mode is left: payloads are taken in again"
+        case CatalogueUnwritten() | CatalogueSetAside() | SafeModeEntered():
             return _joined(event.problems)
         case CatalogueWritten():
             return "the catalogue is written again, with all that happened meanwhile"
@@ -104,6 +108,8 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return _joined(event.problems)
         case PeerLeft():
             return f"the host {event.host} is gone: {event.reason}"
+        case DriveRead(flaws=flaws) if flaws:
+            return f"drive {event.drive}: {_joined(flaws)}"
         case DriveRead(payloads=(), certificates=0, trust_files=0):
             return f"drive {event.drive} carries no payload"
     return None

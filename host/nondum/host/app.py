@@ -17,12 +17,14 @@ from nondum.host import heap, verbs
 from nondum.host.announcements import announced
 from nondum.host.catalogue import backups, opening
 from nondum.host.catalogue.catalogue import Catalogue
+from nondum.host.catalogue.records import Safety
 from nondum.host.cgroups import Cages
 from nondum.host.config import HostConfig
 from nondum.host.confinement import choice
 from nondum.host.control.server import ControlServer
 from nondum.host.conversation import Conversation, Take
 from nondum.host.devices.slots import DeviceSlotSource
+from nondum.host.devices.software import Software
 from nondum.host.devices.source import DeviceSource
 from nondum.host.devices.udev import UdevSource
 from nondum.host.drives.blocks import BlockSource
@@ -31,7 +33,10 @@ from nondum.host.drives.source import DriveSource
 from nondum.host.drives.steady import Steady
 from nondum.host.events import Event, HostStarted, Recomposed
 from nondum.host.feedback import parts as feedback_parts
+from nondum.host.feedback.feedback import Feedback
+from nondum.host.goal_files import GoalFiles, of_people
 from nondum.host.helper import privileged
+from nondum.host.lifecycle import safe_mode
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.lifecycle.children import watch_without_threads
 from nondum.host.lifecycle.component_manager import ComponentManager
@@ -39,6 +44,7 @@ from nondum.host.lifecycle.executor import Executor
 from nondum.host.lifecycle.folders import Folders, claim
 from nondum.host.lifecycle.installation import InstallOptions
 from nondum.host.lifecycle.lanes import in_thread
+from nondum.host.lifecycle.tally import Tally
 from nondum.host.mind.frames import mounts_of_all
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.planners import Planners
@@ -65,20 +71,24 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 
-async def run_host(config: HostConfig, *, more_drives: Sequence[DriveSource] = ()) -> None:
-    """Run a host until SIGTERM or SIGINT. `more_drives` are sources beside the configuration's.
+async def run_host(
+    config: HostConfig, *, more_drives: Sequence[DriveSource] = (), safety: Safety = Safety.OFF
+) -> None:
+    """Run a host until SIGTERM or SIGINT. `more_drives` are sources beside the configuration's;
+    `safety` is asked for by a person.
 
     Raises `ConfigRefused` (ALREADY_RUNNING, SYSTEM_TREE, …) before anything has begun.
     """
     stop = _told_to_stop()
     async with Service(Notifier.from_environment(os.environ)) as service:
-        await _run_as(service, config, more_drives, stop)
+        await _run_as(service, config, more_drives, safety, stop)
 
 
 async def _run_as(
     service: Service,
     config: HostConfig,
     more_drives: Sequence[DriveSource],
+    asked: Safety,
     stop: asyncio.Event,
 ) -> None:
     watch_without_threads()
@@ -87,10 +97,13 @@ async def _run_as(
     folders = Folders(config.host.state)
     held = claim(folders)
     try:
+        tally = Tally(folders.root)
+        safety = await in_thread(tally.begin, asked)
         keep = config.journal.keep
         catalogue = await Catalogue.open(folders.catalogue, config.host.name, keep=keep)
         try:
-            await _run(service, config, folders, catalogue, more_drives, stop)
+            await _run(service, config, folders, catalogue, tally, safety, more_drives, stop)
+            await in_thread(tally.clear)
         finally:
             await catalogue.close()
     finally:
@@ -102,6 +115,8 @@ async def _run(
     config: HostConfig,
     folders: Folders,
     catalogue: Catalogue,
+    tally: Tally,
+    safety: tuple[Safety, str],
     more_drives: Sequence[DriveSource],
     stop: asyncio.Event,
 ) -> None:
@@ -119,6 +134,7 @@ async def _run(
     workers = Workers(config.host.name, bus.emit, launcher=launcher, timing=timing)
     executor = Executor(config.host.name, folders, workers, bus.emit, _install_options(config))
     manager = ComponentManager(catalogue, executor, bus)
+    manager.leave_alone(*safety)
     for source in (*drive_sources(config, folders), *more_drives):
         manager.add_source(source)
     neighbours = await _neighbours(config, folders, workers, catalogue, bus, lambda: mind, executor)
@@ -138,7 +154,10 @@ async def _run(
         bus.subscribe(neighbours.on_event)
     news = News()
     bus.subscribe(news.on_event)
+    software = Software(catalogue.snapshot, mind.people.tell)
+    bus.subscribe(software.on_event)
     bus.subscribe(service.on_event)
+    bus.subscribe(tally.on_event)
     if journal.is_in_use():
         bus.subscribe(Telling(catalogue.snapshot).on_event)
     listing = executor.installation.listing
@@ -147,7 +166,7 @@ async def _run(
         of_peers = neighbours.warnings if neighbours else ()
         return (
             *executor.trust.warnings,
-            *_warnings(catalogue),
+            *_warnings(catalogue, safety[1]),
             *standing.warnings(),
             *feedback.warnings,
             *map(str, cages.problems()),
@@ -157,12 +176,13 @@ async def _run(
     places = neighbours.placement.places if neighbours else dict
     vouched = executor.trust.vouched
     conversation = Conversation(mind, workers.plugins, workers.pids, _take(neighbours))
-    feedback = feedback_parts.made(
+    feedback: Feedback = feedback_parts.made(
         config.feedback,
         folders.root,
         catalogue,
         mind,
         places,
+        lambda: goal_files.concerns,
         conversation,
         news.look_again,
     )
@@ -181,6 +201,10 @@ async def _run(
     )
     trust = TrustOrders(executor.trust, bus.emit)
     orders = Orders(catalogue, mind, workers, news, bus, config.planning.translate_s)
+    goal_files = GoalFiles(
+        catalogue.snapshot, mind, orders.translated, bus.emit, on_change=feedback.wake
+    )
+    bus.subscribe(goal_files.on_event)
     control = ControlServer(
         config.host.control,
         verbs.answering(questions, orders, trust, neighbours),
@@ -197,6 +221,8 @@ async def _run(
             manager.run(),
             mind.run(),
             backups.keep(catalogue.backups, lambda: catalogue.revision, config.backups.every_s),
+            software.run(),
+            tally.outlive(),
             service.watched(
                 (
                     Part("the component manager", lambda: bus.taken, lambda: bus.followed),
@@ -209,6 +235,7 @@ async def _run(
             ),
             conversation.run(),
             feedback.run(),
+            goal_files.run(),
             *(source.watch(bus.emit) for source in device_sources(config)),
         )
     finally:
@@ -316,7 +343,7 @@ class _Listener:
             self._workers.remount(mounts_of_all(snapshot))
             self._mind.see(snapshot)
             if isinstance(event, HostStarted):
-                self._mind.restore(snapshot.goals)
+                self._mind.restore(of_people(snapshot.goals))
             return
         sentence = announced(event, self._catalogue.snapshot())
         if sentence is not None:
@@ -327,6 +354,7 @@ class _Listener:
 def _install_options(config: HostConfig) -> InstallOptions:
     return InstallOptions(
         allow_unsigned=config.drives.allow_unsigned,
+        look_s=config.drives.look_s,
         trust=TrustOptions(config.trust.file, stop=config.trust.on_revoke == "stop"),
         method=config.install.method,
         reserve_mb=config.install.reserve_mb,
@@ -341,7 +369,9 @@ def _install_options(config: HostConfig) -> InstallOptions:
     )
 
 
-def _warnings(catalogue: Catalogue) -> Iterator[str]:
+def _warnings(catalogue: Catalogue, why_safe: str) -> Iterator[str]:
+    if (safety := catalogue.snapshot().safety) is not Safety.OFF:
+        yield str(safe_mode.problem(safety, why=why_safe))
     if catalogue.loss is not None:
         yield str(opening.problem_of(catalogue.loss, ()))
     if catalogue.unwritten is not None:

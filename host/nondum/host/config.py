@@ -7,17 +7,21 @@ import os
 import re
 import socket
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 from types import GenericAlias
 from typing import Any, get_args, get_type_hints
 
+from nondum.host.configuration.places import Places
 from nondum.host.feedback import section as feedback_section
 from nondum.host.feedback.section import FeedbackSection
 from nondum.sdk.errors import ConfigRefused, Problem
 
 SYSTEM_FILE = Path("/etc/nondum/host.toml")
+_LEVELS = ("auto", "3", "2", "1", "0")
+_REFERENCE = re.compile(r"[\w.]+:\w+")
+_AT_LINE = re.compile(r"at line (\d+)")
 HOST_NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 
 
@@ -47,6 +51,9 @@ class DrivesSection:
     """Refuse USB drives that are something else too, such as a keyboard or a network adapter."""
     allow_unsigned: bool = False
     """Accept payloads without a signature: for development; every status says so."""
+    look_s: float = 10.0
+    """A drive that cannot be mounted and listed in this time hangs; more on a computer that has
+    much else to do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,13 +243,17 @@ def user_config() -> HostConfig:
 
 def load(path: Path, defaults: HostConfig) -> HostConfig:
     """Read a file over the defaults. Raises `ConfigRefused` with everything wrong in it."""
+    return parse(read(path), str(path), defaults)
+
+
+def read(path: Path) -> str:
+    """The text of a file. Raises `ConfigRefused` (CONFIG_UNREADABLE)."""
     try:
-        text = path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigRefused(
             Problem("CONFIG_UNREADABLE", f"cannot be read ({error})", where=str(path))
         ) from error
-    return parse(text, str(path), defaults)
 
 
 def parse(text: str, where: str, defaults: HostConfig) -> HostConfig:
@@ -250,23 +261,21 @@ def parse(text: str, where: str, defaults: HostConfig) -> HostConfig:
     try:
         data = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise ConfigRefused(Problem("CONFIG_TOML", str(error), where=where)) from error
+        at = _AT_LINE.search(str(error))
+        place = f"{where}:{at[1] if at else len(text.splitlines())}"
+        raise ConfigRefused(Problem("CONFIG_TOML", str(error), where=place)) from error
+    places = Places(where, text)
     problems: list[Problem] = []
     sections = {f.name: getattr(defaults, f.name) for f in fields(HostConfig)}
     for name, table in data.items():
         if name not in sections:
-            problems.append(_unknown(name, sections, where))
+            problems.append(_unknown(name, sections, places.of(name)))
         elif not isinstance(table, dict):
-            problems.append(_wrong(f"[{name}]", "a table", table, where))
+            problems.append(_wrong(f"[{name}]", "a table", table, places.of(name)))
         else:
-            sections[name] = _section(name, sections[name], table, where, problems)
-    if sections["trust"].on_revoke not in ("stop", "flag"):
-        on_revoke = sections["trust"].on_revoke
-        problems.append(_wrong("[trust] on_revoke", '"stop" or "flag"', on_revoke, where))
-    problems.extend(
-        _contradictions(sections["host"], sections["install"], sections["workers"], where)
-    )
-    problems.extend(feedback_section.problems(sections["feedback"], where))
+            sections[name] = _section(name, sections[name], table, places, problems)
+    problems.extend(_contradictions(HostConfig(**sections), places))
+    problems.extend(feedback_section.problems(sections["feedback"], places))
     if problems:
         raise ConfigRefused(*problems)
     return HostConfig(**sections)
@@ -287,24 +296,24 @@ def documented() -> Iterator[tuple[str, str, Any]]:
 
 
 def _section(
-    name: str, default: Any, table: Mapping[str, Any], where: str, problems: list[Problem]
+    name: str, default: Any, table: Mapping[str, Any], places: Places, problems: list[Problem]
 ) -> Any:
     hints = get_type_hints(type(default))
     values = {key: getattr(default, key) for key in hints}
     for key, value in table.items():
         if key not in hints:
-            problems.append(_unknown(key, hints, f"{where} [{name}]"))
+            problems.append(_unknown(key, hints, f"{places.of(name, key)} [{name}]"))
             continue
         typed = _typed(hints[key], value)
         if typed is None:
-            kind = _KINDS.get(hints[key], "another kind of value")
-            problems.append(_wrong(f"[{name}] {key}", kind, value, where))
+            kind = KINDS.get(hints[key], "another kind of value")
+            problems.append(_wrong(f"[{name}] {key}", kind, value, places.of(name, key)))
         else:
             values[key] = typed
     return type(default)(**values)
 
 
-_KINDS: Mapping[Any, str] = {
+KINDS: Mapping[Any, str] = {
     str: "a string",
     int: "a whole number of at least 0",
     float: "a number above 0",
@@ -332,20 +341,24 @@ def _typed(hint: Any, value: Any) -> Any:
     return value if type(value) is hint else None
 
 
-def _contradictions(
-    host: HostSection, install: InstallSection, workers: WorkersSection, where: str
-) -> Iterator[Problem]:
-    yield from _name_problems(host.name, where, key="[host] name = ")
-    if install.method not in ("store", "pip"):
-        yield _wrong("[install] method", '"store" or "pip"', install.method, where)
-    if workers.confinement not in ("auto", "3", "2", "1", "0"):
-        expected = '"auto", "3", "2", "1" or "0"'
-        yield _wrong("[workers] confinement", expected, workers.confinement, where)
-    if workers.minimum_confinement > 3:
-        expected = "a level from 0 to 3"
-        yield _wrong("[workers] minimum_confinement", expected, workers.minimum_confinement, where)
-    if not re.fullmatch(r"[\w.]+:\w+", host.system_tree):
-        yield _wrong("[host] system_tree", '"package:function"', host.system_tree, where)
+def _contradictions(config: HostConfig, places: Places) -> Iterator[Problem]:
+    """What has the right kind, and a value that there is not."""
+    name = config.host.name
+    yield from _name_problems(name, places.of("host", "name"), key="[host] name = ")
+    for section, key, is_right, expected in (
+        ("trust", "on_revoke", _one_of("stop", "flag"), '"stop" or "flag"'),
+        ("install", "method", _one_of("store", "pip"), '"store" or "pip"'),
+        ("workers", "confinement", _one_of(*_LEVELS), '"auto", "3", "2", "1" or "0"'),
+        ("workers", "minimum_confinement", range(4).__contains__, "a level from 0 to 3"),
+        ("host", "system_tree", _REFERENCE.fullmatch, '"package:function"'),
+    ):
+        value = getattr(getattr(config, section), key)
+        if not is_right(value):
+            yield _wrong(f"[{section}] {key}", expected, value, places.of(section, key))
+
+
+def _one_of(*values: str) -> Callable[[Any], object]:
+    return frozenset(values).__contains__
 
 
 def _name_problems(name: str, where: str, *, key: str = "") -> Iterator[Problem]:

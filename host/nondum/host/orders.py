@@ -10,16 +10,17 @@ from pathlib import Path
 from typing import cast
 
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.catalogue.records import MountPose, PayloadRecord, Snapshot, Step
+from nondum.host.catalogue.records import MountPose, PayloadRecord, Safety, Snapshot, Step
 from nondum.host.control.arguments import Arguments, Triple
-from nondum.host.events import ForgetAsked, MountSet, RetryAsked
+from nondum.host.events import ForgetAsked, MountSet, RetryAsked, SafeModeLeft
 from nondum.host.lifecycle import going_back, installed
 from nondum.host.lifecycle.bus import Bus
+from nondum.host.mind import translation
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.frames import implausible
 from nondum.host.mind.goals import GivenGoal
 from nondum.host.mind.mind import Mind
-from nondum.host.mind.translation import Understood, translated
+from nondum.host.mind.translation import Understood
 from nondum.host.news import News
 from nondum.host.rows import Row, gone_back, is_at_rest, payload_row, unknown
 from nondum.host.workers.workers import Workers
@@ -64,7 +65,7 @@ class Orders:
         except GoalRefused as refused:
             if words is None or self.mind.composition is None:
                 raise
-            understood = await self._translated(words, refused)
+            understood = await self.translated(words, refused)
             if not arguments.flag("yes"):
                 return {"understood": understood.to_dict()}
             self.mind.people.tell(f"{words!r} is {understood}")
@@ -124,6 +125,15 @@ class Orders:
             self.bus.emit(RetryAsked(payload.key))
         return {"payloads": [payload.payload_id for payload in troubled]}
 
+    async def leave_safe_mode(self, arguments: Arguments) -> Row:
+        """Take in what was left alone. Raises `NondumError` (SAFE_MODE_OFF)."""
+        snapshot = self.catalogue.snapshot()
+        if snapshot.safety is Safety.OFF:
+            raise NondumError(Problem("SAFE_MODE_OFF", "this host is not in safe mode"))
+        self.bus.emit(SafeModeLeft(snapshot.host))
+        await self._until(lambda snapshot: snapshot.safety is Safety.OFF)
+        return {"was": snapshot.safety.value}
+
     async def forget(self, arguments: Arguments) -> Row:
         """Forget a payload that was here. Raises `InstallFailed` (FORGET_UNKNOWN)."""
         payload_id = arguments.text("payload")
@@ -179,12 +189,14 @@ class Orders:
         await installed.uninstall(payload_id, self.catalogue, self.bus)
         return {"payload": payload_id}
 
-    async def _translated(self, words: str, refused: GoalRefused) -> Understood:
+    async def translated(self, words: str, refused: GoalRefused) -> Understood:
+        """What components take words to mean that match no phrase. Raises `GoalRefused`."""
+
         def composition() -> Composition:
             assert self.mind.composition is not None, "there is always another one"
             return self.mind.composition
 
-        return await translated(
+        return await translation.translated(
             words,
             refused,
             lambda vocabulary: self.workers.translations(words, vocabulary),

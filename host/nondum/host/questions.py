@@ -68,6 +68,7 @@ class Questions:
             "host": snapshot.host,
             "revision": snapshot.revision,
             "state": host_state(snapshot, places),
+            "safe_mode": snapshot.safety.value,
             "warnings": [
                 *self.warnings(),
                 *map(_kept_out, self.mind.views.kept_out()),

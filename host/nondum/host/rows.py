@@ -12,6 +12,7 @@ from nondum.host.catalogue.records import (
     JournalEntry,
     PayloadRecord,
     PeerComponent,
+    Safety,
     Snapshot,
     Step,
 )
@@ -28,11 +29,14 @@ _AT_REST = frozenset({Step.GONE, Step.ACTIVE, Step.SUPERSEDED, Step.REFUSED, Ste
 def host_state(snapshot: Snapshot, places: Mapping[str, str]) -> str:
     """The host in a word or three: `working`, `ready`, or `ready, with problems`.
 
+    In safe mode, that comes first.
+
     Payloads that have a place on a peer are none.
     """
+    safe = "" if snapshot.safety is Safety.OFF else "safe mode, "
     if not all(map(is_at_rest, snapshot.payloads)):
-        return "working"
-    return "ready, with problems" if any(problems_of(snapshot, places)) else "ready"
+        return f"{safe}working"
+    return f"{safe}ready{', with problems' if any(problems_of(snapshot, places)) else ''}"
 
 
 def is_at_rest(payload: PayloadRecord) -> bool:

@@ -51,6 +51,7 @@ def answering(
         "halt": orders.halt,
         "journal": questions.journal,
         "known_devices": questions.known_devices,
+        "leave_safe_mode": orders.leave_safe_mode,
         "logs": questions.logs,
         "mount": orders.mount,
         "plan": questions.plan,

@@ -36,6 +36,7 @@ Commands:
   behaviours  What the robot can do.
   completion  Print the script that completes commands in a shell.
   components  What the robot is made of at this moment.
+  config      Check, show and explain the configuration, without a daemon.
   devices     What is plugged in, and who has it.
   doctor      Look for what is wrong around this host, without a daemon.
   explain     Say what a code means, where it comes from, and what to do.

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-import dataclasses
 import faulthandler
 import logging
 from pathlib import Path
 
 import click
 
-from nondum.host import config as host_config
-from nondum.host.config import HostConfig
+from nondum.host.catalogue.records import Safety
+from nondum.host.cli import render
+from nondum.host.cli.config import asked_options
+from nondum.host.cli.connection import Session, json_option
+from nondum.host.configuration.effective import Asked, effective
 
 
 @click.group()
@@ -23,24 +25,22 @@ def host() -> None:
 
 
 @host.command()
-@click.option("--user", is_flag=True, help="As this user: no root, no systemd, own state.")
+@asked_options
 @click.option(
-    "--config",
-    "config_file",
-    type=click.Path(path_type=Path),
-    help=f"Configuration file [default: {host_config.SYSTEM_FILE}, none with --user].",
-)
-@click.option("--name", help="The host's name, over the configuration's.")
-@click.option(
-    "--peer",
-    "peers",
-    multiple=True,
-    metavar="HOST[:PORT]",
-    help="Look for this host, too, where multicast does not reach; may be repeated.",
+    "--safe",
+    type=click.Choice([Safety.INITIAL.value, Safety.NOTHING.value]),
+    is_flag=False,
+    flag_value=Safety.INITIAL.value,
+    help="Safe mode: only what was installed for good may be at work, or nothing.",
 )
 @click.option("--verbose", "-v", is_flag=True, help="Log more.")
 def run(
-    user: bool, config_file: Path | None, name: str | None, peers: tuple[str, ...], verbose: bool
+    user: bool,
+    config_file: Path | None,
+    name: str | None,
+    peers: tuple[str, ...],
+    safe: str | None,
+    verbose: bool,
 ) -> None:
     """Run a host until it is told to stop (SIGTERM, or Ctrl-C).
 
@@ -48,20 +48,28 @@ def run(
     Examples: nondum host run --user
               nondum host run --config /etc/nondum/host.toml
               nondum host run --user --peer 10.0.0.7
+              nondum host run --safe
     """
     _log(logging.DEBUG if verbose else logging.INFO)
-    chosen = _config(config_file, is_user=user)
-    if name is not None:
-        host_config.check_name(name, where="--name")
-        chosen = dataclasses.replace(chosen, host=dataclasses.replace(chosen.host, name=name))
-    if peers:
-        section = dataclasses.replace(
-            chosen.peers, enabled=True, static=(*chosen.peers.static, *peers)
-        )
-        chosen = dataclasses.replace(chosen, peers=section)
+    chosen = effective(Asked(user, config_file, name, peers))
     from nondum.host.app import run_host
 
-    asyncio.run(run_host(chosen))
+    asyncio.run(run_host(chosen, safety=Safety(safe) if safe else Safety.OFF))
+
+
+@host.command()
+@json_option
+@click.pass_obj
+def resume(session: Session) -> None:
+    """Leave safe mode: take in again the drives and payloads that were left alone.
+
+    Example: nondum host resume
+    """
+    answer = session.ask("leave_safe_mode")
+    if session.as_json:
+        render.as_json(answer)
+    else:
+        click.echo("safe mode is left; `nondum status` shows what comes")
 
 
 def _log(level: int) -> None:
@@ -76,12 +84,3 @@ def _log(level: int) -> None:
         logging.basicConfig(level=level, format="%(message)s", handlers=[journal.JournalHandler()])
     else:
         logging.basicConfig(level=level, format="%(levelname)s %(name)s: %(message)s")
-
-
-def _config(config_file: Path | None, *, is_user: bool) -> HostConfig:
-    defaults = host_config.user_config() if is_user else HostConfig()
-    if config_file is not None:
-        return host_config.load(config_file, defaults)
-    if not is_user and host_config.SYSTEM_FILE.exists():
-        return host_config.load(host_config.SYSTEM_FILE, defaults)
-    return defaults

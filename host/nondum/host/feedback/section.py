@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from nondum.host.configuration.places import Places
 from nondum.sdk.errors import Problem
 
 LAMP = re.compile(r"[A-Za-z0-9_:.*?+@-]{1,64}")
@@ -32,18 +33,20 @@ class FeedbackSection:
     """How long it is shown that a drive may be pulled."""
 
 
-def problems(section: FeedbackSection, where: str) -> Iterator[Problem]:
+def problems(section: FeedbackSection, places: Places) -> Iterator[Problem]:
     """What is wrong with its values."""
     for name in section.lamps:
         if not LAMP.fullmatch(name):
-            yield _wrong("lamps", name, "a name in /sys/class/leds", where)
+            yield _wrong("lamps", name, "a name in /sys/class/leds", places)
     for key, command in (("hook", section.hook), ("player", section.player)):
         if command and not command[0].startswith("/"):
-            yield _wrong(key, command[0], "a program by its full path, such as /usr/bin/env", where)
+            yield _wrong(
+                key, command[0], "a program by its full path, such as /usr/bin/env", places
+            )
         if any("\0" in word for word in command):
-            yield _wrong(key, list(command), "words without NUL", where)
+            yield _wrong(key, list(command), "words without NUL", places)
 
 
-def _wrong(key: str, value: object, expected: str, where: str) -> Problem:
+def _wrong(key: str, value: object, expected: str, places: Places) -> Problem:
     text = f"[feedback] {key} = {value!r}: expected {expected}"
-    return Problem("CONFIG_VALUE", text, where=where)
+    return Problem("CONFIG_VALUE", text, where=places.of("feedback", key))

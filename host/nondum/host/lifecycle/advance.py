@@ -22,6 +22,7 @@ from nondum.host.lifecycle import (
     peer_rules,
     rebuilding,
     releases,
+    safe_mode_rules,
     tries,
 )
 from nondum.host.lifecycle.turn import Outcome, Turn
@@ -57,6 +58,7 @@ RULES: Mapping[type[Event], _Rule] = {
     events.GoalReached: goal_rules.on_goal_over,
     events.GoalEnded: goal_rules.on_goal_over,
     events.HostSteady: tries.on_host_steady,
+    events.SafeModeLeft: safe_mode_rules.on_left,
     events.PeerJoined: peer_rules.on_peer_joined,
     events.PeerShared: peer_rules.on_peer_shared,
     events.PeerLeft: peer_rules.on_peer_left,

@@ -15,7 +15,7 @@ from typing import Protocol
 
 from nondum.host.catalogue import opening
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.catalogue.records import INSTALLED, Moment, Snapshot
+from nondum.host.catalogue.records import INSTALLED, Moment, Safety, Snapshot
 from nondum.host.catalogue.state import HostState
 from nondum.host.drives.source import DriveSource
 from nondum.host.effects import Effect
@@ -85,10 +85,15 @@ class ComponentManager:
         """Kinds of drives of which it is not known yet what is plugged in."""
         self._trial: asyncio.TimerHandle | None = None
         self._steady_s = steady_s
+        self._safety, self._why_safe = Safety.OFF, ""
 
     def add_source(self, source: DriveSource) -> None:
         """Watch one more source of drives; call it before `run`."""
         self._sources.append(source)
+
+    def leave_alone(self, safety: Safety, why: str) -> None:
+        """Run in safe mode; call it before `run`."""
+        self._safety, self._why_safe = safety, why
 
     def snapshot(self) -> Snapshot:
         """The catalogue as last committed."""
@@ -123,7 +128,7 @@ class ComponentManager:
             self._tell_loss(state, rebuilt)
             state = rebuilt
         missing = await self._executor.missing(state)
-        recovered = recover(state, at, missing)
+        recovered = recover(state, at, missing, self._safety, self._why_safe)
         await self._commit(recovered.state, [(event, at) for event in recovered.events])
         await self._executor.prepare(recovered.state)
         self._bus.tell(recovered.events)

@@ -15,7 +15,7 @@ from nondum.host.events import (
     DriveUnreadable,
     PayloadWithdrawn,
 )
-from nondum.host.lifecycle import releases, tries
+from nondum.host.lifecycle import releases, safe_mode, tries
 from nondum.host.lifecycle.turn import Turn
 from nondum.sdk.errors import Problem
 
@@ -36,7 +36,11 @@ def on_drive_inserted(turn: Turn, event: DriveInserted) -> None:
         since=turn.at,
         mark=event.mark,
     )
-    if problems := (*event.problems, *tries.drive_problems(turn.state, drive)):
+    if problems := (
+        *event.problems,
+        *tries.drive_problems(turn.state, drive),
+        *safe_mode.drive_problems(turn.state, drive.kind, drive.id),
+    ):
         turn.put_drive(drive)
         turn.pending.append(DriveUnreadable(event.drive, problems))
     else:
@@ -69,7 +73,8 @@ def on_drive_read(turn: Turn, event: DriveRead) -> None:
         have="none",
         fix="make one with `nondum payload build`",
     )
-    problems = () if event.payloads or event.certificates or event.trust_files else (nothing,)
+    is_empty = not (event.payloads or event.certificates or event.trust_files)
+    problems = event.flaws or ((nothing,) if is_empty else ())
     turn.put_drive(replace(drive, state=DriveState.COPYING, problems=problems))
     for payload in _on(turn, event.drive):
         if payload.key not in event.payloads:

@@ -40,7 +40,7 @@ from nondum.host.events import (
     TrustChanged,
     WheelsStored,
 )
-from nondum.host.lifecycle import admission, releases, tries
+from nondum.host.lifecycle import admission, releases, safe_mode, tries
 from nondum.host.lifecycle.claims import granted
 from nondum.host.lifecycle.drive_rules import copy_of, read
 from nondum.host.lifecycle.turn import Turn
@@ -82,6 +82,9 @@ def on_payload_found(turn: Turn, event: PayloadFound) -> None:
         *event.problems,
         *admission.release_problems(turn.state, event, turn.at),
         *tries.payload_problems(turn.state, event),
+        *safe_mode.drive_problems(
+            turn.state, turn.state.drives[event.drive].kind, event.payload_id
+        ),
     )
     enter(turn, new, event, TRANSITIONS[Step.GONE, PayloadFound], with_effect=not problems)
     if problems:

@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Set
 from dataclasses import replace
 
-from nondum.host.catalogue.records import Moment, PayloadRecord, Step
+from nondum.host.catalogue.records import Moment, PayloadRecord, Safety, Step
 from nondum.host.catalogue.state import HostState
 from nondum.host.effects import SuspendPayload
-from nondum.host.events import HostStarted, Recovered
-from nondum.host.lifecycle import releases, tries
+from nondum.host.events import HostStarted, Recovered, SafeModeEntered
+from nondum.host.lifecycle import releases, safe_mode, tries
 from nondum.host.lifecycle.advance import follow_all
 from nondum.host.lifecycle.folders import KEEPS_FOLDER
 from nondum.host.lifecycle.payload_rules import effect_for
@@ -21,13 +21,20 @@ from nondum.host.transitions import RECOVERY, Transition
 from nondum.sdk.errors import Problem
 
 
-def recover(state: HostState, at: Moment, missing: Set[str] = frozenset()) -> Outcome:
+def recover(
+    state: HostState,
+    at: Moment,
+    missing: Set[str] = frozenset(),
+    safety: Safety = Safety.OFF,
+    why: str = "",
+) -> Outcome:
     """Send every payload forward or back. Devices and drives are told anew by their sources.
 
-    `missing` are keys of payloads whose folders are not there any more.
+    `missing` are keys of payloads whose folders are not there any more; `why` it is safe mode.
     """
     turn = Turn(state, at)
-    turn.change(devices={}, tries=tries.counted(state), is_stopped=False)
+    turn.change(devices={}, tries=tries.counted(state), is_stopped=False, safety=safety)
+    state = replace(state, payloads=safe_mode.roused(state, safety))
     for payload in state.payloads.values():
         turn.drop_components(payload.key)
         _recover(turn, payload, state, is_missing=payload.key in missing)
@@ -36,6 +43,8 @@ def recover(state: HostState, at: Moment, missing: Set[str] = frozenset()) -> Ou
     turn.change(drives=kept, revision=state.revision + 1)
     recovered = tuple(event.payload for event in turn.events if isinstance(event, Recovered))
     turn.events.append(HostStarted(state.host, recovered))
+    if safety is not Safety.OFF:
+        turn.events.append(SafeModeEntered(state.host, (safe_mode.problem(safety, why=why),)))
     follow_all(turn)
     return turn.outcome()
 
@@ -43,7 +52,7 @@ def recover(state: HostState, at: Moment, missing: Set[str] = frozenset()) -> Ou
 def _recover(turn: Turn, payload: PayloadRecord, found: HostState, *, is_missing: bool) -> None:
     row, problems = _row(turn.state, payload, found, is_missing=is_missing), payload.problems
     if row.to is Step.QUARANTINED and payload.step is not Step.QUARANTINED:
-        problems = (_lost(payload) if is_missing else tries.left_alone(payload.payload_id),)
+        problems = (_why_not(turn.state, payload, is_missing=is_missing),)
     if row.effect is not None:
         turn.effects.append(effect_for(row.effect, payload, turn.state))
     turn.put_payload(replace(payload, step=row.to, waits_for="", problems=problems))
@@ -60,11 +69,26 @@ def _row(
     if is_missing and row.to in KEEPS_FOLDER:
         # A guest is found on its drive again; what was installed for good is not, and is told.
         return Transition(Step.QUARANTINED if tries.is_initial(state, payload) else Step.GONE)
+    if row.to in (Step.STORED, Step.SUPERSEDED) and _is_kept_out(state, payload):
+        return Transition(Step.QUARANTINED, SuspendPayload)
     if row.to is Step.STORED and tries.is_left_alone(state, payload.key):
         return Transition(Step.QUARANTINED, SuspendPayload)
     if row.to is Step.STORED and releases.waits_for_recovery(found, payload):
         return RECOVERY[Step.SUPERSEDED]
     return row
+
+
+def _is_kept_out(state: HostState, payload: PayloadRecord) -> bool:
+    """Whether safe mode leaves it alone."""
+    return safe_mode.is_left_alone(state.safety, is_initial=tries.is_initial(state, payload))
+
+
+def _why_not(state: HostState, payload: PayloadRecord, *, is_missing: bool) -> Problem:
+    if is_missing:
+        return _lost(payload)
+    if _is_kept_out(state, payload):
+        return safe_mode.problem(state.safety, payload.payload_id)
+    return tries.left_alone(payload.payload_id)
 
 
 def _lost(payload: PayloadRecord) -> Problem:

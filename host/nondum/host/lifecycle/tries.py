@@ -13,6 +13,7 @@ from nondum.host.catalogue.records import (
     DriveRecord,
     DriveState,
     PayloadRecord,
+    Safety,
     Step,
 )
 from nondum.host.catalogue.state import HostState
@@ -85,7 +86,9 @@ def on_event(turn: Turn, event: Event) -> None:
     match event:
         case DriveRead() | DriveUnreadable():
             drive = turn.state.drives.get(event.drive)
-            if drive is not None and not is_left_alone(turn.state, subject_of(drive)):
+            if drive is None or turn.state.safety is not Safety.OFF:
+                return
+            if not is_left_alone(turn.state, subject_of(drive)):
                 _clear(turn, subject_of(drive))
         case DriveRemoved():
             drive = turn.state.drives.get(event.drive)
@@ -115,6 +118,8 @@ def on_host_steady(turn: Turn, event: HostSteady) -> None:
     find its drives a moment later, and by other names: it is not until now that they were pulled.
     """
     state = turn.state
+    if state.safety is not Safety.OFF:
+        return  # nothing was lived with
     if any(drive.state is DriveState.READING for drive in state.drives.values()):
         return
     drives = {subject_of(drive) for drive in state.drives.values()}

@@ -27,7 +27,7 @@ def words(
     ready = sum(component.is_ready for component in snapshot.components)
     parts = [
         *(["safe mode"] if snapshot.safety is not Safety.OFF else []),
-        *(["taking in a payload"] if host_state(snapshot, places) == "working" else []),
+        *(["taking in a payload"] if host_state(snapshot, places).endswith("working") else []),
         f"{_count(ready, 'component')} at work",
     ]
     if waiting := len(snapshot.components) - ready:

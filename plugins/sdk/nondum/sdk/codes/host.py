@@ -120,6 +120,21 @@ CODES = (
         "see the log, and report it with what it says",
     ),
     Code(
+        "LAB_MISSING",
+        "The laboratory, which is in nondum's sources, is not here.",
+        "stand in a checkout of nondum's sources, or name one by the variable NONDUM_LAB",
+    ),
+    Code(
+        "SAFE_MODE",
+        "The host leaves payloads alone: daemons before this one died, or a person asked for it.",
+        "find out why (`nondum doctor`, `nondum journal`), then `nondum host resume`",
+    ),
+    Code(
+        "SAFE_MODE_OFF",
+        "The host is not in safe mode, so it cannot leave it.",
+        "`nondum status` says how it is",
+    ),
+    Code(
         "STATE_UNWRITABLE",
         "The state folder cannot be used.",
         "see to it that the disk works, has room, and that this user may write there",

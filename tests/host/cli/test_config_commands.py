@@ -1,0 +1,106 @@
+"""`nondum config`: all that is wrong at once, what holds and who says so, what a key means."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from tests.host.cli.daemon import nondum
+
+WRONG = """[host]
+naem = "spot"
+
+[workers]
+tasks = "many"
+memory_mb = -1
+
+[drivs]
+"""
+
+
+def written(folder: Path, text: str) -> Path:
+    file = folder / "host.toml"
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def test_all_problems_are_told_at_once_each_with_its_line(tmp_path: Path) -> None:
+    file = written(tmp_path, WRONG)
+    done = nondum("config", "check", file)
+    done.refused(3, f"CONFIG_KEY {file}:2 [host]: unknown key 'naem' → did you mean 'name'?")
+    assert f"CONFIG_VALUE {file}:5: [workers] tasks = 'many': expected a whole number" in done.err
+    assert f"CONFIG_VALUE {file}:6: [workers] memory_mb = -1" in done.err
+    assert f"CONFIG_KEY {file}:8: unknown key 'drivs' → did you mean 'drives'?" in done.err
+    told = nondum("config", "check", "--json", file)
+    codes = [problem["code"] for problem in told.json["problems"]]
+    assert (told.code, told.json["ok"]) == (3, False)
+    assert codes == ["CONFIG_KEY", "CONFIG_VALUE", "CONFIG_VALUE", "CONFIG_KEY"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[host\n", "CONFIG_TOML"),
+        ('[host]\nsystem_tree = "nobody.knows:it"\n', "CONFIG_SYSTEM_TREE"),
+    ],
+)
+def test_what_a_daemon_would_not_start_with_is_told(tmp_path: Path, text: str, words: str) -> None:
+    nondum("config", "check", written(tmp_path, text)).refused(3, words)
+
+
+def test_file_that_is_not_there_is_told(tmp_path: Path) -> None:
+    nondum("config", "check", tmp_path / "none.toml").refused(3, "CONFIG_UNREADABLE")
+
+
+def test_file_that_is_right_is_said_to_be(tmp_path: Path) -> None:
+    file = written(tmp_path, '[host]\nname = "spot"\n')
+    assert nondum("config", "check", file).ok().out == f"{file} is right\n"
+    assert nondum("config", "check", "--json", file).ok().json["ok"]
+    assert "by default" in nondum("config", "check", "--user").ok().out
+
+
+def test_every_key_is_shown_with_who_says_it(tmp_path: Path) -> None:
+    file = written(tmp_path, '[host]\nname = "spot"\n[planning]\n\ndeadline_s = 3\n')
+    arguments = ("--user", "--config", file, "--name", "rex", "--peer", "10.0.0.7")
+    shown = nondum("config", "show", *arguments, "--json", XDG_STATE_HOME="/there").ok().json
+    found = {row["key"]: (row["value"], row["from"]) for row in shown["settings"]}
+    assert found["host.name"] == ("rex", "--name")
+    assert found["planning.deadline_s"] == (3.0, f"{file}:5")
+    assert found["peers.static"] == (["10.0.0.7"], "--peer")
+    assert found["host.state"] == ("/there/nondum", "default with --user")
+    assert found["install.method"] == ("store", "default")
+
+
+def test_what_is_not_as_by_default_is_shown_alone(tmp_path: Path) -> None:
+    file = written(tmp_path, '[drives]\nslots = ["/a"]\n')
+    lines = nondum("config", "show", "--set", "--config", file).ok().out.splitlines()
+    assert [line.split() for line in lines] == [
+        ["KEY", "VALUE", "FROM"],
+        ["drives.slots", '["/a"]', f"{file}:2"],
+    ]
+
+
+def test_settings_of_a_wrong_file_are_not_shown(tmp_path: Path) -> None:
+    nondum("config", "show", "--config", written(tmp_path, WRONG)).refused(2, "host.toml:2")
+
+
+def test_key_is_explained_with_unit_default_and_example() -> None:
+    out = nondum("config", "explain", "workers.memory_mb").ok().out
+    assert out.startswith("[workers] memory_mb\nMemory of all its processes")
+    assert "unit: megabytes (of 1,048,576 bytes)" in out
+    assert "default: 2048" in out
+    assert "    [workers]\n    memory_mb = 2048\n" in out
+
+
+def test_key_is_found_by_its_name_alone_where_that_tells_it() -> None:
+    assert nondum("config", "explain", "on_revoke").ok().out.startswith("[trust] on_revoke")
+    nondum("config", "explain", "memory_mb").refused(
+        2, "did you mean workers.memory_mb or planning.memory_mb?"
+    )
+    nondum("config", "explain", "workers.memroy_mb").refused(2, "did you mean workers.memory_mb")
+
+
+def test_all_keys_are_listed_for_those_who_ask_for_none() -> None:
+    assert "drives.slots" in nondum("config", "explain").ok().out
+    rows = nondum("config", "explain", "--json").ok().json["keys"]
+    assert all(row["meaning"] and row["example"] and row["kind"] for row in rows)
