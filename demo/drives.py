@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+import platform
 import shutil
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from demo.maker import Maker
@@ -15,21 +17,46 @@ from demo.robot import nondum
 PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
 
 
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What payloads are built for; the machine that builds them is always among it, since plugins
+    are asked there what they can do."""
+
+    pythons: tuple[str, ...] = ()
+    """Beside this one's."""
+    architectures: tuple[str, ...] = ()
+    """Beside this one."""
+
+    @property
+    def options(self) -> list[str]:
+        """Of `nondum payload build`."""
+        pythons = sorted({PYTHON, *self.pythons})
+        architectures = sorted({platform.machine(), *self.architectures})
+        given = [("--python", python) for python in pythons]
+        given += [("--arch", architecture) for architecture in architectures]
+        return [word for option in given for word in option]
+
+
+HERE = Target()
+
+
 def build(
     plugins: Sequence[Path],
     *,
     libraries: Sequence[Path],
     cache: Path,
     maker: Maker | None = None,
+    target: Target = HERE,
 ) -> dict[str, Path]:
     """Build one drive per plugin folder, or take it from the cache while its sources are the same.
 
     `libraries` are folders of distributions that plugins depend on and no index has; `maker` signs,
-    if there is one. Returns the drive of each plugin by the folder's name.
+    if there is one; `target` is where its payloads are to run. Returns the drive of each plugin by
+    the folder's name.
     """
     drives = {}
     for plugin in plugins:
-        digest = _digest([plugin, *libraries], maker)
+        digest = _digest([plugin, *libraries], maker, target)
         drive = cache / f"{plugin.name}-{digest[:12]}"
         if not drive.exists():
             unfinished = drive.with_suffix(".part")
@@ -40,8 +67,7 @@ def build(
                 plugin,
                 "-o",
                 unfinished,
-                "--python",
-                PYTHON,
+                *target.options,
             ]
             for library in libraries:
                 command += ["--library", library]
@@ -59,8 +85,8 @@ def payload_id(drive: Path) -> str:
     return str(payload["id"])
 
 
-def _digest(folders: Sequence[Path], maker: Maker | None) -> str:
-    total = hashlib.sha256(PYTHON.encode())
+def _digest(folders: Sequence[Path], maker: Maker | None, target: Target) -> str:
+    total = hashlib.sha256(" ".join(target.options).encode())
     total.update(maker.public if maker is not None else b"")
     for folder in folders:
         for path in sorted(folder.rglob("*")):

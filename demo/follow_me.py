@@ -76,7 +76,7 @@ class FollowMe:
     def lose(self, drive: Path, *, name: str) -> StageResult:
         """Pull a drive while the body turns: all that needed it ends at once, the body stands, and
         the host says what would help."""
-        lost = _components(self.robot.view, drive)
+        lost = self.robot.components_on([drive.name])
         return self.bereave(lambda: self.robot.pull(drive.name), lost, name=name, since="the pull")
 
     def bereave(
@@ -128,7 +128,7 @@ class FollowMe:
         for drive in drives.values():
             self.robot.plug(drive)
         stage.installed(tuple(drives))
-        new = {id for drive in drives.values() for id in _components(self.robot.view, drive)}
+        new = self.robot.components_on([drive.name for drive in drives.values()])
         offered = self.robot.until(
             f"{name}: an alternative",
             lambda view: next((c for c in choices(view["tree"]) if new & {*c.others}), None),
@@ -267,12 +267,6 @@ def _told(share: float) -> str:
 
 def _ms(seconds: float) -> str:
     return f"{1000 * seconds:.0f} ms"
-
-
-def _components(view: View, drive: Path) -> set[str]:
-    """The components of the payloads on a drive."""
-    rows = (row for row in view["payloads"] if drive.name in row["drive"].split(", "))
-    return {id for row in rows for id in row["components"]}
 
 
 def _pids(view: View) -> dict[str, int]:

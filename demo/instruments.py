@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +16,8 @@ from demo.scenario import Scenario
 
 EMULATORS = Path(__file__).parent / "emulators"
 LOG_DEADLINE_S = 5.0
+_PORTS = (("camera",), ("head", "relay"))
+"""Of each emulator, in the order that it names them in."""
 _ADAPTERS = {
     "camera": slots.COMPTON_CAMERA,
     "head": slots.PAN_TILT_UNIT,
@@ -29,7 +31,7 @@ class Instruments:
 
     scenario: Scenario
     nodes: dict[str, str]
-    """`camera`, `head` and `relay` → the terminal that each is on."""
+    """`camera`, `head` and `relay` → the terminal, or the unix socket, that each is on."""
     log: Path
 
     def plug(self, folder: Path) -> None:
@@ -57,22 +59,30 @@ class Instruments:
 
 
 @contextmanager
-def switched_on(scenario: Scenario, folder: Path) -> Iterator[Instruments]:
-    """Start the emulators of a scenario; truth and log are kept in `folder`."""
+def switched_on(
+    scenario: Scenario, folder: Path, *, sockets: bool = False
+) -> Iterator[Instruments]:
+    """Start the emulators of a scenario; truth and log are kept in `folder`, and their sockets,
+    where they are to listen at such instead of being on terminals."""
     truth, log = folder / "truth.json", folder / "truth-log.jsonl"
     scenario.write(truth)
     log.touch()
     with ExitStack() as programs:
-        (camera,) = programs.enter_context(_program("compton_emulator", truth, paths=1))
-        unit = _program("ptu_emulator", truth, "--log", str(log), paths=2)
+        at = [[str(folder / name) for name in names] if sockets else [] for names in _PORTS]
+        (camera,) = programs.enter_context(_program("compton_emulator", truth, at[0], paths=1))
+        unit = _program("ptu_emulator", truth, at[1], "--log", str(log), paths=2)
         head, relay = programs.enter_context(unit)
         yield Instruments(scenario, {"camera": camera, "head": head, "relay": relay}, log)
 
 
 @contextmanager
-def _program(name: str, truth: Path, *options: str, paths: int) -> Iterator[list[str]]:
+def _program(
+    name: str, truth: Path, at: Sequence[str], *options: str, paths: int
+) -> Iterator[list[str]]:
     """A running emulator; the paths that it printed."""
-    command = [sys.executable, str(EMULATORS / f"{name}.py"), "--scenario", str(truth), *options]
+    where = ["--at", *at] if at else []
+    program = [sys.executable, str(EMULATORS / f"{name}.py"), "--scenario", str(truth)]
+    command = [*program, *options, *where]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
         try:
             assert running.stdout is not None

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from demo.drives import build, payload_id
+from demo.drives import HERE, Target, build, payload_id
 from demo.maker import Maker
 
 ROOT = Path(__file__).parent.parent
@@ -33,6 +33,7 @@ class Kit:
         libraries: Sequence[str],
         folders: Mapping[str, Path],
         cache: Path = CACHE,
+        target: Target = HERE,
     ) -> Kit:
         """Build drives, or take them from the cache. `folders` are the sources of plugins and
         libraries that are not where they are in the checkout."""
@@ -43,6 +44,7 @@ class Kit:
             libraries=[where[name] for name in libraries],
             cache=cache,
             maker=maker,
+            target=target,
         )
         by_name = {name: drives[where[name].name] for name in names}
         payloads = {name: payload_id(drive) for name, drive in by_name.items()}

@@ -81,6 +81,11 @@ class Switch:
     namespace: str
     cables: list[Cable] = field(default_factory=list)
 
+    def add_tap(self, name: str) -> None:
+        """Make a port for a program that stands for a machine, such as an emulator."""
+        _run("ip", "-n", self.namespace, "tuntap", "add", "dev", name, "mode", "tap")
+        _run("ip", "-n", self.namespace, "link", "set", name, "master", _HALF, "up")
+
     def split(self, apart: Sequence[Cable]) -> None:
         """Part the network in two: no machine sees its link go down."""
         for cable in apart:

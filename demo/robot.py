@@ -1,11 +1,16 @@
-"""One host as a person meets it: a daemon with slots for drives and devices, and views of it."""
+"""One host as a person meets it: a daemon with slots for drives and devices, and views of it.
+
+What another kind of host would do otherwise (one in a machine of the laboratory) is in methods.
+"""
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import time
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -24,6 +29,9 @@ class TooLate(Exception):
 
 class Robot:
     """A running host. Make one with `running`."""
+
+    slowness = 1.0
+    """How much longer than usual things may take here."""
 
     def __init__(self, work: Path, *, name: str) -> None:
         self.work = work
@@ -46,6 +54,39 @@ class Robot:
         """Yank a drive."""
         (self.slots / name).unlink()
 
+    @property
+    def plugged(self) -> set[str]:
+        """The names of the drives that are in."""
+        return {path.name for path in self.slots.iterdir()}
+
+    def payloads_on(self, drives: Collection[str], view: View | None = None) -> list[View]:
+        """The rows of the payloads that drives of these names carry, in the latest view."""
+        rows = (self.view if view is None else view)["payloads"]
+        return [row for row in rows if {*drives} & {*row["drive"].split(", ")}]
+
+    def components_on(self, drives: Collection[str]) -> set[str]:
+        """The components of the payloads that drives of these names carry."""
+        return {id for row in self.payloads_on(drives) for id in row["components"]}
+
+    def deliver(self, file: Path, folder: Path) -> None:
+        """Copy a file into a folder of its machine, at once and whole."""
+        unfinished = Path(shutil.copy(file, folder / f".{file.name}.part"))
+        unfinished.rename(folder / file.name)
+
+    def written(self, folder: Path, since_s: float) -> list[tuple[float, Path]]:
+        """The files that were written to a folder of its machine since a time of `now_s`: when,
+        oldest first, and where they can be read here."""
+        found = ((path.stat().st_mtime, path) for path in folder.glob("*.wav"))
+        return sorted(entry for entry in found if entry[0] >= since_s)
+
+    def now_s(self) -> float:
+        """Seconds since 1970, by its machine's clock."""
+        return time.time()
+
+    def nondum(self, *words: str) -> str:
+        """Run the command line for this host, and return what it printed."""
+        return nondum("--control", self.control, *words)
+
     def ask(self, verb: str, **arguments: Any) -> Any:
         """Ask the daemon. Raises `NondumError` with its refusal."""
         with ControlClient(self.control) as client:
@@ -66,7 +107,9 @@ class Robot:
         told = self.view.get("told", ())
         return tuple(row["text"] for row in told if row["number"] > number)
 
-    def until(self, what: str, found: Callable[[View], _T | None], *, timeout_s: float) -> _T:
+    def until(
+        self, what: str, found: Callable[[View], _T | None], *, timeout_s: float = 60.0
+    ) -> _T:
         """Wait until a view satisfies `found`, and return what it found. Raises `TooLate`."""
         result: list[_T] = []
 
@@ -77,9 +120,11 @@ class Robot:
             return bool(result) or not self._watching
 
         with self._changed:
-            self._changed.wait_for(look, timeout=timeout_s)
+            self._changed.wait_for(look, timeout=timeout_s * self.slowness)
         if not result:
-            raise TooLate(f"{what}: not within {timeout_s:.0f} s\n{self._last_words()}")
+            raise TooLate(
+                f"{what}: not within {timeout_s * self.slowness:.0f} s\n{self._last_words()}"
+            )
         return result[0]
 
     def see(self, view: View) -> None:
@@ -89,17 +134,22 @@ class Robot:
             self._changed.notify_all()
 
     def watch(self) -> None:
-        """Keep `view` fresh until the daemon leaves; runs in a thread of its own."""
+        """Keep `view` fresh until the host leaves; runs in a thread of its own."""
         try:
-            with ControlClient(self.control, timeout_s=None) as client:
-                for view in client.follow("watch"):
-                    self.see(view)
-        except HostUnreachable:
-            pass  # the daemon was stopped: `until` says so
+            for view in self.shown():
+                self.see(view)
         finally:
             with self._changed:
                 self._watching = False
                 self._changed.notify_all()
+
+    def shown(self) -> Iterator[View]:
+        """What is to be seen, whenever it changes, until the host leaves."""
+        try:
+            with ControlClient(self.control, timeout_s=None) as client:
+                yield from client.follow("watch")
+        except HostUnreachable:
+            pass  # the daemon was stopped: `until` says so
 
     def _last_words(self) -> str:
         try:

@@ -59,7 +59,7 @@ def withdraw(robot: Robot, *drives: Path) -> None:
     names = {drive.name for drive in drives}
     robot.until(
         "pulled drives withdrawn",
-        lambda view: not any(names & set(p["drive"].split(", ")) for p in view["payloads"]),
+        lambda view: not robot.payloads_on(names, view),
         timeout_s=INSTALL_S,
     )
 

@@ -1,4 +1,4 @@
-"""Program: a Compton camera on a pseudo-terminal. Prints the terminal's path, nothing else."""
+"""Program: a Compton camera on a pseudo-terminal, or a unix socket. Prints the path, no more."""
 
 import sys
 from pathlib import Path
@@ -7,8 +7,7 @@ if __name__ == "__main__":  # a program of its own, whatever folder it is starte
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from demo.emulators.compton import ComptonCamera
-from demo.emulators.port import Port
-from demo.emulators.program import arguments, ticks
+from demo.emulators.program import arguments, ports, ticks
 
 TICK_S = 0.02
 
@@ -17,7 +16,7 @@ def main() -> None:
     """Send what the instrument would, in real time, until the parent process is gone."""
     given = arguments(__doc__ or "")
     camera = ComptonCamera(given.scenario)
-    port = Port()
+    (port,) = ports(given, 1)
     print(port.path, flush=True)
     for wait_s in ticks(TICK_S, given.parent):
         port.read(wait_s)  # the instrument takes no commands

@@ -1,4 +1,4 @@
-"""Program: a pan-tilt unit and its laser's relay on two pseudo-terminals.
+"""Program: a pan-tilt unit and its laser's relay on two pseudo-terminals, or unix sockets.
 
 Prints the two paths, the unit's first, and nothing else. With `--log` it writes what the head and
 the laser really did, one JSON object a line: time (the monotonic clock), angles, laser.
@@ -14,8 +14,7 @@ if __name__ == "__main__":  # a program of its own, whatever folder it is starte
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from demo.emulators.pan_tilt import PanTiltUnit
-from demo.emulators.port import Port
-from demo.emulators.program import arguments, ticks
+from demo.emulators.program import arguments, ports, ticks
 from demo.emulators.relay import Relay
 
 TICK_S = 0.01
@@ -28,7 +27,7 @@ def main() -> None:
     unit, relay = PanTiltUnit(given.scenario.pan_rad, given.scenario.tilt_rad), Relay()
     if given.scenario.seized:
         unit.seize()
-    head, switch = Port(), Port()
+    head, switch = ports(given, 2)
     print(head.path, switch.path, sep="\n", flush=True)
     log = given.log.open("a", encoding="utf-8") if given.log else None
     logged_s, before = 0.0, time.monotonic()

@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
 from demo.follow_me import FollowMe
-from demo.robot import Robot, View, nondum
+from demo.robot import Robot, View
 from demo.search.searching import WORDS, own_components
 from demo.search.sites import Site
 from demo.stage import PLAN_S, Mark
@@ -37,14 +37,14 @@ def lose_node(site: Site, node: Robot, following: FollowMe, others: Sequence[Rob
     )
     left = [robot, *others]
     for host in left:
-        host.until(f"{host.name} forgets {node.name}", _without(node.name), timeout_s=PLAN_S)
-    told = {host.name: _missing(host) for host in left}
+        host.until(f"{host.name} forgets {node.name}", without(node.name), timeout_s=PLAN_S)
+    told = {host.name: missing(host) for host in left}
     faults = [
         f"{name} does not say that {node.name} is missing"
         for name, sentence in told.items()
         if f"bring the host {node.name} back" not in sentence
     ]
-    if not _within(lambda: _have_ended(busy, node, mark, pids), ENDED_S):
+    if not _within(lambda: have_ended(busy, node, mark, pids), ENDED_S):
         faults.append(f"{node.name} still does something for hosts that it lost")
     names = " and ".join(told)
     measure = (
@@ -58,14 +58,14 @@ def lose_node(site: Site, node: Robot, following: FollowMe, others: Sequence[Rob
     )
 
 
-def _missing(host: Robot) -> str:
+def missing(host: Robot) -> str:
     """What a host says when it is asked why it cannot search: one sentence a cause."""
-    found = json.loads(nondum("--control", host.control, "why", "--json", WORDS))
+    found = json.loads(host.nondum("why", "--json", WORDS))
     causes = (f"{cause['message']} → {cause['fix']}" for cause in found["causes"])
     return "; ".join(causes)
 
 
-def _have_ended(components: Collection[str], node: Robot, mark: Mark, pids: Sequence[int]) -> bool:
+def have_ended(components: Collection[str], node: Robot, mark: Mark, pids: Sequence[int]) -> bool:
     """Whether components of the node have ended what they did, by its own journal; where its daemon
     is dead, whether its workers are."""
     try:
@@ -75,7 +75,7 @@ def _have_ended(components: Collection[str], node: Robot, mark: Mark, pids: Sequ
     return {*components} <= {row["subject"] for row in journal if row["event"] == "BehaviourEnded"}
 
 
-def _without(name: str) -> Callable[[View], bool]:
+def without(name: str) -> Callable[[View], bool]:
     return lambda view: all(row["host"] != name for row in view["components"])
 
 

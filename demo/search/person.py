@@ -28,15 +28,19 @@ class Person:
         from nondum_speech.espeak import Espeak
 
         scratch.mkdir()
+        self._scratch = scratch
         self._espeak = Espeak(scratch)
         self._ears = self._made_ears(tuple(expects))
 
-    def say(self, words: str, into: Path) -> None:
-        """Write a WAV file of what they say, at once and whole."""
+    def say(self, words: str, into: Path) -> Path:
+        """Write a WAV file of what they say; answers the file."""
         sound = self._espeak.say(words, voice=VOICE, words_per_minute=WORDS_PER_MINUTE)
-        unfinished = into.with_suffix(".part")
-        unfinished.write_bytes(sound.to_wav())
-        unfinished.rename(into)
+        into.write_bytes(sound.to_wav())
+        return into
+
+    def saying(self, words: str, name: str) -> Path:
+        """The same, in a file of that name in their own folder."""
+        return self.say(words, self._scratch / name)
 
     def understood(self, wav: Path) -> tuple[str, ...]:
         """The sentences in a WAV file that they expected; nothing for others."""

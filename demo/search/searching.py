@@ -62,7 +62,7 @@ class Search:
     def run(self, stage: Stage) -> StageResult:
         """Say the words to the node; the robot must have the goal, and the node must say the
         alert, that a person understands."""
-        robot, begun_wall_s = stage.robot, time.time()
+        robot, begun_wall_s = stage.robot, self.node.now_s()
         marks = (Mark(robot), Mark(self.node))
         self._until_possible(robot)
         tries = self._say(stage)
@@ -70,7 +70,7 @@ class Search:
         stage.phase("understood", _when(marks[0], "GoalGiven"))
         stage.phase("in plan", _when(marks[0], "PlanMade"))
         said_s, file = self._alert(begun_wall_s, stage)
-        stage.phase("alert", time.monotonic() - (time.time() - said_s))
+        stage.phase("alert", time.monotonic() - (self.node.now_s() - said_s))
         goal = robot.until(f"{stage.name}: the goal reached", _reached, timeout_s=PLAN_S)
         stage.faults += self._unfed(marks[1], robot)
         ran = {robot.name: _started(marks[0]), self.node.name: _started(marks[1])}
@@ -90,7 +90,7 @@ class Search:
         """Wait until the robot says that it can, and the node knows the words: its own account of
         the facts that came over the network."""
         Talking(self.node).has_learnt()
-        deadline_s = time.monotonic() + PLAN_S
+        deadline_s = time.monotonic() + PLAN_S * robot.slowness
         while time.monotonic() < deadline_s:
             offers = robot.ask("goals")["can"]
             if any(SAID_SO.fullmatch(row["words"]) and row["now"] == "can" for row in offers):
@@ -100,9 +100,9 @@ class Search:
 
     def _say(self, stage: Stage) -> int:
         """Say it until the robot has it as a goal; how often that was. Raises `TooLate`."""
-        inbox = Talking(self.node).inbox()
+        talking = Talking(self.node)
         for number in range(1, TRIES + 1):
-            self.person.say(WORDS, inbox / f"{stage.name}-{number}.wav")
+            talking.hear(self.person.saying(WORDS, f"{stage.name}-{number}.wav"))
             with contextlib.suppress(TooLate):
                 stage.robot.until("the goal", _given, timeout_s=UNDERSTAND_S)
                 return number
@@ -113,15 +113,11 @@ class Search:
         """Host → the components that are expected to have a part: those of the robot's drives, and
         all of the node's that can act."""
         robot = stage.robot
-        plugged = {path.name for path in robot.slots.iterdir()}
-        on_drives = {
-            id
-            for row in robot.view["payloads"]
-            if plugged & {*row["drive"].split(", ")}
-            for id in row["components"]
-        }
         acting = {row["component"] for row in self.node.view["components"] if row["behaviours"]}
-        return {robot.name: on_drives, self.node.name: acting & own_components(self.node)}
+        return {
+            robot.name: robot.components_on(robot.plugged),
+            self.node.name: acting & own_components(self.node),
+        }
 
     def _unfed(self, mark: Mark, robot: Robot) -> Sequence[str]:
         """A fault if nothing that the node did was done with a stream of the robot."""
@@ -134,7 +130,8 @@ class Search:
     def _alert(self, since_wall_s: float, stage: Stage) -> tuple[float, Path]:
         """When the node's speaker said that somebody was found, and in which file; what a person
         does not understand as that does not count. Raises `TooLate`."""
-        talking, deadline_s = Talking(self.node), time.monotonic() + ALERT_S
+        talking = Talking(self.node)
+        deadline_s = time.monotonic() + ALERT_S * self.node.slowness
         heard: dict[Path, tuple[str, ...]] = {}
         while time.monotonic() < deadline_s:
             for said_s, file in talking.said_since(since_wall_s):

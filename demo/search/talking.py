@@ -21,9 +21,9 @@ class Talking:
     def __init__(self, host: Robot) -> None:
         self._host = host
 
-    def inbox(self) -> Path:
-        """The folder that it hears. Raises `TooLate`."""
-        return self._folder("speech", HEARS)
+    def hear(self, sound: Path) -> None:
+        """Have it hear a WAV file. Raises `TooLate`."""
+        self._host.deliver(sound, self._folder("speech", HEARS))
 
     def has_learnt(self) -> None:
         """Wait until it knows what it may hear. Raises `TooLate`."""
@@ -32,8 +32,7 @@ class Talking:
     def said_since(self, wall_s: float) -> Sequence[tuple[float, Path]]:
         """What its speaker has said since then: when (seconds since 1970) and in which file,
         oldest first. Raises `TooLate`."""
-        files = self._folder("speaker", SAYS).glob("*.wav")
-        return sorted(entry for entry in map(_entry, files) if entry[0] >= wall_s)
+        return self._host.written(self._folder("speaker", SAYS), wall_s)
 
     def _folder(self, component: str, ends: tuple[str, str]) -> Path:
         before, after = ends
@@ -42,14 +41,10 @@ class Talking:
     def _logged(self, component: str, ends: tuple[str, str]) -> str:
         """The newest line of a component's log that begins and ends so, once there is one."""
         before, after = ends
-        deadline_s = time.monotonic() + LEARN_S
+        deadline_s = time.monotonic() + LEARN_S * self._host.slowness
         while time.monotonic() < deadline_s:
             for row in reversed(self._host.ask("logs", component=component)):
                 if row["message"].startswith(before) and row["message"].endswith(after):
                     return str(row["message"])
             time.sleep(LOOK_S)
         raise TooLate(f"{component} of {self._host.name} did not log “{before}…{after}”")
-
-
-def _entry(path: Path) -> tuple[float, Path]:
-    return path.stat().st_mtime, path

@@ -6,11 +6,12 @@ import argparse
 import functools
 import shutil
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
 from demo import live, stages
+from demo.drives import HERE, Target
 from demo.follow_me import follow_me
 from demo.following import Reference
 from demo.kit import PLUGINS, Kit
@@ -71,7 +72,7 @@ def _play(
     options: argparse.Namespace, facts: dict[str, str], work: Path, say: Says
 ) -> Iterator[StageResult]:
     say("building the payload drives (cached after the first time)")
-    kit = _kit(work)
+    kit = search_kit(work)
     person = Person(work / "person", expects=(ALERT, *OTHER_SENTENCES))
     names = (ROBOT, NODE, SMALL)
     with ExitStack() as stack:
@@ -139,9 +140,10 @@ def _switched_on(
     )
 
 
-def _kit(work: Path) -> Kit:
-    folders = {name: _copy(name, work / "sources", text) for name, text in SETTINGS.items()}
-    return Kit.built((BASE, CAMERA, *FOR_NODE), libraries=LIBRARIES, folders=folders)
+def search_kit(work: Path, *, target: Target = HERE, settings: Mapping[str, str] = SETTINGS) -> Kit:
+    """The drives of this demonstration; `settings` are lines of plugins' settings, by name."""
+    folders = {name: _copy(name, work / "sources", text) for name, text in settings.items()}
+    return Kit.built((BASE, CAMERA, *FOR_NODE), libraries=LIBRARIES, folders=folders, target=target)
 
 
 def _copy(name: str, sources: Path, settings: str) -> Path:

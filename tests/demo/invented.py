@@ -120,7 +120,7 @@ def labels():
            "?$goal_thing - $thing_type ?$body - host)")
 async def $behaviour(ctx, $actor, $stream, $goal_thing, $body):
     try:
-        message = await ctx.input($stream).next(timeout_s=5.0)
+        message = await ctx.input($stream).next(timeout_s=60.0)
     except TimeoutError:
         raise BehaviourFailed("nothing was said") from None
     ctx.know("$heard", $actor, $stream, value=Text(Header(), message.text))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from tests.lab.traces import descendants, pids
 
-from nondum.host.drives.mounting import mounted_below
+from nondum.host.drives.mounts import mounted_below
 
 CALM, CALM_S = 8, 1.6
 OWN = ("catalogue", "staging")
@@ -68,7 +68,7 @@ def descriptors(pid: int) -> int:
     return len(list(Path(f"/proc/{pid}/fd").iterdir()))
 
 
-def until_at_rest(pid: int, timeout_s: float = 15.0) -> None:
+def until_at_rest(pid: int, timeout_s: float = 60.0) -> None:
     """Wait until a process has had the same number of descriptors for a while: what it still makes
     ready or tidies up is done then, as far as anybody outside can tell."""
     end, calm, before = time.monotonic() + timeout_s, 0, -1

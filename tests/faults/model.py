@@ -20,7 +20,7 @@ from tests.host.lifecycle.living import Living, left_over, living
 from nondum.host import events
 from nondum.host.catalogue.catalogue import Catalogue, now
 from nondum.host.catalogue.records import DriveState, Step
-from nondum.host.drives import mounting
+from nondum.host.drives.mounts import mounted_below
 from nondum.host.lifecycle.folders import Folders, missing, sweep
 from nondum.host.lifecycle.recovery import recover
 from nondum.wheelhouse.store import Store
@@ -60,7 +60,7 @@ def look(root: Path, told: list[Told]) -> Iterator[str]:
     if left:
         yield f"left running: {left}"
     state = root / "state"
-    if mounted := mounting.mounted_below(state):
+    if mounted := mounted_below(state):
         yield f"left mounted: {mounted}"
     if (state / "catalogue.sqlite").exists():
         yield from _look_at_catalogue(state / "catalogue.sqlite", told)

@@ -62,5 +62,4 @@ def until_pulled(host: RunningHost, name: str) -> None:
     host.until(
         f"{name} pulled",
         lambda view: name not in [row["drive"] for row in view["drives"]],
-        timeout_s=9,
     )

@@ -21,8 +21,8 @@ from tests.loops import attach, cut_off, detach
 from tests.payloads import Part, make_payload, make_wheel
 
 from nondum.host.catalogue.records import Step
-from nondum.host.drives import mounting
 from nondum.host.drives.blocks import BlockSource
+from nondum.host.drives.mounts import mounted_below
 from nondum.host.lifecycle.folders import Folders
 
 GOOD, BAD = "org.example.good", "org.example.lamp"
@@ -109,7 +109,7 @@ class Bench:
 
     def _left(self) -> list[str]:
         """Folders, mounts and processes of the payload that was yanked."""
-        mounts = [str(path) for path in mounting.mounted_below(self.host.folders.mounts)]
+        mounts = [str(path) for path in mounted_below(self.host.folders.mounts)]
         workers = [id for id in self.host.workers.pids() if id != "good"]
         return [*(set(self._folders()) - self._kept), *mounts, *workers]
 
@@ -127,7 +127,7 @@ class Bench:
         return "copy" if record.step is Step.RECEIVED else "install"
 
     def _look_around(self) -> None:
-        self.told.stuck_mounts += len(mounting.mounted_below(self.host.folders.mounts))
+        self.told.stuck_mounts += len(mounted_below(self.host.folders.mounts))
         self.told.left_over += self._left()
         self.told.disturbed += self.host.workers.pids() != {"good": self._good}
 

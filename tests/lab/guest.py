@@ -22,7 +22,7 @@ from nondum.transport.peers import (
     Trust,
 )
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 T = TypeVar("T")
 
 

@@ -58,7 +58,7 @@ def fragments():
 @behaviour("write", action="(write ?u - sensor ?s - text ?h - host)", lasting=True)
 async def write(ctx, u, s, h):
     words = ctx.input(s)
-    await words.next(timeout_s=5.0)
+    await words.next(timeout_s=60.0)
     await ctx.established()
     async for _ in words:
         pass

@@ -19,9 +19,9 @@ from demo.robot import NONDUM, Robot, TooLate, View, configuration
 from tests.lab.traces import Traces
 from tests.payloads import Part, make_payload
 
-READY_S = 30.0
-GONE_S = 10.0
-END_S = 20.0
+READY_S = 120.0
+GONE_S = 60.0
+END_S = 60.0
 DAEMON = (*NONDUM, "host", "run", "--user")
 
 Row = View

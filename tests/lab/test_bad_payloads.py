@@ -39,7 +39,7 @@ def nobody_notices(host: RunningHost) -> Iterator[None]:
     assert host.view["plan"]["steps"] == steps
     assert len(host.journal("scribe")) == known
     host.pull("bad")
-    host.until("gone", lambda view: bad_one(view) is None, timeout_s=10)
+    host.until("gone", lambda view: bad_one(view) is None)
     assert host.traces() == traces
 
 

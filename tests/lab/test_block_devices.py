@@ -42,9 +42,7 @@ def test_stick_pulled_in_the_middle_of_a_behaviour(host: RunningHost, tmp_path: 
     before = host.traces()
     with attached(image(tmp_path, talker())) as node:
         host.until_step(PAYLOAD, "active")
-        host.until(
-            "safe to pull", lambda v: {d["state"] for d in v["drives"]} == {"idle"}, timeout_s=9
-        )
+        host.until("safe to pull", lambda v: {d["state"] for d in v["drives"]} == {"idle"})
         assert not host.traces().mounts
         host.until_goal(goal, "holds")
         detach(node)
@@ -63,6 +61,6 @@ def test_stick_that_dies_while_it_is_copied(host: RunningHost, tmp_path: Path) -
         host.until_told("DRIVE_GONE")
         host.until_gone(PAYLOAD)
         until_unmounted(host.state)
-    host.until("let go", lambda view: not view["drives"], timeout_s=9)
+    host.until("let go", lambda view: not view["drives"])
     assert host.traces() == before
     assert "DRIVE_GONE" in str(host.journal())

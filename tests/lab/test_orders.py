@@ -34,10 +34,8 @@ def test_halt_now_needs_no_planner(host: RunningHost) -> None:
         "test-scribe.write",
     }
     host.until_goal(goal, "halted")
-    host.until("nothing runs", lambda view: not any_stream(view), timeout_s=5)
-    host.until(
-        "both have ended", lambda _: {"talker", "scribe"} <= outcomes(host).keys(), timeout_s=5
-    )
+    host.until("nothing runs", lambda view: not any_stream(view), timeout_s=60)
+    host.until("both have ended", lambda _: {"talker", "scribe"} <= outcomes(host).keys())
     assert set(outcomes(host).values()) == {"HALTED"}
     assert not any(row["running"] for row in host.ask("behaviours"))
 

@@ -253,9 +253,7 @@ def test_stick_that_was_let_go_is_mounted_again_to_hand_it_over(tmp_path: Path) 
         mule.stop()
         with attached(image(tmp_path, talker())) as node:
             rover.until_step("lamp", "refused")
-            rover.until(
-                "let go", lambda v: {d["state"] for d in v["drives"]} == {"idle"}, timeout_s=9
-            )
+            rover.until("let go", lambda v: {d["state"] for d in v["drives"]} == {"idle"})
             assert not rover.traces().mounts
             mule.start()
             mule.until_step("lamp", "active")

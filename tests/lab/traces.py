@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from nondum.host.drives.mounting import mounted_below
+from nondum.host.drives.mounts import mounted_below
 
 FOLDERS = ("staging", "payloads", "venvs", "scratch", "mounts")
 LASTING = {"host", "highwater", "former", "journal"}
@@ -60,7 +60,7 @@ def workers(state: Path) -> Iterator[tuple[int, str]]:
                     yield pid, value
 
 
-def until_unmounted(folder: Path, timeout_s: float = 10.0) -> None:
+def until_unmounted(folder: Path, timeout_s: float = 60.0) -> None:
     """Wait until nothing is mounted below a folder. Raises `TimeoutError`."""
     with Path("/proc/self/mountinfo").open() as changes:  # see proc(5): polls as an exception
         poll = select.poll()

@@ -108,7 +108,7 @@ def echo(ctx: ThreadContext, u: str, i: str, o: str) -> None:
 
 @behaviour("await-hint", action="(await-hint ?u - speaker)")
 async def await_hint(ctx: Context, u: str) -> None:
-    hint = await ctx.optional_input("hints").next(timeout_s=5)
+    hint = await ctx.optional_input("hints").next(timeout_s=60)
     ctx.know("hinted", hint.text)
 
 

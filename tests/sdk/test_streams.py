@@ -80,7 +80,7 @@ class Reader:
 
     async def line(self) -> list[str]:
         assert self._process.stdout is not None
-        return (await asyncio.wait_for(self._process.stdout.readline(), 10)).decode().split()
+        return (await asyncio.wait_for(self._process.stdout.readline(), 60)).decode().split()
 
     def signal(self, number: int) -> None:
         self._process.send_signal(number)
@@ -230,7 +230,7 @@ class Listener:
         self.consumer = Consumer(kind, packets, self.arrived.set, self.lost.set_result)
 
     async def verdict(self) -> str:
-        violation = await asyncio.wait_for(self.lost, 5)
+        violation = await asyncio.wait_for(self.lost, 30)
         self.raw.close()
         return violation.code if violation else "closed"
 
@@ -322,7 +322,7 @@ async def test_long_frame_crosses_where_no_memory_is_shared(producer: Source) ->
     consumer = Consumer("image", theirs, arrived.set, lambda violation: None)
     producer.connect("bench", ours)
     producer.send(image(7, side=300))  # longer than a packet of a socket
-    await asyncio.wait_for(arrived.wait(), 5)
+    await asyncio.wait_for(arrived.wait(), 30)
     message = consumer.take()
     assert isinstance(message, Image)
     assert message.header.seq == 7
@@ -338,7 +338,7 @@ async def test_kept_frames_neither_change_nor_stop_the_stream(producer: Source) 
     kept: list[Image] = []
     for seq in range(10):
         producer.send(image(seq))
-        await asyncio.wait_for(arrived.wait(), 5)
+        await asyncio.wait_for(arrived.wait(), 30)
         arrived.clear()
         message = consumer.take()
         assert isinstance(message, Image)
@@ -362,7 +362,7 @@ async def test_frames_let_go_in_other_threads_are_released(producer: Source) -> 
     consumer = Consumer("image", packets, arrived.set, lambda violation: None)
     for seq in range(20):
         producer.send(image(seq))
-        await asyncio.wait_for(arrived.wait(), 5)
+        await asyncio.wait_for(arrived.wait(), 30)
         arrived.clear()
         held = [consumer.take()]
         await asyncio.to_thread(held.clear)

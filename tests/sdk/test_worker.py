@@ -73,19 +73,19 @@ class Worker:
 
     async def event(self, name: str) -> dict[str, Any]:
         """Wait for the next event of this name; those before it are dropped."""
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(60):
             while True:
                 found, body, _ = await self.events.get()
                 if found == name:
                     return body
 
     async def gone(self) -> int:
-        return await asyncio.wait_for(self.process.wait(), 10)
+        return await asyncio.wait_for(self.process.wait(), 60)
 
     async def end(self) -> None:
         self.link.close()
         try:
-            await asyncio.wait_for(self.process.wait(), 10)
+            await asyncio.wait_for(self.process.wait(), 60)
         finally:
             if self.process.returncode is None:
                 self.process.kill()

@@ -11,6 +11,7 @@ from nondum.host.events import (
     CatalogueUnwritten,
     CatalogueWritten,
     DriveFlapping,
+    DriveLeftAlone,
     DriveRead,
     DriveUnreadable,
     Event,
@@ -78,7 +79,7 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
         case PayloadTaken():
             name = _name(event.payload, snapshot)
             return f"{name} runs here for {event.host}, not there: {event.why}"
-        case DriveFlapping():
+        case DriveFlapping() | DriveLeftAlone():
             return _joined(event.problems)
         case WorkerStrained():
             return _joined(event.problems)

@@ -31,6 +31,7 @@ from nondum.host.drives.slots import SlotSource
 from nondum.host.drives.source import DriveSource
 from nondum.host.drives.steady import Steady
 from nondum.host.events import Event, HostStarted, Recomposed
+from nondum.host.feedback import parts as feedback_parts
 from nondum.host.helper import privileged
 from nondum.host.lifecycle import safe_mode
 from nondum.host.lifecycle.bus import Bus
@@ -68,15 +69,19 @@ log = logging.getLogger(__name__)
 
 
 async def run_host(
-    config: HostConfig, *, more_drives: Sequence[DriveSource] = (), safety: Safety = Safety.OFF
+    config: HostConfig,
+    *,
+    more_drives: Sequence[DriveSource] = (),
+    safety: Safety = Safety.OFF,
+    notifier: Notifier | None = None,
 ) -> None:
     """Run a host until SIGTERM or SIGINT. `more_drives` are sources beside the configuration's;
-    `safety` is asked for by a person.
+    `safety` is asked for by a person; `notifier` tells a service manager how it is.
 
     Raises `ConfigRefused` (ALREADY_RUNNING, SYSTEM_TREE, …) before anything has begun.
     """
     stop = _told_to_stop()
-    async with Service(Notifier.from_environment(os.environ)) as service:
+    async with Service(notifier or Notifier()) as service:
         await _run_as(service, config, more_drives, safety, stop)
 
 
@@ -162,14 +167,35 @@ async def _run(
             *executor.trust.warnings,
             *_warnings(catalogue, safety[1]),
             *standing.warnings(),
+            *feedback.warnings,
             *map(str, cages.problems()),
             *of_peers,
         )
 
     places = neighbours.placement.places if neighbours else dict
     vouched = executor.trust.vouched
+    conversation = Conversation(mind, workers.plugins, workers.pids, _take(neighbours))
+    feedback = feedback_parts.made(
+        config.feedback,
+        folders.root,
+        catalogue,
+        mind,
+        places,
+        conversation,
+        news.look_again,
+    )
+    bus.subscribe(feedback.on_event)
     questions = Questions(
-        catalogue, mind, workers, standing, news, listing, warnings, places, vouched
+        catalogue,
+        mind,
+        workers,
+        standing,
+        news,
+        listing,
+        warnings,
+        places,
+        vouched,
+        feedback.to_dict,
     )
     trust = TrustOrders(executor.trust, bus.emit)
     orders = Orders(catalogue, mind, workers, news, bus, config.planning.translate_s)
@@ -200,7 +226,8 @@ async def _run(
                 lambda: words(catalogue.snapshot(), mind.views.given(), places(), warnings()),
                 questions.changed,
             ),
-            Conversation(mind, workers.plugins, workers.pids, _take(neighbours)).run(),
+            conversation.run(),
+            feedback.run(),
             *(source.watch(bus.emit) for source in device_sources(config)),
         )
     finally:

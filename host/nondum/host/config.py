@@ -14,6 +14,8 @@ from types import GenericAlias
 from typing import Any, get_args, get_type_hints
 
 from nondum.host.configuration.places import Places
+from nondum.host.feedback import section as feedback_section
+from nondum.host.feedback.section import FeedbackSection
 from nondum.sdk.errors import ConfigRefused, Problem
 
 SYSTEM_FILE = Path("/etc/nondum/host.toml")
@@ -203,6 +205,7 @@ class HostConfig:
     planning: PlanningSection = field(default_factory=PlanningSection)
     peers: PeersSection = field(default_factory=PeersSection)
     router: RouterSection = field(default_factory=RouterSection)
+    feedback: FeedbackSection = field(default_factory=FeedbackSection)
 
 
 def default_name(hostname: str) -> str:
@@ -269,6 +272,7 @@ def parse(text: str, where: str, defaults: HostConfig) -> HostConfig:
         else:
             sections[name] = _section(name, sections[name], table, places, problems)
     problems.extend(_contradictions(HostConfig(**sections), places))
+    problems.extend(feedback_section.problems(sections["feedback"], places))
     if problems:
         raise ConfigRefused(*problems)
     return HostConfig(**sections)

@@ -63,6 +63,7 @@ class Conversation:
         self._take = take or self._taken_here
         self._plugins = plugins
         self._processes = processes
+        self._saying = asyncio.Lock()
 
     async def run(self) -> None:
         """Speak and listen until cancelled."""
@@ -72,11 +73,13 @@ class Conversation:
 
     async def say(self, text: str) -> None:
         """Have a sentence said by all components that speak, at once; `SPEAK_S` at most."""
-        saying = [asyncio.ensure_future(_awaited(p.speak(text))) for p in self._plugins().values()]
-        if saying:
-            _, late = await asyncio.wait(saying, timeout=SPEAK_S)
-            for task in late:
-                task.cancel()
+        async with self._saying:
+            said = (p.speak(text) for p in self._plugins().values())
+            saying = [asyncio.ensure_future(_awaited(answer)) for answer in said]
+            if saying:
+                _, late = await asyncio.wait(saying, timeout=SPEAK_S)
+                for task in late:
+                    task.cancel()
 
     async def heard(self, component: str, words: str) -> None:
         """Want what a person has said; tell people where that cannot be."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from nondum.host.devices.view import device_of
 from nondum.host.mind.diagnosis import Seen, moment, why_not, words_gone
 from nondum.host.shelf import Shelved, candidate_of, distinct, on_shelf
 from nondum.planning.advise import Advice, Candidate, Here, advise, understood
@@ -64,8 +65,8 @@ class Surroundings:
     def of(cls, told: Mapping[str, Any], shelf: Iterable[Shelved]) -> Surroundings:
         """What a daemon told, and payloads from elsewhere."""
         host = told["host"]
-        devices = told.get("devices")
-        seen = tuple(_seen(row, host) for row in told["seen"])
+        devices = tuple(map(device_of, told["devices"])) if "devices" in told else None
+        seen = tuple(seen_of(row, host) for row in told["seen"])
         present = tuple(
             Contribution.from_description(
                 _description(row), host=row["host"], component=row["component"], rank=row["rank"]
@@ -75,7 +76,7 @@ class Surroundings:
         at_work = {contribution.component for contribution in present}
         known = [
             payload
-            for payload in distinct((*shelf, *_remembered(seen)))
+            for payload in distinct((*shelf, *remembered(seen)))
             if not at_work.issuperset(payload.components)
         ]
         candidates = tuple(candidate_of(payload, host, devices) for payload in known)
@@ -164,7 +165,7 @@ def waiting(told: Mapping[str, Any], facts: HostFacts | None) -> Iterable[Shelve
                     yield Shelved(found.id, found.version, name, found.components, refusal)
 
 
-def _remembered(seen: Iterable[Seen]) -> list[Shelved]:
+def remembered(seen: Iterable[Seen]) -> list[Shelved]:
     """The payloads of components that were here, with those of their components that were."""
     found: dict[tuple[str, str], dict[str, PluginDescription]] = {}
     left: dict[tuple[str, str], float] = {}
@@ -178,7 +179,8 @@ def _remembered(seen: Iterable[Seen]) -> list[Shelved]:
     ]
 
 
-def _seen(row: Mapping[str, Any], host: str) -> Seen:
+def seen_of(row: Mapping[str, Any], host: str) -> Seen:
+    """A component that was here or on a peer, as the daemon of `host` tells of it."""
     description = _description(row)
     contribution = Contribution.from_description(
         description, host=row["host"] or host, component=row["component"]

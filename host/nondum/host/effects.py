@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from nondum.host.catalogue.records import DeviceRecord
+from nondum.host.catalogue.records import DeviceNode
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,11 +139,11 @@ class RestartWorker(Effect):
 
 @dataclass(frozen=True, slots=True)
 class AttachDevice(Effect):
-    """Give a device to a component."""
+    """Give nodes of a device to a component: these, instead of any that it has for that need."""
 
     component: str
     need: str
-    device: DeviceRecord
+    nodes: tuple[DeviceNode, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
-from nondum.host.catalogue.records import ComponentRecord, MountPose, PeerRecord
+from nondum.host.catalogue.records import ComponentRecord, DeviceRecord, MountPose, PeerRecord
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
 from nondum.wheelhouse.signatures import NOTHING, Grant
@@ -106,6 +106,14 @@ class DriveFlapping(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class DriveLeftAlone(Event):
+    """A disk that could be plugged in is this machine's own: it is never read."""
+
+    drive: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class DriveRemoved(Event):
     """A drive was pulled, or its source says that it is not there."""
 
@@ -122,6 +130,14 @@ class DriveRead(Event):
     """How many certificates of hosts it carries."""
     trust_files: int = 0
     """How many versions of trust files it carries."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveReleased(Event):
+    """A drive was let go of: nothing of it is mounted, and nothing is read from it."""
+
+    JOURNALLED: ClassVar[bool] = False
+    drive: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -649,9 +665,24 @@ class DeviceAppeared(Event):
     """A device is there."""
 
     device: str
-    """Name of the device on this host: a sysfs path or the name of its slot file."""
-    node: Path
-    properties: Mapping[str, str]
+    """Its id on this host: bus and port, or the name of its slot file."""
+    found: DeviceRecord = field(repr=False)
+    """As its source sees it."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Only what it is: all its properties stand in the catalogue."""
+        nodes = [str(node.node) for node in self.found.nodes]
+        return {"device": self.device, "identity": self.found.identity, "nodes": nodes}
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceChanged(Event):
+    """A device that is there has other nodes or properties than before."""
+
+    JOURNALLED: ClassVar[bool] = False
+    device: str
+    found: DeviceRecord = field(repr=False)
+    """As its source sees it now."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -63,6 +63,10 @@ class News:
             self._ahead.pop(str(getattr(event, "drive", None)), None)
             self._tell()
 
+    def look_again(self) -> None:
+        """What is shown is another, whatever the reason: time, for instance."""
+        self._tell()
+
     def progress(self, payload: str) -> Progress | None:
         """How far the payload of that key is within its step, where that is known."""
         return self._progress.get(payload)

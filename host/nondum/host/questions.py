@@ -11,13 +11,13 @@ from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import PayloadRecord, Step
 from nondum.host.confinement.level import SCRATCH, Level, Standing
 from nondum.host.control.arguments import Arguments
+from nondum.host.devices import view
+from nondum.host.feedback.state import NOTHING
 from nondum.host.mind.mind import Mind
 from nondum.host.news import News
 from nondum.host.rows import (
     Row,
-    claims_by_device,
     component_row,
-    device_row,
     drive_row,
     gone_back,
     host_state,
@@ -58,6 +58,8 @@ class Questions:
     """Payload key → the peer that runs it, for those that run elsewhere."""
     vouched: Callable[[str], Vouched] = lambda _: NOBODY
     """Payload key → who vouches for it."""
+    shown: Callable[[], Row] = NOTHING.to_dict
+    """What people without a screen are shown."""
 
     async def status(self, arguments: Arguments) -> Row:
         """The host, its payloads and its goals at a glance."""
@@ -72,6 +74,7 @@ class Questions:
                 *map(_kept_out, self.mind.views.kept_out()),
                 *map(_gone_back, gone_back(snapshot)),
             ],
+            "feedback": self.shown(),
             "confinement": self.standing.to_dict(),
             "payloads": [
                 payload_row(
@@ -121,12 +124,19 @@ class Questions:
     async def devices(self, arguments: Arguments) -> list[Row]:
         """What is plugged in, and who has it."""
         snapshot = self.catalogue.snapshot()
-        claims = claims_by_device(snapshot)
-        own = [device_row(device, claims) for device in snapshot.devices]
         peers = (
             (device, owner) for peer in snapshot.peers for device, owner in peer.devices.items()
         )
+        own = view.rows_of(snapshot)
         return own + [peers_device_row(device, owner) for device, owner in peers]
+
+    async def devices_why(self, arguments: Arguments) -> list[Row]:
+        """Every device of this host, and how it fared with every rule of every component."""
+        return view.why_rows(self.catalogue.snapshot())
+
+    async def known_devices(self, arguments: Arguments) -> list[Row]:
+        """What was ever plugged in here, as far as is remembered; what was seen last comes last."""
+        return [view.known_row(known) for known in self.catalogue.snapshot().known_devices]
 
     async def streams(self, arguments: Arguments) -> list[Row]:
         """Who sends what to whom."""
@@ -163,7 +173,7 @@ class Questions:
         """All that planning goes by, and what is known that is not here, for tools that plan by
         themselves; `waiting` are payloads that are here and not active."""
         snapshot = self.catalogue.snapshot()
-        devices = [dict(device.properties) for device in snapshot.devices]
+        devices = view.rows_of(snapshot)
         waiting = [
             {
                 "payload": payload.payload_id,

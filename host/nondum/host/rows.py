@@ -8,8 +8,6 @@ from typing import Any, TypeAlias
 
 from nondum.host.catalogue.records import (
     ComponentRecord,
-    DeviceClaim,
-    DeviceRecord,
     DriveRecord,
     JournalEntry,
     PayloadRecord,
@@ -108,23 +106,10 @@ def drive_row(drive: DriveRecord, ahead: int = 0) -> Row:
     }
 
 
-def device_row(device: DeviceRecord, claims: Mapping[str, tuple[str, DeviceClaim]]) -> Row:
-    """A device that is plugged in, and the component that has it, if one has."""
-    component, claim = claims.get(device.id, ("", None))
-    return {
-        "device": device.id,
-        "node": str(device.node),
-        "component": component,
-        "need": claim.name if claim else "",
-        "contested_by": list(claim.contested_by) if claim else [],
-        "properties": dict(device.properties),
-    }
-
-
 def peers_device_row(device: str, component: str) -> Row:
     """A device of a peer, in the same columns: of it, only who has it is told."""
-    row = {"device": device, "node": "", "component": component, "need": ""}
-    return {**row, "contested_by": [], "properties": {}}
+    row = {"device": device, "node": "", "component": component, "need": "", "name": ""}
+    return {**row, "contested_by": [], "properties": {}, "nodes": [], "left_alone": ""}
 
 
 def component_row(
@@ -212,16 +197,6 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> Problem:
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     fix = f"did you mean {near[0]!r}?" if near else f"there is: {', '.join(names) or 'none'}"
     return Problem(f"{kind.upper()}_UNKNOWN", f"there is no {kind} {name!r}", fix=fix)
-
-
-def claims_by_device(snapshot: Snapshot) -> Mapping[str, tuple[str, DeviceClaim]]:
-    """Device → the component that has it, and the claim by which."""
-    return {
-        claim.device: (component.id, claim)
-        for component in snapshot.components
-        for claim in component.devices
-        if claim.device is not None
-    }
 
 
 def _state(component: ComponentRecord) -> str:

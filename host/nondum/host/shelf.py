@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from pathlib import Path
 
+from nondum.host.catalogue.records import DeviceRecord
+from nondum.host.devices.matching import serving
 from nondum.host.mind.composition import component_facts
 from nondum.planning.advise import Candidate
 from nondum.planning.claims import claims_of
@@ -61,13 +62,13 @@ def _preflight(payload: StagedPayload, facts: HostFacts) -> tuple[Problem, ...]:
 
 
 def candidate_of(
-    payload: Shelved, host: str, devices: Iterable[Mapping[str, str]] | None = None
+    payload: Shelved, host: str, devices: Sequence[DeviceRecord] | None = None
 ) -> Candidate:
     """A payload as it would be on a host, its components healthy.
 
     Components whose fragments are wrong are left out, as planning leaves them out; caveats say why.
-    Of required devices that are not among `devices` (their udev properties) a caveat tells; None:
-    it is not known which there are.
+    Of required devices that are not among `devices` a caveat tells; None: it is not known which
+    there are.
     """
     facts: set[str] = set()
     caveats = list(payload.caveats)
@@ -81,7 +82,7 @@ def candidate_of(
         facts |= component_facts(host, component, description, is_ready=True).keys()
         facts.update(_flowing(host, component, description))
         if devices is not None:
-            caveats += _missing_devices(component, description, tuple(devices))
+            caveats += _missing_devices(component, description, devices)
     return Candidate(
         payload.id,
         payload.version,
@@ -101,13 +102,10 @@ def _flowing(host: str, component: str, description: PluginDescription) -> Itera
 
 
 def _missing_devices(
-    component: str, description: PluginDescription, devices: tuple[Mapping[str, str], ...]
+    component: str, description: PluginDescription, devices: Sequence[DeviceRecord]
 ) -> Iterator[Problem]:
     for need in description.devices:
-        is_there = any(
-            all(fnmatchcase(d.get(name, ""), pattern) for name, pattern in need.match.items())
-            for d in devices
-        )
+        is_there = any(serving(device, need.match) for device in devices)
         if not is_there and not need.optional:
             wanted = ", ".join(f"{name}={pattern}" for name, pattern in need.match.items())
             message = f"{component} needs a device {need.name!r} that is not plugged in"

@@ -41,7 +41,7 @@ def test_cancelled_playing_leaves_nothing_running(tmp_path: Path) -> None:
         pid = int(await asyncio.to_thread(started.read_text))
         playing.cancel()
         with pytest.raises(asyncio.CancelledError):
-            await asyncio.wait_for(playing, 5)
+            await asyncio.wait_for(playing, 60)
         return pid
 
     pid = asyncio.run(interrupted())

@@ -29,7 +29,7 @@ def turn_of(pose: Pose) -> float:
 
 def until(bench: Any, is_so: Any, feed: Twist | None = None) -> Pose:
     """The first odometry that satisfies, with a command fed again for each that does not."""
-    for _ in range(60):
+    for _ in range(600):
         pose: Pose = bench.read("odometry")
         if is_so(pose):
             return pose

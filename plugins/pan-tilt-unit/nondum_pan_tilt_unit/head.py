@@ -18,7 +18,7 @@ from nondum_pan_tilt_unit.line import Line
 from nondum_pan_tilt_unit.replies import LimitHit, Replies, Reply
 
 BAUD = 9600
-_ANSWER_S = 1.0
+ANSWER_S = 3.0
 _RESET_S = 60.0
 _QUIET_S = 0.1
 _CHATTER = 100
@@ -41,8 +41,9 @@ class Aim:
 class Head:
     """A unit that has been set up by `ready`."""
 
-    def __init__(self, line: Line) -> None:
-        self._line = line
+    def __init__(self, line: Line, *, answer_s: float = ANSWER_S) -> None:
+        """`answer_s`: how long a command's answer is waited for."""
+        self._line, self._answer_s = line, answer_s
         self._replies = Replies()
         self._waiting: deque[Reply] = deque()
         self.pan = Axis("pan", 1.0, 0, 0)
@@ -64,9 +65,10 @@ class Head:
         self._steps_per_s = await self._set_speed(speed_rad_s)
 
     async def command(
-        self, text: str, *, within_s: float = _ANSWER_S, may_hit: bool = False
+        self, text: str, *, within_s: float | None = None, may_hit: bool = False
     ) -> str:
         """Send one command, give the text of its answer. `may_hit`: running into ends is meant."""
+        within_s = self._answer_s if within_s is None else within_s
         self._line.send(text.encode("ascii") + b" ")
         try:
             async with asyncio.timeout(within_s):

@@ -1,8 +1,9 @@
-"""A serial line on the event loop; pyserial's errors become `BehaviourFailed` SERIAL_FAILED."""
+"""A serial line on the event loop; what goes wrong with it is `BehaviourFailed` SERIAL_FAILED."""
 
 from __future__ import annotations
 
 import asyncio
+import termios
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import TracebackType
@@ -56,7 +57,9 @@ class Line:
     def _translated(self) -> Iterator[None]:
         try:
             yield
-        except OSError as error:  # pyserial's own errors are OSErrors too
+        # pyserial's own errors are OSErrors too; those of termios, which it lets through when the
+        # device is pulled between open and tcsetattr, are not.
+        except (OSError, termios.error) as error:
             raise BehaviourFailed(
                 Problem("SERIAL_FAILED", str(error), where=self._node, fix="check the cable")
             ) from error

@@ -96,11 +96,13 @@ async def _follow(ctx: Context, pointer: Pointer, u: str, t: str, h: str) -> Non
 @contextmanager
 def _pointer(ctx: Context) -> Iterator[Pointer]:
     """Open both devices; on leaving, the laser is switched off before they are closed."""
-    nodes = [_node(ctx, name) for name in (HEAD, LASER)]
+    nodes, settings = [_node(ctx, name) for name in (HEAD, LASER)], Settings.parse(ctx.settings)
     with (
         Line(nodes[0], head.BAUD) as head_line,
         Line(nodes[1], relay.BAUD) as laser_line,
-        Pointer(Head(head_line), Laser(laser_line), Settings.parse(ctx.settings)) as pointer,
+        Pointer(
+            Head(head_line, answer_s=settings.answer_s), Laser(laser_line), settings
+        ) as pointer,
     ):
         yield pointer
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass, fields
 
 from nondum.sdk.errors import ConfigRefused, Problem
 
+_POSITIVE = ("speed_deg_s", "answer_s")
+
 
 @dataclass(frozen=True, slots=True)
 class Settings:
@@ -19,6 +21,8 @@ class Settings:
     tilt_min_deg: float = -90.0
     tilt_max_deg: float = 90.0
     speed_deg_s: float = 100.0
+    answer_s: float = 3.0
+    """A command that has no answer by then has none: the unit itself takes some milliseconds."""
     reset: bool = False
     """Drive to the ends before the first aim, as after a power-up without room to move."""
 
@@ -40,7 +44,7 @@ def _problems(given: Mapping[str, object]) -> Iterator[Problem]:
             yield _problem(f"setting {key!r} must be true or false, not {value!r}")
         elif known[key] is float and not _is_number(value):
             yield _problem(f"setting {key!r} must be a number, not {value!r}")
-        elif key == "speed_deg_s" and float(str(value)) <= 0:
+        elif key in _POSITIVE and float(str(value)) <= 0:
             yield _problem(f"setting {key!r} must be positive, not {value!r}")
 
 

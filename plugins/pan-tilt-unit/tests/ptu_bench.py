@@ -43,7 +43,7 @@ class Bench:
     def node(self, name: str) -> str:
         return os.ttyname(self._ports[name][1])
 
-    def wait_until(self, is_so: Callable[[], bool], timeout_s: float = 5.0) -> None:
+    def wait_until(self, is_so: Callable[[], bool], timeout_s: float = 30.0) -> None:
         """Wait for what the plugin does to the bench."""
         with self._changed:
             assert self._changed.wait_for(is_so, timeout_s), self.order

@@ -105,6 +105,7 @@ def test_it_follows_a_bearing_that_changes(pointer: Pointer) -> None:
 def test_small_corrections_stay_lit(pointer: Pointer) -> None:
     pointer.know(bearing(10))
     pointer.begin().wait_established()
+    pointer.wait(lambda: pointer.bench.light[-1])
     before = list(pointer.bench.light)
     pointer.know(bearing(10.5))
     pointer.wait(lambda: pointer.bench.position["P"] == round(10.5 / STEP_DEG))

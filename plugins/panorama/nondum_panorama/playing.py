@@ -25,9 +25,10 @@ class Score:
     """How long the picture stands still at both ends, in place of one frame's time."""
 
     @classmethod
-    def of(cls, clip: Clip, *, hold_s: float) -> Score:
-        """As the clip is stated to be played."""
-        return cls(clip.first, clip.last, clip.frames_per_s, hold_s=hold_s, rest_s=clip.rest_s)
+    def of(cls, clip: Clip, *, hold_s: float, speed: float = 1.0) -> Score:
+        """As the clip is stated to be played, or that much faster; `hold_s` is as long as given."""
+        rate, rest_s = clip.frames_per_s * speed, clip.rest_s / speed
+        return cls(clip.first, clip.last, rate, hold_s=hold_s, rest_s=rest_s)
 
     def frame_at(self, elapsed_s: float) -> int:
         """The number of the frame that is shown `elapsed_s` after the stream began."""

@@ -28,11 +28,15 @@ class CameraSettings:
     """How long the first frame stands still after the stream began."""
     pace: Literal["real-time", "every-frame"] = "real-time"
     """`real-time` leaves frames out when the machine is slow; `every-frame` slows down."""
+    speed: float = 1.0
+    """How fast the recording is played: 0.1 is slow motion, for who sees an image a second."""
 
     def __post_init__(self) -> None:
         self.view  # noqa: B018  # refuses impossible views when the settings are made
         if self.hold_s < 0:
             raise ValueError(f"hold_s is {self.hold_s}; it cannot be negative")
+        if self.speed <= 0:
+            raise ValueError(f"speed is {self.speed}; it must be positive")
 
     @property
     def view(self) -> View:

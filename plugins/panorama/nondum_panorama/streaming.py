@@ -35,8 +35,8 @@ async def play(
     output, odometry = ctx.output(slot), ctx.optional_input("odometry")
     lens, heading = Lens(clip, settings.view), BodyHeading()
     camera, looks = camera_model(settings.view), math.radians(settings.looks_deg)
-    score = Score.of(clip, hold_s=settings.hold_s)
-    async for elapsed_s in _ticks(settings, clip.frames_per_s):
+    score = Score.of(clip, hold_s=settings.hold_s, speed=settings.speed)
+    async for elapsed_s in _ticks(settings, score.frames_per_s):
         pose = odometry.latest
         if pose is not None and pose.child_frame_id in ("", ctx.host):
             heading.update(pose)

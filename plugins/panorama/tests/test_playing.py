@@ -43,3 +43,10 @@ def test_packaged_clip_plays_as_stated() -> None:
     leg_s = (clip.last - clip.first) / clip.frames_per_s
     assert score.frame_at(3.0 + leg_s) == score.frame_at(3.9 + leg_s) == clip.last
     assert score.frame_at(3.0 + 2 * leg_s + clip.rest_s) == clip.first
+
+
+def test_slow_motion_shows_the_same_later() -> None:
+    clip = packaged_clip()
+    usual, slow = Score.of(clip, hold_s=3.0), Score.of(clip, hold_s=3.0, speed=0.1)
+    shown = [usual.frame_at(3.0 + step / 10) for step in range(100)]
+    assert [slow.frame_at(3.0 + step) for step in range(100)] == shown

@@ -14,7 +14,7 @@ from nondum.sdk.streams import Consumer, Producer
 from nondum.sdk.wire import MAX_PACKET
 from nondum.transport import link_sockets
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 HERE = ("tcp://127.0.0.1:0",)
 
 

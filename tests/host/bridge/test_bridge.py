@@ -258,7 +258,7 @@ async def test_stalled_network_ends_the_stream_at_its_reader() -> None:
                 await reader.until()
                 link.stall()
                 assert await reader_over.code() == "STREAM_SILENT"
-                await asyncio.wait_for(reader.ended.wait(), 5)
+                await asyncio.wait_for(reader.ended.wait(), 30)
                 assert reader.violation is None
                 assert await owner_over.code() in {"STREAM_SILENT", "STREAM_LOST"}
 
@@ -284,7 +284,7 @@ async def test_end_of_the_producer_ends_the_stream() -> None:
         producer.close()
         assert await owner_over.code() == "STREAM_ENDED"
         assert await reader_over.code() == "STREAM_ENDED"
-        await asyncio.wait_for(reader.ended.wait(), 5)
+        await asyncio.wait_for(reader.ended.wait(), 30)
 
 
 async def test_withdrawn_reader_is_cut() -> None:
@@ -305,7 +305,7 @@ async def test_killed_bridge_ends_its_streams_and_a_new_one_serves(side: str) ->
         os.kill(killed.pid, signal.SIGKILL)
         assert await owner_over.code() in {"BRIDGE_DIED", "STREAM_LOST"}
         assert await reader_over.code() in {"BRIDGE_DIED", "STREAM_LOST"}
-        await asyncio.wait_for(reader.ended.wait(), 5)
+        await asyncio.wait_for(reader.ended.wait(), 30)
         producer, again, _, _ = await read(hosts)
         async with sent(producer):
             await again.until()

@@ -19,12 +19,15 @@ from nondum.host.catalogue.records import (
     ComponentRecord,
     ComponentState,
     DeviceClaim,
+    DeviceInterface,
+    DeviceNode,
     DeviceRecord,
     DriveRecord,
     DriveState,
     FormerPayload,
     GoalRecord,
     JournalEntry,
+    KnownDevice,
     Moment,
     MountPose,
     PayloadRecord,
@@ -75,7 +78,12 @@ def payload(key: str = "k1", step: Step = Step.ACTIVE) -> PayloadRecord:
     )
 
 
-def component(id: str = "eye", payload: str = "k1", device: str | None = "usb1") -> ComponentRecord:
+def component(
+    id: str = "eye",
+    payload: str = "k1",
+    device: str | None = "usb1",
+    nodes: tuple[Path, ...] = (Path("/dev/ttyUSB0"),),
+) -> ComponentRecord:
     return ComponentRecord(
         id=id,
         payload=payload,
@@ -92,7 +100,7 @@ def component(id: str = "eye", payload: str = "k1", device: str | None = "usb1")
         permissions=("devices",),
         settings={"gain": 1.5, "nested": {"list": [1, 2]}},
         devices=(
-            DeviceClaim("port", {"ID_MODEL": "PT*"}, False, device, ("other",)),
+            DeviceClaim("port", {"ID_MODEL": "PT*"}, False, device, nodes, ("other",)),
             DeviceClaim("lamp", {"ID_MODEL": "L"}, True),
         ),
         problems=(PROBLEM,),
@@ -114,7 +122,33 @@ FULL = HostState(
     },
     payloads={"k1": payload(), "k2": payload("k2", Step.REFUSED)},
     components={"eye": component()},
-    devices={"usb1": DeviceRecord("usb1", Path("/dev/ttyUSB0"), {"ID_MODEL": "PTU"})},
+    devices={
+        "usb1": DeviceRecord(
+            "usb1",
+            (
+                DeviceNode(Path("/dev/ttyUSB0"), {"ID_MODEL": "PTU"}, "00"),
+                DeviceNode(Path("/dev/bus/usb/001/002"), {}),
+            ),
+            bus="usb",
+            port="1-4.2",
+            parent="usb:1-4",
+            interfaces=(DeviceInterface("00", "ff:ff:ff", "ftdi_sio"),),
+            driver="ftdi_sio",
+            vendor="0403",
+            product="6001",
+            serial="A9",
+            name="FTDI FT232R",
+            first_s=1_700_000_000.5,
+            since_s=1_700_000_001.5,
+        )
+    },
+    known_devices={
+        known.identity: known
+        for known in (
+            KnownDevice("usb 0403:6001 A9", "FTDI FT232R", "usb:1-4.2", 1_700_000_000.5, 2.0e9),
+            KnownDevice("usb 16c0:05df at 1-1", "", "usb:1-1", 1.0, 2.0),
+        )
+    },
     mounts={
         "spot__eye__camera": MountPose(
             "spot__eye__camera", (0.1, 0.0, 1.0), (0.0, 0.2, 0.0), "person"
@@ -322,8 +356,19 @@ async def test_file_of_another_version_is_left_alone(tmp_path: Path) -> None:
     assert refused.value.code == "CATALOGUE_VERSION"
 
 
-OF_4 = replace(FULL, tries={}, is_stopped=False, rollbacks={})
+OF_5 = replace(
+    FULL, devices={}, known_devices={}, components={"eye": component(device=None, nodes=())}
+)
+THE_5 = (
+    "DROP TABLE device_nodes; DROP TABLE device_interfaces; DROP TABLE known_devices;"
+    "ALTER TABLE claims DROP COLUMN nodes; DROP TABLE devices;"
+    "CREATE TABLE devices (id TEXT PRIMARY KEY, node TEXT NOT NULL, properties TEXT NOT NULL)"
+    " STRICT; INSERT INTO devices VALUES ('usb1', '/dev/ttyUSB0', '{}');"
+    "UPDATE claims SET device = 'usb1' WHERE name = 'port';"
+)
+OF_4 = replace(OF_5, tries={}, is_stopped=False, rollbacks={})
 THE_4 = (
+    f"{THE_5}"
     "ALTER TABLE drives DROP COLUMN mark;"
     "DROP TABLE tries; DROP TABLE rollbacks; ALTER TABLE host DROP COLUMN stopped;"
     "ALTER TABLE payloads ADD COLUMN attempts INTEGER NOT NULL DEFAULT 0;"
@@ -333,6 +378,7 @@ OLDER = {
     1: (f"{THE_4} DROP TABLE goals; DROP TABLE former;", replace(OF_4, goals={}, former={})),
     2: (f"{THE_4} DROP TABLE former;", replace(OF_4, former={})),
     3: (THE_4, OF_4),
+    4: (THE_5, OF_5),
 }
 """Schema → what makes it of the present one, and what it can hold of `FULL`."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -186,6 +187,15 @@ def test_no_daemon_is_told_with_its_own_exit_code(tmp_path: Path) -> None:
 def test_the_usual_sockets_are_tried_in_turn(tmp_path: Path) -> None:
     environment = {"XDG_RUNTIME_DIR": str(tmp_path / "run"), "XDG_STATE_HOME": str(tmp_path)}
     nondum("status", **environment).refused(4, "/run/nondum/control.sock")
+
+
+def test_the_socket_that_a_killed_daemon_left_is_named(tmp_path: Path) -> None:
+    left = tmp_path / "run/nondum/control.sock"
+    left.parent.mkdir(parents=True)
+    with socket.socket(socket.AF_UNIX) as daemon:
+        daemon.bind(str(left))
+    environment = {"XDG_RUNTIME_DIR": str(tmp_path / "run"), "XDG_STATE_HOME": str(tmp_path)}
+    nondum("status", **environment).refused(4, str(left))
 
 
 def test_a_refusal_is_json_where_json_was_asked_for(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ from nondum.transport.peers.public_file import parse_host
 
 pytestmark = pytest.mark.anyio
 
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 CODE = re.compile(r"code  (\d{3} \d{3})")
 
 

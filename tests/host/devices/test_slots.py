@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nondum.host.catalogue.records import DeviceNode
 from nondum.host.devices import DeviceSlotSource
 from nondum.host.devices.slots import parse_slot
 from nondum.host.events import DeviceAppeared, DeviceRemoved, Event
@@ -32,7 +33,7 @@ async def watching(*folders: Path) -> AsyncIterator[asyncio.Queue[Event]]:
 
 
 async def heard(told: asyncio.Queue[Event]) -> Event:
-    return await asyncio.wait_for(told.get(), 5.0)
+    return await asyncio.wait_for(told.get(), 30.0)
 
 
 @pytest.mark.anyio
@@ -40,7 +41,8 @@ async def test_devices_that_are_there_are_told(tmp_path: Path) -> None:
     (tmp_path / "front.toml").write_text(CAMERA)
     async with watching(tmp_path) as told:
         event = await heard(told)
-    assert event == DeviceAppeared("front", Path("/dev/video0"), {"ID_BUS": "usb"})
+    assert isinstance(event, DeviceAppeared)
+    assert event.found.nodes == (DeviceNode(Path("/dev/video0"), {"ID_BUS": "usb"}),)
 
 
 @pytest.mark.anyio
@@ -67,7 +69,7 @@ async def test_device_that_changes_is_replugged(tmp_path: Path) -> None:
         assert await heard(told) == DeviceRemoved("front")
         event = await heard(told)
         assert isinstance(event, DeviceAppeared)
-        assert event.node == Path("/dev/video1")
+        assert event.found.nodes[0].node == Path("/dev/video1")
 
 
 @pytest.mark.anyio
@@ -101,6 +103,9 @@ async def test_two_folders_keep_their_devices_apart(tmp_path: Path) -> None:
         pytest.param('[device]\nnode = ""', id="empty node"),
         pytest.param("[device]\nnode = 3", id="node is no text"),
         pytest.param('[device]\nnode = "/dev/a"\nnodes = []', id="unknown key"),
+        pytest.param("[device]\nnodes = []", id="no nodes"),
+        pytest.param('[device]\nnodes = ["/dev/a"]', id="node is no table"),
+        pytest.param('[device]\nnodes = [{ node = "/dev/a" }]\nx = 1', id="unknown key of many"),
         pytest.param('[device]\nnode = "/dev/a"\n[other]', id="unknown table"),
         pytest.param('[device]\nnode = "/dev/a"\nproperties = 1', id="properties are no table"),
         pytest.param('[device]\nnode = "/dev/a"\nproperties = { A = 1 }', id="no string"),
@@ -117,3 +122,14 @@ def test_any_text_is_read_or_refused(text: str) -> None:
         parse_slot(text, "x.toml")
     except ConfigRefused as refused:
         assert refused.code == "DEVICE_SLOT"
+
+
+def test_device_of_several_nodes_has_what_they_share_and_what_each_has() -> None:
+    text = """[device]
+nodes = [{ node = "/dev/video0" }, { node = "/dev/video1", properties = { N = "1" } }]
+properties = { ID_VENDOR_ID = "046d" }
+"""
+    assert parse_slot(text, "a.toml") == (
+        DeviceNode(Path("/dev/video0"), {"ID_VENDOR_ID": "046d"}),
+        DeviceNode(Path("/dev/video1"), {"ID_VENDOR_ID": "046d", "N": "1"}),
+    )

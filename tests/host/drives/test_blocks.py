@@ -25,6 +25,7 @@ from nondum.host import events
 from nondum.host.catalogue.records import DriveState, Step
 from nondum.host.drives import filesystems, mounting, nodes
 from nondum.host.drives.blocks import Accepts, BlockSource
+from nondum.host.drives.mounts import mounted_below
 from nondum.host.drives.source import DriveSource
 from nondum.host.lifecycle.folders import Folders
 from nondum.sdk.errors import DriveGone, PayloadRefused
@@ -96,7 +97,7 @@ async def test_block_device_becomes_a_drive_and_is_safe_to_pull(tmp_path: Path) 
             await host.until_gone(LAMP_ID)
         assert not host.snapshot.drives
         assert not left_over(host.folders)
-        assert not mounting.mounted_below(host.folders.mounts)
+        assert not mounted_below(host.folders.mounts)
 
 
 async def test_device_that_was_there_before_the_daemon_is_read(tmp_path: Path) -> None:
@@ -115,7 +116,7 @@ async def test_drive_that_fails_while_it_is_copied_is_let_go(tmp_path: Path) -> 
             (drive,) = host.snapshot.drives
             assert [problem.code for problem in drive.problems] == ["DRIVE_GONE"]
             await host.until_gone(LAMP_ID)
-            await host.until(lambda: not mounting.mounted_below(host.folders.mounts))
+            await host.until(lambda: not mounted_below(host.folders.mounts))
             assert not [path for path in left_over(host.folders) if path.name != "mounts"]
 
 
@@ -168,7 +169,7 @@ async def test_mounts_left_by_a_killed_daemon_are_undone(tmp_path: Path) -> None
     with attached(image(tmp_path, Part("lamp", LAMP))) as node:
         mounting.mount(node, folders.mounts / "left", "ext4")
         async with living(tmp_path):
-            assert not mounting.mounted_below(folders.mounts)
+            assert not mounted_below(folders.mounts)
             assert not list(folders.mounts.iterdir())
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from nondum.host.drives.uses import Machine as Places
 from nondum.host.helper.disks import Disks
 from nondum.sdk.errors import NondumError
 
@@ -29,12 +30,8 @@ class Machine:
 
     @property
     def disks(self) -> Disks:
-        return Disks(
-            sys=self.root / "sys",
-            fstab=self.root / "fstab",
-            proc=self.root / "proc",
-            dev=self.root / "dev",
-        )
+        root = self.root
+        return Disks(machine=Places(root / "sys", root / "proc", root / "dev", root / "etc"))
 
     def judge(self, device: str = "sdb1", diskseq: int | None = 7) -> Path:
         return self.disks.node(device, diskseq, ours=Path("/run/nondum/mounts"))
@@ -55,7 +52,8 @@ def machine(root: Path, place: str = USB) -> Machine:
     (root / "proc/self").mkdir(parents=True)
     (root / "proc/self/mountinfo").write_text("22 1 8:1 / / rw - ext4 /dev/sda1 rw\n")
     (root / "proc/swaps").write_text("Filename Type Size Used Priority\n")
-    (root / "fstab").write_text("# comment\nUUID=1-2 / ext4 defaults 0 1\n")
+    (root / "etc").mkdir()
+    (root / "etc/fstab").write_text("# comment\nUUID=1-2 / ext4 defaults 0 1\n")
     (root / "dev/disk/by-uuid").mkdir(parents=True)
     os.mknod(root / "dev/sdb1", stat.S_IFBLK | 0o600, os.makedev(*NUMBER))
     os.mknod(root / "dev/sdb", stat.S_IFBLK | 0o600, os.makedev(8, 16))
@@ -67,10 +65,16 @@ def stick(tmp_path: Path) -> Iterator[Machine]:
     yield machine(tmp_path)
 
 
-def refused(machine: Machine, words: str, device: str = "sdb1", diskseq: int | None = 7) -> None:
+def refused(
+    machine: Machine,
+    words: str,
+    device: str = "sdb1",
+    diskseq: int | None = 7,
+    code: str = "HELPER_REFUSED",
+) -> None:
     with pytest.raises(NondumError) as error:
         machine.judge(device, diskseq)
-    assert error.value.code == "HELPER_REFUSED"
+    assert error.value.code == code
     assert words in str(error.value)
 
 
@@ -102,22 +106,23 @@ def test_what_is_not_there_is_refused(stick: Machine) -> None:
 def test_what_is_mounted_elsewhere_is_left_alone(stick: Machine) -> None:
     mountinfo = stick.root / "proc/self/mountinfo"
     mountinfo.write_text("30 22 8:17 / /home rw - ext4 /dev/sdb1 rw\n")
-    refused(stick, "mounted already")
+    refused(stick, "mounted on /home")
+    mountinfo.write_text("30 22 8:17 / /media/ann/STICK rw - ext4 /dev/sdb1 rw\n")
+    refused(stick, "mounted on /media/ann/STICK", code="DRIVE_MOUNTED")
     mountinfo.write_text("30 22 8:17 / /run/nondum/mounts/sdb1-7.read rw - ext4 /dev/sdb1 rw\n")
     assert stick.judge()
 
 
-@pytest.mark.parametrize("spec", ["{dev}/sdb1", "UUID=AB-CD", 'UUID="AB-CD"'])
+@pytest.mark.parametrize("spec", ["/dev/sdb1", "UUID=AB-CD", 'UUID="AB-CD"'])
 def test_what_fstab_names_is_the_machine_s_own(stick: Machine, spec: str) -> None:
     (stick.root / "dev/disk/by-uuid/AB-CD").symlink_to("../../sdb1")
-    line = spec.format(dev=stick.root / "dev")
-    (stick.root / "fstab").write_text(f"{line} /media/backup vfat noauto,user 0 0\n")
+    (stick.root / "etc/fstab").write_text(f"{spec} /media/backup vfat noauto,user 0 0\n")
     refused(stick, "fstab")
 
 
 def test_swap_and_parts_of_other_devices_are_left_alone(stick: Machine) -> None:
     swaps = stick.root / "proc/swaps"
-    swaps.write_text(f"Filename Type Size Used Priority\n{stick.root}/dev/sdb1 partition 1 0 -2\n")
+    swaps.write_text("Filename Type Size Used Priority\n/dev/sdb1 partition 1 0 -2\n")
     refused(stick, "swaps")
     swaps.unlink()
     (stick.disk / "sdb1/holders/dm-0").mkdir()

@@ -21,6 +21,7 @@ WORDS: dict[str, st.SearchStrategy[Any]] = {
     "device": st.from_regex(requests.DEVICE, fullmatch=True),
     "diskseq": st.none() | NUMBERS,
     "filesystem": st.from_regex(requests.FILESYSTEM, fullmatch=True),
+    "state": st.from_regex(requests.STATE, fullmatch=True),
     "use": st.sampled_from(["read", "handover"]),
     "drive": DRIVES,
     "component": st.from_regex(requests.COMPONENT, fullmatch=True),

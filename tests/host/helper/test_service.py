@@ -10,6 +10,7 @@ import pytest
 from tests.host.helper.test_disks import Machine, machine
 
 from nondum.host.cgroups.cages import NoTree
+from nondum.host.feedback.lamps import Lamps
 from nondum.host.helper import requests, service
 from nondum.host.helper.nodes import Nodes
 from nondum.host.helper.requests import Request
@@ -29,7 +30,8 @@ def stick(tmp_path: Path) -> Machine:
 @pytest.fixture
 def root(stick: Machine, tmp_path: Path) -> Service:
     nodes = Nodes(tmp_path / "nodes", NOBODY, sys=tmp_path / "sys")
-    return Service(NOBODY, tmp_path / "mounts", stick.disks, nodes, NoTree())
+    lamps = Lamps((), tmp_path / "lamps.json")
+    return Service(NOBODY, tmp_path / "mounts", stick.disks, nodes, NoTree(), lambda: lamps)
 
 
 def refused(root: Service, request: Request) -> str:

@@ -22,7 +22,7 @@ from nondum.host.lifecycle.tries import STEADY_S
 from nondum.host.workers import Timing, Workers
 
 HOST = "spot"
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 
 LAMP = '''"""A lamp that does nothing, well."""
 from nondum.sdk import Output, Unit, behaviour, hookimpl

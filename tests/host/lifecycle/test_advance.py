@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.host.devices.sightings import appeared
 
 from nondum.host import effects, events
 from nondum.host.catalogue.records import (
@@ -297,12 +298,12 @@ def test_worker_that_fails_before_activation_takes_its_payload_along() -> None:
 
 
 def test_device_goes_to_who_needs_it() -> None:
-    port = events.DeviceAppeared("usb1", Path("/dev/ttyUSB0"), {"ID_MODEL": "PTU"})
-    other = events.DeviceAppeared("usb2", Path("/dev/ttyUSB1"), {"ID_MODEL": "other"})
+    port = appeared("usb1", "/dev/ttyUSB0", ID_MODEL="PTU")
+    other = appeared("usb2", "/dev/ttyUSB1", ID_MODEL="other")
     before = active(need="PT*")
     assert not before.components["eye"].is_ready
     state, done = after(other, port, state=before)
-    assert done == [effects.AttachDevice("eye", "port", state.devices["usb1"])]
+    assert done == [effects.AttachDevice("eye", "port", state.devices["usb1"].nodes)]
     assert state.components["eye"].is_ready
     state, done = after(events.DeviceRemoved("usb1"), state=state)
     assert done == [effects.DetachDevice("eye", "port", "usb1")]
@@ -310,7 +311,7 @@ def test_device_goes_to_who_needs_it() -> None:
 
 
 def test_contested_device_stays_and_the_contest_is_told() -> None:
-    port = events.DeviceAppeared("usb1", Path("/dev/ttyUSB0"), {"ID_MODEL": "PTU"})
+    port = appeared("usb1", "/dev/ttyUSB0", ID_MODEL="PTU")
     held, _ = after(port, state=active(id="zoom", need="PTU"))
     rival = way_to_active("k2", "b", "arm", "PTU", payload_id="org.y")
     state, _ = after(drive("b"), *rival, state=held)
@@ -383,7 +384,7 @@ HAPPENINGS: list[Event] = [
     events.WorkerExited("eye", "test"),
     events.WorkerFailed("arm", (PROBLEM,)),
     events.WorkerReady("eye", PluginDescription("eye", "1.0")),
-    events.DeviceAppeared("usb1", Path("/dev/x"), {"ID_MODEL": "PTU"}),
+    appeared("usb1", "/dev/x", ID_MODEL="PTU"),
     events.DeviceRemoved("usb1"),
 ]
 

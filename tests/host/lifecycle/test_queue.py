@@ -57,7 +57,7 @@ async def test_a_turn_is_had_and_given_back_once(steps: list[str]) -> None:
         else:
             queue.leave("a")
     queue.leave("a")
-    async with asyncio.timeout(1):
+    async with asyncio.timeout(30):
         await queue.enter("b", lambda ahead: None)
         waits = asyncio.create_task(queue.enter("c", lambda ahead: None))
         await asyncio.sleep(0)

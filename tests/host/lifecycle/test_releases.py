@@ -9,6 +9,7 @@ import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+from tests.host.devices.sightings import appeared
 from tests.host.lifecycle.test_advance import (
     AT,
     PROBLEM,
@@ -79,7 +80,7 @@ def test_it_takes_over_in_one_revision() -> None:
 
 
 def test_ranks_mounts_and_devices_are_kept() -> None:
-    port = events.DeviceAppeared("usb1", Path("/dev/x"), {"ID_MODEL": "PTU"})
+    port = appeared("usb1", "/dev/x", ID_MODEL="PTU")
     rival = way_to_active("k9", "c", "arm", "PTU", payload_id="org.y")
     said = events.MountSet("spot__eye__camera", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     before, _ = after(port, drive("c"), *rival, said, state=active(need="PTU"))
@@ -90,12 +91,12 @@ def test_ranks_mounts_and_devices_are_kept() -> None:
     assert state.components["eye"].rank == before.components["eye"].rank
     assert state.components["eye"].devices[0].device == "usb1"
     assert state.components["arm"].devices[0].device is None
-    assert effects.AttachDevice("eye", "port", state.devices["usb1"]) in done
+    assert effects.AttachDevice("eye", "port", state.devices["usb1"].nodes) in done
     assert state.mounts["spot__eye__camera"].origin == "person"
 
 
 def test_device_goes_to_a_component_that_has_another_name_now() -> None:
-    port = events.DeviceAppeared("usb1", Path("/dev/x"), {"ID_MODEL": "PTU"})
+    port = appeared("usb1", "/dev/x", ID_MODEL="PTU")
     rival = way_to_active("k9", "c", "arm", "PTU", payload_id="org.y")
     before, _ = after(port, drive("c"), *rival, state=active(need="PTU"))
     entered = events.PayloadActivated("k2", (component("gaze", "k2", "PTU"),))

@@ -17,7 +17,7 @@ from nondum.transport.peers import HostKeys, PeerKey, PeerRefused, fingerprint
 
 pytestmark = pytest.mark.anyio
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 Row = dict[str, Any]
 
 

@@ -105,7 +105,7 @@ class House:
         return self.workers.behave(component, behaviour, arguments)
 
     async def until(
-        self, kind: type[_E], test: Callable[[_E], bool] = lambda _: True, timeout_s: float = 15.0
+        self, kind: type[_E], test: Callable[[_E], bool] = lambda _: True, timeout_s: float = 60.0
     ) -> _E:
         """Wait for an event that has come, or comes."""
         async with asyncio.timeout(timeout_s):
@@ -154,7 +154,7 @@ def is_alive(pid: int) -> bool:
     return status.rpartition(")")[2].split()[0] not in {"Z", "X"}
 
 
-async def until_gone(pid: int, timeout_s: float = 5.0) -> None:
+async def until_gone(pid: int, timeout_s: float = 30.0) -> None:
     """Wait for a process to end, whosever child it is."""
     try:
         descriptor = os.pidfd_open(pid)

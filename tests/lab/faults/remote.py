@@ -15,7 +15,7 @@ from demo.namespaces import Cable, Machine
 
 from nondum.transport.peers import HostKeys
 
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 PORT = 7410
 
 Told = dict[str, Any]

@@ -57,7 +57,7 @@ def test_host_that_starts_anew_before_its_death_is_noticed_does_nothing_twice(ho
     mule.start()
     rover.loses(mule)
     assert rover.meets(mule)["epoch"] == mule.epoch
-    assert call.get(timeout=10)["failure"] == "PEER_LOST"
+    assert call.get(timeout=60)["failure"] == "PEER_LOST"
     hosts.all_see({"rover": {}, "mule": {}, "base": {}})
     assert mule.ask("status")["running"] == 0
     hosts.check_work()

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from tests.lab.machines.building import built
 from tests.lab.machines.lab import Lab
-from tests.lab.machines.recipe import X86_64
-from tests.lab.machines.scenario import Result, Scenario, keep, run_all, scenarios
+from tests.lab.machines.recipe import RECIPES, X86_64
+from tests.lab.machines.scenario import SHORT, Result, Scenario, keep, run_all, scenarios
 from tests.lab.machines.shell import talk
 from tests.lab.machines.software import software
 
@@ -28,17 +28,18 @@ def main(words: Sequence[str]) -> int:
         print(*(f"{s.name:{width}}  {s.sentence}" for s in known.values()), sep="\n")
         return 0
     began = time.monotonic()
-    machine = built(X86_64)
+    machine = built(RECIPES[asked.arch])
     _told("the machine is built", began)
     began = time.monotonic()
     disk = software(machine, asked.commit)
     _told("nondum is built for it", began)
     work = Path(tempfile.mkdtemp(prefix="nondum-lab-"))
-    lab = Lab(machine, disk, work)
+    lab = Lab(machine, disk, asked.commit, work)
     try:
         if asked.shell:
             return talk(lab)
-        return _run(lab, [known[name] for name in asked.scenario or known], asked)
+        names = asked.scenario or (SHORT if asked.short else known)
+        return _run(lab, [known[name] for name in names], asked)
     finally:
         lab.close()
         shutil.rmtree(work)
@@ -50,7 +51,7 @@ def _run(lab: Lab, wanted: Sequence[Scenario], asked: argparse.Namespace) -> int
         results.append(result)
         _show(result)
         if asked.keep and result.kept is None:
-            print(f"    kept: {keep(result.scenario.name, lab.machines)}")
+            print(f"    kept: {keep(result.scenario.name, lab)}")
     failed = sum(1 for r in results if r.failure)
     for result in results:
         if result.failure:
@@ -75,7 +76,11 @@ def _arguments(known: dict[str, Scenario], words: Sequence[str]) -> argparse.Nam
     parser.add_argument(
         "scenario", nargs="*", metavar="SCENARIO", help="which ones (all)", choices=[*known, []]
     )
+    parser.add_argument(
+        "--arch", choices=RECIPES, default=X86_64.name, help="its processor (%(default)s)"
+    )
     parser.add_argument("--list", action="store_true", help="tell which scenarios there are")
+    parser.add_argument("--short", action="store_true", help=f"only {', '.join(SHORT)}")
     parser.add_argument("--keep", action="store_true", help="keep consoles and journals of all")
     parser.add_argument("--commit", help="nondum as of a commit, not as the checkout is now")
     parser.add_argument("--shell", action="store_true", help="boot one and run what you type")

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.lab.machines.cache import call, kept
+from tests.lab.machines.foreign import see_it_run
 from tests.lab.machines.initramfs import write_initramfs
 from tests.lab.machines.recipe import INSIDE, Recipe
 
@@ -47,7 +48,9 @@ class Built:
 
 
 def built(recipe: Recipe) -> Built:
-    """The machine of a recipe, from the cache or built now (about a minute)."""
+    """The machine of a recipe, from the cache or built now (a minute; ten, where the machine that
+    it is built on has another processor)."""
+    see_it_run(recipe)
     return Built(recipe, kept(f"{recipe.name}-{recipe.key}", lambda f: _build(recipe, f)))
 
 

@@ -6,10 +6,13 @@ import fcntl
 import os
 import shutil
 import subprocess
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 DONE = ".done"
+IN_USE_S = 3 * 3600.0
+"""A run that began longer ago than this is over."""
 MODEST = ("nice", "-n", os.environ.get("NONDUM_LAB_NICE", "15"))
 """Begins the command of what takes much of a processor: others may need it, too."""
 
@@ -24,7 +27,7 @@ def kept(name: str, make: Callable[[Path], None]) -> Path:
     """The folder of this name in the cache; `make` fills it when it is not there.
 
     Names that begin alike up to their last hyphen are versions of one thing: the two used last
-    stay. Two laboratories that want the same wait for each other.
+    stay, and what another laboratory may be using. Two that want the same wait for each other.
     """
     cache = cache_folder()
     cache.mkdir(parents=True, exist_ok=True)
@@ -60,5 +63,10 @@ def call(*command: str | Path, env: dict[str, str] | None = None) -> str:
 
 def _forget(cache: Path, kind: str) -> None:
     versions = [f for f in cache.iterdir() if f.name.rpartition("-")[0] == kind]
-    for folder in sorted(versions, key=lambda f: f.stat().st_mtime)[:-2]:
-        shutil.rmtree(folder, ignore_errors=True)
+    for folder in sorted(versions, key=_used)[:-2]:
+        if _used(folder) < time.time() - IN_USE_S:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _used(folder: Path) -> float:
+    return folder.stat().st_mtime

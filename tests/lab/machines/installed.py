@@ -13,11 +13,11 @@ from tests.lab.machines.machine import Machine
 PATIENCE_S = 400.0
 CONFIGURATION = """
 [host]
-name = "spot"
+name = "{name}"
 [drives]
 allow_unsigned = true
 [peers]
-enabled = false
+enabled = {has_peers}
 [workers]
 startup_s = 200
 """
@@ -34,10 +34,15 @@ cp /opt/nondum/packaging/sysusers.d/*.conf /usr/lib/sysusers.d/ 2>/dev/null || t
 cp /opt/nondum/packaging/tmpfiles.d/*.conf /usr/lib/tmpfiles.d/ 2>/dev/null || true
 systemd-sysusers
 systemd-tmpfiles --create
+mkdir -p /etc/systemd/system/nondum.service.d
+printf '[Service]\\nTimeoutStartSec=900\\nWatchdogSec=300\\n' \\
+    >/etc/systemd/system/nondum.service.d/slow.conf
 systemctl daemon-reload
 systemctl -q enable nondum.service
 """
+"""Machines whose processors are emulated, and shared, get more time than real ones."""
 SERVICE = "nondum.service"
+NAME = "spot"
 LOOK_S = 2.0
 """Between two looks at the status: each takes a second of an emulated processor."""
 REPLUGS = 3
@@ -48,8 +53,9 @@ View = dict[str, Any]
 class Installed:
     """The nondum of one machine."""
 
-    def __init__(self, machine: Machine) -> None:
-        self.machine = machine
+    def __init__(self, machine: Machine, name: str = NAME) -> None:
+        """`name` is what the host is called; it looks for others where it has a network."""
+        self.machine, self.name = machine, name
 
     def install(self) -> None:
         """Install it from the machine's first further disk; nothing is started."""
@@ -58,7 +64,9 @@ class Installed:
 
     def configure(self, more: str = "") -> None:
         """Write its configuration, with some more lines of its table `[workers]`."""
-        self.machine.put("/etc/nondum/host.toml", CONFIGURATION + more)
+        has_peers = "true" if self.machine.socket else "false"
+        text = CONFIGURATION.format(name=self.name, has_peers=has_peers)
+        self.machine.put("/etc/nondum/host.toml", text + more)
 
     def start(self) -> None:
         """Start the service and wait until its command line is answered.
@@ -67,6 +75,10 @@ class Installed:
         """
         self.machine.run(f"systemctl start {SERVICE}", timeout_s=PATIENCE_S)
         self.machine.until("an answer", self._first_answer, PATIENCE_S)
+
+    def begin_to_start(self) -> None:
+        """Have systemd start the service, and wait for nothing: `start` must follow."""
+        self.machine.run(f"systemctl start --no-block {SERVICE}", timeout_s=PATIENCE_S)
 
     def wait_until_started(self) -> None:
         """Wait until somebody answers, whoever started the service."""
@@ -95,29 +107,44 @@ class Installed:
 
         return self.machine.until(what, found, PATIENCE_S, LOOK_S)
 
-    def bring(self, image: Path, payload: str) -> str:
+    def bring(self, image: Path, payload: str, *, port: str | None = None) -> str:
         """Plug a stick in and wait until its payload is active; answers its name for `pull`.
 
         Drives that do not answer for ten seconds count as broken. Where the emulated processors
         have to wait that long for real ones, this does as people are told: pulls, and plugs again.
         """
         for _ in range(REPLUGS):
-            stick = self.machine.plug(image)
-            if self.until(f"{payload} or a stalled drive", partial(_active_or_stalled, payload)):
+            stick = self.machine.plug(image, port=port)
+            if self.until(f"{payload} or a stalled drive", partial(active_or_stalled, payload)):
                 return stick
             self.machine.pull(stick)
         raise AssertionError(f"the drive of {payload} stalled {REPLUGS} times")
+
+    def components(self) -> list[View]:
+        """What `nondum components --json` shows, peers' components too; nothing while nobody
+        answers."""
+        seen = self.machine.attempt("nondum components --json", timeout_s=PATIENCE_S)
+        rows: list[View] = seen.json() if seen.status == 0 else []
+        return rows
 
     def until_component(self, component: str, state: str) -> View:
         """Wait until a component is in a state."""
 
         def found() -> View | None:
-            seen = self.machine.attempt("nondum components --json")
-            rows: list[View] = seen.json() if seen.status == 0 else []
-            states = [row for row in rows if row["component"] == component]
+            states = [row for row in self.components() if row["component"] == component]
             return states[0] if states and states[0]["state"] == state else None
 
         return self.machine.until(f"{component} {state}", found, PATIENCE_S, LOOK_S)
+
+    def until_peer(self, peer: str, state: str) -> View:
+        """Wait until another host is `here` or `away`."""
+
+        def found() -> View | None:
+            seen = self.machine.attempt("nondum peers --json", timeout_s=PATIENCE_S)
+            rows: list[View] = seen.json() if seen.status == 0 else []
+            return next((r for r in rows if (r["peer"], r["state"]) == (peer, state)), None)
+
+        return self.machine.until(f"{peer} {state}", found, PATIENCE_S, LOOK_S)
 
     def until_goal(self, goal: str, state: str) -> View:
         """Wait until a goal, in PDDL, is in a state; one that is kept and true `holds`."""
@@ -160,7 +187,7 @@ def _payload_in(payload: str, state: str, view: View) -> View | None:
     return rows[0] if rows[0]["state"] == state else None
 
 
-def _active_or_stalled(payload: str, view: View) -> bool | None:
+def active_or_stalled(payload: str, view: View) -> bool | None:
     """Whether it is active; None while it is neither that nor kept from it by its drive."""
     if _payload_in(payload, "active", view):
         return True

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+import base64
 import os
 import signal
 import subprocess
@@ -14,29 +14,45 @@ from typing import TypeVar
 from tests.lab.machines.agent import Agent, CommandFailed, MachineSilent, Outcome
 from tests.lab.machines.building import Built
 from tests.lab.machines.cache import MODEST, call
-from tests.lab.machines.qmp import Qmp, QmpError
+from tests.lab.machines.network import FIND, PREFIX, Socket
+from tests.lab.machines.qmp import Qmp
+from tests.lab.machines.usb import CONTROLLER, Usb
 
 BOOT_S = 400.0
 """Nine seconds on an idle machine; this one may be shared by many."""
 PATIENCE_S = 400.0
-"""How long a program inside may run, unless its caller says otherwise."""
+"""How long a program inside may run, unless its caller says otherwise. All time-outs are those of
+an x86_64, and multiplied by the recipe's slowness."""
 POLL_S = 0.2
 TICKS_HZ = os.sysconf("SC_CLK_TCK")
 T = TypeVar("T")
+OURS = ("-accel", "tcg,thread=multi,tb-size=512")
+"""A clock that goes with ours: where a processor has to wait for a real one, time passes for it."""
+ITS_OWN = ("-accel", "tcg,thread=single,tb-size=512", "-icount", "shift=1,sleep=on")
+"""A clock that goes by instructions, 500 million a second, and with ours while there is nothing to
+do: however slow the emulation is, and whoever shares the real processors, it is a computer of one
+speed. It takes half as much again."""
 
 
 class Machine:
     """A machine with a disk of its own, which outlives its boots. Call `close` at last."""
 
     def __init__(
-        self, built: Built, work: Path, *, memory_mb: int = 2048, drives: tuple[Path, ...] = ()
+        self,
+        built: Built,
+        work: Path,
+        *,
+        memory_mb: int = 2048,
+        drives: tuple[Path, ...] = (),
+        clock: tuple[str, ...] = OURS,
+        socket: Socket | None = None,
     ) -> None:
         """`work` keeps its disk, console and sockets (a short path: see unix(7)); `drives` are
-        read-only disks that it has for good, `/dev/vdb` and on."""
-        self.built, self.work = built, work
+        read-only disks that it has for good, `/dev/vdb` and on; `clock` is what its time is;
+        `socket` is where it is plugged into a network, if it has one."""
+        self.built, self.work, self.socket, self._clock = built, work, socket, clock
         self._memory_mb, self._drives = memory_mb, drives
         self._qemu: subprocess.Popen[bytes] | None = None
-        self._plugged = itertools.count(1)
         self._cpu_s = 0.0
         work.mkdir(parents=True, exist_ok=True)
         self._disk = work / "disk.qcow2"
@@ -51,17 +67,28 @@ class Machine:
         `more` goes on the kernel's command line. Raises `MachineSilent` with its console's end.
         """
         began = time.monotonic()
+        self.switch_on(more=more)
+        self.until_booted()
+        return time.monotonic() - began
+
+    def switch_on(self, *, more: str = "") -> None:
+        """The first half of `boot`, so that several boot at once: `until_booted` must follow."""
         with (self.work / "qemu.log").open("ab") as log:
             self._qemu = subprocess.Popen(
                 self._command(more), stdin=subprocess.DEVNULL, stdout=log, stderr=log
             )
+
+    def until_booted(self) -> None:
+        """The second half of `boot`. Raises `MachineSilent`."""
         try:
             self.qmp = self._connected(lambda: Qmp(self.work / "qmp"))
+            self._usb = Usb(self.qmp, self.until)
             self.agent = self._connected(lambda: Agent(self.work / "agent"))
-            self.agent.wait_for_boot(BOOT_S)
+            self.agent.wait_for_boot(BOOT_S * self.slowness)
         except MachineSilent as error:
             raise MachineSilent(f"{error}\n{self.last_words()}") from None
-        return time.monotonic() - began
+        if self.socket is not None:
+            self._join(self.socket)
 
     def cut_power(self) -> None:
         """End it at once: what its disk was not told to keep is lost."""
@@ -74,14 +101,14 @@ class Machine:
         """Press its reset button, and wait for the agent: what is plugged in stays so."""
         self.qmp.do("set-action", reboot="reset")
         self.qmp.do("system_reset")
-        self.agent.wait_for_boot(BOOT_S)
+        self.agent.wait_for_boot(BOOT_S * self.slowness)
 
     def shut_down(self, timeout_s: float = BOOT_S) -> None:
         """Have it go down as from its power button's menu."""
         assert self._qemu is not None
         self.agent.run("systemctl", "--no-block", "poweroff")
         self._cpu_s = self.cpu_s
-        self._qemu.wait(timeout_s)
+        self._qemu.wait(timeout_s * self.slowness)
         self._see_end()
 
     def close(self) -> None:
@@ -100,7 +127,7 @@ class Machine:
 
     def attempt(self, command: str, *, timeout_s: float = PATIENCE_S) -> Outcome:
         """Run a line of shell as root, whatever comes of it."""
-        outcome = self.agent.run("/bin/sh", "-c", command, timeout_s=timeout_s)
+        outcome = self.agent.run("/bin/sh", "-c", command, timeout_s=timeout_s * self.slowness)
         with (self.work / "commands.log").open("a", encoding="utf-8") as log:
             log.write(f"$ {command}\n{outcome.out}{outcome.err}[{outcome.status}]\n")
         return outcome
@@ -110,6 +137,13 @@ class Machine:
         data = content.encode() if isinstance(content, str) else content
         self.agent.put(path, data, mode)
 
+    def get(self, path: str) -> bytes:
+        """Read a file inside. Raises `CommandFailed`."""
+        outcome = self.agent.run("base64", path, timeout_s=PATIENCE_S)
+        if outcome.status != 0:
+            raise CommandFailed(str(outcome))
+        return base64.b64decode(outcome.out)
+
     def until(
         self,
         what: str,
@@ -118,7 +152,7 @@ class Machine:
         every_s: float = POLL_S,
     ) -> T:
         """Look until there is something to see. Raises `AssertionError` when there is not."""
-        deadline = time.monotonic() + timeout_s
+        deadline = time.monotonic() + timeout_s * self.slowness
         while (seen := look()) is None:
             if time.monotonic() > deadline:
                 raise AssertionError(f"not seen in {timeout_s:.0f} s: {what}")
@@ -131,34 +165,53 @@ class Machine:
 
     # What happens outside
 
-    def plug(self, image: Path) -> str:
-        """Plug a USB stick in; answers its name for `pull`."""
-        name = f"stick{next(self._plugged)}"
-        file = {"driver": "file", "filename": str(image)}
-        self.qmp.do("blockdev-add", driver="raw", node_name=name, file=file)
-        stick = {"drive": name, "id": name, "bus": "xhci.0", "removable": True}
-        self.qmp.do("device_add", driver="usb-storage", **stick)
-        return name
+    def plug(self, image: Path, *, port: str | None = None) -> str:
+        """Plug a USB stick in, at a free port if none is given (see `usb.py`); answers its name
+        for `pull`."""
+        return self._usb.plug_stick(image, port)
 
     def pull(self, name: str) -> None:
         """Pull a stick out, whatever it is doing."""
-        self.qmp.do("device_del", id=name)
-        self._until_let_go("blockdev-del", node_name=name)
+        self._usb.pull(name)
 
-    def plug_line(self) -> str:
-        """Plug a USB serial adapter in, at whose other end nobody is; answers its name."""
-        name = f"line{next(self._plugged)}"
-        self.qmp.do("chardev-add", id=name, backend={"type": "null", "data": {}})
-        adapter = {"chardev": name, "id": name, "bus": "xhci.0", "always_plugged": True}
-        self.qmp.do("device_add", driver="usb-serial", **adapter)
-        return name
+    def plug_hub(self, port: str | None = None) -> str:
+        """Plug a USB hub in, whose ports are then `<port>.1` and on; answers its name."""
+        return self._usb.plug_hub(port)
+
+    def unplug(self, name: str) -> None:
+        """Pull a hub out, and with it all that is plugged into it."""
+        self._usb.pull(name)
+
+    def plug_line(
+        self, path: Path | None = None, *, port: str | None = None, serial: str | None = None
+    ) -> str:
+        """Plug a USB serial adapter in (an FTDI, 0403:6001); answers its name for `pull_line`.
+
+        `path` is the unix socket at which an emulated instrument listens; it is called again
+        whenever it hangs up. None: nobody is at the other end.
+        """
+        return self._usb.plug_line(path, port, serial)
 
     def pull_line(self, name: str) -> None:
         """Pull a serial adapter out."""
-        self.qmp.do("device_del", id=name)
-        self._until_let_go("chardev-remove", id=name)
+        self._usb.pull(name)
+
+    def cut_cable(self) -> None:
+        """Part it from its network, without a word to either."""
+        assert self.socket is not None
+        self.socket.pull()
+
+    def plug_cable(self) -> None:
+        """Join it to its network again."""
+        assert self.socket is not None
+        self.socket.put_back()
 
     # What is left to see
+
+    @property
+    def slowness(self) -> float:
+        """What all time-outs are multiplied by (see `Recipe.slowness`)."""
+        return self.built.recipe.slowness
 
     @property
     def cpu_s(self) -> float:
@@ -186,27 +239,37 @@ class Machine:
         recipe = self.built.recipe
         serial = f"file,id=console,path={self.console},append=on"
         disks: list[str] = []
+        around, card = (self.socket.around, self.socket.card) if self.socket else ((), ())
         for image in self._drives:
             disks += ["-drive", f"file={image},format=raw,if=virtio,readonly=on"]
         return [
-            *("setpriv", "--pdeathsig", "KILL", *MODEST, recipe.program),
+            *("setpriv", "--pdeathsig", "KILL", *around, *MODEST, recipe.program),
             *("-nodefaults", "-display", "none", "-no-reboot"),
-            *("-accel", "tcg,thread=multi,tb-size=512", *recipe.machine),
+            *self._clock,
+            *recipe.machine,
             *("-smp", "2", "-m", str(self._memory_mb)),
             *("-kernel", self.built.kernel, "-initrd", self.built.initramfs),
-            *("-append", f"console={recipe.terminal} panic=-1 quiet {more}".strip()),
+            *("-append", f"console={recipe.terminal} panic=-1 quiet no_timer_check {more}".strip()),
             *("-drive", f"file={self._disk},format=qcow2,if=virtio", *disks),
             *("-chardev", serial, "-serial", "chardev:console"),
             *("-qmp", f"unix:{self.work / 'qmp'},server=on,wait=off"),
             *("-chardev", f"socket,id=agent,path={self.work / 'agent'},server=on,wait=off"),
             *("-device", "virtio-serial"),
             *("-device", "virtserialport,chardev=agent,name=org.nondum.lab"),
-            *("-device", "qemu-xhci,id=xhci,p2=8,p3=8"),
-            *("-device", "virtio-rng"),
+            *CONTROLLER,
+            *("-device", "virtio-rng", *card),
         ]
 
+    def _join(self, socket: Socket) -> None:
+        """Give its network card its address: nothing else there would."""
+        card = self.until("a network card", lambda: self._card(socket) or None)
+        self.run(f"ip link set {card} up && ip addr replace {socket.address}/{PREFIX} dev {card}")
+
+    def _card(self, socket: Socket) -> str:
+        return self.attempt(FIND.format(mac=socket.mac)).out.strip()
+
     def _connected(self, connect: Callable[[], T]) -> T:
-        deadline = time.monotonic() + BOOT_S
+        deadline = time.monotonic() + BOOT_S * self.slowness
         while time.monotonic() < deadline:
             assert self._qemu is not None
             if self._qemu.poll() is not None:
@@ -217,23 +280,10 @@ class Machine:
                 time.sleep(POLL_S)
         raise MachineSilent("QEMU does not listen")
 
-    def _until_let_go(self, command: str, **arguments: str) -> None:
-        """Remove what stood behind a device, once the guest has let go of that."""
-
-        def removed() -> bool | None:
-            try:
-                self.qmp.do(command, **arguments)
-            except QmpError as error:
-                if "in use" in str(error) or "is busy" in str(error):
-                    return None
-                raise
-            return True
-
-        self.until("the device let go", removed)
-
     def _see_end(self) -> None:
         assert self._qemu is not None
         self._qemu.wait()
         self._qemu = None
-        self.agent.close()
-        self.qmp.close()
+        for line in (getattr(self, "agent", None), getattr(self, "qmp", None)):
+            if line is not None:  # it was not heard of before its end
+                line.close()

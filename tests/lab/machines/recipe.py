@@ -14,7 +14,7 @@ INSIDE = HERE / "inside"
 PACKAGES = (
     *("systemd", "systemd-sysv", "udev", "dbus", "kmod", "procps", "util-linux", "iproute2"),
     *("python3", "python3-venv", "bubblewrap", "libseccomp2", "busybox-static"),
-    *("e2fsprogs", "dosfstools", "usbutils", "strace"),
+    *("e2fsprogs", "dosfstools", "usbutils", "libusb-1.0-0", "strace"),
 )
 WITHOUT = (
     *("/usr/share/doc/*", "/usr/share/man/*", "/usr/share/locale/*", "/usr/share/info/*"),
@@ -43,6 +43,8 @@ class Recipe:
     """Board and processor, as arguments of that."""
     terminal: str
     """The device of its first serial line."""
+    slowness: float = 1.0
+    """What time-outs are multiplied by; nothing else depends on it."""
     suite: str = "bookworm"
     packages: tuple[str, ...] = PACKAGES
     without: tuple[str, ...] = WITHOUT
@@ -53,12 +55,18 @@ class Recipe:
     @property
     def key(self) -> str:
         """A hash of all that its root file system is made of."""
-        parts = [json.dumps(asdict(self), sort_keys=True).encode()]
+        parts = [json.dumps(self._of_root, sort_keys=True).encode()]
         sources = [HERE / "building.py", HERE / "initramfs.py", *sorted(INSIDE.rglob("*"))]
         parts += [f.read_bytes() for f in sources if f.is_file()]
         return hashlib.sha256(b"\0".join(parts)).hexdigest()[:16]
 
+    @property
+    def _of_root(self) -> dict[str, object]:
+        """Those of its fields that its root file system depends on."""
+        return {name: value for name, value in asdict(self).items() if name not in HOW_IT_IS_RUN}
 
+
+HOW_IT_IS_RUN = frozenset({"program", "machine", "terminal", "slowness"})
 X86_64 = Recipe(
     name="x86_64",
     debian="amd64",
@@ -67,4 +75,14 @@ X86_64 = Recipe(
     machine=("-machine", "q35", "-cpu", "max"),
     terminal="ttyS0",
 )
-RECIPES = {recipe.name: recipe for recipe in (X86_64,)}
+AARCH64 = Recipe(
+    name="aarch64",
+    debian="arm64",
+    kernel="linux-image-arm64",
+    program="qemu-system-aarch64",
+    machine=("-machine", "virt", "-cpu", "cortex-a72"),
+    terminal="ttyAMA0",
+    slowness=3.0,
+)
+"""Stands for a Raspberry Pi 4 of 2 GB with its system: processor and memory, not its devices."""
+RECIPES = {recipe.name: recipe for recipe in (X86_64, AARCH64)}

@@ -13,10 +13,11 @@ from pathlib import Path
 from tests.lab.machines.agent import MachineSilent
 from tests.lab.machines.cache import cache_folder
 from tests.lab.machines.lab import Lab
-from tests.lab.machines.machine import Machine
 
 FOLDER = Path(__file__).parent / "scenarios"
 PACKAGE = "tests.lab.machines.scenarios"
+SHORT = ("starts", "stick", "yank", "neighbours")
+"""Those that every change is tried with (`./run tests`): some four minutes of two processors."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,15 +75,15 @@ def _run(scenario: Scenario, lab: Lab) -> tuple[str, str, Path | None]:
         return scenario.run(lab) or "", "", None
     except Exception as error:
         words = str(error).strip().splitlines() or [type(error).__name__]
-        kept = keep(scenario.name, lab.machines)
+        kept = keep(scenario.name, lab)
         return words[0], "".join(traceback.format_exception(error)), kept
 
 
-def keep(name: str, machines: Iterable[Machine]) -> Path:
+def keep(name: str, lab: Lab) -> Path:
     """Copy consoles, commands and journals to where they stay, in place of those of last time."""
-    folder = cache_folder() / "kept" / name
+    folder = cache_folder() / "kept" / lab.built.recipe.name / name
     shutil.rmtree(folder, ignore_errors=True)
-    for number, machine in enumerate(machines):
+    for number, machine in enumerate(lab.machines):
         target = folder / str(number)
         target.mkdir(parents=True)
         for log in machine.work.glob("*.log"):

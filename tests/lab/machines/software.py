@@ -54,7 +54,7 @@ def software(machine: Built, commit: str | None = None) -> Path:
     """The image of /opt/nondum with what this checkout has now, or had at a commit; from the cache
     or made now (ten seconds)."""
     kind = f"nondum-{machine.recipe.name}"
-    key = f"{_commit_key(commit) if commit else _key()}{machine.folder.name[-6:]}"
+    key = f"{_commit_key(commit) if commit else sources_key()}{machine.folder.name[-6:]}"
     return kept(f"{kind}-{key}", lambda folder: _make(machine, commit, folder)) / "disk.img"
 
 
@@ -124,7 +124,7 @@ def _extra(wheel: Path) -> str:
     return extras.get(wheel.name.partition("-")[0], "")
 
 
-def _key() -> str:
+def sources_key() -> str:
     """A hash of all that nondum is made from."""
     total = hashlib.sha256()
     names = call("git", "-C", CHECKOUT, "ls-files", "-co", "--exclude-standard", "--", *SOURCES)

@@ -24,7 +24,7 @@ from nondum_planner_fast_downward import FastDownwardPlanner
 from nondum_planner_fast_downward.engine import find_engine
 
 ENGINE = find_engine()
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 needs_engine = pytest.mark.skipif(
     ENGINE is None and "CI" not in os.environ, reason="no wheel with Fast Downward"
 )

@@ -16,7 +16,7 @@ from nondum.transport.bridge.sockets import dialling
 from nondum.transport.peers.drained import Drained
 from nondum.transport.peers.keys import HostKeys
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 T = TypeVar("T")
 
 

@@ -25,7 +25,7 @@ from demo.namespaces import Machine
 from nondum.transport.discovery import Announcement, Discovery, Hint
 from nondum.transport.peers.keys import HostKeys, PeerKey
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 @dataclass

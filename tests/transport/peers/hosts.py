@@ -38,7 +38,7 @@ from nondum.transport.peers import (
 )
 
 ROOT = Path(__file__).parents[3]
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 E = TypeVar("E", bound=PeerEvent)
 
 

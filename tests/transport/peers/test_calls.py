@@ -78,7 +78,7 @@ async def test_a_slow_reader_of_progress_gets_the_newest() -> None:
 async def test_notice_arrives_unanswered() -> None:
     async with two_hosts() as (rover, base):
         rover.node.notify(base.key, "moved", {"to": 3})
-        heard = await asyncio.wait_for(base.servant.notices.get(), 5)
+        heard = await asyncio.wait_for(base.servant.notices.get(), 30)
         assert heard == {"from": "rover", "method": "moved", "to": 3}
 
 
@@ -87,7 +87,7 @@ async def test_cancelled_caller_cancels_the_errand() -> None:
         task = asyncio.ensure_future(wait(rover, base))
         await base.servant.running.get()
         task.cancel()
-        assert await asyncio.wait_for(base.servant.ended.get(), 5) == "cancelled"
+        assert await asyncio.wait_for(base.servant.ended.get(), 30) == "cancelled"
 
 
 async def test_halted_call_says_so() -> None:
@@ -104,7 +104,7 @@ async def test_deadline_travels_and_ends_both_ends() -> None:
         errand = await base.servant.running.get()
         assert errand.ends_s - asyncio.get_running_loop().time() <= 0.2
         assert await raises(lambda: call) == ["DEADLINE"]
-        assert await asyncio.wait_for(base.servant.ended.get(), 5) == "cancelled"
+        assert await asyncio.wait_for(base.servant.ended.get(), 30) == "cancelled"
 
 
 async def test_too_long_a_request_is_refused_before_it_is_sent() -> None:
@@ -178,7 +178,7 @@ async def test_address_that_cannot_be_dialled_is_told() -> None:
 
 async def test_round_trip_is_measured() -> None:
     async with two_hosts() as (rover, base):
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(60):
             while rover.node.round_trip_s(base.key) is None:
                 await rover.node.call(base.key, "echo", {}, deadline_s=5)
 

@@ -11,6 +11,7 @@ from packaging.specifiers import InvalidSpecifier, SpecifierSet
 
 from nondum.sdk.description import DeviceNeed
 from nondum.wheelhouse import names, tables
+from nondum.wheelhouse.device_rules import wrong_rules
 from nondum.wheelhouse.tables import Form, Report, Table
 
 NAME = "payload.toml"
@@ -149,6 +150,8 @@ def _device(table: Table) -> DeviceNeed:
         match=table.strings("match"),
         optional=table.flag("optional"),
     )
+    for message, fix in wrong_rules(need.match):
+        table.wrong("match", message, fix)
     table.close()
     return need
 

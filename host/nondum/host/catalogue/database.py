@@ -16,7 +16,7 @@ from nondum.host.catalogue.records import ComponentRecord, JournalEntry, Rollbac
 from nondum.host.catalogue.state import HostState
 from nondum.sdk.errors import ConfigRefused, Problem
 
-SCHEMA = 4
+SCHEMA = 5
 
 _UPGRADES = {
     1: "CREATE TABLE goals (id TEXT PRIMARY KEY, text TEXT NOT NULL, pddl TEXT NOT NULL,"
@@ -36,6 +36,21 @@ _UPGRADES = {
     "CREATE TRIGGER journal_is_never_deleted BEFORE DELETE ON journal"
     " WHEN old.id > (SELECT max(id) FROM journal) - 1000"
     " BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;",
+    # Devices are told anew by every daemon that starts.
+    4: "UPDATE claims SET device = NULL; DROP TABLE devices;"
+    "ALTER TABLE claims ADD COLUMN nodes TEXT NOT NULL DEFAULT '[]';"
+    "CREATE TABLE devices (id TEXT PRIMARY KEY, bus TEXT NOT NULL, port TEXT NOT NULL,"
+    " parent TEXT NOT NULL, driver TEXT NOT NULL, vendor TEXT NOT NULL, product TEXT NOT NULL,"
+    " serial TEXT NOT NULL, name TEXT NOT NULL, first_s REAL NOT NULL, since_s REAL NOT NULL)"
+    " STRICT;"
+    "CREATE TABLE device_interfaces (device TEXT NOT NULL REFERENCES devices (id) ON DELETE"
+    " CASCADE, position INTEGER NOT NULL, number TEXT NOT NULL, kind TEXT NOT NULL,"
+    " driver TEXT NOT NULL, PRIMARY KEY (device, position)) STRICT;"
+    "CREATE TABLE device_nodes (device TEXT NOT NULL REFERENCES devices (id) ON DELETE CASCADE,"
+    " position INTEGER NOT NULL, node TEXT NOT NULL, interface TEXT NOT NULL,"
+    " properties TEXT NOT NULL, PRIMARY KEY (device, position)) STRICT;"
+    "CREATE TABLE known_devices (identity TEXT PRIMARY KEY, name TEXT NOT NULL,"
+    " device TEXT NOT NULL, first_s REAL NOT NULL, last_s REAL NOT NULL) STRICT;",
 }
 """Schema → what makes the next one of it."""
 
@@ -118,6 +133,12 @@ def load(connection: sqlite3.Connection, host: str) -> HostState:
 
     sources = _grouped(every("sources", "position"), "payload")
     claims = _grouped(every("claims", "position"), "component")
+    interfaces = _grouped(every("device_interfaces", "position"), "device")
+    nodes = _grouped(every("device_nodes", "position"), "device")
+    devices = [
+        rows.device(row, interfaces.get(row["id"], ()), nodes.get(row["id"], ()))
+        for row in every("devices")
+    ]
     payloads = [rows.payload(row, sources.get(row["key"], ())) for row in every("payloads")]
     components = [rows.component(row, claims.get(row["id"], ())) for row in every("components")]
     found = connection.execute("SELECT revision, stopped FROM host").fetchone()
@@ -127,7 +148,10 @@ def load(connection: sqlite3.Connection, host: str) -> HostState:
         drives={d.id: d for d in map(rows.drive, every("drives"))},
         payloads={p.key: p for p in payloads},
         components={c.id: c for c in components},
-        devices={d.id: d for d in map(rows.device, every("devices"))},
+        devices={d.id: d for d in devices},
+        known_devices={
+            known.identity: known for known in map(rows.known_device, every("known_devices"))
+        },
         mounts={m.unit: m for m in map(rows.mount, every("mounts"))},
         goals={g.id: g for g in map(rows.goal, every("goals"))},
         former={f.key: f for f in map(rows.former, every("former")) if f is not None},
@@ -180,6 +204,10 @@ def _write_state(connection: sqlite3.Connection, before: HostState, after: HostS
     simple: Iterable[tuple[str, str, Any, Any, Callable[[Any], rows.Row]]] = (
         ("drives", "id", before.drives, after.drives, rows.drive_row),
         ("mounts", "unit", before.mounts, after.mounts, rows.mount_row),
+        (
+            *("known_devices", "identity"),
+            *(before.known_devices, after.known_devices, rows.known_device_row),
+        ),
         ("goals", "id", before.goals, after.goals, rows.goal_row),
         ("former", "payload_id", before.former, after.former, rows.former_row),
         ("tries", "subject", _tries(before), _tries(after), _try_row),
@@ -227,6 +255,10 @@ def _write_components(connection: sqlite3.Connection, before: HostState, after: 
     for id in sorted({*gone, *(component.id for component in changed)}):
         connection.execute("DELETE FROM claims WHERE component = ?", (id,))
     _difference(connection, "devices", "id", before.devices, after.devices, rows.device_row)
+    for device in _changed(before.devices, after.devices):
+        interfaces, nodes = rows.interface_rows(device), rows.node_rows(device)
+        _replace_parts(connection, "device_interfaces", "device", device.id, interfaces)
+        _replace_parts(connection, "device_nodes", "device", device.id, nodes)
     _difference(
         connection, "components", "id", before.components, after.components, rows.component_row
     )

@@ -107,12 +107,78 @@ class MountPose:
 
 
 @dataclass(frozen=True, slots=True)
-class DeviceRecord:
-    """A device that is plugged in, wanted or not."""
+class DeviceNode:
+    """What is opened to use a device, or a part of it."""
 
-    id: str
     node: Path
     properties: Mapping[str, str]
+    """udev's, and those of its interface and device by which it is identified."""
+    interface: str = ""
+    """Number of the USB interface that it belongs to: `00`; empty: of the device as a whole."""
+
+    @property
+    def subsystem(self) -> str:
+        """The kernel's kind of node."""
+        return self.properties.get("SUBSYSTEM", "")
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceInterface:
+    """One of the functions of a USB device."""
+
+    number: str
+    kind: str
+    """Class, subclass and protocol in hexadecimal: `03:01:02`."""
+    driver: str = ""
+    """The kernel's; empty: none."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceRecord:
+    """A physical device that is plugged in, wanted or not, with all its nodes."""
+
+    id: str
+    """Bus and port, `usb:1-4.2`, or the name of its slot file."""
+    nodes: tuple[DeviceNode, ...]
+    """At least one, those that drivers made first, the raw one of a USB device last."""
+    bus: str = ""
+    port: str = ""
+    parent: str = ""
+    """Id of the device that it is plugged into, where that is a USB device."""
+    interfaces: tuple[DeviceInterface, ...] = ()
+    driver: str = ""
+    """The kernel's drivers of it and its interfaces."""
+    vendor: str = ""
+    """Hexadecimal, of USB devices."""
+    product: str = ""
+    serial: str = ""
+    name: str = ""
+    """What it, or udev's database, says that it is."""
+    first_s: float = 0.0
+    """When such a device was first seen on this host, in seconds since 1970."""
+    since_s: float = 0.0
+    """When it was plugged in, or the daemon started."""
+
+    @property
+    def identity(self) -> str:
+        """What it is known by when it comes again, at another port too if it has a number."""
+        if not self.vendor:
+            return self.id
+        kind = f"{self.bus} {self.vendor}:{self.product}"
+        return f"{kind} {self.serial}" if self.serial else f"{kind} at {self.port}"
+
+
+@dataclass(frozen=True, slots=True)
+class KnownDevice:
+    """A device that was seen on this host, whether it is there or not."""
+
+    identity: str
+    name: str
+    device: str
+    """Id that it had when last seen."""
+    first_s: float
+    last_s: float
+    """When it was last plugged in or pulled, in seconds since 1970."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +190,8 @@ class DeviceClaim:
     optional: bool
     device: str | None = None
     """Id of a `DeviceRecord`."""
+    nodes: tuple[Path, ...] = ()
+    """Its nodes that serve the need, the first of them first."""
     contested_by: tuple[str, ...] = ()
     """Components that want the same device and did not get it."""
 
@@ -324,6 +392,8 @@ class Snapshot:
     payloads: tuple[PayloadRecord, ...] = ()
     drives: tuple[DriveRecord, ...] = ()
     devices: tuple[DeviceRecord, ...] = ()
+    known_devices: tuple[KnownDevice, ...] = ()
+    """Those that were here, whether they are or not; last seen last."""
     mounts: tuple[MountPose, ...] = ()
     rollbacks: tuple[str, ...] = ()
     """Digests of the releases that people went back to."""

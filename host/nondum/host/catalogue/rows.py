@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +12,15 @@ from nondum.host.catalogue.records import (
     ComponentRecord,
     ComponentState,
     DeviceClaim,
+    DeviceInterface,
+    DeviceNode,
     DeviceRecord,
     DriveRecord,
     DriveState,
     FormerPayload,
     GoalRecord,
     JournalEntry,
+    KnownDevice,
     Moment,
     MountPose,
     PayloadRecord,
@@ -29,6 +32,12 @@ from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, Problem
 
 Row = dict[str, Any]
+
+_DEVICE = (
+    *("id", "bus", "port", "parent", "driver", "vendor", "product", "serial", "name"),
+    *("first_s", "since_s"),
+)
+"""Columns of `devices`, which are fields of its record."""
 
 
 def as_json(value: Any) -> str:
@@ -185,6 +194,7 @@ def claim_rows(component: ComponentRecord) -> list[Row]:
             "optional": int(claim.optional),
             "device": claim.device,
             "contested_by": as_json(claim.contested_by),
+            "nodes": as_json(claim.nodes),
         }
         for i, claim in enumerate(component.devices)
     ]
@@ -197,18 +207,61 @@ def _claim(row: sqlite3.Row) -> DeviceClaim:
         optional=bool(row["optional"]),
         device=row["device"],
         contested_by=tuple(json.loads(row["contested_by"])),
+        nodes=tuple(map(Path, json.loads(row["nodes"]))),
     )
 
 
 def device_row(device: DeviceRecord) -> Row:
     """A row of `devices`."""
-    properties: Mapping[str, str] = device.properties
-    return {"id": device.id, "node": str(device.node), "properties": as_json(properties)}
+    return {name: getattr(device, name) for name in _DEVICE}
 
 
-def device(row: sqlite3.Row) -> DeviceRecord:
-    """A device of its row."""
-    return DeviceRecord(row["id"], Path(row["node"]), json.loads(row["properties"]))
+def interface_rows(device: DeviceRecord) -> list[Row]:
+    """Rows of `device_interfaces`."""
+    return [
+        {"device": device.id, "position": i, **plain(interface)}
+        for i, interface in enumerate(device.interfaces)
+    ]
+
+
+def node_rows(device: DeviceRecord) -> list[Row]:
+    """Rows of `device_nodes`."""
+    return [
+        {
+            "device": device.id,
+            "position": i,
+            "node": str(node.node),
+            "interface": node.interface,
+            "properties": as_json(node.properties),
+        }
+        for i, node in enumerate(device.nodes)
+    ]
+
+
+def device(
+    row: sqlite3.Row, interfaces: Iterable[sqlite3.Row], nodes: Iterable[sqlite3.Row]
+) -> DeviceRecord:
+    """A device of its row and those of its parts, in their order."""
+    return DeviceRecord(
+        nodes=tuple(
+            DeviceNode(Path(one["node"]), json.loads(one["properties"]), one["interface"])
+            for one in nodes
+        ),
+        interfaces=tuple(
+            DeviceInterface(one["number"], one["kind"], one["driver"]) for one in interfaces
+        ),
+        **{name: row[name] for name in _DEVICE},
+    )
+
+
+def known_device_row(known: KnownDevice) -> Row:
+    """A row of `known_devices`."""
+    return {name: getattr(known, name) for name in KnownDevice.__slots__}
+
+
+def known_device(row: sqlite3.Row) -> KnownDevice:
+    """A known device of its row."""
+    return KnownDevice(**{name: row[name] for name in KnownDevice.__slots__})
 
 
 def mount_row(mount: MountPose) -> Row:

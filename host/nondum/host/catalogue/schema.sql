@@ -68,13 +68,48 @@ CREATE TABLE claims (
     optional      INTEGER NOT NULL,
     device        TEXT REFERENCES devices (id),
     contested_by  TEXT NOT NULL,         -- JSON
+    nodes         TEXT NOT NULL DEFAULT '[]', -- JSON, those of the device that serve it
     PRIMARY KEY (component, name)
 ) STRICT;
 
-CREATE TABLE devices (
-    id          TEXT PRIMARY KEY,
+CREATE TABLE devices (                   -- physical ones that are there
+    id       TEXT PRIMARY KEY,           -- bus and port, or the name of a slot file
+    bus      TEXT NOT NULL,
+    port     TEXT NOT NULL,
+    parent   TEXT NOT NULL,              -- id of what it is plugged into, or empty
+    driver   TEXT NOT NULL,
+    vendor   TEXT NOT NULL,
+    product  TEXT NOT NULL,
+    serial   TEXT NOT NULL,
+    name     TEXT NOT NULL,
+    first_s  REAL NOT NULL,
+    since_s  REAL NOT NULL
+) STRICT;
+
+CREATE TABLE device_interfaces (
+    device    TEXT NOT NULL REFERENCES devices (id) ON DELETE CASCADE,
+    position  INTEGER NOT NULL,
+    number    TEXT NOT NULL,
+    kind      TEXT NOT NULL,             -- class:subclass:protocol
+    driver    TEXT NOT NULL,
+    PRIMARY KEY (device, position)
+) STRICT;
+
+CREATE TABLE device_nodes (
+    device      TEXT NOT NULL REFERENCES devices (id) ON DELETE CASCADE,
+    position    INTEGER NOT NULL,
     node        TEXT NOT NULL,
-    properties  TEXT NOT NULL            -- JSON
+    interface   TEXT NOT NULL,           -- number of an interface, or empty
+    properties  TEXT NOT NULL,           -- JSON
+    PRIMARY KEY (device, position)
+) STRICT;
+
+CREATE TABLE known_devices (             -- those that were ever here, as far as is remembered
+    identity  TEXT PRIMARY KEY,
+    name      TEXT NOT NULL,
+    device    TEXT NOT NULL,             -- id when last seen
+    first_s   REAL NOT NULL,
+    last_s    REAL NOT NULL
 ) STRICT;
 
 CREATE TABLE mounts (

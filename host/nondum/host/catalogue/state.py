@@ -11,6 +11,7 @@ from nondum.host.catalogue.records import (
     DriveRecord,
     FormerPayload,
     GoalRecord,
+    KnownDevice,
     MountPose,
     PayloadRecord,
     PeerRecord,
@@ -40,6 +41,8 @@ class HostState:
     payloads: Mapping[str, PayloadRecord] = field(default_factory=dict)
     components: Mapping[str, ComponentRecord] = field(default_factory=dict)
     devices: Mapping[str, DeviceRecord] = field(default_factory=dict)
+    known_devices: Mapping[str, KnownDevice] = field(default_factory=dict)
+    """Identity → a device that was ever here, as far as is remembered; last seen last."""
     mounts: Mapping[str, MountPose] = field(default_factory=dict)
     highwater: Mapping[tuple[str, str], Highwater] = field(default_factory=dict)
     """(fleet, payload id) → newest release."""
@@ -67,6 +70,7 @@ class HostState:
             payloads=tuple(self.payloads.values()),
             drives=tuple(self.drives.values()),
             devices=tuple(self.devices.values()),
+            known_devices=tuple(self.known_devices.values()),
             mounts=tuple(self.mounts.values()),
             rollbacks=tuple(rollback.digest for rollback in self.rollbacks.values()),
             goals=tuple(self.goals.values()),

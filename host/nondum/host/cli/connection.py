@@ -28,15 +28,17 @@ class Session:
     def connect(self, *, timeout_s: float | None = TIMEOUT_S) -> ControlClient:
         """Connect to the daemon that was named, else to the first of the usual ones that answers.
 
-        Raises `HostUnreachable` when none does.
+        Raises `HostUnreachable` when none does, naming a socket that a killed daemon left behind
+        rather than one that is not there.
         """
         paths = [self.control] if self.control else list(usual_sockets())
-        for path in paths[:-1]:
+        for path in paths:
             try:
                 return ControlClient(path, timeout_s=timeout_s)
             except HostUnreachable:
                 continue
-        return ControlClient(paths[-1], timeout_s=timeout_s)
+        left = [path for path in paths if path.exists()]
+        return ControlClient((left or paths)[-1], timeout_s=timeout_s)
 
     def ask(self, verb: str, *, timeout_s: float | None = TIMEOUT_S, **arguments: Any) -> Any:
         """Ask one question. Raises `NondumError` with the refusal."""

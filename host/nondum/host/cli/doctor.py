@@ -11,6 +11,7 @@ import click
 
 from nondum.host.cli import render
 from nondum.host.cli.connection import Session, json_option
+from nondum.host.cli.doctor_disks import disks
 from nondum.host.cli.failure import EXIT_PROBLEMS
 from nondum.host.cli.table import table
 
@@ -24,6 +25,9 @@ def doctor() -> None:
 
     Example: nondum doctor network
     """
+
+
+doctor.add_command(disks)
 
 
 @doctor.command()

@@ -44,6 +44,7 @@ def status(session: Session, follow: bool) -> None:
 def show(view: dict[str, Any]) -> None:
     """Print a status for people."""
     click.echo(f"host {view['host']}  revision {view['revision']}  {view['state']}")
+    _show_feedback(view["feedback"])
     for warning in view["warnings"]:
         render.sentence(warning, colour="yellow", mark="warning: ")
     _show_confinement(view["confinement"])
@@ -62,6 +63,13 @@ def show(view: dict[str, Any]) -> None:
         click.echo()
     for told in view["told"][-LAST_TOLD:]:
         render.sentence(told["text"], mark="> ")
+
+
+def _show_feedback(shown: dict[str, Any]) -> None:
+    """What lamps and hooks show; that the host is ready stands in the first line."""
+    if shown["state"] != "ready":
+        code = f" ({shown['code']})" if shown["code"] else ""
+        render.sentence(shown["sentence"], mark=f"shown: {shown['state']}{code}: ")
 
 
 def _show_confinement(confinement: dict[str, Any]) -> None:

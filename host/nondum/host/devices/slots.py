@@ -6,19 +6,22 @@
     SUBSYSTEM = "tty"
     ID_MODEL = "PTU-D46-17"
 
-A file appears: the device is plugged in. It goes: the device is pulled. Files whose names begin
-with a dot, or end in anything but `.toml`, mean nothing.
+A device of several nodes has `nodes = [{ node = "/dev/…", properties = {} }, …]` instead, and
+perhaps `properties` that all of them have. A file appears: the device is plugged in. It goes: the
+device is pulled. Files whose names begin with a dot, or end in anything but `.toml`, mean nothing.
 """
 
 from __future__ import annotations
 
 import logging
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from nondum.host.devices.source import Found, Sightings
+from nondum.host.catalogue.records import DeviceNode, DeviceRecord
+from nondum.host.devices.hardware import described
+from nondum.host.devices.source import Sightings
 from nondum.host.events import Emit
 from nondum.host.inotify import folders_watched
 from nondum.sdk.errors import ConfigRefused, Problem
@@ -44,18 +47,19 @@ class DeviceSlotSource:
                 sightings.see_all(dict(self._present()))
                 await changed.wait()
 
-    def _present(self) -> Iterator[tuple[str, Found]]:
+    def _present(self) -> Iterator[tuple[str, DeviceRecord]]:
         for folder in self._folders:
             for path in sorted(folder.glob("[!.]*.toml")):
+                name = path.stem if len(self._folders) == 1 else f"{folder.name}/{path.stem}"
                 try:
-                    found = parse_slot(_read(path), str(path))
+                    found = device_of(name, parse_slot(_read(path), str(path)))
                 except ConfigRefused as refused:
                     self._refuse(path, str(refused))
                     continue
                 except OSError:  # it has just gone
                     continue
                 self._refused.pop(path, None)
-                yield path.stem if len(self._folders) == 1 else f"{folder.name}/{path.stem}", found
+                yield name, found
 
     def _refuse(self, path: Path, why: str) -> None:
         """Say it once: a file that is being written is looked at several times."""
@@ -64,27 +68,48 @@ class DeviceSlotSource:
             log.warning("%s", why)
 
 
-def parse_slot(text: str, where: str) -> Found:
-    """Read a slot file. Raises `ConfigRefused` (DEVICE_SLOT).
+def device_of(name: str, nodes: Sequence[DeviceNode]) -> DeviceRecord:
+    """The device that a slot file stands for: it is what its nodes' properties say."""
+    known = {key: value for node in reversed(nodes) for key, value in node.properties.items()}
+    bus = known.get("ID_BUS", "")
+    return DeviceRecord(name, tuple(nodes), bus=bus, port=name, **described(known))
+
+
+def parse_slot(text: str, where: str) -> tuple[DeviceNode, ...]:
+    """Read a slot file: the nodes of its device. Raises `ConfigRefused` (DEVICE_SLOT).
 
     >>> parse_slot('[device]\\nnode = "/dev/null"\\nproperties = { ID_BUS = "usb" }', "a.toml")
-    Found(node=PosixPath('/dev/null'), properties={'ID_BUS': 'usb'})
+    (DeviceNode(node=PosixPath('/dev/null'), properties={'ID_BUS': 'usb'}, interface=''),)
     """
     try:
         data: dict[str, Any] = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise _refused(where, str(error)) from error
     match data:
-        case {"device": {"node": str(node), **rest}, **others} if not others and node:
-            properties = rest.pop("properties", {})
+        case {"device": {"nodes": [_, *_] as nodes, **rest}, **others} if not others:
+            shared = _properties(rest.pop("properties", {}), where)
             if rest:
                 raise _refused(where, f"unknown key {next(iter(rest))!r}")
-            if not isinstance(properties, dict) or not all(
-                isinstance(value, str) for value in properties.values()
-            ):
-                raise _refused(where, "properties are a table of strings")
-            return Found(Path(node), properties)
-    raise _refused(where, "there is one table, [device], with node and properties")
+            return tuple(_node(node, shared, where) for node in nodes)
+        case {"device": {"node": _, **_rest} as node, **others} if not others:
+            return (_node(node, {}, where),)
+    raise _refused(where, "there is one table, [device], with node or nodes, and properties")
+
+
+def _node(said: Any, shared: Mapping[str, str], where: str) -> DeviceNode:
+    match said:
+        case {"node": str(node), **rest} if node:
+            properties = _properties(rest.pop("properties", {}), where)
+            if rest:
+                raise _refused(where, f"unknown key {next(iter(rest))!r}")
+            return DeviceNode(Path(node), {**shared, **properties})
+    raise _refused(where, "each node is a table with node and properties")
+
+
+def _properties(said: Any, where: str) -> dict[str, str]:
+    if not isinstance(said, dict) or not all(isinstance(value, str) for value in said.values()):
+        raise _refused(where, "properties are a table of strings")
+    return said
 
 
 def _read(path: Path) -> str:

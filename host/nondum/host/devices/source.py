@@ -3,31 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Protocol
 
-from nondum.host.events import DeviceAppeared, DeviceRemoved, Emit
+from nondum.host.catalogue.records import DeviceRecord
+from nondum.host.events import DeviceAppeared, DeviceChanged, DeviceRemoved, Emit
 
 
 class DeviceSource(Protocol):
     """Tells devices that come and go."""
 
     async def watch(self, emit: Emit) -> None:
-        """Emit `DeviceAppeared` for what is there, then what comes and goes.
+        """Emit `DeviceAppeared` for what is there, then what comes, changes and goes.
 
-        A device that changes is removed and appears again. Runs until cancelled; leaves nothing
-        open then.
+        Another device in a port is told as removal and appearance. Runs until cancelled; leaves
+        nothing open then.
         """
         ...
-
-
-@dataclass(frozen=True, slots=True)
-class Found:
-    """A device as its source sees it now."""
-
-    node: Path
-    properties: Mapping[str, str]
 
 
 class Sightings:
@@ -35,21 +26,40 @@ class Sightings:
 
     def __init__(self, emit: Emit) -> None:
         self._emit = emit
-        self._known: dict[str, Found] = {}
+        self._known: dict[str, DeviceRecord] = {}
 
-    def see(self, device: str, found: Found | None) -> None:
+    def see(self, device: str, found: DeviceRecord | None) -> None:
         """A device is there like this, or (None) is not there."""
         known = self._known.get(device)
         if found == known:
+            return
+        if known is not None and found is not None and is_same(known, found):
+            self._known[device] = found
+            self._emit(DeviceChanged(device, found))
             return
         if known is not None:
             del self._known[device]
             self._emit(DeviceRemoved(device))
         if found is not None:
             self._known[device] = found
-            self._emit(DeviceAppeared(device, found.node, found.properties))
+            self._emit(DeviceAppeared(device, found))
 
-    def see_all(self, present: Mapping[str, Found]) -> None:
+    def see_all(self, present: Mapping[str, DeviceRecord]) -> None:
         """These devices are there, and no others."""
         for device in sorted(self._known.keys() | present.keys()):
             self.see(device, present.get(device))
+
+
+def is_same(before: DeviceRecord, after: DeviceRecord) -> bool:
+    """Whether it can be one device whose drivers came or went meanwhile: of its nodes one stayed,
+    and nothing else came in its name."""
+    nodes = {node.node: node.properties for node in after.nodes}
+    stayed = [node for node in before.nodes if node.node in nodes]
+    return before.identity == after.identity and any(
+        _numbers(node.properties) == _numbers(nodes[node.node]) for node in stayed
+    )
+
+
+def _numbers(properties: Mapping[str, str]) -> tuple[str, ...]:
+    """By which the kernel knows a node; a USB device has another DEVNUM each time it comes."""
+    return tuple(properties.get(name, "") for name in ("MAJOR", "MINOR", "DEVNUM"))

@@ -8,17 +8,29 @@ from pathlib import Path
 import pyudev
 
 from nondum.host.drives import usb
-from nondum.host.drives.nodes import drive_name
-from nondum.host.events import DriveInserted, DriveRemoved, DrivesScanned, Emit
+from nondum.host.drives.mounting import unsupported
+from nondum.host.drives.nodes import drive_name, mounted_elsewhere
+from nondum.host.drives.uses import Machine
+from nondum.host.events import DriveInserted, DriveLeftAlone, DriveRemoved, DrivesScanned, Emit
 from nondum.host.uevents import udev_runs, uevents
 from nondum.sdk.errors import Problem
 
 Accepts = Callable[[pyudev.Device], bool]
+Known = tuple[str, str]
+"""A drive's name, and its file system: one that is formatted anew is told anew."""
 
 SYSFS = Path("/sys")
 MARKS = ("ID_SERIAL", "PARTN", "ID_FS_UUID")
 """Properties of udev by which a drive is known again."""
 MOST_MARK = 200
+NO_FILES = frozenset(
+    {
+        *("0x5", "0xf", "0x85"),
+        "e3c9e316-0b5c-4db8-817d-f92df00215ae",
+        "21686148-6449-6e6f-744e-656564454649",
+    }
+)
+"""Kinds of partitions that never hold files: extended ones, Microsoft's reserve, GRUB's."""
 
 
 def is_usb_drive(device: pyudev.Device) -> bool:
@@ -27,7 +39,10 @@ def is_usb_drive(device: pyudev.Device) -> bool:
 
 
 class BlockSource:
-    """Watches block devices that `accepts` lets through; each with a file system is a drive."""
+    """Watches block devices that `accepts` lets through; each with a file system is a drive.
+
+    What goes while it is looked at is none: that it is gone is told by the next message.
+    """
 
     kind = "block"
 
@@ -38,19 +53,24 @@ class BlockSource:
         accepts: Accepts = is_usb_drive,
         single_function: bool = True,
         sysfs: Path = SYSFS,
+        machine: Machine | None = None,
     ) -> None:
         """`single_function`: refuse what is something else beside a drive, as `sysfs` has it."""
         self._mounts, self._accepts = mounts, accepts
         self._single_function, self._sysfs = single_function, sysfs
-        self._seen: dict[str, str] = {}
+        self._machine = machine or Machine()
+        self._seen: dict[str, Known] = {}
         """sysfs path → drive."""
+        self._left_alone: dict[str, str] = {}
+        """sysfs path → what was told of once, and is none of this host's drives until it is
+        plugged in anew."""
 
     async def watch(self, emit: Emit) -> None:
         """Tell what is there, then what comes and goes, until cancelled."""
         context = pyudev.Context()
         with uevents(context, "block") as messages:
             self._look_at_all(context, emit)
-            emit(DrivesScanned(self.kind, tuple(self._seen.values())))
+            emit(DrivesScanned(self.kind, tuple(drive for drive, _ in self._seen.values())))
             while True:
                 devices = await messages.next()
                 if devices is None:
@@ -65,51 +85,97 @@ class BlockSource:
         """Compare what is there now with what was known."""
         present = {d.sys_path: d for d in context.list_devices(subsystem="block")}
         for path in sorted(self._seen.keys() - present.keys()):
-            emit(DriveRemoved(self._seen.pop(path)))
+            emit(DriveRemoved(self._seen.pop(path)[0]))
+        for path in self._left_alone.keys() - present.keys():
+            del self._left_alone[path]
         for path in sorted(present):
             self._look(present[path], emit)
 
     def _look(self, device: pyudev.Device, emit: Emit) -> None:
         """Compare one device with what was known of it."""
-        drive = _drive(device) if self._is_drive(device) else None
-        known = self._seen.get(device.sys_path)
-        if known is not None and known != drive:
-            del self._seen[device.sys_path]
-            emit(DriveRemoved(known))
-        if drive is not None and known != drive:
-            self._seen[device.sys_path] = drive
-            emit(
-                DriveInserted(
-                    drive,
-                    self._mounts / drive,
-                    self.kind,
-                    node=Path(device.device_node),
-                    filesystem=device.properties.get("ID_FS_TYPE", ""),
-                    problems=self._problems(device, drive),
-                    port=usb.port_of(Path(device.sys_path)),
-                    mark=mark_of(device.properties),
-                )
-            )
+        path = device.sys_path
+        try:
+            found = self._known(device)
+        except OSError:
+            found = None
+        known = self._seen.get(path)
+        if known is not None and known != found:
+            del self._seen[path]
+            emit(DriveRemoved(known[0]))
+        if found is None or self._left_alone.get(path) != found[0]:
+            self._left_alone.pop(path, None)
+            if found is not None and known != found:
+                self._tell(device, found, emit)
 
-    def _problems(self, device: pyudev.Device, drive: str) -> tuple[Problem, ...]:
-        """What keeps it from being read at all."""
+    def _tell(self, device: pyudev.Device, found: Known, emit: Emit) -> None:
+        """Tell a drive that has just come."""
+        drive, filesystem = found
+        use = self._machine.uses(self._mounts).get(device.sys_name)
+        if use is not None and use.is_own:
+            self._left_alone[device.sys_path] = drive
+            emit(DriveLeftAlone(drive, (_own(drive, use.why),)))
+            return
+        node = Path(device.device_node)
+        try:
+            problems = self._extra(device, drive)
+        except OSError:
+            return
+        if not filesystem and udev_runs():
+            text = "has no file system that is known"
+            problems = (*problems, *unsupported(node, text, "none").problems)
+        if use is not None:
+            problems = (*problems, mounted_elsewhere(node, use.why))
+        self._seen[device.sys_path] = found
+        emit(
+            DriveInserted(
+                drive,
+                self._mounts / drive,
+                self.kind,
+                node=node,
+                filesystem=filesystem,
+                problems=problems,
+                port=usb.port_of(Path(device.sys_path)),
+                mark=mark_of(device.properties),
+            )
+        )
+
+    def _extra(self, device: pyudev.Device, drive: str) -> tuple[Problem, ...]:
+        """What it is beside a drive. Raises `OSError` when it goes meanwhile."""
         if not self._single_function:
             return ()
         block = self._sysfs / Path(device.sys_path).relative_to(SYSFS)
         return usb.extra_interfaces(block, where=drive)
 
-    def _is_drive(self, device: pyudev.Device) -> bool:
+    def _known(self, device: pyudev.Device) -> Known | None:
+        """What a device is as a drive; None: it is none. Raises `OSError` when it goes."""
         if device.action == "remove" or not device.device_node or not _size(device):
-            return False
+            return None
         if device.device_type == "disk" and _has_partitions(device):
-            return False
-        if udev_runs() and "ID_FS_TYPE" not in device.properties:
-            return False
-        return self._accepts(device)
+            return None
+        if udev_runs() and (not device.is_initialized or _holds_no_files(device.properties)):
+            return None
+        if not self._accepts(device):
+            return None
+        return _drive(device), device.properties.get("ID_FS_TYPE", "")
+
+
+def _own(drive: str, why: str) -> Problem:
+    return Problem(
+        "DRIVE_OWN",
+        f"is this machine's own, and left alone: {why}",
+        where=drive,
+        fix="`nondum doctor disks` tells which disks are whose",
+    )
+
+
+def _holds_no_files(properties: Mapping[str, str]) -> bool:
+    return properties.get("ID_PART_ENTRY_TYPE", "") in NO_FILES
 
 
 def _drive(device: pyudev.Device) -> str:
     """Kernel name and insertion number: the next stick in the same port is another drive."""
+    if said := device.properties.get("DISKSEQ", ""):  # of the one that the message is about
+        return drive_name(device.sys_name, int(said))
     disk = Path(device.sys_path)
     if device.device_type == "partition":
         disk = disk.parent

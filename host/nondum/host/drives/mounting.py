@@ -10,11 +10,11 @@ from __future__ import annotations
 import ctypes
 import errno
 import os
-import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from nondum.host.drives import filesystems, nodes
+from nondum.host.drives.mounts import mounted_below
 from nondum.sdk.errors import DriveGone, NondumError, PayloadRefused, Problem
 
 MS_RDONLY = 0x1
@@ -44,13 +44,13 @@ def mount(node: Path, target: Path, filesystem: str, *, drive: str = "") -> None
 
     Without a `filesystem`, the device says which it has. Given a `drive`, no other one is mounted
     that has come to the same node since. Nothing can be written to the device afterwards. Raises
-    `PayloadRefused` (FS_UNSUPPORTED, FS_ERROR) and `DriveGone` (DRIVE_GONE).
+    `PayloadRefused` (FS_UNSUPPORTED, FS_ERROR, DRIVE_MOUNTED) and `DriveGone` (DRIVE_GONE).
     """
-    with nodes.held(node, drive) as source:
+    with nodes.held(node, drive, ours=target.parent) as source:
         filesystem = filesystem or _probed(source, node)
         if filesystem not in FILESYSTEMS:
             have = filesystem or "none that is known"
-            raise _unsupported(node, "the drive's file system is not read", have)
+            raise unsupported(node, "the drive's file system is not read", have)
         target.mkdir(parents=True, exist_ok=True)
         error = _call_mount(source, target, filesystem, FILESYSTEMS[filesystem])
         if error == 0:
@@ -58,7 +58,7 @@ def mount(node: Path, target: Path, filesystem: str, *, drive: str = "") -> None
         target.rmdir()
         if error == errno.ENODEV and not _is_known_to_kernel(filesystem):
             text = "this host's kernel does not read its file system"
-            raise _unsupported(node, text, filesystem, filter(_is_known_to_kernel, FILESYSTEMS))
+            raise unsupported(node, text, filesystem, filter(_is_known_to_kernel, FILESYSTEMS))
         raise _unmountable(node, filesystem, error)
 
 
@@ -76,14 +76,6 @@ def unmount_all(folder: Path) -> None:
     if folder.is_dir():
         for left in folder.iterdir():
             left.rmdir()
-
-
-def mounted_below(folder: Path) -> list[Path]:
-    """Mount points below a folder, innermost first, as /proc/self/mountinfo tells them."""
-    base = folder.resolve()
-    lines = Path("/proc/self/mountinfo").read_text(encoding="utf-8").splitlines()
-    points = [Path(_unescaped(line.split()[4])) for line in lines]
-    return sorted((p for p in points if base in p.parents), reverse=True)
 
 
 def _probed(source: Path, node: Path) -> str:
@@ -111,9 +103,10 @@ def _is_known_to_kernel(filesystem: str) -> bool:
     return f"\t{filesystem}\n" in Path("/proc/filesystems").read_text(encoding="ascii")
 
 
-def _unsupported(
+def unsupported(
     node: Path, text: str, have: str, known: Iterable[str] = FILESYSTEMS
 ) -> PayloadRefused:
+    """What to raise of a device with no file system that drives may have (FS_UNSUPPORTED)."""
     need = " or ".join(sorted(known))
     fix = "format the drive as one of them"
     return PayloadRefused(Problem("FS_UNSUPPORTED", text, str(node), need, have, fix))
@@ -123,15 +116,8 @@ def _unmountable(node: Path, filesystem: str, error: int) -> NondumError:
     if not node.exists():
         text = "went away while it was mounted"
         return DriveGone(Problem("DRIVE_GONE", text, where=str(node), fix="plug it in again"))
+    if error == errno.EBUSY:
+        return PayloadRefused(nodes.mounted_elsewhere(node, os.strerror(error)))
     text = f"cannot be mounted as {filesystem} ({os.strerror(error)})"
     fix = "check the drive on another computer"
     return PayloadRefused(Problem("FS_ERROR", text, where=str(node), fix=fix))
-
-
-def _unescaped(field: str) -> str:
-    """A field of mountinfo, where blanks and backslashes are octal.
-
-    >>> _unescaped("/media/my\\\\040drive")
-    '/media/my drive'
-    """
-    return re.sub(r"\\([0-7]{3})", lambda match: chr(int(match[1], 8)), field)

@@ -14,7 +14,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from nondum.sdk.errors import DriveGone, Problem
+from nondum.host.drives.uses import Machine
+from nondum.sdk.errors import DriveGone, PayloadRefused, Problem
 
 _BLKROSET = 0x125D
 _BLKGETDISKSEQ = 0x80081280
@@ -31,12 +32,13 @@ def drive_name(device: str, diskseq: int | None) -> str:
 
 
 @contextmanager
-def held(node: Path, drive: str = "") -> Iterator[Path]:
+def held(node: Path, drive: str = "", ours: Path | None = None) -> Iterator[Path]:
     """A path by which the node of that drive can be mounted, read-only from now on until it is
     plugged in anew, and sure to be no other drive's while the context lasts.
 
     `drive` is as `drive_name` gives it; empty: whichever it is. Raises `DriveGone` (DRIVE_GONE)
-    when it is another one by now.
+    when it is another one by now, `PayloadRefused` (DRIVE_MOUNTED) when somebody else has it: it is
+    mounted anywhere but below `ours`, or is a part of another device.
     """
     try:
         descriptor = os.open(node, os.O_RDONLY | os.O_CLOEXEC)
@@ -46,10 +48,47 @@ def held(node: Path, drive: str = "") -> Iterator[Path]:
         is_any = drive in ("", node.name)
         if not is_any and drive_name(node.name, diskseq(descriptor)) != drive:
             raise _gone(node, "was pulled, and another one is in its place")
-        fcntl.ioctl(descriptor, _BLKROSET, struct.pack("i", 1))
-        yield Path(f"/proc/self/fd/{descriptor}")
+        path = Path(f"/proc/self/fd/{descriptor}")
+        with _claimed(path, node, ours):
+            fcntl.ioctl(descriptor, _BLKROSET, struct.pack("i", 1))
+        yield path
     finally:
         os.close(descriptor)
+
+
+@contextmanager
+def _claimed(path: Path, node: Path, ours: Path | None) -> Iterator[None]:
+    """Have a device that nobody else has, as long as the context lasts. Raises `DriveGone`,
+    `PayloadRefused` (DRIVE_MOUNTED).
+
+    O_EXCL claims it as mounts and swaps do (open(2)): were it only asked whether somebody has it,
+    the answer might be true no more. What this host has mounted itself, or has just let go, is
+    claimed already.
+    """
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_EXCL)
+    except OSError as error:
+        if error.errno != errno.EBUSY:
+            raise _gone(node, f"went away before it was read ({error.strerror})") from error
+        use = Machine().uses(ours or Path("/nowhere")).get(node.resolve().name)
+        if use is not None:
+            raise PayloadRefused(mounted_elsewhere(node, use.why)) from error
+        yield
+        return
+    try:
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def mounted_elsewhere(node: Path, why: str) -> Problem:
+    """What is told of a drive that somebody else has mounted, or uses otherwise."""
+    return Problem(
+        "DRIVE_MOUNTED",
+        f"somebody else uses it, so it is not read: {why}",
+        where=str(node),
+        fix="unmount it there, pull it and plug it in again; do not have drives mounted by others",
+    )
 
 
 def diskseq(descriptor: int) -> int | None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import logging
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,7 @@ from nondum.host.events import (
     CertificatesBrought,
     DriveQueued,
     DriveRead,
+    DriveReleased,
     Emit,
     Event,
     PayloadFound,
@@ -24,6 +27,8 @@ from nondum.host.trust.chain import unpacked
 from nondum.host.trust.payload_trust import PayloadTrust
 from nondum.sdk.errors import DriveGone, InstallFailed, Problem
 from nondum.wheelhouse.signatures import Grant
+
+log = logging.getLogger(__name__)
 
 LOOK_S = 10.0
 """A drive that cannot be mounted and listed in this time hangs."""
@@ -121,10 +126,13 @@ class DriveReading:
         return found
 
     async def release(self, effect: ReleaseDrive) -> tuple[Event, ...]:
-        """Unmount a drive that was mounted for reading."""
+        """Unmount a drive that was mounted for reading; tell once it is not mounted any more."""
         if (root := self._mounted.pop(effect.drive, None)) is not None:
             await in_thread(privileged().unmount, root, effect.drive, "read")
-        return ()
+            if await in_thread(os.path.ismount, root):
+                log.warning("drive %s is still mounted at %s", effect.drive, root)
+                return ()
+        return (DriveReleased(effect.drive),)
 
     async def close(self) -> None:
         """Unmount all drives."""

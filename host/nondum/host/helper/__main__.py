@@ -10,11 +10,14 @@ import socket
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from nondum.host.cgroups import mounts
 from nondum.host.cgroups.cage import Tree
 from nondum.host.cgroups.cages import tree
+from nondum.host.config import SYSTEM_FILE, HostConfig, load
+from nondum.host.feedback.lamps import Lamps
 from nondum.host.helper.disks import Disks
 from nondum.host.helper.nodes import Nodes
 from nondum.host.helper.server import IDLE_S, Server
@@ -38,6 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         disks=Disks(allow_loop=told.allow_loop),
         nodes=Nodes(told.run / "devices", uid, frozenset(told.allow_subsystem)),
         tree=_tree(f"{OWNER}-{uid}"),
+        lamps=partial(_lamps, told.config, told.run / "lamps.json"),
     )
     service.nodes.prepare()  # workers' rooms, which are made early, show what is below it
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
@@ -53,10 +57,19 @@ def _tree(owner: str) -> Tree:
     return tree([replace(hierarchy, own=hierarchy.top) for hierarchy in mounts.here()], owner)
 
 
+def _lamps(config: Path, kept: Path) -> Lamps:
+    """The lamps that the configuration names. Raises `ConfigRefused`."""
+    names = load(config, HostConfig()).feedback.lamps if config.exists() else ()
+    return Lamps(names, kept)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="nondum-helper", description=__doc__)
     parser.add_argument("--user", default="nondum", help="the one user who is served")
     parser.add_argument("--run", type=Path, default=RUN, help="folder for mounts and devices")
+    parser.add_argument(
+        "--config", type=Path, default=SYSTEM_FILE, help="the daemon's, which names the lamps"
+    )
     parser.add_argument("--idle-s", type=float, default=IDLE_S, help="end after such a silence")
     parser.add_argument("--allow-loop", action="store_true", help="loop devices are drives, too")
     parser.add_argument(

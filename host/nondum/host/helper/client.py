@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.cgroups.cage import CageLimits, Usage
+from nondum.host.feedback.state import State
 from nondum.host.helper import requests
 from nondum.host.helper.requests import Request
 from nondum.sdk import errors
@@ -67,6 +68,14 @@ class HelperClient:
     def take_node(self, component: str, need: str) -> None:
         """Have a node removed."""
         self._try(requests.TakeNode(component, _word(need)))
+
+    def show_lamps(self, names: tuple[str, ...], state: State, kept: Path) -> None:
+        """Have lamps show a state: those that the helper's own configuration names."""
+        self._ask(requests.ShowLamps(state.value))
+
+    def end_lamps(self, names: tuple[str, ...], kept: Path) -> None:
+        """Have them show what they showed before."""
+        self._ask(requests.EndLamps())
 
     def cages(self) -> HelperTree:
         """The cgroups of the helper's making. Raises `NondumError`."""

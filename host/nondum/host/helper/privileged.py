@@ -9,6 +9,8 @@ from typing import Protocol
 from nondum.host.cgroups.cage import Tree
 from nondum.host.cgroups.cages import NoTree
 from nondum.host.drives import mounting
+from nondum.host.feedback.lamps import Lamps
+from nondum.host.feedback.state import State
 from nondum.host.helper.client import SOCKET, HelperClient
 from nondum.sdk.errors import InstallFailed, Problem
 
@@ -45,6 +47,17 @@ class Privileged(Protocol):
         """Remove a node that was made for a component."""
         ...
 
+    def show_lamps(self, names: tuple[str, ...], state: State, kept: Path) -> None:
+        """Have lamps show a state; what they showed before is kept, by the helper or in `kept`.
+
+        Raises `InstallFailed` (LAMP_…).
+        """
+        ...
+
+    def end_lamps(self, names: tuple[str, ...], kept: Path) -> None:
+        """Have lamps show what they showed before."""
+        ...
+
     def cages(self) -> Tree:
         """Where cages are that this process may not make itself."""
         ...
@@ -77,13 +90,22 @@ class InProcess:
     def take_node(self, component: str, need: str) -> None:
         """Nothing was made."""
 
+    def show_lamps(self, names: tuple[str, ...], state: State, kept: Path) -> None:
+        """Set them (see `Privileged`)."""
+        Lamps(names, kept).show(state)
+
+    def end_lamps(self, names: tuple[str, ...], kept: Path) -> None:
+        """Set them back."""
+        Lamps(names, kept).end()
+
     def cages(self) -> Tree:
         """None but its own."""
         return NoTree()
 
 
 class Unprivileged(InProcess):
-    """For a user's daemon without the helper: no drives but slots, and what the user may open."""
+    """For a user's daemon without the helper: no drives but slots, and what the user may open, be
+    it a device or a lamp."""
 
     def mount(self, node: Path, root: Path, filesystem: str, drive: str, use: str) -> Path:
         """Refuse. Raises `InstallFailed` (HELPER_MISSING)."""

@@ -1,7 +1,8 @@
 """What the helper can be asked, as values and as bytes: a packet of JSON for each. Pure.
 
 No request carries a path: drives are named by kernel name and insertion number, folders of devices
-by component, cages by their own names. Everything else is refused before anything is done.
+by component, cages by their own names, and lamps not at all. Everything else is refused before
+anything is done.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import Any, TypeAlias, get_args, get_type_hints
 
 from nondum.host.cgroups.cage import NAME as CAGE
 from nondum.host.cgroups.cage import CageLimits
+from nondum.host.feedback.state import State
 from nondum.sdk.errors import NondumError, Problem
 
 MAX_BYTES = 1024
@@ -24,8 +26,9 @@ DEVICE = re.compile(r"[a-z][a-z0-9]{1,31}")
 DRIVE = re.compile(r"[a-z][a-z0-9]{1,31}(-[0-9]{1,19})?")
 USE = re.compile("read|handover")
 COMPONENT = re.compile(r"[a-z0-9][a-z0-9-]{0,62}")
-NEED = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}")
+NEED = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}(\.[A-Za-z0-9][A-Za-z0-9_-]{0,62})?")
 FILESYSTEM = re.compile(r"[a-z0-9]{0,16}")
+STATE = re.compile("|".join(state.value for state in State))
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +82,19 @@ class ClearNodes:
     """Remove all nodes of a component; empty: of all."""
 
     component: str
+
+
+@dataclass(frozen=True, slots=True)
+class ShowLamps:
+    """Have the lamps that root's configuration names show a state."""
+
+    state: str
+    """`State` by its value."""
+
+
+@dataclass(frozen=True, slots=True)
+class EndLamps:
+    """Have them show what they showed before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +161,8 @@ Request: TypeAlias = (
     | PutNode
     | TakeNode
     | ClearNodes
+    | ShowLamps
+    | EndLamps
     | ListCages
     | LookAtCage
     | MakeCage
@@ -163,6 +181,7 @@ _FORMS = {
     "need": NEED,
     "filesystem": FILESYSTEM,
     "cage": CAGE,
+    "state": STATE,
 }
 _MOST = 2**63 - 1
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -13,6 +13,8 @@ from typing import Any
 from nondum.host.cgroups.cage import Tree
 from nondum.host.drives import mounting
 from nondum.host.drives.nodes import drive_name
+from nondum.host.feedback.lamps import Lamps
+from nondum.host.feedback.state import State
 from nondum.host.helper import requests
 from nondum.host.helper.disks import Disks
 from nondum.host.helper.nodes import Nodes
@@ -32,6 +34,8 @@ class Service:
     disks: Disks
     nodes: Nodes
     tree: Tree
+    lamps: Callable[[], Lamps]
+    """Those that root's configuration names now."""
 
     def serve(self, request: Request) -> dict[str, Any]:
         """Do what is asked. Raises `NondumError`, `OSError`."""
@@ -50,6 +54,10 @@ class Service:
                 self.nodes.take(component, need)
             case requests.ClearNodes(component):
                 self.nodes.clear(component)
+            case requests.ShowLamps(state):
+                self.lamps().show(State(state))
+            case requests.EndLamps():
+                self.lamps().end()
             case _:
                 return self._serve_cage(request)
         return {}

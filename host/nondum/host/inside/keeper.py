@@ -114,7 +114,7 @@ class _Keeper:
         error = ""
         try:
             if order["do"] == "grant":
-                room.grant(self._given["outside"], order["need"], order["node"])
+                room.grant(self._given["outside"], order["need"], order["node"], order["own"])
             else:
                 room.revoke(order["need"])
         except OSError as failure:

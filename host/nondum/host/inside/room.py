@@ -69,12 +69,19 @@ def move_in(room: Mapping[str, Any]) -> None:
         Path("/proc/self/gid_map").write_text(f"{NOBODY} {group} 1")
 
 
-def grant(outside: str, need: str, node: str) -> None:
-    """Make a device of the host appear below `DEVICES`. Raises `OSError`."""
+def grant(outside: str, need: str, node: str, own: str) -> None:
+    """Make a device of the host appear below `DEVICES`, and link to it from where it is there:
+    libraries look for sound cards at one place only. Raises `OSError`."""
     revoke(need)
     if os.path.isdir(outside + node):  # noqa: PTH112
         raise OSError(f"{node} is no device")
-    _bind_node(outside + node, f"{DEVICES}/{need}")
+    target = f"{DEVICES}/{need}"
+    _bind_node(outside + node, target)
+    if own.startswith("/dev/") and not own.startswith(f"{DEVICES}/"):
+        with contextlib.suppress(OSError):  # it is in the room anyway: /dev/zero, /dev/snd
+            os.makedirs(os.path.dirname(own), exist_ok=True)  # noqa: PTH103, PTH120
+            os.symlink(target, own)  # noqa: PTH211
+            _links[need] = own
 
 
 def revoke(need: str) -> None:
@@ -82,8 +89,13 @@ def revoke(need: str) -> None:
     target = f"{DEVICES}/{need}"
     with contextlib.suppress(OSError):
         kernel.unmount(target)
-    with contextlib.suppress(FileNotFoundError):
-        os.unlink(target)  # noqa: PTH108  # no class for each of a few plain calls
+    for path in (target, _links.pop(need, target)):
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(path)  # noqa: PTH108  # no class for each of a few plain calls
+
+
+_links: dict[str, str] = {}
+"""Of process 1 of the room: need → where a link to its node is."""
 
 
 def _bind(source: str, target: str, more: int) -> None:

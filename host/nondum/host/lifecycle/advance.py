@@ -51,6 +51,7 @@ RULES: Mapping[type[Event], _Rule] = {
     events.WorkerExited: component_rules.on_worker_news,
     events.WorkerFailed: component_rules.on_worker_news,
     events.DeviceAppeared: component_rules.on_device_appeared,
+    events.DeviceChanged: component_rules.on_device_changed,
     events.DeviceRemoved: component_rules.on_device_removed,
     events.MountSet: component_rules.on_mount_set,
     events.GoalGiven: goal_rules.on_goal_given,
@@ -97,7 +98,7 @@ def settle(turn: Turn, before: HostState) -> Outcome:
     drive_rules.release_idle_drives(turn)
     rebuilding.settle(turn, before)
     if turn.state.components != before.components or turn.state.devices != before.devices:
-        claims.settle(turn)
+        claims.settle(turn, before.devices)
     parts = ("components", "mounts", "former")
     is_recomposed = any(getattr(turn.state, part) != getattr(before, part) for part in parts)
     if is_recomposed or peer_rules.offers(turn.state) != peer_rules.offers(before):

@@ -8,6 +8,7 @@ from nondum.host.catalogue.records import DeviceRecord, MountPose, Step
 from nondum.host.effects import RestartWorker
 from nondum.host.events import (
     DeviceAppeared,
+    DeviceChanged,
     DeviceRemoved,
     MountSet,
     PayloadFailed,
@@ -17,7 +18,7 @@ from nondum.host.events import (
     WorkerFailed,
     WorkerReady,
 )
-from nondum.host.lifecycle import releases
+from nondum.host.lifecycle import known_devices, releases
 from nondum.host.lifecycle.payload_rules import on_payload_tried
 from nondum.host.lifecycle.turn import Turn
 from nondum.host.transitions import COMPONENT_TRANSITIONS
@@ -68,8 +69,21 @@ def on_mount_set(turn: Turn, event: MountSet) -> None:
 def on_device_appeared(turn: Turn, event: DeviceAppeared) -> None:
     """Enter a device; who needs it gets it when the turn is settled."""
     turn.events.append(event)
-    device = DeviceRecord(event.device, event.node, event.properties)
-    turn.change(devices={**turn.state.devices, event.device: device})
+    now_s = turn.at.wall_s
+    known = known_devices.seen(turn.state.known_devices, event.found, now_s)
+    first_s = known[event.found.identity].first_s
+    _put_device(turn, replace(event.found, first_s=first_s, since_s=now_s))
+    turn.change(known_devices=known)
+
+
+def on_device_changed(turn: Turn, event: DeviceChanged) -> None:
+    """Take over what is told of a device that is there: who has it keeps what of it still serves,
+    and gets what more of it does, when the turn is settled."""
+    before = turn.state.devices.get(event.device)
+    if before is None:
+        return
+    turn.events.append(event)
+    _put_device(turn, replace(event.found, first_s=before.first_s, since_s=before.since_s))
 
 
 def on_device_removed(turn: Turn, event: DeviceRemoved) -> None:
@@ -77,8 +91,10 @@ def on_device_removed(turn: Turn, event: DeviceRemoved) -> None:
     if event.device not in turn.state.devices:
         return
     turn.events.append(event)
+    gone = turn.state.devices[event.device]
+    known = known_devices.seen(turn.state.known_devices, gone, turn.at.wall_s)
     kept = {id: device for id, device in turn.state.devices.items() if id != event.device}
-    turn.change(devices=kept)
+    turn.change(devices=kept, known_devices=known)
 
 
 def on_trial_failed(turn: Turn, event: TrialFailed) -> None:
@@ -91,6 +107,10 @@ def on_trial_failed(turn: Turn, event: TrialFailed) -> None:
         turn.pending.append(PayloadFailed(payload.key, event.problems))
     elif payload.step is Step.ACTIVE:
         turn.pending.append(WorkerFailed(event.component, event.problems, event.payload))
+
+
+def _put_device(turn: Turn, device: DeviceRecord) -> None:
+    turn.change(devices={**turn.state.devices, device.id: device})
 
 
 def _fail_probed(turn: Turn, event: WorkerReady | WorkerExited | WorkerFailed) -> None:

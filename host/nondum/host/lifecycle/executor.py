@@ -168,10 +168,8 @@ class Executor:
         return ()
 
     async def _attach(self, effect: effects.AttachDevice) -> tuple[Event, ...]:
-        device = effect.device
-        await self._workers.attach(
-            effect.component, effect.need, str(device.node), device.properties
-        )
+        first, *others = ((str(node.node), node.properties) for node in effect.nodes)
+        await self._workers.attach(effect.component, effect.need, *first, others)
         return ()
 
     async def _detach(self, effect: effects.DetachDevice) -> tuple[Event, ...]:

@@ -41,6 +41,7 @@ from nondum.host.events import (
     WheelsStored,
 )
 from nondum.host.lifecycle import admission, releases, safe_mode, tries
+from nondum.host.lifecycle.claims import granted
 from nondum.host.lifecycle.drive_rules import copy_of, read
 from nondum.host.lifecycle.turn import Turn
 from nondum.host.transitions import TRANSITIONS, Transition
@@ -267,7 +268,8 @@ def _entering(
 def _attached(turn: Turn, component: ComponentRecord) -> Iterator[AttachDevice]:
     for claim in component.devices:
         if claim.device is not None:
-            yield AttachDevice(component.id, claim.name, turn.state.devices[claim.device])
+            device = turn.state.devices[claim.device]
+            yield AttachDevice(component.id, claim.name, granted(device, claim))
 
 
 def _by_unit(mounts: Iterable[MountPose]) -> dict[str, MountPose]:

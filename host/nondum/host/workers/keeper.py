@@ -44,12 +44,12 @@ class Keeper:
             self._read()
         return self._worker
 
-    async def grant(self, need: str, node: str) -> None:
-        """Have a device appear in the room, at `node_of`.
+    async def grant(self, need: str, node: str, own: str) -> None:
+        """Have a device appear in the room, at `node_of`, and a link to it where it is outside.
 
         Raises `WorkerFailed` (DEVICE_REFUSED).
         """
-        answer = await self._ask({"do": "grant", "need": need, "node": _real(node)})
+        answer = await self._ask({"do": "grant", "need": need, "node": _real(node), "own": own})
         if answer["error"]:
             raise WorkerFailed(
                 Problem(

@@ -10,7 +10,7 @@ from nondum.host.workers.standing import Standing
 from nondum.host.workers.supervisor import Supervisor
 
 Granted: TypeAlias = dict[str, dict[str, Any]]
-"""Declared need → node and properties of the device that serves it."""
+"""Declared need → node and properties of the device that serves it, and all its `nodes`."""
 
 
 class Others:
@@ -52,7 +52,7 @@ class Others:
         await self._ended(
             other
             for other, devices in tuple(self._devices.items())
-            if any(device["node"] == node for device in devices.values())
+            if any(node == each["node"] for device in devices.values() for each in device["nodes"])
         )
 
     async def _ended(self, some: Iterator[Supervisor]) -> None:

@@ -7,7 +7,9 @@ import contextlib
 import os
 import signal
 import subprocess
-from typing import IO
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import IO, Any
 
 from nondum.host.cgroups import Cage
 from nondum.host.cgroups.services import ServiceGroup
@@ -64,10 +66,13 @@ class WorkerProcess:
         """The path at which it finds a device that it was granted."""
         return node if self._keeper is None else node_of(need)
 
-    async def grant(self, need: str, node: str) -> None:
-        """Let it have a device. Raises `WorkerFailed` (DEVICE_REFUSED)."""
+    async def grant(self, need: str, node: str, own: str) -> None:
+        """Let it have a device, under its own name too, where it has a room.
+
+        Raises `WorkerFailed` (DEVICE_REFUSED).
+        """
         if self._keeper is not None:
-            await self._keeper.grant(need, node)
+            await self._keeper.grant(need, node, own)
 
     async def revoke(self, need: str) -> None:
         """Take a device away."""
@@ -116,6 +121,15 @@ class WorkerProcess:
 def _signal_group(leader: int, number: signal.Signals) -> None:
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(leader, number)
+
+
+def names_of(need: str, nodes: Sequence[Mapping[str, Any]]) -> list[str]:
+    """By which names a worker finds the nodes of a device: the first by that of its need.
+
+    >>> names_of("eye", [{"node": "/dev/video0"}, {"node": "/dev/video1"}])
+    ['eye', 'eye.video1']
+    """
+    return [need, *(f"{need}.{Path(each['node']).name}" for each in nodes[1:])]
 
 
 def exit_words(status: int) -> str:

@@ -21,7 +21,7 @@ from nondum.host.workers.launcher import Launcher
 from nondum.host.workers.leftovers import end_leftovers
 from nondum.host.workers.news import Claims, parse_news, parse_progress
 from nondum.host.workers.output import Output, Valve
-from nondum.host.workers.process import WorkerProcess
+from nondum.host.workers.process import WorkerProcess, names_of
 from nondum.host.workers.spec import Timing, WorkerSpec
 from nondum.planning.running import RunState
 from nondum.sdk.description import PluginDescription
@@ -51,7 +51,9 @@ class Worker:
         self._loop = asyncio.get_running_loop()
         self._calls: dict[int, Call] = {}
         self._reached: set[str] = set()
-        """Needs of which a node may have been made for it, to be removed with it."""
+        """Names by which a node may have been made for it, to be removed with it."""
+        self._granted: dict[str, dict[str, str]] = {}
+        """Need → name → node that it has by that name."""
         self._tail: deque[str] = deque(maxlen=TAIL_LINES)
         self._ending: asyncio.Task[None] | None = None
         self._watchdog: asyncio.TimerHandle | None = None
@@ -92,7 +94,8 @@ class Worker:
         """
         self._streams = frozenset(welcome["outputs"].values())
         devices = {need: await self._let_in(need, d) for need, d in welcome["devices"].items()}
-        await self.link.meet({**welcome, "devices": devices})
+        nodes = {need: device.pop("nodes") for need, device in devices.items()}
+        await self.link.meet({**welcome, "devices": devices, "device_nodes": nodes})
         said = await self.link.request("describe", {})
         description = PluginDescription.parse(said, where=self.spec.component)
         if differences := mismatches(self.spec.index, description, self.spec.component):
@@ -110,9 +113,8 @@ class Worker:
         try:
             await self.link.request("detach", {"device": need})
         finally:
-            await self._process.revoke(need)
-            self._reached.discard(need)
-            await asyncio.to_thread(withdrawn, self.spec.component, need)
+            for name in tuple(self._granted.pop(need, {})):
+                await self._shut_out(name)
 
     async def look(self) -> tuple[Problem, ...]:
         """Look at what it uses: end it when that is too much, tell what is nearly."""
@@ -197,16 +199,36 @@ class Worker:
             await self._end(problems.hung_up(self.spec.component), 0.0)
 
     async def _let_in(self, need: str, device: Mapping[str, Any]) -> dict[str, Any]:
-        """Have a device where the worker can open it; what it is told of that."""
-        node = device["node"]
+        """Have a device's nodes where the worker can open them, and no others that it had for that
+        need; what it is told of that."""
+        names = dict(zip(names_of(need, device["nodes"]), device["nodes"], strict=True))
+        had = self._granted.get(need, {})
+        for name in tuple(had):
+            if name not in names or had[name] != names[name]["node"]:
+                del had[name]
+                await self._shut_out(name)
+        inside = [{**n, "node": await self._open_up(need, name, n)} for name, n in names.items()]
+        return {**inside[0], "nodes": inside}
+
+    async def _open_up(self, need: str, name: str, device: Mapping[str, Any]) -> str:
+        """Have one node where the worker can open it; where that is."""
+        node = own = device["node"]
         if self._process.service is None:  # a service has a user of its own, and the node's group
-            self._reached.add(need)
-            node = await asyncio.to_thread(reachable, self.spec.component, need, node)
-        try:
-            await self._process.grant(need, node)
-        except WorkerFailed as error:
-            self._emit(WorkerLogged(self.spec.component, "error", str(error)))
-        return {**device, "node": self._process.node(need, node)}
+            self._reached.add(name)
+            node = await asyncio.to_thread(reachable, self.spec.component, name, own)
+        if self._granted.setdefault(need, {}).get(name) != own:
+            self._granted[need][name] = own
+            try:
+                await self._process.grant(name, node, own)
+            except WorkerFailed as error:
+                self._emit(WorkerLogged(self.spec.component, "error", str(error)))
+        return self._process.node(name, node)
+
+    async def _shut_out(self, name: str) -> None:
+        """Take one node away."""
+        await self._process.revoke(name)
+        self._reached.discard(name)
+        await asyncio.to_thread(withdrawn, self.spec.component, name)
 
     async def _reading(self) -> Reading:
         pids, folder = self._gauge.pids(), self.spec.scratch

@@ -218,14 +218,22 @@ class Workers:
         self._tell(self._supervisors, "mounts", mounts)
 
     async def attach(
-        self, component: str, need: str, node: str, properties: Mapping[str, str]
+        self,
+        component: str,
+        need: str,
+        node: str,
+        properties: Mapping[str, str],
+        others: Sequence[tuple[str, Mapping[str, str]]] = (),
     ) -> None:
-        """Grant a device for a declared need, to this worker and those after it.
+        """Grant a device for a declared need, to this worker and those after it, instead of what
+        they had for it. `others` are further nodes of it, with their properties.
 
         Another worker that has it, and is being stopped, is waited for.
         """
-        await self._others.released(node)
-        device = {"node": node, "properties": dict(properties)}
+        nodes = [{"node": n, "properties": dict(p)} for n, p in ((node, properties), *others)]
+        for each in nodes:
+            await self._others.released(str(each["node"]))
+        device = {**nodes[0], "nodes": nodes}
         self._devices.setdefault(component, {})[need] = device
         await self._tell_of_device(component, lambda worker: worker.attach(need, device))
 

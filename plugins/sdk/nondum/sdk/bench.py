@@ -21,7 +21,7 @@ from nondum.sdk.messages import Message, Vector, value_to_wire
 from nondum.sdk.plugin import describe, load
 from nondum.sdk.signature import parse_signature
 
-TIMEOUT_S = 5.0
+TIMEOUT_S = 30.0
 """How long the bench waits for anything before the test fails."""
 
 _T = TypeVar("_T")

@@ -185,7 +185,7 @@ class Session:
             case "unconsume":
                 self._place.input_for(body).disconnect()
             case "attach":
-                device = Device(body["node"], body.get("properties", {}))
+                device = Device.from_wire(body, body.get("nodes"))
                 self._place.devices[body["device"]] = device
             case "detach":
                 self._place.devices.pop(body["device"], None)

@@ -20,6 +20,21 @@ Tell = Callable[[str, Mapping[str, Any], int | None], None]
 
 
 @dataclass(frozen=True, slots=True)
+class DeviceNode:
+    """One node of a device: a camera may have two, a sound card has several."""
+
+    node: str
+    """Path by which this worker opens it."""
+    properties: Mapping[str, str]
+    """Its udev properties: `DEVNAME` is what it is called outside."""
+
+    @property
+    def subsystem(self) -> str:
+        """The kernel's kind of node: `video4linux`, `sound`, `hidraw` …"""
+        return self.properties.get("SUBSYSTEM", "")
+
+
+@dataclass(frozen=True, slots=True)
 class Device:
     """A device that the host has granted."""
 
@@ -27,6 +42,15 @@ class Device:
     """Path of the device node."""
     properties: Mapping[str, str]
     """Its udev properties."""
+    nodes: tuple[DeviceNode, ...] = ()
+    """All nodes of it that serve the need, the first of them first; empty: the host tells of none
+    but that one."""
+
+    @classmethod
+    def from_wire(cls, body: Mapping[str, Any], nodes: Any) -> Device:
+        """Make one of what a host tells of it. Raises `KeyError`, `TypeError`."""
+        every = tuple(DeviceNode(n["node"], dict(n["properties"])) for n in nodes or ())
+        return cls(body["node"], dict(body.get("properties", {})), every)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +84,10 @@ class Place:
                 outputs=dict(body.get("outputs", {})),
                 settings=dict(body.get("settings", {})),
                 scratch=Path(body.get("scratch", "")),
-                devices={name: Device(**d) for name, d in body.get("devices", {}).items()},
+                devices={
+                    name: Device.from_wire(device, body.get("device_nodes", {}).get(name))
+                    for name, device in body.get("devices", {}).items()
+                },
                 mounts=dict(body.get("mounts", {})),
                 limits=dict(body.get("limits", {})),
             )

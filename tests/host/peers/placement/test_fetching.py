@@ -95,11 +95,31 @@ async def test_wrong_piece_is_refused_wherever_it_is(tmp_path: Path, at: int, wr
 
 async def test_pieces_that_are_not_wanted_any_more_are_cancelled(tmp_path: Path) -> None:
     cancelled: list[int] = []
+    all_asked = asyncio.Event()
 
     def read(sha256: str, offset: int, length: int) -> Call:
+        if offset == (PIECES - 1) * (LEAST // PIECES):
+            all_asked.set()
         return asked(offset, cancelled.append)
 
-    fetch = Fetching(tmp_path, read).fetch(listed(bytes(100_000)))
-    with pytest.raises(TimeoutError):
-        await asyncio.wait_for(fetch, 0.05)
+    fetch = asyncio.create_task(Fetching(tmp_path, read).fetch(listed(bytes(100_000))))
+    await all_asked.wait()
+    fetch.cancel()
+    await asyncio.wait([fetch])
+    assert fetch.cancelled()
     assert cancelled == [number * LEAST // PIECES for number in range(PIECES)]
+
+
+async def test_file_of_a_fetch_that_ends_as_it_begins_is_closed(tmp_path: Path) -> None:
+    owner = Owner(b"data")
+    fetch = asyncio.create_task(Fetching(tmp_path, owner.read).fetch(listed(b"data")))
+    await asyncio.sleep(0)  # it is opening its file from now on
+    fetch.cancel()
+    await asyncio.wait([fetch])
+    assert fetch.cancelled()
+    assert not any(entry.endswith("a.whl") for entry in open_files())
+
+
+def open_files() -> list[str]:
+    folder = Path("/proc/self/fd")
+    return [str(entry.readlink()) for entry in folder.iterdir() if entry.is_symlink()]

@@ -6,6 +6,7 @@ import asyncio
 import hashlib
 from collections import deque
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
@@ -41,10 +42,11 @@ class Fetching:
         Raises `PayloadRefused` (HASH_MISMATCH), and what the call does.
         """
         path = self.folder / listed.path
-        out = await in_thread(_created, path)
         pieces: deque[_Piece] = deque()
         digest, done = hashlib.sha256(), 0
+        opened = ExitStack()
         try:
+            out = await in_thread(_created, path, opened)
             while done < listed.size:
                 self._ask(listed, done, pieces)
                 piece = pieces.popleft()
@@ -58,7 +60,7 @@ class Fetching:
         finally:
             for piece in pieces:
                 piece.call.cancel()
-            await in_thread(out.close)
+            await in_thread(opened.close)
         if digest.hexdigest() != listed.sha256:
             raise PayloadRefused(_mismatch(listed, "its bytes are not those that were listed"))
 
@@ -83,9 +85,9 @@ def _now_s() -> float:
     return asyncio.get_running_loop().time()
 
 
-def _created(path: Path) -> BinaryIO:
+def _created(path: Path, opened: ExitStack) -> BinaryIO:
     path.parent.mkdir(parents=True, exist_ok=True)
-    return path.open("xb")
+    return opened.enter_context(path.open("xb"))
 
 
 def _add(out: BinaryIO, digest: hashlib._Hash, data: bytes) -> None:

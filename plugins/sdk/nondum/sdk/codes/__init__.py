@@ -26,6 +26,7 @@ AREAS = (
     "peers",
     "pairing",
     "host",
+    "feedback",
     "goals",
     "reasons",
     "pddl",

@@ -36,6 +36,13 @@ CODES = (
         causes=("it was pulled; a loose plug or a bad cable; a stick that fails"),
     ),
     Code(
+        "DRIVE_MOUNTED",
+        "Somebody else has mounted the drive, or uses it otherwise, so it is not read.",
+        "unmount it there, pull it and plug it in again; have no desktop or automounter mount what "
+        "is plugged into a robot",
+        causes=("an automounter; a person who had a look; a check of its file system"),
+    ),
+    Code(
         "DRIVE_NAME",
         "The drive's name has characters that cannot be shown, so it is not read.",
         "give the drive another label, or mount it under another name",
@@ -48,6 +55,15 @@ CODES = (
         causes=(
             "an ordinary stick; the payload's folder was copied without its parents; the wrong "
             "partition"
+        ),
+    ),
+    Code(
+        "DRIVE_OWN",
+        "The disk is the machine's own, whatever it hangs on, and is left alone.",
+        "nothing is wrong; `nondum doctor disks` tells which disks are whose, and why",
+        causes=(
+            "the machine boots from it, mounts it by /etc/fstab, swaps to it, or has made another "
+            "device of it; a stick that has the label of such a disk"
         ),
     ),
     Code(

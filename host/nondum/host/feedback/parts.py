@@ -1,0 +1,53 @@
+"""Feedback as the configuration asks for it: what is listened to, what shows it, and how long."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+from nondum.host.catalogue.catalogue import Catalogue
+from nondum.host.conversation import LONGEST_SPOKEN, UNSAID, Conversation
+from nondum.host.feedback.feedback import Feedback, Sources
+from nondum.host.feedback.hook import Hook
+from nondum.host.feedback.lamp_output import LampOutput
+from nondum.host.feedback.outputs import Output
+from nondum.host.feedback.player import Player
+from nondum.host.feedback.section import FeedbackSection
+from nondum.host.feedback.showing import Durations
+from nondum.host.feedback.speaking import Aloud
+from nondum.host.mind.mind import Mind
+
+
+def made(
+    section: FeedbackSection,
+    state: Path,
+    catalogue: Catalogue,
+    mind: Mind,
+    places: Callable[[], Mapping[str, str]],
+    conversation: Conversation,
+    on_change: Callable[[], None],
+) -> Feedback:
+    """What shows people how the host is who have no screen. `state` is the daemon's folder,
+    `places` the payloads that run on peers; `on_change` is called whenever it shows another."""
+    sources = Sources(catalogue.snapshot, places, lambda: mind.queue)
+    durations = Durations(section.refused_s, section.safe_s)
+    outputs = tuple(_outputs(section, state, mind, conversation))
+    return Feedback(sources, durations, outputs, on_change=on_change)
+
+
+def _outputs(
+    section: FeedbackSection, state: Path, mind: Mind, conversation: Conversation
+) -> Iterator[Output]:
+    """All that is configured."""
+
+    def told() -> list[str]:
+        return [said.text for said in mind.people.since(mind.people.last_number - UNSAID)]
+
+    if section.lamps:
+        yield LampOutput(section.lamps, state / "lamps.json")
+    if section.player:
+        yield Player(section.player)
+    if section.hook:
+        yield Hook(section.hook, section.hook_deadline_s)
+    if section.speak:
+        yield Aloud(conversation.say, told, LONGEST_SPOKEN)

@@ -1,0 +1,90 @@
+"""Running an integrator's program: in a group of its own, for a while, and never longer."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+OUTPUT_BYTES = 4096
+"""Of what it writes, so much is kept."""
+_INHERITED = ("PATH", "HOME", "LANG", "LC_ALL", "XDG_RUNTIME_DIR")
+_END_S = 1.0
+"""How long a killed program, and what it has left behind, is waited for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How a program ended."""
+
+    status: int | None
+    """Its exit status, negative for a signal; None: it was killed at its deadline."""
+    output: str
+    """The beginning of what it wrote."""
+
+
+async def run(
+    command: Sequence[str], environment: Mapping[str, str], data: bytes, deadline_s: float
+) -> Ended:
+    """Run a program with `data` at its standard input, until it ends; then, or at its deadline, all
+    that is left of its process group is killed. Cancelling does the same. Raises `OSError`."""
+    inherited = {name: os.environ[name] for name in _INHERITED if name in os.environ}
+    transport, talk = await asyncio.get_running_loop().subprocess_exec(
+        _Talk,
+        *command,
+        stderr=subprocess.STDOUT,
+        env={**inherited, **environment},
+        start_new_session=True,
+    )
+    _tell(transport, data)
+    status: int | None = None
+    try:
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(deadline_s):
+                await talk.exited.wait()
+            status = transport.get_returncode()
+    finally:
+        await asyncio.shield(_end(transport, talk))
+    return Ended(status, talk.output.decode(errors="replace").strip())
+
+
+class _Talk(asyncio.SubprocessProtocol):
+    """Hears a program. That it has ended counts, not that all have who may write in its place:
+    streams of asyncio would wait for those, too."""
+
+    def __init__(self) -> None:
+        self.exited, self.closed = asyncio.Event(), asyncio.Event()
+        self.output = bytearray()
+
+    def pipe_data_received(self, fd: int, data: bytes) -> None:
+        """Keep the beginning."""
+        self.output.extend(data[: max(0, OUTPUT_BYTES - len(self.output))])
+
+    def process_exited(self) -> None:
+        """It has ended."""
+        self.exited.set()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """It has ended, and nobody can write in its place."""
+        self.closed.set()
+
+
+def _tell(transport: asyncio.SubprocessTransport, data: bytes) -> None:
+    stdin = transport.get_pipe_transport(0)
+    assert isinstance(stdin, asyncio.WriteTransport)
+    stdin.write(data)
+    stdin.write_eof()
+
+
+async def _end(transport: asyncio.SubprocessTransport, talk: _Talk) -> None:
+    """Kill what is left of the group; what has left the group is not waited for."""
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(transport.get_pid(), signal.SIGKILL)
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(_END_S):
+            await talk.closed.wait()
+    transport.close()

@@ -1,0 +1,44 @@
+"""The processors that there are packages for, in Debian's words and in those of wheels."""
+
+from __future__ import annotations
+
+import platform
+from dataclasses import dataclass
+
+from nondum_deb.places import PYTHON
+
+GLIBC = (36, 35, 34, 31, 28, 27, 26, 24, 17)
+"""Minor versions of glibc 2 that wheels may ask for: Debian 12 has 2.36."""
+
+
+@dataclass(frozen=True, slots=True)
+class Architecture:
+    """One of them."""
+
+    debian: str
+    machine: str
+    """As `uname -m` and wheels' tags call it."""
+
+    @property
+    def platforms(self) -> tuple[str, ...]:
+        """Tags of wheels that run on it, best first (PEP 600)."""
+        new = (f"manylinux_2_{minor}_{self.machine}" for minor in GLIBC)
+        return (*new, f"manylinux2014_{self.machine}")
+
+    @property
+    def of_pip(self) -> tuple[str, ...]:
+        """How pip is told to deal in wheels for it, whatever this machine's architecture is."""
+        python = ("--python-version", PYTHON, "--implementation", "cp")
+        platforms = (f"--platform={name}" for name in self.platforms)
+        return ("--only-binary=:all:", *python, *platforms)
+
+
+AMD64 = Architecture("amd64", "x86_64")
+ARM64 = Architecture("arm64", "aarch64")
+ARCHITECTURES = {known.debian: known for known in (AMD64, ARM64)}
+
+
+def here() -> Architecture | None:
+    """The one of this machine, if there are packages for it."""
+    known = [a for a in ARCHITECTURES.values() if a.machine == platform.machine()]
+    return known[0] if known else None

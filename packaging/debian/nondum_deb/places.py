@@ -1,0 +1,51 @@
+"""Where things are in the checkout, and what nondum is made of."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+PACKAGING = Path(__file__).parents[2]
+CHECKOUT = PACKAGING.parent
+DEBIAN = PACKAGING / "debian"
+LOCK = DEBIAN / "requirements.lock"
+DISTRIBUTIONS = ("plugins/sdk", ".", "plugins/planner-pyperplan")
+"""Of the checkout, what is in the package. pyperplan is here as the DESIGN asks of every package: a
+distribution of its own, for it is under the GPL."""
+EXTRAS = {"nondum": ("fast", "usb")}
+"""Of those, the optional parts that are always installed with them."""
+PYTHON = "3.11"
+"""Debian 12's."""
+
+
+def project(distribution: str) -> dict[str, object]:
+    """The table `[project]` of one of the checkout's distributions."""
+    text = (CHECKOUT / distribution / "pyproject.toml").read_text(encoding="utf-8")
+    table: dict[str, object] = tomllib.loads(text)["project"]
+    return table
+
+
+def version() -> str:
+    """nondum's own."""
+    return str(project(".")["version"])
+
+
+def declared() -> list[str]:
+    """What the distributions need, each other left out, as pip is told (PEP 508)."""
+    own = {str(project(place)["name"]) for place in DISTRIBUTIONS}
+    wanted: list[str] = []
+    for place in DISTRIBUTIONS:
+        table = project(place)
+        wanted += _strings(table.get("dependencies"))
+        extras = table.get("optional-dependencies")
+        for extra in EXTRAS.get(str(table["name"]), ()):
+            wanted += _strings(extras.get(extra) if isinstance(extras, dict) else None)
+    return sorted({line for line in wanted if not any(_is(line, name) for name in own)})
+
+
+def _strings(value: object) -> list[str]:
+    return [str(line) for line in value] if isinstance(value, list) else []
+
+
+def _is(line: str, name: str) -> bool:
+    return line.startswith(name) and not line[len(name) :][:1].strip("<>=!~;[ ")

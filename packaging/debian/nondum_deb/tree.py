@@ -1,0 +1,136 @@
+"""What the package puts on a machine: a venv under /opt/nondum, units, configuration, completion.
+
+The venv is made without running anything of its architecture: `pip install --target` unpacks wheels
+for any, and a venv is little else than a link to Python and a file beside it (PEP 405).
+"""
+
+from __future__ import annotations
+
+import gzip
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+from nondum_deb import lock
+from nondum_deb.architecture import Architecture
+from nondum_deb.command import PIP, BuildFailed, call
+from nondum_deb.places import CHECKOUT, DEBIAN, DISTRIBUTIONS, EXTRAS, PACKAGING, PYTHON, project
+
+PREFIX = "opt/nondum"
+SITE = f"{PREFIX}/lib/python{PYTHON}/site-packages"
+PYVENV = f"""\
+home = /usr/bin
+include-system-site-packages = false
+version = {PYTHON}
+executable = /usr/bin/python{PYTHON}
+"""
+LAUNCHER = """\
+#!/opt/nondum/bin/python -I
+import sys
+
+from nondum.host.cli import main
+
+sys.exit(main())
+"""
+"""`-I`: what the caller's folder and variables hold is not run."""
+FOLDERS = {
+    "systemd": "lib/systemd/system",
+    "sysusers.d": "usr/lib/sysusers.d",
+    "tmpfiles.d": "usr/lib/tmpfiles.d",
+    "udev": "lib/udev/rules.d",
+    "journald.conf.d": "usr/lib/systemd/journald.conf.d",
+}
+"""Folders of packaging/, and where on a machine their files belong."""
+COMPLETIONS = {
+    "bash": "usr/share/bash-completion/completions/nondum",
+    "fish": "usr/share/fish/vendor_completions.d/nondum.fish",
+    "zsh": "usr/share/zsh/vendor-completions/_nondum",
+}
+DOCS = "usr/share/doc/nondum"
+
+
+def make(root: Path, architecture: Architecture, own: Path) -> None:
+    """Fill an empty folder with all files of the package but those of dpkg. `own` holds the wheels
+    that `own_wheels` made."""
+    _site_packages(root / SITE, architecture, own)
+    _venv(root)
+    _machine_files(root)
+    _completions(root)
+
+
+def own_wheels(folder: Path) -> None:
+    """Build the checkout's distributions: they are the same for every architecture."""
+    call(*PIP, "wheel", "--no-deps", "-w", folder, *(CHECKOUT / place for place in DISTRIBUTIONS))
+
+
+def compress(text: str, path: Path) -> None:
+    """Write a text as gzip does, but the same whenever and wherever it is written."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(gzip.compress(text.encode(), 9, mtime=0))
+
+
+def _site_packages(site: Path, architecture: Architecture, own: Path) -> None:
+    with tempfile.TemporaryDirectory(prefix="nondum-wheels-") as others:
+        lock.locked_wheels(architecture, Path(others))
+        _unpack(site, architecture, own, Path(others))
+    _without_programs(site)
+
+
+def _unpack(site: Path, architecture: Architecture, *wheels: Path) -> None:
+    places = (f"--find-links={folder}" for folder in wheels)
+    wanted = (_requirement(place) for place in DISTRIBUTIONS)
+    told = ("--no-index", "--no-compile", "--no-warn-conflicts", *architecture.of_pip)
+    call(*PIP, "install", "--target", site, *told, *places, *wanted)
+
+
+def _requirement(place: str) -> str:
+    table = project(place)
+    extras = ",".join(EXTRAS.get(str(table["name"]), ()))
+    return f"{table['name']}[{extras}]=={table['version']}"
+
+
+def _without_programs(site: Path) -> None:
+    """Other people's programs are not nondum's to offer; what was said of them goes, too."""
+    shutil.rmtree(site / "bin", ignore_errors=True)
+    for record in site.glob("*.dist-info/RECORD"):
+        lines = record.read_text(encoding="utf-8").splitlines(keepends=True)
+        kept = (line for line in lines if not line.startswith(("../../bin/", "bin/")))
+        record.write_text("".join(kept), encoding="utf-8")
+
+
+def _venv(root: Path) -> None:
+    _write(root / PREFIX / "pyvenv.cfg", PYVENV)
+    programs = root / PREFIX / "bin"
+    _write(programs / "nondum", LAUNCHER, 0o755)
+    (programs / f"python{PYTHON}").symlink_to(f"/usr/bin/python{PYTHON}")
+    for name in ("python", "python3"):
+        (programs / name).symlink_to(f"python{PYTHON}")
+    (root / "usr/bin").mkdir(parents=True)
+    (root / "usr/bin/nondum").symlink_to(f"/{PREFIX}/bin/nondum")
+
+
+def _machine_files(root: Path) -> None:
+    for folder in sorted(PACKAGING.iterdir()):
+        if folder.is_dir() and folder != DEBIAN:
+            if folder.name not in FOLDERS:
+                raise BuildFailed(f"{folder}: nobody said where on a machine this belongs")
+            for file in sorted(folder.iterdir()):
+                _write(root / FOLDERS[folder.name] / file.name, file.read_text(encoding="utf-8"))
+    _write(root / "etc/nondum/host.toml", (DEBIAN / "host.toml").read_text(encoding="utf-8"))
+    overrides = (DEBIAN / "lintian-overrides").read_text(encoding="utf-8")
+    _write(root / "usr/share/lintian/overrides/nondum", overrides)
+    manual = (DEBIAN / "nondum.1").read_text(encoding="utf-8")
+    compress(manual, root / "usr/share/man/man1/nondum.1.gz")
+
+
+def _completions(root: Path) -> None:
+    """As this checkout's own command prints them: they ask nothing of an architecture."""
+    for shell, path in COMPLETIONS.items():
+        _write(root / path, call(sys.executable, "-m", "nondum.host.cli", "completion", shell))
+
+
+def _write(path: Path, text: str, mode: int = 0o644) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    path.chmod(mode)

@@ -1,0 +1,94 @@
+"""vfat, exfat, ext4; whole disks, tables, several partitions; odd labels, litter: all are read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from tests.lab.machines import images
+from tests.lab.machines.installed import Installed
+from tests.lab.machines.lab import Lab
+from tests.lab.machines.plugins import doer
+
+ODD = {"vfat": "$(reboot)&", "exfat": "Stöck ☂ ½", "ext4": "../../etc\\x0a"}
+"""Labels that are no good names, file system by file system."""
+TABLES = {"vfat": "dos", "exfat": "gpt", "ext4": "gpt"}
+
+
+def run(lab: Lab) -> str:
+    """One drawer of drives after the other is plugged in at once, and pulled."""
+    host = lab.host()
+    whole = {f"whole-{kind}": _whole(lab, kind) for kind in images.FILE_SYSTEMS}
+    see_at_work(host, whole, {name: [name] for name in whole})
+    tables = {f"table-{kind}": _with_table(lab, kind) for kind in images.FILE_SYSTEMS}
+    see_at_work(host, tables, {name: [name] for name in tables})
+    see_at_work(host, {"several": _several(lab)}, {"several": ["first", "third"]})
+    codes = _see_told(lab, host)
+    return f"{len(whole) + len(tables)} drives, one of several partitions; told: {codes}"
+
+
+def see_at_work(host: Installed, drives: dict[str, Path], payloads: dict[str, list[str]]) -> None:
+    """Plug drives in, wait for their payloads, and have all gone again."""
+    plugged = [host.machine.plug(image) for image in drives.values()]
+    ids = [f"org.example.{name}" for names in payloads.values() for name in names]
+    for payload in ids:
+        host.until_payload(payload, "active")
+    for name in plugged:
+        host.machine.pull(name)
+    for payload in ids:
+        host.until_payload(payload, "gone")
+    host.until("no drive is left", lambda view: None if view["drives"] else True)
+
+
+def _content(lab: Lab, name: str) -> Path:
+    return images.with_litter(lab.payload(name, doer(name, "pass")))
+
+
+def _whole(lab: Lab, kind: str) -> Path:
+    """A disk without a partition table."""
+    content = _content(lab, f"whole-{kind}")
+    return images.file_system(content.parent / "disk.img", kind, content, label=ODD[kind])
+
+
+def _with_table(lab: Lab, kind: str) -> Path:
+    content = _content(lab, f"table-{kind}")
+    part = images.file_system(content.parent / "part.img", kind, content, label="STICK")
+    return images.partitioned(content.parent / "disk.img", TABLES[kind], [part])
+
+
+def _several(lab: Lab) -> Path:
+    """Payloads on the first and the third; the second has only photographs, the fourth nothing."""
+    first, third = _content(lab, "first"), _content(lab, "third")
+    photos = first.parent / "photos"
+    (photos / "DCIM").mkdir(parents=True)
+    (photos / "DCIM/beach.jpg").write_bytes(b"sand")
+    parts = [
+        images.file_system(first.parent / "1.img", "vfat", first),
+        images.file_system(first.parent / "2.img", "ext4", photos),
+        images.file_system(third.parent / "3.img", "exfat", third),
+        None,
+    ]
+    return images.partitioned(first.parent / "disk.img", "gpt", parts)
+
+
+def _see_told(lab: Lab, host: Installed) -> str:
+    """What of drives that cannot be used is said, drive by drive."""
+    folder = lab.folder()
+    wrong = {
+        "FS_UNSUPPORTED": images.blank(folder / "blank.img"),
+        "FS_UNSUPPORTED swap": images.file_system(folder / "swap.img", "swap"),
+        "DRIVE_NOT_PAYLOAD": images.file_system(folder / "empty.img", "vfat"),
+    }
+    said = []
+    for words, image in wrong.items():
+        name = host.machine.plug(image)
+        (told,) = host.until(words, _problems)
+        assert all(word in told for word in words.split()), f"{words}: {told}"
+        said.append(told.split()[0])
+        host.machine.pull(name)
+        host.until("it is gone", lambda view: None if view["drives"] else True)
+    return ", ".join(said)
+
+
+def _problems(view: dict[str, Any]) -> list[str] | None:
+    return [problem for drive in view["drives"] for problem in drive["problems"]] or None

@@ -1,0 +1,91 @@
+"""USB disks that fstab mounts and swaps to stay untouched, beside a stick that works."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tests.lab.machines import images
+from tests.lab.machines.installed import Installed
+from tests.lab.machines.lab import Lab
+from tests.lab.machines.plugins import doer
+from tests.lab.plugins import talker
+
+PAYLOAD = "org.example.talker"
+FSTAB = """
+LABEL=DATA\\040OF\\040OURS /srv/data ext4 nofail 0 2
+LABEL=SPARE none swap nofail 0 0
+"""
+OWN = 2
+
+
+def run(lab: Lab) -> str:
+    """Boot with both, plug a stick in beside them, and one that somebody has mounted."""
+    host = lab.booted()
+    folder = lab.folder()
+    bait = lab.payload("bait", doer("bait", "pass"))
+    data = images.file_system(folder / "data.img", "ext4", bait, label="DATA OF OURS")
+    disk = images.partitioned(folder / "disk.img", "gpt", [data, None])
+    swap = images.file_system(folder / "swap.img", "swap", label="SPARE")
+    for image in (disk, swap):
+        host.machine.plug(image)
+    host.machine.run(f"mkdir -p /srv/data; cat >>/etc/fstab <<'END'{FSTAB}END\nsync")
+    host.machine.reset()
+    host.wait_until_started()
+    host.machine.until("swap and data", lambda: _in_use(host))
+    host.machine.until("both are told", lambda: True if len(_left_alone(host)) >= OWN else None)
+    stick = host.bring(lab.stick("talker", talker()), PAYLOAD)
+    _see_untouched(host)
+    _see_mounted_one_told(lab, host)
+    host.machine.pull(stick)
+    host.until_payload(PAYLOAD, "gone")
+    _see_untouched(host)
+    return "; ".join(sorted(_left_alone(host)))
+
+
+def _in_use(host: Installed) -> bool | None:
+    seen = host.machine.attempt("mountpoint -q /srv/data && grep -q /dev/sd /proc/swaps")
+    return True if seen.status == 0 else None
+
+
+def _left_alone(host: Installed) -> list[str]:
+    """What the journal has of disks that are left alone."""
+    rows: list[dict[str, Any]] = host.machine.attempt("nondum journal --json --limit 1000").json()
+    return [
+        f"{problem['where']}: {problem['message']}"
+        for row in rows
+        for problem in row["problems"]
+        if problem["code"] == "DRIVE_OWN"
+    ]
+
+
+def _see_untouched(host: Installed) -> None:
+    """They are in use as before, can be written to, are no drives, and nobody read of them."""
+    assert _in_use(host)
+    host.machine.run("echo well >/srv/data/letter && sync && rm /srv/data/letter")
+    host.machine.run("cat /sys/class/block/sd*/ro | sort | uniq -c")
+    view = host.status()
+    assert view is not None
+    assert "bait" not in str(view), view["payloads"]
+    disks = host.machine.run("nondum doctor disks --json")
+    assert disks.count('"host"') >= OWN, disks
+
+
+def _see_mounted_one_told(lab: Lab, host: Installed) -> None:
+    """One that somebody mounts before the host comes to it."""
+    content = lab.payload("seen", doer("seen", "pass"))
+    image = images.file_system(content.parent / "seen.img", "vfat", content, label="SEEN")
+    host.stop()
+    name = host.machine.plug(image)
+    node = host.machine.until("a node", lambda: _labelled(host, "SEEN"))
+    host.machine.run(f"mkdir -p /mnt/look && mount {node} /mnt/look")
+    host.start()
+    host.until("DRIVE_MOUNTED", lambda view: True if "DRIVE_MOUNTED" in str(view) else None)
+    host.machine.run("touch /mnt/look/well && umount /mnt/look")
+    host.machine.pull(name)
+
+
+def _labelled(host: Installed, label: str) -> str | None:
+    """The node of the file system with a label, once udev has told all about it."""
+    seen = host.machine.attempt(f"udevadm settle && readlink -f /dev/disk/by-label/{label}")
+    node = seen.out.strip()
+    return node if seen.status == 0 and node.startswith("/dev/sd") else None

@@ -1,0 +1,37 @@
+"""The Debian packages of this checkout, built once for all that look at them."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+BUILDER = ROOT / "packaging/debian"
+Build = Callable[..., Path]
+
+
+@pytest.fixture(scope="session")
+def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
+    """Runs the builder; answers the folder of what it built."""
+
+    def run(*words: str, **variables: str) -> Path:
+        folder = tmp_path_factory.mktemp("packages")
+        command = [sys.executable, "-m", "nondum_deb", "-o", str(folder), *words]
+        surroundings = {**os.environ, "PYTHONPATH": str(BUILDER), **variables}
+        done = subprocess.run(command, env=surroundings, capture_output=True, text=True, cwd="/")
+        assert done.returncode == 0, done.stderr
+        return folder
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def packages(build: Build) -> dict[str, Path]:
+    """The packages of both architectures, by Debian's name of it."""
+    folder = build("--arch", "amd64", "--arch", "arm64", "--version", "0.1.0+test1")
+    return {deb.stem.rpartition("_")[2]: deb for deb in folder.iterdir()}
