@@ -28,10 +28,11 @@ LIKELY = re.compile(r"(?:[A-Z][A-Z0-9]+(?:_[A-Z0-9]+)+|E-[A-Z]+(?:-[A-Z]+)*)(?= 
 """What a string in the sources begins with when it is most probably a code."""
 NO_CODES = frozenset(
     {
-        *("ID_BUS", "ID_FS_TYPE", "ID_FS_UUID", "ID_SERIAL", "SYNTH_UUID", "USEC_INITIALIZED"),
+        *("ID_BUS", "ID_FS_TYPE", "ID_FS_UUID", "ID_PART_ENTRY_TYPE", "ID_SERIAL"),
+        *("SYNTH_UUID", "USEC_INITIALIZED"),
         *("LC_ALL", "LISTEN_FDS", "LISTEN_PID", "NO_COLOR", "SOURCE_DATE_EPOCH"),
         *("MALLOC_ARENA_MAX", "SCHED_IDLE", "VECLIB_MAXIMUM"),
-        *("NONDUM_CONTROL", "NONDUM_ROOM", "NONDUM_SPARE_OF", "NONDUM_WORKER"),
+        *("NONDUM_CONTROL", "NONDUM_LAB", "NONDUM_ROOM", "NONDUM_SPARE_OF", "NONDUM_WORKER"),
         *("NONDUM_CODE", "NONDUM_EVENT", "NONDUM_LOGGER", "NONDUM_LOST", "SYSLOG_IDENTIFIER"),
         *("CODE_FILE", "CODE_FUNC", "CODE_LINE", "JOURNAL_STREAM"),
         *("NOTIFY_SOCKET", "WATCHDOG_PID", "WATCHDOG_USEC"),

@@ -16,8 +16,8 @@ from tests.host.lifecycle.living import LAMP, Living, left_over, living
 from tests.payloads import Part, make_payload, make_wheel
 
 from nondum.host.catalogue.records import PayloadRecord, Step
-from nondum.host.drives import reading
 from nondum.host.lifecycle import installation
+from nondum.host.lifecycle.installation import InstallOptions
 
 pytestmark = [
     pytest.mark.anyio,
@@ -28,18 +28,19 @@ pytestmark = [
 
 LAMP_ID = "org.example.lamp"
 FOLDER = f"nondum/{LAMP_ID}"
+IMPATIENT = InstallOptions(allow_unsigned=True, look_s=4.0)
 LIST, MANIFEST = f"{FOLDER}/CONTENTS", f"{FOLDER}/payload.toml"
 
 
 @asynccontextmanager
 async def lying(
-    tmp_path: Path, *, answers: dict[str, Answer]
+    tmp_path: Path, *, answers: dict[str, Answer], options: InstallOptions | None = None
 ) -> AsyncIterator[tuple[Living, FuseDrive]]:
     """A host, and a drive with a sound payload on a device that gives these answers."""
     root = tmp_path / "root"
     ballast = make_wheel(tmp_path, "ballast", "1.0", {"ballast.bin": os.urandom(2**20)})
     make_payload(root, Part("lamp", LAMP, wheels=[ballast]), payload_id=LAMP_ID)
-    async with living(tmp_path) as host:
+    async with living(tmp_path, options=options) as host:
         with served(root, tmp_path / "fuse") as drive:
             drive.answers |= answers
             host.plug(drive.mount)
@@ -183,10 +184,9 @@ async def test_folder_without_end_is_read_no_further_than_a_person_fills_it(
 
 
 async def test_list_that_grows_while_it_is_read_is_given_up(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
 ) -> None:
     """It is as long as it says, and a byte longer each time that somebody has come to its end."""
-    monkeypatch.setattr(reading, "LOOK_S", 4.0)
     told: list[int] = []
 
     def answer(opening: int, offset: int, size: int) -> bytes:
@@ -196,7 +196,7 @@ async def test_list_that_grows_while_it_is_read_is_given_up(
             time.sleep(0.01)  # so does a device that takes its time
         return data[offset : offset + size] or b"x"
 
-    async with lying(tmp_path, answers={LIST: answer}) as (host, _):
+    async with lying(tmp_path, answers={LIST: answer}, options=IMPATIENT) as (host, _):
         await unreadable(host, "DRIVE_STALLED")
     assert max(told) <= 256 * 1024
 
@@ -217,7 +217,6 @@ async def test_device_that_is_silent_is_given_up(
     tmp_path: Path, path: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its child hangs in the kernel; nobody else waits for it."""
-    monkeypatch.setattr(reading, "LOOK_S", 4.0)
     monkeypatch.setattr(installation, "COPY_SILENCE_S", 4.0)
     heard = threading.Event()
 
@@ -226,7 +225,7 @@ async def test_device_that_is_silent_is_given_up(
         return b""
 
     where = LIST if path == "list" else wheel(tmp_path)
-    async with lying(tmp_path, answers={where: answer}) as (host, _):
+    async with lying(tmp_path, answers={where: answer}, options=IMPATIENT) as (host, _):
         make_payload(tmp_path / "good", Part("good", LAMP), payload_id="org.example.good")
         host.plug(tmp_path / "good", "good")
         await host.until_step("org.example.good", Step.ACTIVE)

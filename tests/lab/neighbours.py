@@ -16,11 +16,14 @@ UNCONFINED = '[workers]\nconfinement = "0"\nminimum_confinement = 0\n\n'
 
 
 def free_port() -> int:
-    """A port that nobody listens at just now."""
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        port: int = found.getsockname()[1]
-        return port
+    """A port that is given to nobody else, as long as this process lives, but who asks for it by
+    its number, as daemons do."""
+    reserved = socket.socket()
+    reserved.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    reserved.bind(("127.0.0.1", 0))
+    port: int = reserved.getsockname()[1]
+    reserved.detach()
+    return port
 
 
 @contextmanager

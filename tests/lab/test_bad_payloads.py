@@ -9,7 +9,7 @@ import pytest
 from demo.robot import nondum
 from tests.host.lifecycle.test_bad_payloads import BAD, EXITS_LATER, WAYS, Bad, bare
 from tests.lab.plugins import scribe, talker
-from tests.lab.running_host import Row, RunningHost, running
+from tests.lab.running_host import READY_S, Row, RunningHost, running
 from tests.payloads import make_payload
 
 pytestmark = [pytest.mark.lab, pytest.mark.beside]
@@ -48,7 +48,7 @@ def test_bad_payload_is_told_with_its_code(host: RunningHost, bad: Bad, tmp_path
     told, known = host.told_number(), len(host.journal(BAD))
     bad.write(tmp_path / "bad")
     host.plug(tmp_path / "bad")
-    row = host.until("judged", judged, timeout_s=20)
+    row = host.until("judged", judged, timeout_s=READY_S)
     assert host.until_told(f": {bad.code} ", since=told).startswith(BAD)
     assert (row["state"], set(row["codes"])) == (bad.step.value, {bad.code})
     assert host.view["state"] == "ready, with problems"
@@ -72,7 +72,7 @@ def test_command_line_shows_what_is_wrong(host: RunningHost, tmp_path: Path) -> 
         tmp_path / "bad", bare(""), payload_id=BAD, requires='python = ">=3.99"', release=2
     )
     host.plug(tmp_path / "bad")
-    host.until("judged", judged, timeout_s=20)
+    host.until("judged", judged, timeout_s=READY_S)
     for command in (["status"], ["why"], ["journal", "--subject", BAD]):
         assert "PYTHON_VERSION" in nondum("--control", host.control, *command)
 

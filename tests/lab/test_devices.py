@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
+import os
+import select
+import struct
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -13,6 +17,8 @@ from tests.lab.running_host import RunningHost
 
 pytestmark = [pytest.mark.lab, pytest.mark.beside]
 
+TIOCSPTLCK, TIOCGPTN = 0x40045431, 0x80045430
+"""Unlock the other end of a line, and tell its number (ioctl_tty(2))."""
 WAITS = "waits for gauge"
 
 
@@ -100,3 +106,54 @@ def test_one_device_for_two_stays_with_whoever_has_it_and_that_is_told(
     assert host.until_component("second", WAITS)
     host.pull("first")
     host.until_component("second", "ready")
+
+
+def test_device_that_nobody_needs_is_never_opened(host: RunningHost, plug_gauge: Plug) -> None:
+    """The kernel tells the other end of a line once anybody has opened and closed it."""
+    line, slave = unopened_line()
+    try:
+        slots.plug(host.devices, "port-9", slave, {"ID_MODEL": "Other", "SUBSYSTEM": "tty"})
+        plug_gauge()
+        host.bring("gauge", gauge())
+        goal = host.want("(measured spot)")
+        host.until_goal(goal, "holds")
+        assert {row["device"]: row["component"] for row in host.ask("devices")} == {
+            "port-1": "gauge",
+            "port-9": "",
+        }
+        host.ask("devices_why")
+        slots.unplug(host.devices, "port-9")
+        slots.unplug(host.devices, "port-1")
+        host.until_goal(goal, "suspended")
+        assert not was_opened(line)
+        os.close(os.open(slave, os.O_RDWR | os.O_NOCTTY))
+        assert was_opened(line)
+    finally:
+        os.close(line)
+
+
+def unopened_line() -> tuple[int, str]:
+    """One end of a terminal's line, and the path of the other, which was never open."""
+    line = os.open("/dev/ptmx", os.O_RDWR | os.O_NOCTTY | os.O_CLOEXEC)
+    fcntl.ioctl(line, TIOCSPTLCK, struct.pack("i", 0))
+    (number,) = struct.unpack("I", fcntl.ioctl(line, TIOCGPTN, struct.pack("I", 0)))
+    return line, f"/dev/pts/{number}"
+
+
+def was_opened(line: int) -> bool:
+    """Whether anybody has opened the other end, and closed it again."""
+    poll = select.poll()
+    poll.register(line, 0)
+    return any(events & select.POLLHUP for _, events in poll.poll(0))
+
+
+def test_software_that_was_here_is_named_for_a_device_that_has_none(
+    host: RunningHost, plug_gauge: Plug
+) -> None:
+    host.bring("gauge", gauge())
+    host.until_component("gauge", WAITS)
+    host.pull("gauge")
+    host.until_gone("gauge")
+    plug_gauge()
+    told = host.until_told("nothing here drives Gauge (port-1)")
+    assert "org.example.gauge 1.0 (here until" in told

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from tests.lab.plugins import attic, lamps
-from tests.lab.running_host import RunningHost
+from tests.lab.running_host import READY_S, RunningHost
 
 pytestmark = [pytest.mark.lab, pytest.mark.beside]
 
@@ -21,7 +21,7 @@ def test_quantifier_speaks_of_rooms_that_come_later(host: RunningHost) -> None:
     goal = host.want("(bright self)")
     host.until_goal(goal, "holds")
     host.bring("attic", attic())
-    host.until("the attic is lit", lambda _: "lit attic" in host.facts(), timeout_s=20)
+    host.until("the attic is lit", lambda _: "lit attic" in host.facts(), timeout_s=READY_S)
     host.until_goal(goal, "holds")
     host.pull("attic")
     host.until_gone("attic")

@@ -53,7 +53,7 @@ def test_spoken_goal_is_reached_and_told_aloud(
         (scratch / "unfinished").write_bytes(sound.to_wav())
         (scratch / "unfinished").rename(scratch / "in" / f"{name}.wav")
     host.until_told("speech heard 'greet people': that is goal")
-    host.until("the goal is reached", greeted, timeout_s=30)
+    host.until("the goal is reached", greeted, timeout_s=READY_S)
     assert not any("weather" in goal["text"] for goal in host.view["goals"])
 
     said = Vocabulary(("speech heard greet people that is goal one", "speech is active"))
@@ -67,7 +67,7 @@ def test_spoken_goal_is_reached_and_told_aloud(
             for sentence in sentences_of(read_wav(file))
         )
 
-    host.until("the answer was said", repeated, timeout_s=60)
+    host.until("the answer was said", repeated, timeout_s=READY_S)
 
 
 def greeted(view: Row) -> bool:

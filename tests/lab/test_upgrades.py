@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import json
 import subprocess
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
 from demo.robot import NONDUM, View
 from tests.lab.plugins import TALKER, scribe, talker
-from tests.lab.running_host import RunningHost, running
+from tests.lab.running_host import READY_S, RunningHost
 from tests.payloads import Part, make_payload
 
 pytestmark = [pytest.mark.lab, pytest.mark.beside]
@@ -46,7 +44,7 @@ def until_states(host: RunningHost, **wanted: str) -> View:
         states = {f"r{r['release']}": r["state"] for r in view["payloads"] if r["payload"] == TALK}
         return view if states == wanted else None
 
-    return host.until(f"releases: {wanted}", found, timeout_s=30)
+    return host.until(f"releases: {wanted}", found, timeout_s=READY_S)
 
 
 def until_holds_with(host: RunningHost, version: str, goal: str) -> None:
@@ -55,7 +53,7 @@ def until_holds_with(host: RunningHost, version: str, goal: str) -> None:
     def found(view: View) -> bool:
         return versions(view).get("talker") == version
 
-    host.until(f"talker {version}", found, timeout_s=20)
+    host.until(f"talker {version}", found, timeout_s=READY_S)
     host.until_goal(goal, "holds")
     host.until_runs("talk")
 
@@ -73,13 +71,6 @@ def nondum(host: RunningHost, *arguments: str) -> Any:
     command = [*NONDUM, "--control", str(host.control), *arguments, "--json"]
     done = subprocess.run(command, capture_output=True, text=True)
     return json.loads(done.stdout or done.stderr)
-
-
-@pytest.fixture
-def host(tmp_path: Path) -> Iterator[RunningHost]:
-    """A host that does not watch newer releases for long."""
-    with running(tmp_path, more="[workers]\nsettle_beats = 1\n") as host:
-        yield host
 
 
 def test_robot_goes_on_through_upgrades_and_back(host: RunningHost) -> None:

@@ -18,6 +18,7 @@ _MOUNTED = tuple(
         "test_unknown_file_system_is_refused_by_name",
     )
 )
+_CLAIMED = (*_MOUNTED, f"{_TH}/drives/test_left_alone.py")
 _BROUGHT = tuple(
     f"{_TH}/trust/test_payload_trust.py::{test}"
     for test in (
@@ -46,7 +47,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/trust/payload_trust.py": _BROUGHT,
     # What drives are, and what is read of them.
     f"{_H}/drives/mounting.py": _MOUNTED,
-    f"{_H}/drives/nodes.py": _MOUNTED,
+    f"{_H}/drives/nodes.py": _CLAIMED,
     f"{_H}/drives/usb.py": (f"{_TH}/drives/test_usb.py",),
     f"{_H}/drives/slots.py": (f"{_TH}/drives/test_slots.py",),
     f"{_H}/drives/reading.py": (

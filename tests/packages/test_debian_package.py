@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -106,7 +107,7 @@ def test_every_unit_and_rule_of_the_checkout_is_in_it(
 ) -> None:
     names = {path.name for path in _files(trees[architecture])}
     folders = (f for f in (ROOT / "packaging").iterdir() if f.name != "debian")
-    assert {path.name for folder in folders for path in folder.iterdir()} <= names
+    assert {path.name for folder in folders for path in _files(folder)} <= names
 
 
 @both
@@ -127,6 +128,17 @@ def test_units_in_scripts_are_those_that_can_be_enabled(
         script = (trees[architecture] / "DEBIAN" / name).read_text()
         (line,) = (line for line in script.splitlines() if line.startswith("UNITS="))
         assert set(line.partition("=")[2].strip('"').split()) == enabled, name
+
+
+@both
+def test_all_that_is_compiled_at_installation_can_be(
+    trees: dict[str, Path], architecture: str
+) -> None:
+    script = (trees[architecture] / "DEBIAN/postinst").read_text()
+    (left_out,) = re.findall(r"py3compile .*-X '(.*)'", script)
+    modules = [path for path in _files(trees[architecture] / "opt") if path.suffix == ".py"]
+    for path in (path for path in modules if not re.match(left_out, str(path))):
+        compile(path.read_bytes(), str(path), "exec", dont_inherit=True)
 
 
 def test_command_of_the_tree_runs_wherever_it_lies(trees: dict[str, Path]) -> None:

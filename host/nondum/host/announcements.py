@@ -108,6 +108,8 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return _joined(event.problems)
         case PeerLeft():
             return f"the host {event.host} is gone: {event.reason}"
+        case DriveRead(flaws=flaws) if flaws:
+            return f"drive {event.drive}: {_joined(flaws)}"
         case DriveRead(payloads=(), certificates=0, trust_files=0):
             return f"drive {event.drive} carries no payload"
     return None

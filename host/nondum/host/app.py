@@ -24,6 +24,7 @@ from nondum.host.confinement import choice
 from nondum.host.control.server import ControlServer
 from nondum.host.conversation import Conversation, Take
 from nondum.host.devices.slots import DeviceSlotSource
+from nondum.host.devices.software import Software
 from nondum.host.devices.source import DeviceSource
 from nondum.host.devices.udev import UdevSource
 from nondum.host.drives.blocks import BlockSource
@@ -32,6 +33,8 @@ from nondum.host.drives.source import DriveSource
 from nondum.host.drives.steady import Steady
 from nondum.host.events import Event, HostStarted, Recomposed
 from nondum.host.feedback import parts as feedback_parts
+from nondum.host.feedback.feedback import Feedback
+from nondum.host.goal_files import GoalFiles, of_people
 from nondum.host.helper import privileged
 from nondum.host.lifecycle import safe_mode
 from nondum.host.lifecycle.bus import Bus
@@ -155,6 +158,8 @@ async def _run(
         bus.subscribe(neighbours.on_event)
     news = News()
     bus.subscribe(news.on_event)
+    software = Software(catalogue.snapshot, mind.people.tell)
+    bus.subscribe(software.on_event)
     bus.subscribe(service.on_event)
     bus.subscribe(tally.on_event)
     if journal.is_in_use():
@@ -175,12 +180,13 @@ async def _run(
     places = neighbours.placement.places if neighbours else dict
     vouched = executor.trust.vouched
     conversation = Conversation(mind, workers.plugins, workers.pids, _take(neighbours))
-    feedback = feedback_parts.made(
+    feedback: Feedback = feedback_parts.made(
         config.feedback,
         folders.root,
         catalogue,
         mind,
         places,
+        lambda: goal_files.concerns,
         conversation,
         news.look_again,
     )
@@ -199,6 +205,10 @@ async def _run(
     )
     trust = TrustOrders(executor.trust, bus.emit)
     orders = Orders(catalogue, mind, workers, news, bus, config.planning.translate_s)
+    goal_files = GoalFiles(
+        catalogue.snapshot, mind, orders.translated, bus.emit, on_change=feedback.wake
+    )
+    bus.subscribe(goal_files.on_event)
     control = ControlServer(
         config.host.control,
         verbs.answering(questions, orders, trust, neighbours),
@@ -216,6 +226,7 @@ async def _run(
             mind.run(),
             backups.keep(catalogue.backups, lambda: catalogue.revision, config.backups.every_s),
             tally.outlive(),
+            software.run(),
             service.watched(
                 (
                     Part("the component manager", lambda: bus.taken, lambda: bus.followed),
@@ -228,6 +239,7 @@ async def _run(
             ),
             conversation.run(),
             feedback.run(),
+            goal_files.run(),
             *(source.watch(bus.emit) for source in device_sources(config)),
         )
     finally:
@@ -335,7 +347,7 @@ class _Listener:
             self._workers.remount(mounts_of_all(snapshot))
             self._mind.see(snapshot)
             if isinstance(event, HostStarted):
-                self._mind.restore(snapshot.goals)
+                self._mind.restore(of_people(snapshot.goals))
             return
         sentence = announced(event, self._catalogue.snapshot())
         if sentence is not None:
@@ -346,6 +358,7 @@ class _Listener:
 def _install_options(config: HostConfig) -> InstallOptions:
     return InstallOptions(
         allow_unsigned=config.drives.allow_unsigned,
+        look_s=config.drives.look_s,
         trust=TrustOptions(config.trust.file, stop=config.trust.on_revoke == "stop"),
         method=config.install.method,
         reserve_mb=config.install.reserve_mb,

@@ -51,6 +51,9 @@ class DrivesSection:
     """Refuse USB drives that are something else too, such as a keyboard or a network adapter."""
     allow_unsigned: bool = False
     """Accept payloads without a signature: for development; every status says so."""
+    look_s: float = 10.0
+    """A drive that cannot be mounted and listed in this time hangs; more on a computer that has
+    much else to do."""
 
 
 @dataclass(frozen=True, slots=True)

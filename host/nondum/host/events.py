@@ -130,6 +130,8 @@ class DriveRead(Event):
     """How many certificates of hosts it carries."""
     trust_files: int = 0
     """How many versions of trust files it carries."""
+    flaws: tuple[Problem, ...] = ()
+    """What is on it, and is not taken."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,10 +240,13 @@ class PayloadActivated(Event):
     """Where their units sit, as the payload says."""
     grant: Grant = NOTHING
     """What it may have."""
+    goals: tuple[str, ...] = ()
+    """What it wants, in words."""
 
     def to_dict(self) -> dict[str, Any]:
         """Only names: what the components are stands in the catalogue."""
-        return {"payload": self.payload, "components": [c.id for c in self.components]}
+        told = {"payload": self.payload, "components": [c.id for c in self.components]}
+        return {**told, "goals": list(self.goals)} if self.goals else told
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,11 +15,12 @@ from nondum.host.control.arguments import Arguments, Triple
 from nondum.host.events import ForgetAsked, MountSet, RetryAsked, SafeModeLeft
 from nondum.host.lifecycle import going_back, installed
 from nondum.host.lifecycle.bus import Bus
+from nondum.host.mind import translation
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.frames import implausible
 from nondum.host.mind.goals import GivenGoal
 from nondum.host.mind.mind import Mind
-from nondum.host.mind.translation import Understood, translated
+from nondum.host.mind.translation import Understood
 from nondum.host.news import News
 from nondum.host.rows import Row, gone_back, is_at_rest, payload_row, unknown
 from nondum.host.workers.workers import Workers
@@ -64,7 +65,7 @@ class Orders:
         except GoalRefused as refused:
             if words is None or self.mind.composition is None:
                 raise
-            understood = await self._translated(words, refused)
+            understood = await self.translated(words, refused)
             if not arguments.flag("yes"):
                 return {"understood": understood.to_dict()}
             self.mind.people.tell(f"{words!r} is {understood}")
@@ -188,12 +189,14 @@ class Orders:
         await installed.uninstall(payload_id, self.catalogue, self.bus)
         return {"payload": payload_id}
 
-    async def _translated(self, words: str, refused: GoalRefused) -> Understood:
+    async def translated(self, words: str, refused: GoalRefused) -> Understood:
+        """What components take words to mean that match no phrase. Raises `GoalRefused`."""
+
         def composition() -> Composition:
             assert self.mind.composition is not None, "there is always another one"
             return self.mind.composition
 
-        return await translated(
+        return await translation.translated(
             words,
             refused,
             lambda vocabulary: self.workers.translations(words, vocabulary),

@@ -11,7 +11,7 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from nondum_deb import control, lock, places, tree
@@ -33,33 +33,42 @@ def main(words: Sequence[str]) -> int:
             lock.write()
             return 0
         wanted = [ARCHITECTURES[name] for name in asked.arch or [_default()]]
+        versions = asked.version or [debian(places.version())]
         with tempfile.TemporaryDirectory(prefix="nondum-own-") as own:
             tree.own_wheels(Path(own))
             for architecture in wanted:
-                version = asked.version or debian(places.version())
-                print(build(architecture, version, Path(own), asked.output))
+                for package in build(architecture, versions, Path(own), asked.output):
+                    print(package)
     except BuildFailed as error:
         print(f"package: {error}", file=sys.stderr)
         return 1
     return 0
 
 
-def build(architecture: Architecture, version: str, own: Path, output: Path) -> Path:
-    """Build the package of one architecture, of the checkout's own wheels; answers its file."""
+def build(
+    architecture: Architecture, versions: Sequence[str], own: Path, output: Path
+) -> Iterator[Path]:
+    """Build the packages of one architecture, of the checkout's own wheels; yields their files."""
     output.mkdir(parents=True, exist_ok=True)
-    target = output / f"nondum_{version}_{architecture.debian}.deb"
-    epoch = _epoch()
-    surroundings = {**os.environ, "SOURCE_DATE_EPOCH": str(epoch)}
     with tempfile.TemporaryDirectory(prefix="nondum-deb-") as scratch:
         root = Path(scratch, "root")
         root.mkdir()
         tree.make(root, architecture, own)
-        control.write(root, version, architecture, epoch)
-        _settle(root, epoch)
-        made = Path(scratch, target.name)
-        call("dpkg-deb", "--root-owner-group", "-Zxz", "--build", root, made, env=surroundings)
-        shutil.move(made, target)
-    return target
+        for version in versions:
+            target = output / f"nondum_{version}_{architecture.debian}.deb"
+            made = _packed(root, version, architecture, Path(scratch, version))
+            yield Path(shutil.move(made, target))
+
+
+def _packed(root: Path, version: str, architecture: Architecture, work: Path) -> Path:
+    epoch = _epoch()
+    files, made = work / "files", work / "made.deb"
+    shutil.copytree(root, files, symlinks=True)
+    control.write(files, version, architecture, epoch)
+    _settle(files, epoch)
+    surroundings = {**os.environ, "SOURCE_DATE_EPOCH": str(epoch)}
+    call("dpkg-deb", "--root-owner-group", "-Zxz", "--build", files, made, env=surroundings)
+    return made
 
 
 def debian(version: str) -> str:
@@ -104,7 +113,7 @@ def _arguments(words: Sequence[str]) -> argparse.Namespace:
         *("--arch", "-a"), action="append", choices=ARCHITECTURES, help="this machine's; repeatable"
     )
     parser.add_argument(
-        "--version", type=_version, help="Debian's version of it, for builds of your own"
+        "--version", action="append", type=_version, help="Debian's version, for builds of your own"
     )
     parser.add_argument("--output", "-o", type=Path, default=OUTPUT, help="folder (build/packages)")
     parser.add_argument(

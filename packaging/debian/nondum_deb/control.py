@@ -19,7 +19,9 @@ DEPENDS = (
     *("init-system-helpers (>= 1.54)", "systemd (>= 252)", "udev", "libudev1", "bubblewrap"),
 )
 """bubblewrap as well: without it workers are held in by less."""
-SUGGESTS = ("openssh-client", "exfatprogs")
+RECOMMENDS = ("libusb-1.0-0",)
+"""What devices without a driver of the kernel are read with."""
+SUGGESTS = ("openssh-client",)
 CONTROL = """\
 Package: nondum
 Version: {version}
@@ -27,6 +29,7 @@ Architecture: {architecture}
 Maintainer: {maintainer}
 Installed-Size: {kilobytes}
 Depends: {depends}
+Recommends: {recommends}
 Suggests: {suggests}
 Section: misc
 Priority: optional
@@ -87,6 +90,7 @@ def write(root: Path, version: str, architecture: Architecture, epoch: int) -> N
         maintainer=MAINTAINER,
         kilobytes=sum(-(-p.stat().st_size // 1024) for p in files),
         depends=", ".join(DEPENDS),
+        recommends=", ".join(RECOMMENDS),
         suggests=", ".join(SUGGESTS),
     )
     (control / "control").write_text(text, encoding="utf-8")

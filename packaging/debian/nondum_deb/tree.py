@@ -34,8 +34,10 @@ from nondum.host.cli import main
 sys.exit(main())
 """
 """`-I`: what the caller's folder and variables hold is not run."""
+DOCS = "usr/share/doc/nondum"
 FOLDERS = {
     "systemd": "lib/systemd/system",
+    "systemd/user": f"{DOCS}/examples/user",
     "sysusers.d": "usr/lib/sysusers.d",
     "tmpfiles.d": "usr/lib/tmpfiles.d",
     "udev": "lib/udev/rules.d",
@@ -47,7 +49,6 @@ COMPLETIONS = {
     "fish": "usr/share/fish/vendor_completions.d/nondum.fish",
     "zsh": "usr/share/zsh/vendor-completions/_nondum",
 }
-DOCS = "usr/share/doc/nondum"
 
 
 def make(root: Path, architecture: Architecture, own: Path) -> None:
@@ -111,12 +112,12 @@ def _venv(root: Path) -> None:
 
 
 def _machine_files(root: Path) -> None:
-    for folder in sorted(PACKAGING.iterdir()):
-        if folder.is_dir() and folder != DEBIAN:
-            if folder.name not in FOLDERS:
-                raise BuildFailed(f"{folder}: nobody said where on a machine this belongs")
-            for file in sorted(folder.iterdir()):
-                _write(root / FOLDERS[folder.name] / file.name, file.read_text(encoding="utf-8"))
+    for file in (f for f in sorted(PACKAGING.rglob("*")) if f.is_file()):
+        if not file.is_relative_to(DEBIAN):
+            folder = str(file.parent.relative_to(PACKAGING))
+            if folder not in FOLDERS:
+                raise BuildFailed(f"{file}: nobody said where on a machine this belongs")
+            _write(root / FOLDERS[folder] / file.name, file.read_text(encoding="utf-8"))
     _write(root / "etc/nondum/host.toml", (DEBIAN / "host.toml").read_text(encoding="utf-8"))
     overrides = (DEBIAN / "lintian-overrides").read_text(encoding="utf-8")
     _write(root / "usr/share/lintian/overrides/nondum", overrides)

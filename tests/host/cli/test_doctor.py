@@ -44,3 +44,11 @@ def test_every_level_of_confinement_is_tried() -> None:
     assert told["ok"]
     assert (available[3], available[1]) == (True, True), "tests need bubblewrap and Landlock"
     assert all(row["available"] or (row["reason"] and row["fix"]) for row in told["levels"])
+
+
+def test_it_tells_which_disks_are_whose() -> None:
+    """None of a machine without USB disks is a drive."""
+    told = json.loads(nondum("doctor", "disks", "--json").ok().out)
+    assert all(row["whose"] == "host" and row["why"] for row in told if not row["usb"])
+    shown = nondum("doctor", "disks").ok().out
+    assert all(row["disk"] in shown for row in told)

@@ -68,7 +68,7 @@ async def test_a_hook_that_does_not_end_is_killed_with_its_children(tmp_path: Pa
     hook = Hook([script(tmp_path, f"sleep 999 & echo $! > {pids}; echo $$ >> {pids}; wait")], 1.0)
     with pytest.raises(InstallFailed) as overdue:
         await hook.show(REFUSED)
-    assert overdue.value.code == "HOOK_OVERDUE"
+    assert overdue.value.code == "PROGRAM_OVERDUE"
     for pid in map(int, pids.read_text().split()):
         await until_ended(pid)
 
@@ -98,7 +98,7 @@ async def test_a_hook_that_fails_is_told(tmp_path: Path, text: str | None, says:
     command = script(tmp_path, text) if text else str(tmp_path / "none")
     with pytest.raises(InstallFailed, match=says) as failed:
         await Hook([command], FOR_EVER_S).show(REFUSED)
-    assert failed.value.code == "HOOK_FAILED"
+    assert failed.value.code == "PROGRAM_FAILED"
 
 
 async def test_of_endless_output_the_beginning_is_kept(tmp_path: Path) -> None:

@@ -110,3 +110,64 @@ async def test_strangers_are_told_nothing(house: House) -> None:
     house.workers.tell_values("nobody", [("p", (), None)])
     await house.workers.detach("nobody", "line")
     await house.workers.stop("nobody")
+
+
+GROUP = """
+from nondum.sdk import Unit, behaviour, hookimpl
+
+@hookimpl
+def units():
+    return (Unit("port", "sensor"),)
+
+@behaviour("look", action="(look ?u - sensor)")
+async def look(ctx, u):
+    device = ctx.device("line")
+    for node in device.nodes:
+        with open(node.node, "rb+", buffering=0) as file:
+            file.write(b"x")
+        ctx.know("node", node.node, node.subsystem)
+"""
+
+
+async def test_device_of_several_nodes_is_granted_as_a_group(house: House) -> None:
+    others = (("/dev/full", {"SUBSYSTEM": "b"}),)
+    await house.workers.attach("guest", "line", "/dev/zero", {"SUBSYSTEM": "a"}, others)
+    await house.start("guest", GROUP, behaviours=(LOOK,), units=(Unit("port", "sensor"),))
+    in_box = house.workers.launcher.level == Level.BOX
+    zero = "/dev/nondum/line" if in_box else "/dev/zero"
+    null = "/dev/nondum/line.null" if in_box else "/dev/null"
+    call = house.behave("guest", "look", u=UNIT)
+    assert await call.ended() is RunState.FAILED  # a full disk tells that it was the one written to
+    assert "No space left" in call.reason
+    assert [fact.arguments for fact in house.told(FactKnown)] == [(zero, "a")]
+    others = (("/dev/null", {"SUBSYSTEM": "c"}),)
+    await house.workers.attach("guest", "line", "/dev/zero", {"SUBSYSTEM": "a"}, others)
+    assert await house.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
+    told = [fact.arguments for fact in house.told(FactKnown)]
+    assert told[1:] == [(zero, "a"), (null, "c")]
+
+
+NAMED = """
+import os
+from nondum.sdk import Unit, behaviour, hookimpl
+
+@hookimpl
+def units():
+    return (Unit("port", "sensor"),)
+
+@behaviour("look", action="(look ?u - sensor)")
+async def look(ctx, u):
+    ctx.know("link", os.path.realpath("/dev/kmsg") if os.path.islink("/dev/kmsg") else "none")
+"""
+
+
+async def test_node_is_found_by_its_own_name_in_a_room(house: House) -> None:
+    if house.workers.launcher.level != Level.BOX:
+        pytest.skip("only a room has a /dev of its own")
+    await house.start("guest", NAMED, behaviours=(LOOK,), units=(Unit("port", "sensor"),))
+    await house.workers.attach("guest", "line", "/dev/kmsg", {})
+    assert await house.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
+    await house.workers.detach("guest", "line")
+    assert await house.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
+    told = [fact.arguments[0] for fact in house.told(FactKnown)]
+    assert told == ["/dev/nondum/line", "none"]

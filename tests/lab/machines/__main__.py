@@ -34,7 +34,7 @@ def main(words: Sequence[str]) -> int:
     disk = software(machine, asked.commit)
     _told("nondum is built for it", began)
     work = Path(tempfile.mkdtemp(prefix="nondum-lab-"))
-    lab = Lab(machine, disk, asked.commit, work)
+    lab = Lab(machine, disk, asked.commit, work, brought=asked.payload)
     try:
         if asked.shell:
             return talk(lab)
@@ -79,6 +79,7 @@ def _arguments(known: dict[str, Scenario], words: Sequence[str]) -> argparse.Nam
     parser.add_argument(
         "--arch", choices=RECIPES, default=X86_64.name, help="its processor (%(default)s)"
     )
+    parser.add_argument("--payload", type=Path, metavar="DIR", help="what `payload` plugs in")
     parser.add_argument("--list", action="store_true", help="tell which scenarios there are")
     parser.add_argument("--short", action="store_true", help=f"only {', '.join(SHORT)}")
     parser.add_argument("--keep", action="store_true", help="keep consoles and journals of all")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import sys
 from pathlib import Path
 
@@ -11,8 +10,7 @@ from tests.lab.machines.cache import call, kept
 from tests.lab.machines.software import CHECKOUT, sources_key
 
 OLD, NEW = "old.deb", "new.deb"
-NEW_VERSION = "0.1.0+next"
-BUILDS: dict[str, tuple[str, ...]] = {OLD: (), NEW: ("--version", NEW_VERSION)}
+VERSIONS = {OLD: "0.1.0+lab1", NEW: "0.1.0+lab2"}
 DISK_MB = 96
 
 
@@ -24,17 +22,10 @@ def debs(machine: Built) -> Path:
 
 def _make(machine: Built, folder: Path) -> None:
     tree = folder / "debs"
-    tree.mkdir()
-    for name, more in BUILDS.items():
-        output = folder / name.partition(".")[0]
-        builder = (sys.executable, "-m", "nondum_deb", "--arch", machine.recipe.debian)
-        call(
-            *builder,
-            "--output",
-            output,
-            *more,
-            env={"PYTHONPATH": str(CHECKOUT / "packaging/debian")},
-        )
-        (deb,) = output.iterdir()
-        shutil.move(deb, tree / name)
+    versions = [f"--version={version}" for version in VERSIONS.values()]
+    builder = (sys.executable, "-m", "nondum_deb", "--arch", machine.recipe.debian)
+    place = {"PYTHONPATH": str(CHECKOUT / "packaging/debian")}
+    call(*builder, "--output", tree, *versions, env=place)
+    for name, version in VERSIONS.items():
+        (tree / f"nondum_{version}_{machine.recipe.debian}.deb").rename(tree / name)
     make_disk(tree, folder / "disk.img", DISK_MB, label="debs")

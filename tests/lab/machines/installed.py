@@ -16,6 +16,7 @@ CONFIGURATION = """
 name = "{name}"
 [drives]
 allow_unsigned = true
+look_s = 60.0
 [peers]
 enabled = {has_peers}
 [workers]
@@ -136,15 +137,18 @@ class Installed:
 
         return self.machine.until(f"{component} {state}", found, PATIENCE_S, LOOK_S)
 
-    def until_peer(self, peer: str, state: str) -> View:
-        """Wait until another host is `here` or `away`."""
+    def until_peers(self, *wanted: str) -> None:
+        """Wait until exactly these other hosts are here."""
 
-        def found() -> View | None:
+        def found() -> bool | None:
             seen = self.machine.attempt("nondum peers --json", timeout_s=PATIENCE_S)
-            rows: list[View] = seen.json() if seen.status == 0 else []
-            return next((r for r in rows if (r["peer"], r["state"]) == (peer, state)), None)
+            if seen.status != 0:
+                return None
+            here = {row["peer"] for row in seen.json() if row["state"] == "here"}
+            return True if here == {*wanted} else None
 
-        return self.machine.until(f"{peer} {state}", found, PATIENCE_S, LOOK_S)
+        what = f"{' and '.join(wanted) or 'nobody'} at {self.name}"
+        self.machine.until(what, found, PATIENCE_S, LOOK_S)
 
     def until_goal(self, goal: str, state: str) -> View:
         """Wait until a goal, in PDDL, is in a state; one that is kept and true `holds`."""

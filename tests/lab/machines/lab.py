@@ -32,6 +32,8 @@ class Lab:
     """What nondum is as of; None: as the checkout is now."""
     work: Path
     """A folder with a short path, for all that is made on the way."""
+    brought: Path | None = None
+    """A payload, or a drive, of whoever runs the laboratory."""
     machines: list[Machine] = field(default_factory=list)
     """Every machine that was switched on in the present scenario, the shared one first."""
     all_machines: list[Machine] = field(default_factory=list)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from tests.lab.machines.installed import LOOK_S, PATIENCE_S, Installed
+from tests.lab.machines.followed import EVERY_S, Followed
+from tests.lab.machines.installed import PATIENCE_S
 
 LOOK = """
 cd /var/lib/nondum
@@ -30,24 +31,21 @@ class Seen:
     drives: tuple[str, ...]
 
 
-def seen(host: Installed) -> Seen | None:
+def seen(host: Followed) -> Seen | None:
     """What there is now; None while nobody answers."""
     view = host.status()
     if view is None:
-        return None
-    components = host.machine.attempt("nondum components --json")
-    if components.status != 0:
         return None
     return Seen(
         daemon=host.shown("MainPID"),
         traces=host.machine.run(LOOK),
         payloads=_names(view["payloads"], "payload"),
-        components=_names(components.json(), "component"),
+        components=_names(view["components"], "component"),
         drives=_names(view["drives"], "drive"),
     )
 
 
-def until_as_before(host: Installed, before: Seen) -> None:
+def until_as_before(host: Followed, before: Seen) -> None:
     """Wait until there is nothing else than before. Raises `AssertionError` with what is left."""
     last: list[Seen | None] = [None]
 
@@ -56,7 +54,7 @@ def until_as_before(host: Installed, before: Seen) -> None:
         return True if last[0] == before else None
 
     try:
-        host.machine.until("all as before", look, PATIENCE_S, LOOK_S)
+        host.machine.until("all as before", look, PATIENCE_S, EVERY_S)
     except AssertionError as error:
         raise AssertionError(f"{error}\nbefore: {before}\nnow:    {last[0]}") from None
 

@@ -53,6 +53,8 @@ class Machine:
         self.built, self.work, self.socket, self._clock = built, work, socket, clock
         self._memory_mb, self._drives = memory_mb, drives
         self._qemu: subprocess.Popen[bytes] | None = None
+        self._agent: Agent | None = None
+        self._qmp: Qmp | None = None
         self._cpu_s = 0.0
         work.mkdir(parents=True, exist_ok=True)
         self._disk = work / "disk.qcow2"
@@ -81,14 +83,12 @@ class Machine:
     def until_booted(self) -> None:
         """The second half of `boot`. Raises `MachineSilent`."""
         try:
-            self.qmp = self._connected(lambda: Qmp(self.work / "qmp"))
+            self._qmp = self._connected(lambda: Qmp(self.work / "qmp"))
             self._usb = Usb(self.qmp, self.until)
-            self.agent = self._connected(lambda: Agent(self.work / "agent"))
-            self.agent.wait_for_boot(BOOT_S * self.slowness)
+            self._agent = self._connected(lambda: Agent(self.work / "agent"))
+            self._until_up()
         except MachineSilent as error:
             raise MachineSilent(f"{error}\n{self.last_words()}") from None
-        if self.socket is not None:
-            self._join(self.socket)
 
     def cut_power(self) -> None:
         """End it at once: what its disk was not told to keep is lost."""
@@ -101,7 +101,7 @@ class Machine:
         """Press its reset button, and wait for the agent: what is plugged in stays so."""
         self.qmp.do("set-action", reboot="reset")
         self.qmp.do("system_reset")
-        self.agent.wait_for_boot(BOOT_S * self.slowness)
+        self._until_up()
 
     def shut_down(self, timeout_s: float = BOOT_S) -> None:
         """Have it go down as from its power button's menu."""
@@ -115,6 +115,20 @@ class Machine:
         """End it, if it runs."""
         if self._qemu is not None:
             self.cut_power()
+
+    @property
+    def agent(self) -> Agent:
+        """What acts in it. Raises `MachineSilent` when it does not run, or not yet."""
+        if self._agent is None:
+            raise MachineSilent("it is off, or has not booted")
+        return self._agent
+
+    @property
+    def qmp(self) -> Qmp:
+        """Its monitor. Raises `MachineSilent` when it does not run, or not yet."""
+        if self._qmp is None:
+            raise MachineSilent("it is off")
+        return self._qmp
 
     # What happens inside
 
@@ -174,6 +188,10 @@ class Machine:
         """Pull a stick out, whatever it is doing."""
         self._usb.pull(name)
 
+    def plug_keyboard(self) -> str:
+        """Plug a USB keyboard in; answers its name for `unplug`."""
+        return self._usb.plug_keyboard()
+
     def plug_hub(self, port: str | None = None) -> str:
         """Plug a USB hub in, whose ports are then `<port>.1` and on; answers its name."""
         return self._usb.plug_hub(port)
@@ -191,6 +209,10 @@ class Machine:
         whenever it hangs up. None: nobody is at the other end.
         """
         return self._usb.plug_line(path, port, serial)
+
+    def plug_device(self, driver: str, *, port: str | None = None) -> str:
+        """Plug in what QEMU calls `usb-tablet`, `usb-audio` …; answers its name for `unplug`."""
+        return self._usb.plug_device(driver, port)
 
     def pull_line(self, name: str) -> None:
         """Pull a serial adapter out."""
@@ -240,6 +262,9 @@ class Machine:
         serial = f"file,id=console,path={self.console},append=on"
         disks: list[str] = []
         around, card = (self.socket.around, self.socket.card) if self.socket else ((), ())
+        kernel = [f"console={recipe.terminal}", "panic=-1", "quiet", "no_timer_check"]
+        if self.socket:
+            kernel.append("net.ifnames=0")  # or udev renames its card under our hands
         for image in self._drives:
             disks += ["-drive", f"file={image},format=raw,if=virtio,readonly=on"]
         return [
@@ -249,7 +274,7 @@ class Machine:
             *recipe.machine,
             *("-smp", "2", "-m", str(self._memory_mb)),
             *("-kernel", self.built.kernel, "-initrd", self.built.initramfs),
-            *("-append", f"console={recipe.terminal} panic=-1 quiet no_timer_check {more}".strip()),
+            *("-append", " ".join(filter(None, (*kernel, more)))),
             *("-drive", f"file={self._disk},format=qcow2,if=virtio", *disks),
             *("-chardev", serial, "-serial", "chardev:console"),
             *("-qmp", f"unix:{self.work / 'qmp'},server=on,wait=off"),
@@ -259,6 +284,11 @@ class Machine:
             *CONTROLLER,
             *("-device", "virtio-rng", *card),
         ]
+
+    def _until_up(self) -> None:
+        self.agent.wait_for_boot(BOOT_S * self.slowness)
+        if self.socket is not None:
+            self._join(self.socket)
 
     def _join(self, socket: Socket) -> None:
         """Give its network card its address: nothing else there would."""
@@ -284,6 +314,7 @@ class Machine:
         assert self._qemu is not None
         self._qemu.wait()
         self._qemu = None
-        for line in (getattr(self, "agent", None), getattr(self, "qmp", None)):
-            if line is not None:  # it was not heard of before its end
+        for line in (self._agent, self._qmp):
+            if line is not None:  # it was heard of before its end
                 line.close()
+        self._agent = self._qmp = None

@@ -16,8 +16,8 @@ from tests.lab.machines.lab import Lab
 
 FOLDER = Path(__file__).parent / "scenarios"
 PACKAGE = "tests.lab.machines.scenarios"
-SHORT = ("starts", "stick", "yank", "neighbours")
-"""Those that every change is tried with (`./run tests`): some four minutes of two processors."""
+SHORT = ("starts", "stick", "yank")
+"""Those that every change is tried with (`./run tests`): two minutes of two processors."""
 
 
 @dataclass(frozen=True, slots=True)

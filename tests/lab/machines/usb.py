@@ -62,6 +62,10 @@ class Usb:
         """Plug a hub in; only one whose port is given can have things plugged into it."""
         return self._add(self._name("hub"), "usb-hub", port, None, {"ports": PORTS})
 
+    def plug_device(self, driver: str, port: str | None) -> str:
+        """Plug in another of QEMU's USB devices, by the name of its driver there."""
+        return self._add(self._name("device"), driver, port, None, {})
+
     def pull(self, name: str) -> None:
         """Pull something out, with all that is plugged into it; what went with its hub is gone."""
         gone = self._gone_with(name)

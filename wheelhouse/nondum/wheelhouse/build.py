@@ -22,7 +22,17 @@ from packaging.utils import parse_wheel_filename
 
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem, problems_of
-from nondum.wheelhouse import capture, contents, index, lock, locking, manifest, resolve, wheel
+from nondum.wheelhouse import (
+    capture,
+    contents,
+    goals,
+    index,
+    lock,
+    locking,
+    manifest,
+    resolve,
+    wheel,
+)
 from nondum.wheelhouse.contents import Contents, Entry
 from nondum.wheelhouse.library_wheels import library_wheel
 from nondum.wheelhouse.manifest import Manifest
@@ -76,9 +86,10 @@ def build(package: Path, drive: Path, options: Options, progress: Progress) -> P
         folder = work / said.id
         _write(folder, package, said, locked, described)
         _judge(folder / "wheels", said)
-        _seal(folder, said.id, _version(own), options)
+        fleet, hosts = options.fleet, options.hosts
+        seal(folder, said.id, _version(own), options.release, fleet=fleet, hosts=hosts)
         progress("copying it to the drive", steps - 1, steps)
-        target = _delivered(folder, drive)
+        target = deliver(folder, drive)
         progress("done", steps, steps)
         return target
 
@@ -208,6 +219,9 @@ def _write(
         if not (wheels / path.name).exists():
             os.link(path, wheels / path.name)
     shutil.copyfile(package / manifest.NAME, folder / manifest.NAME)
+    if (package / goals.NAME).is_file():
+        wanted = goals.parse((package / goals.NAME).read_bytes(), str(package / goals.NAME))
+        (folder / goals.NAME).write_bytes(goals.to_bytes(wanted))
     for component in said.components:
         text = locking.lock_text(locked)
         (folder / lock.file_name(component.id)).write_text(text, encoding="utf-8")
@@ -229,8 +243,19 @@ def _judge(wheels: Path, said: Manifest) -> None:
     wheel.refuse_if_any(tuple(problems))
 
 
-def _seal(folder: Path, payload_id: str, version: str, options: Options) -> None:
-    """Write the contents list of what the folder holds."""
+def seal(
+    folder: Path,
+    payload_id: str,
+    version: str,
+    release: int | None = None,
+    *,
+    fleet: str = "",
+    hosts: tuple[str, ...] = (),
+) -> None:
+    """Write the contents list of what the folder holds; without a release, it is the time.
+
+    Raises `PayloadRefused` (CONTENTS_HEADER): a name that is none.
+    """
     now = int(os.environ.get("SOURCE_DATE_EPOCH", time.time()))
     paths = sorted(
         (path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()),
@@ -238,20 +263,20 @@ def _seal(folder: Path, payload_id: str, version: str, options: Options) -> None
     listed = Contents(
         payload_id=payload_id,
         version=version,
-        release=now if options.release is None else options.release,
-        fleet=options.fleet,
+        release=now if release is None else release,
+        fleet=fleet,
         minimum_nondum=MINIMUM_NONDUM,
         built=time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(now)),
         entries=tuple(
             Entry(locking.sha256(folder / p), (folder / p).stat().st_size, p) for p in paths
         ),
-        hosts=options.hosts,
+        hosts=hosts,
     )
     contents.parse(listed.to_bytes(), contents.NAME)  # refuses fleets and hosts that are no names
     (folder / contents.NAME).write_bytes(listed.to_bytes())
 
 
-def _delivered(folder: Path, drive: Path) -> Path:
+def deliver(folder: Path, drive: Path) -> Path:
     """Put the folder on the drive: copied beside, then renamed in."""
     target = drive / "nondum" / folder.name
     unfinished = target.with_name(f".{folder.name}.part")

@@ -16,6 +16,11 @@ from nondum.wheelhouse.tables import Form, Report, Table
 
 NAME = "payload.toml"
 PERMISSIONS = ("audio", "devices", "gpu", "network")
+"""What components may ask for."""
+GOALS = "goals"
+"""The permission to give a host goals, which a payload asks for by having a goal.txt."""
+GRANTABLE = (*PERMISSIONS, GOALS)
+"""What a role may give."""
 MAX_CONFINEMENT = 3
 
 _PAYLOAD_ID = Form(names.PAYLOAD_ID, "a reverse domain name like org.example.blinker")
@@ -83,8 +88,11 @@ class Manifest:
     do not, and that they are left out."""
 
 
-def parse(text: str, where: str) -> Manifest:
-    """Check and parse a manifest. Raises `PayloadRefused` with everything wrong in it."""
+def parse(text: str, where: str, *, brings_goals: bool = False) -> Manifest:
+    """Check and parse a manifest; a payload that brings goals need not bring components.
+
+    Raises `PayloadRefused` with everything wrong in it.
+    """
     root, report = tables.read(text, "MANIFEST", where)
     manifest = Manifest(
         id=root.text("id", _PAYLOAD_ID),
@@ -94,11 +102,13 @@ def parse(text: str, where: str) -> Manifest:
         licence=root.text("licence", default=""),
         homepage=root.text("homepage", default=""),
         requires=_requires(root.table("requires")),
-        components=tuple(_component(table) for table in root.tables("component", required=True)),
+        components=tuple(
+            _component(table) for table in root.tables("component", required=not brings_goals)
+        ),
         startup_hooks=root.texts("startup_hooks"),
     )
     root.close()
-    if not manifest.components and not report.problems:
+    if not (manifest.components or brings_goals or report.problems):
         report.add("KEY", "a payload brings at least one [[component]]")
     _tell_twice(report, "component", (c.id for c in manifest.components))
     for component in manifest.components:

@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import TypeVar
 
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem
-from nondum.wheelhouse import index, lock, manifest, tables, wheel
+from nondum.wheelhouse import goals, index, lock, manifest, tables, wheel
 from nondum.wheelhouse.contents import Contents
 from nondum.wheelhouse.index import Index
 from nondum.wheelhouse.lock import Lock, LockedWheel
@@ -42,6 +42,8 @@ class StagedPayload:
     manifest: Manifest
     locks: Mapping[str, Lock]
     index: Index
+    goals: tuple[str, ...] = ()
+    """What it wants, in words."""
 
     def wheels(self, facts: HostFacts) -> dict[str, tuple[LockedWheel, ...]]:
         """The wheels of each component on such a host. Raises `PayloadRefused`."""
@@ -51,7 +53,9 @@ class StagedPayload:
 def load(folder: Path, listed: Contents) -> StagedPayload:
     """Parse a staged payload. Raises `PayloadRefused` with the problems of all its parts."""
     problems: list[Problem] = []
-    said = _part(problems, lambda: manifest.parse(_text(folder, manifest.NAME), manifest.NAME))
+    brings_goals = any(entry.path == goals.NAME for entry in listed.entries)
+    wanted = _part(problems, partial(_goals, folder)) if brings_goals else ()
+    said = _part(problems, partial(_manifest, folder, brings_goals=brings_goals))
     described = _part(problems, lambda: index.parse(_bytes(folder, index.NAME), index.NAME))
     locks = {}
     for component in said.components if said else ():
@@ -59,10 +63,10 @@ def load(folder: Path, listed: Contents) -> StagedPayload:
             locks[component.id] = parsed
     if problems:
         raise PayloadRefused(*problems)
-    assert said is not None and described is not None  # else that was told
+    assert said is not None and described is not None and wanted is not None  # else that was told
     if disagreements := tuple(_disagreements(listed, said, locks, described)):
         raise PayloadRefused(*disagreements)
-    return StagedPayload(folder, listed, said, locks, described)
+    return StagedPayload(folder, listed, said, locks, described, wanted)
 
 
 def is_metadata(path: str) -> bool:
@@ -85,6 +89,8 @@ def oversized(listed: Contents) -> Iterator[Problem]:
 def _most_bytes(path: str) -> int:
     if path == manifest.NAME:
         return tables.MAX_BYTES
+    if path == goals.NAME:
+        return goals.MAX_BYTES
     if path == index.NAME:
         return index.MAX_BYTES
     return lock.MAX_BYTES if path.startswith("pylock.") else MAX_METADATA
@@ -154,6 +160,14 @@ def _part(problems: list[Problem], parse: Callable[[], _T]) -> _T | None:
     except NondumError as error:
         problems.extend(error.problems)
         return None
+
+
+def _manifest(folder: Path, *, brings_goals: bool) -> Manifest:
+    return manifest.parse(_text(folder, manifest.NAME), manifest.NAME, brings_goals=brings_goals)
+
+
+def _goals(folder: Path) -> tuple[str, ...]:
+    return goals.parse(_bytes(folder, goals.NAME), goals.NAME)
 
 
 def _lock(folder: Path, name: str) -> Lock:

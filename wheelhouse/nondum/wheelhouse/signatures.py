@@ -6,12 +6,13 @@ bytes of the signature file.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
 from nondum.sdk.errors import Problem
-from nondum.wheelhouse.manifest import PERMISSIONS, Manifest
+from nondum.wheelhouse import goals as goal_file
+from nondum.wheelhouse.manifest import GOALS, GRANTABLE, Manifest
 
 MAX_SIGNATURE_BYTES = 8 * 1024
 
@@ -21,7 +22,7 @@ class Grant:
     """What a payload that is believed may have."""
 
     permissions: tuple[str, ...] = ()
-    """What its components may ask for."""
+    """What it may ask for."""
     role: str = ""
     """The role in the trust file by which it is believed; empty: it is not by one."""
     owners: tuple[str, ...] = ()
@@ -39,20 +40,22 @@ class Grant:
         permissions, owners = tuple(said["permissions"]), tuple(said["owners"])
         return cls(permissions, said["role"], owners, said["most_release"])
 
-    def problems(self, manifest: Manifest) -> tuple[Problem, ...]:
+    def problems(self, manifest: Manifest, goals: Sequence[str] = ()) -> tuple[Problem, ...]:
         """What a payload asks for and is not granted (PERMISSION_DENIED)."""
+        asked = [(c.id, permission) for c in manifest.components for permission in c.permissions]
+        if goals:
+            asked.append((goal_file.NAME, GOALS))
         by = f"the role {self.role}" if self.role else "whoever signed it"
         return tuple(
             Problem(
                 "PERMISSION_DENIED",
                 f"the payload asks for {permission!r}, which {by} may not give",
-                where=component.id,
+                where=where,
                 need=permission,
                 have=", ".join(self.permissions) or "no permissions",
                 fix=f"leave it out, or add {permission!r} to that role in the trust file",
             )
-            for component in manifest.components
-            for permission in component.permissions
+            for where, permission in asked
             if permission not in self.permissions
         )
 
@@ -60,7 +63,7 @@ class Grant:
 NOTHING = Grant()
 """What is granted where nobody is believed."""
 
-EVERYTHING = Grant(PERMISSIONS)
+EVERYTHING = Grant(GRANTABLE)
 """What is granted where nobody asks for signatures."""
 
 

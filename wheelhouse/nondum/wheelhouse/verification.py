@@ -82,7 +82,7 @@ def _found(
     if staged is None:
         return
     if not verdict.problems:
-        yield from verdict.grant.problems(staged.manifest)
+        yield from verdict.grant.problems(staged.manifest, staged.goals)
     if facts is None:
         return
     minimum = staged.contents.minimum_nondum
@@ -97,6 +97,6 @@ def _hooks_of(copied: Path) -> tuple[str, ...]:
     """The hooks that the manifest names, if that at least can be read."""
     try:
         text = (copied / manifest.NAME).read_text(encoding="utf-8")
-        return manifest.parse(text, manifest.NAME).startup_hooks
+        return manifest.parse(text, manifest.NAME, brings_goals=True).startup_hooks
     except (NondumError, OSError, UnicodeDecodeError):
         return ()

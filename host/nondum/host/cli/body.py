@@ -76,18 +76,6 @@ def units(session: Session) -> None:
 @click.command()
 @json_option
 @click.pass_obj
-def devices(session: Session) -> None:
-    """What is plugged in, and who has it.
-
-    Example: nondum devices --json
-    """
-    columns = ["device", "node", "component", "need", "contested_by"]
-    show(session, session.ask("devices"), columns, "no devices")
-
-
-@click.command()
-@json_option
-@click.pass_obj
 def store(session: Session) -> None:
     """The wheels that this host keeps.
 

@@ -36,6 +36,8 @@ def inspect(session: Session, drive: Path) -> None:
         render.sentence(f"{about}  {render.size(view['bytes'])}")
         by = f"signed by {', '.join(view['signers'])}" if view["signers"] else view["unsigned"]
         render.sentence(f"  built {view['built']} ({render.age(view['age_s'])} ago), {by}")
+        for goal in view["goals"]:
+            render.sentence(f"  goal: {goal}")
         for component in view["components"]:
             can = ", ".join(component["behaviours"]) or "no behaviours"
             render.sentence(f"  component {component['id']}: {can}")
@@ -96,6 +98,7 @@ def _view(payload: StagedPayload) -> dict[str, Any]:
         **_signed(payload.folder),
         "summary": payload.manifest.summary,
         "bytes": listed.total_bytes,
+        "goals": list(payload.goals),
         "components": [
             {
                 "id": component.id,

@@ -129,6 +129,53 @@ def build(
 
 
 @payload.command()
+@click.argument("words", metavar="WORDS…", nargs=-1, required=True)
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    type=click.Path(path_type=Path, file_okay=False),
+    help="The drive: any folder.",
+)
+@click.option("--id", "payload_id", default="org.example.goal", help="The payload's id.")
+@click.option("--release", type=int, help="Number that orders releases [default: the time].")
+@click.option("--fleet", default="", help="Robots that it is meant for [default: any].")
+@click.option("--host", "hosts", multiple=True, help="The only hosts it is for [default: any].")
+@click.option("--sign", "keys", multiple=True, type=KEY, help="Key to sign it with.")
+@json_option
+@click.pass_obj
+def goal(
+    session: Session,
+    words: tuple[str, ...],
+    output: Path,
+    payload_id: str,
+    release: int | None,
+    fleet: str,
+    hosts: tuple[str, ...],
+    keys: tuple[Path, ...],
+) -> None:
+    """Put goals on a drive, in words: a robot wants them while it is plugged in.
+
+    Each of WORDS is one goal. Robots take them only from those whose role may give `goals`:
+    `nondum keys allow … --permission goals`.
+
+    \b
+    Examples: nondum payload goal "follow me" -o /media/usb --sign alice
+              nondum payload goal "search for people" "come back" -o drive --id com.acme.errand
+    """
+    from nondum.wheelhouse import goal_payload
+    from nondum.wheelhouse.trust import owners_folder
+
+    made = goal_payload.write(output, payload_id, words, release=release, fleet=fleet, hosts=hosts)
+    for key in keys:
+        owners_folder.sign_payload(made, key)
+    if session.as_json:
+        render.as_json({"payloads": [str(made)]})
+    else:
+        click.echo(str(made))
+
+
+@payload.command()
 @click.argument("drive", type=FOLDER)
 @click.option(
     "--key",

@@ -37,6 +37,7 @@ def device_row(device: DeviceRecord, held: Held) -> Row:
     return {
         **told,
         "device": device.id,
+        "identity": device.identity,
         "node": str(first.node),
         "properties": dict(first.properties),
         "component": ", ".join(dict.fromkeys(component for component, _ in held)),

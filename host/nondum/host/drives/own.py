@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import PurePosixPath
+from pathlib import PurePath, PurePosixPath
 
 from nondum.host.drives.mounts import Mount, unescaped
 
@@ -94,7 +94,7 @@ def in_command_line(text: str) -> Iterator[Named]:
             yield from _named(spec, f"the machine was booted with it ({key}=)")
 
 
-def mounted(mounts: Iterable[Mount], ours: PurePosixPath) -> Iterator[tuple[Mount, Use]]:
+def mounted(mounts: Iterable[Mount], ours: PurePath) -> Iterator[tuple[Mount, Use]]:
     """What mounts need their devices for, but for those below `ours`."""
     for mount in mounts:
         at = PurePosixPath(mount.at)

@@ -17,6 +17,7 @@ from packaging.version import Version
 
 from nondum.host.brief import brief
 from nondum.host.drives import trial
+from nondum.host.drives.loose_goals import loose_goals
 from nondum.host.drives.pace import paced
 from nondum.host.helper import privileged
 from nondum.host.trust.chain import packed
@@ -47,7 +48,8 @@ KEY_DIGITS = 16
 
 def look(arguments: Arguments, report: Report) -> dict[str, list[Any]]:
     """Mount the drive if it is a device, and tell the `payloads`, host `certificates` and `trust`
-    files on it. Payloads are judged as they will be once those are taken.
+    files on it, and what else is not as it should be, `flaws`. Payloads are judged as they will be
+    once those are taken.
 
     Raises `DriveGone`, `PayloadRefused` (FS_UNSUPPORTED, FS_ERROR).
     """
@@ -63,6 +65,7 @@ def look(arguments: Arguments, report: Report) -> dict[str, list[Any]]:
     return {
         "trust": packed(offered),
         "trust_problems": [problem.to_dict() for problem in brief(flaws)],
+        "flaws": [] if is_payload else [problem.to_dict() for problem in loose_goals(root)],
         "payloads": [_found(folder, verifier) for folder in folders],
         "certificates": [] if is_payload else list(_certificates(root)),
     }
@@ -107,7 +110,7 @@ def copy(arguments: Arguments, report: Report) -> dict[str, int]:
         (staging / contents.SIGNATURE_NAME).write_bytes(signature)
     trial.run(lambda: payload.load(staging, listed), listed.payload_id)
     staged = payload.load(staging, listed)
-    refuse_if_any(verdict.grant.problems(staged.manifest))
+    refuse_if_any(verdict.grant.problems(staged.manifest, staged.goals))
     facts = facts_of(arguments)
     facts = replace(facts, memory=memory_for(arguments, facts))
     minimum = listed.minimum_nondum

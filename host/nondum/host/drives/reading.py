@@ -31,7 +31,7 @@ from nondum.wheelhouse.signatures import Grant
 log = logging.getLogger(__name__)
 
 LOOK_S = 10.0
-"""A drive that cannot be mounted and listed in this time hangs."""
+"""A drive that cannot be mounted and listed in this time hangs, on a computer that keeps up."""
 
 AT_ONCE = 4
 """Drives that are looked through at the same time; the others wait. One that hangs takes the place
@@ -57,8 +57,11 @@ def telling_stalls(drive: str, stall_s: float) -> Iterator[None]:
 class DriveReading:
     """Looks through drives in children, and unmounts them."""
 
-    def __init__(self, children: Children, emit: Emit, trust: PayloadTrust) -> None:
+    def __init__(
+        self, children: Children, emit: Emit, trust: PayloadTrust, look_s: float = LOOK_S
+    ) -> None:
         self._children, self._emit = children, emit
+        self._look_s = look_s
         self._queue = Queue(AT_ONCE)
         self._trust = trust
         self._mounted: dict[str, Path] = {}
@@ -111,15 +114,18 @@ class DriveReading:
         files = unpacked(found["trust"])
         flaws = tuple(Problem(**problem) for problem in found["trust_problems"])
         changed = await self._trust.offer(effect.drive, files, flaws)
-        read = DriveRead(effect.drive, keys, len(certificates), len(files))
+        loose = tuple(Problem(**problem) for problem in found["flaws"])
+        read = DriveRead(effect.drive, keys, len(certificates), len(files), loose)
         return *changed, *brought, *payloads, read
 
     async def _look(self, drive: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
         """What is on a drive. Its child stays as long as there is something to copy."""
         found: dict[str, Any] = {"payloads": ()}
         try:
-            with telling_stalls(drive, LOOK_S):
-                found = await self._children.run("look", arguments, owner=drive, stall_s=LOOK_S)
+            with telling_stalls(drive, self._look_s):
+                found = await self._children.run(
+                    "look", arguments, owner=drive, stall_s=self._look_s
+                )
         finally:
             if all(said["problems"] for said in found["payloads"]):
                 await self._children.release(drive)

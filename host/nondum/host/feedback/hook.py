@@ -23,7 +23,7 @@ class Hook:
 
     async def show(self, concern: Concern) -> None:
         """Run it: state, code, payload and sentence as arguments and in the environment, all of it
-        as JSON at its standard input. Raises `InstallFailed` (HOOK_FAILED, HOOK_OVERDUE)."""
+        as JSON at its standard input. Raises `InstallFailed` (PROGRAM_FAILED, PROGRAM_OVERDUE)."""
         told = {name: _printable(text) for name, text in concern.to_dict().items()}
         arguments = [told[name] for name in ("state", "code", "payload", "sentence")]
         environment = {f"NONDUM_{name.upper()}": text for name, text in told.items()}
@@ -34,16 +34,16 @@ class Hook:
         except OSError as error:
             text = f"cannot be run ({error.strerror})"
             raise InstallFailed(
-                Problem("HOOK_FAILED", text, where=self._command[0], fix=_FIX)
+                Problem("PROGRAM_FAILED", text, where=self._command[0], fix=_FIX)
             ) from error
         for line in ended.output.splitlines():
             log.info("hook: %s", _printable(line))
         if ended.status is None:
             text = f"was killed: it had not ended after {self._deadline_s:g} s"
-            raise InstallFailed(Problem("HOOK_OVERDUE", text, where=self._command[0], fix=_FIX))
+            raise InstallFailed(Problem("PROGRAM_OVERDUE", text, where=self._command[0], fix=_FIX))
         if ended.status != 0:
             text = f"ended with status {ended.status}"
-            raise InstallFailed(Problem("HOOK_FAILED", text, where=self._command[0], fix=_FIX))
+            raise InstallFailed(Problem("PROGRAM_FAILED", text, where=self._command[0], fix=_FIX))
 
     async def end(self) -> None:
         """Nothing is left: each run has ended."""

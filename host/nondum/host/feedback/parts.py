@@ -15,6 +15,7 @@ from nondum.host.feedback.player import Player
 from nondum.host.feedback.section import FeedbackSection
 from nondum.host.feedback.showing import Durations
 from nondum.host.feedback.speaking import Aloud
+from nondum.host.feedback.state import Concern
 from nondum.host.mind.mind import Mind
 
 
@@ -24,12 +25,14 @@ def made(
     catalogue: Catalogue,
     mind: Mind,
     places: Callable[[], Mapping[str, str]],
+    more: Callable[[], tuple[Concern, ...]],
     conversation: Conversation,
     on_change: Callable[[], None],
 ) -> Feedback:
     """What shows people how the host is who have no screen. `state` is the daemon's folder,
-    `places` the payloads that run on peers; `on_change` is called whenever it shows another."""
-    sources = Sources(catalogue.snapshot, places, lambda: mind.queue)
+    `places` the payloads that run on peers, `more` what others know to be amiss; `on_change` is
+    called whenever it shows another."""
+    sources = Sources(catalogue.snapshot, places, lambda: mind.queue, more)
     durations = Durations(section.refused_s, section.safe_s)
     outputs = tuple(_outputs(section, state, mind, conversation))
     return Feedback(sources, durations, outputs, on_change=on_change)

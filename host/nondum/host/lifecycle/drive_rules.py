@@ -73,7 +73,8 @@ def on_drive_read(turn: Turn, event: DriveRead) -> None:
         have="none",
         fix="make one with `nondum payload build`",
     )
-    problems = () if event.payloads or event.certificates or event.trust_files else (nothing,)
+    is_empty = not (event.payloads or event.certificates or event.trust_files)
+    problems = event.flaws or ((nothing,) if is_empty else ())
     turn.put_drive(replace(drive, state=DriveState.COPYING, problems=problems))
     for payload in _on(turn, event.drive):
         if payload.key not in event.payloads:

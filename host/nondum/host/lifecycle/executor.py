@@ -72,7 +72,7 @@ class Executor:
         self._lanes = Lanes()
         self._quiet = Quiet()
         self._is_prune_waiting = False
-        self._drives = DriveReading(self.children, emit, self.trust)
+        self._drives = DriveReading(self.children, emit, self.trust, options.look_s)
         self.installation = Installation(
             host, folders, workers, self.children, emit, options, self.trust
         )

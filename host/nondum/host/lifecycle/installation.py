@@ -16,7 +16,7 @@ from typing import Any
 from nondum.host import effects
 from nondum.host.catalogue.records import Moment
 from nondum.host.catalogue.state import HostState
-from nondum.host.drives.reading import telling_stalls
+from nondum.host.drives.reading import LOOK_S, telling_stalls
 from nondum.host.events import (
     BesideRefused,
     ComponentsProbed,
@@ -69,6 +69,8 @@ class InstallOptions:
     """How payloads are judged and installed on this host."""
 
     allow_unsigned: bool = False
+    look_s: float = LOOK_S
+    """A drive that cannot be mounted and listed in this time hangs."""
     method: str = "store"
     """`store`: links to the store. `pip`: pip itself."""
     reserve_mb: int = 64
@@ -96,6 +98,7 @@ class Installation:
         self._host, self._folders, self._options = host, folders, options
         self._trust = trust
         self._grants: dict[str, Grant] = {}
+        self._goals: dict[str, tuple[str, ...]] = {}
         self._workers, self._children, self._emit = workers, children, emit
         self._prepared: dict[str, tuple[Prepared, ...]] = {}
         self._needs: dict[str, Needs] = {}
@@ -206,6 +209,7 @@ class Installation:
                 tuple(component.record(effect.payload) for component in prepared),
                 tuple(pose for component in prepared for pose in component.poses(self._host)),
                 self._grants[effect.payload],
+                self._goals[effect.payload],
             ),
         )
 
@@ -283,6 +287,7 @@ class Installation:
             for said in told["components"]
         )
         self._grants[key] = Grant.parse(told["grant"])
+        self._goals[key] = tuple(told["goals"])
         return int(told["fresh"])
 
     def _tell_queued(self, payload: str, ahead: int) -> None:
@@ -311,6 +316,7 @@ class Installation:
         self._needs.pop(effect.payload, None)
         self._promises.give_up(effect.payload)
         self._grants.pop(effect.payload, None)
+        self._goals.pop(effect.payload, None)
         self._uncompiled.discard(effect.payload)
         scratches = self._folders.scratches_of(effect.payload)
         await in_thread(end_leftovers, scratches)

@@ -36,7 +36,7 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
     folder, root = Path(arguments["folder"]), Path(arguments["venvs"])
     by_pip = arguments["method"] == "pip"
     staged = reader.load_staged(folder)
-    grant = chain.grant_of_kept(arguments, folder, staged.manifest)
+    grant = chain.grant_of_kept(arguments, folder, staged.manifest, staged.goals)
     facts = reader.facts_of(arguments)
     requires = staged.manifest.requires
     if arguments["room"] is not None:
@@ -68,6 +68,7 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
         "needs": needs,
         "gpu": asdict(gpu) if gpu is not None else None,
         "grant": grant.to_dict(),
+        "goals": list(staged.goals),
     }
 
 

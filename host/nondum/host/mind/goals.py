@@ -97,10 +97,13 @@ class GoalQueue:
             )
         return self._goals[id]
 
-    def give(self, text: str, pddl: str, kind: GoalKind, *, priority: int = 0) -> GivenGoal:
-        """Add a goal."""
+    def give(
+        self, text: str, pddl: str, kind: GoalKind, *, priority: int = 0, id: str = ""
+    ) -> GivenGoal:
+        """Add a goal; with an `id` of its own it takes the place of the one before of that id."""
         self._given += 1
-        goal = GivenGoal(str(self._given), text, pddl, kind, priority, self._given)
+        goal = GivenGoal(id or str(self._given), text, pddl, kind, priority, self._given)
+        self._goals.pop(goal.id, None)
         self._goals[goal.id] = goal
         self._forget_oldest()
         return goal

@@ -133,14 +133,16 @@ class Mind:
         kind: GoalKind | None = None,
         priority: int = 0,
         said: str | None = None,
+        id: str = "",
     ) -> GivenGoal:
-        """Want something, in words or in PDDL; `said` are words that the PDDL was understood from.
+        """Want something, in words or in PDDL; `said` are words that the PDDL was understood from,
+        `id` is its id if it is to have one of its own.
 
         Raises `GoalRefused`.
         """
         goal = self._understood(words, pddl, kind)
         text = words or said or goal.text
-        given = self.queue.give(text, goal_text(goal.expr), goal.kind, priority=priority)
+        given = self.queue.give(text, goal_text(goal.expr), goal.kind, priority=priority, id=id)
         self._emit(GoalGiven(given.id, given.text, given.kind, given.pddl, priority))
         self.wake()
         return given
@@ -151,8 +153,11 @@ class Mind:
             self.people.tell(f"goal {goal.id} is taken up again: {goal.text}")
         self.wake()
 
-    def halt(self, *, id: str | None = None, now: bool = False) -> tuple[str, ...]:
+    def halt(
+        self, *, id: str | None = None, now: bool = False, why: str = "halted by a person"
+    ) -> tuple[str, ...]:
         """Halt a goal, or all of them; with `now` every behaviour that runs is halted directly.
+        `why` is what is said of it.
 
         Gives the names of what was asked to end. Needs no planner. Raises `GoalRefused`
         (GOAL_UNKNOWN).
@@ -160,14 +165,14 @@ class Mind:
         goals = [self.queue[id]] if id is not None else list(self.queue)
         for goal in goals:
             if not goal.state.is_final:
-                self.queue.put(goal.id, GoalState.HALTED, "halted by a person")
-                self._emit(GoalEnded(goal.id, "halted by a person"))
+                self.queue.put(goal.id, GoalState.HALTED, why)
+                self._emit(GoalEnded(goal.id, why))
                 self.people.tell(f"goal {goal.id} is halted: {goal.text}")
         current = self.pursuit.current
         is_over = current is not None and self.queue[current.goal].state.is_final
         running = tuple(run.step.name for run in self.runner) if now or is_over else ()
         if now or is_over:
-            self.pursuit.drop("halted by a person")
+            self.pursuit.drop(why)
         if now:
             self.runner.halt_all()
         self.wake()

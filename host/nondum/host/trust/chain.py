@@ -90,14 +90,16 @@ def _told_of(arguments: Arguments, folder: Path) -> dict[str, Any]:
     }
 
 
-def grant_of_kept(arguments: Arguments, folder: Path, manifest: Manifest) -> Grant:
+def grant_of_kept(
+    arguments: Arguments, folder: Path, manifest: Manifest, goals: Sequence[str] = ()
+) -> Grant:
     """What a payload may have, judged by what is kept of it; whether its keys hold now was asked as
     it came.
 
     Raises `PayloadRefused`, but where what is here may go on without trust.
     """
     verdict = _judged(arguments, folder)
-    problems = verdict.problems or verdict.grant.problems(manifest)
+    problems = verdict.problems or verdict.grant.problems(manifest, goals)
     if problems and arguments.get("demand_trust", True):
         raise PayloadRefused(*problems)
     return verdict.grant

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tests.lab.machines.followed import Followed
 from tests.lab.machines.lab import Lab
 from tests.lab.plugins import talker
 
@@ -18,11 +19,11 @@ def run(lab: Lab) -> str:
     assert host.shown("MainPID") != daemon
     host.until_payload(PAYLOAD, "active")
     host.machine.reset()
-    host.until_payload(PAYLOAD, "active")
+    Followed.follow(host).until_payload(PAYLOAD, "active")
     host.forget()
     host.machine.run("sync")
     host.machine.reset()
-    host.until_payload(PAYLOAD, "active")
+    Followed.follow(host).until_payload(PAYLOAD, "active")
     uptime_s = float(host.machine.run("cat /proc/uptime").split()[0])
     host.machine.pull(stick)
     host.until_payload(PAYLOAD, "gone")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.lab.machines import images
-from tests.lab.machines.installed import Installed
+from tests.lab.machines.followed import Followed, Stick
 from tests.lab.machines.lab import Lab
 from tests.lab.machines.plugins import doer
 
@@ -17,27 +17,26 @@ TABLES = {"vfat": "dos", "exfat": "gpt", "ext4": "gpt"}
 
 def run(lab: Lab) -> str:
     """One drawer of drives after the other is plugged in at once, and pulled."""
-    host = lab.host()
+    host = Followed.follow(lab.host())
     whole = {f"whole-{kind}": _whole(lab, kind) for kind in images.FILE_SYSTEMS}
-    see_at_work(host, whole, {name: [name] for name in whole})
+    _see_at_work(host, whole)
     tables = {f"table-{kind}": _with_table(lab, kind) for kind in images.FILE_SYSTEMS}
-    see_at_work(host, tables, {name: [name] for name in tables})
-    see_at_work(host, {"several": _several(lab)}, {"several": ["first", "third"]})
+    _see_at_work(host, tables)
+    _see_several(host, _several(lab))
     codes = _see_told(lab, host)
     return f"{len(whole) + len(tables)} drives, one of several partitions; told: {codes}"
 
 
-def see_at_work(host: Installed, drives: dict[str, Path], payloads: dict[str, list[str]]) -> None:
+def _see_at_work(host: Followed, drives: dict[str, Path]) -> None:
     """Plug drives in, wait for their payloads, and have all gone again."""
-    plugged = [host.machine.plug(image) for image in drives.values()]
-    ids = [f"org.example.{name}" for names in payloads.values() for name in names]
-    for payload in ids:
-        host.until_payload(payload, "active")
+    plugged = host.bring_all({f"org.example.{name}": Stick(drives[name]) for name in drives})
+    _have_gone(host, *plugged.values())
+
+
+def _have_gone(host: Followed, *plugged: str) -> None:
     for name in plugged:
         host.machine.pull(name)
-    for payload in ids:
-        host.until_payload(payload, "gone")
-    host.until("no drive is left", lambda view: None if view["drives"] else True)
+    host.until("nothing is left", lambda v: None if v["drives"] or v["payloads"] else True)
 
 
 def _content(lab: Lab, name: str) -> Path:
@@ -71,7 +70,17 @@ def _several(lab: Lab) -> Path:
     return images.partitioned(first.parent / "disk.img", "gpt", parts)
 
 
-def _see_told(lab: Lab, host: Installed) -> str:
+def _see_several(host: Followed, image: Path) -> None:
+    """Both payloads of one drive are at work, and go with it."""
+    disk = host.bring(image, "org.example.first")
+    host.until_payload("org.example.third", "active")
+    told = host.until("four are told", lambda v: v["drives"] if len(v["drives"]) == 4 else None)
+    codes = sorted(problem.split()[0] for drive in told for problem in drive["problems"])
+    assert codes == ["DRIVE_NOT_PAYLOAD", "FS_UNSUPPORTED"], told
+    _have_gone(host, disk)
+
+
+def _see_told(lab: Lab, host: Followed) -> str:
     """What of drives that cannot be used is said, drive by drive."""
     folder = lab.folder()
     wrong = {
@@ -85,8 +94,7 @@ def _see_told(lab: Lab, host: Installed) -> str:
         (told,) = host.until(words, _problems)
         assert all(word in told for word in words.split()), f"{words}: {told}"
         said.append(told.split()[0])
-        host.machine.pull(name)
-        host.until("it is gone", lambda view: None if view["drives"] else True)
+        _have_gone(host, name)
     return ", ".join(said)
 
 

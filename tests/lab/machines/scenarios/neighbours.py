@@ -15,22 +15,22 @@ def run(lab: Lab) -> str:
     """Meet, share, cut the cable, plug it in again, cut the power."""
     hosts = lab.fleet(ONE, OTHER)
     one, other = hosts[ONE], hosts[OTHER]
-    one.until_peer(OTHER, "here")
-    other.until_peer(ONE, "here")
+    one.until_peers(OTHER)
+    other.until_peers(ONE)
     other.bring(lab.stick("talker", talker()), PAYLOAD)
     one.until_component(SHARED, "ready")
 
     other.machine.cut_cable()
     _until_forgotten(one)
-    one.until_peer(OTHER, "away")
-    other.until_peer(ONE, "away")
+    one.until_peers()
+    other.until_peers()
     other.machine.plug_cable()
-    one.until_peer(OTHER, "here")
+    one.until_peers(OTHER)
     one.until_component(SHARED, "ready")
 
     other.machine.cut_power()
     _until_forgotten(one)
-    one.until_peer(OTHER, "away")
+    one.until_peers()
     return f"met by multicast; {SHARED} came and went with the cable, and with the power"
 
 

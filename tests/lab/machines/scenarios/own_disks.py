@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tests.lab.machines import images
-from tests.lab.machines.installed import Installed
+from tests.lab.machines.followed import Followed
 from tests.lab.machines.lab import Lab
 from tests.lab.machines.plugins import doer
 from tests.lab.plugins import talker
@@ -20,16 +20,17 @@ OWN = 2
 
 def run(lab: Lab) -> str:
     """Boot with both, plug a stick in beside them, and one that somebody has mounted."""
-    host = lab.booted()
+    machine = lab.booted()
     folder = lab.folder()
     bait = lab.payload("bait", doer("bait", "pass"))
     data = images.file_system(folder / "data.img", "ext4", bait, label="DATA OF OURS")
     disk = images.partitioned(folder / "disk.img", "gpt", [data, None])
     swap = images.file_system(folder / "swap.img", "swap", label="SPARE")
     for image in (disk, swap):
-        host.machine.plug(image)
-    host.machine.run(f"mkdir -p /srv/data; cat >>/etc/fstab <<'END'{FSTAB}END\nsync")
-    host.machine.reset()
+        machine.machine.plug(image)
+    machine.machine.run(f"mkdir -p /srv/data; cat >>/etc/fstab <<'END'{FSTAB}END\nsync")
+    machine.machine.reset()
+    host = Followed.follow(machine)
     host.wait_until_started()
     host.machine.until("swap and data", lambda: _in_use(host))
     host.machine.until("both are told", lambda: True if len(_left_alone(host)) >= OWN else None)
@@ -42,12 +43,12 @@ def run(lab: Lab) -> str:
     return "; ".join(sorted(_left_alone(host)))
 
 
-def _in_use(host: Installed) -> bool | None:
+def _in_use(host: Followed) -> bool | None:
     seen = host.machine.attempt("mountpoint -q /srv/data && grep -q /dev/sd /proc/swaps")
     return True if seen.status == 0 else None
 
 
-def _left_alone(host: Installed) -> list[str]:
+def _left_alone(host: Followed) -> list[str]:
     """What the journal has of disks that are left alone."""
     rows: list[dict[str, Any]] = host.machine.attempt("nondum journal --json --limit 1000").json()
     return [
@@ -58,19 +59,18 @@ def _left_alone(host: Installed) -> list[str]:
     ]
 
 
-def _see_untouched(host: Installed) -> None:
+def _see_untouched(host: Followed) -> None:
     """They are in use as before, can be written to, are no drives, and nobody read of them."""
     assert _in_use(host)
     host.machine.run("echo well >/srv/data/letter && sync && rm /srv/data/letter")
     host.machine.run("cat /sys/class/block/sd*/ro | sort | uniq -c")
-    view = host.status()
-    assert view is not None
+    view = host.until("a status", lambda view: view)
     assert "bait" not in str(view), view["payloads"]
     disks = host.machine.run("nondum doctor disks --json")
     assert disks.count('"host"') >= OWN, disks
 
 
-def _see_mounted_one_told(lab: Lab, host: Installed) -> None:
+def _see_mounted_one_told(lab: Lab, host: Followed) -> None:
     """One that somebody mounts before the host comes to it."""
     content = lab.payload("seen", doer("seen", "pass"))
     image = images.file_system(content.parent / "seen.img", "vfat", content, label="SEEN")
@@ -84,7 +84,7 @@ def _see_mounted_one_told(lab: Lab, host: Installed) -> None:
     host.machine.pull(name)
 
 
-def _labelled(host: Installed, label: str) -> str | None:
+def _labelled(host: Followed, label: str) -> str | None:
     """The node of the file system with a label, once udev has told all about it."""
     seen = host.machine.attempt(f"udevadm settle && readlink -f /dev/disk/by-label/{label}")
     node = seen.out.strip()

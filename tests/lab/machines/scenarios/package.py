@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.lab.machines.debs import NEW, NEW_VERSION, OLD, debs
+from tests.lab.machines.debs import NEW, OLD, VERSIONS, debs
 from tests.lab.machines.installed import Installed
 from tests.lab.machines.lab import Lab
 from tests.lab.machines.machine import Machine
@@ -60,7 +60,7 @@ def _sees_it_run(host: Installed) -> None:
 def _remembers(host: Installed) -> None:
     """The newer one has its operator's configuration, the state, and the payload again."""
     version = host.machine.run("dpkg-query -W -f '${Version}' nondum")
-    assert version == NEW_VERSION, version
+    assert version == VERSIONS[NEW], version
     assert "startup_s" in host.machine.run("cat /etc/nondum/host.toml")
     host.until_payload(PAYLOAD, "active")
     journal = host.machine.run("nondum journal --limit 1000")

@@ -8,7 +8,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from tests.lab.machines.installed import Installed
+from tests.lab.machines.followed import Followed
 from tests.lab.machines.lab import Lab
 from tests.lab.machines.leftovers import Seen, seen, until_as_before
 from tests.lab.plugins import talker
@@ -35,7 +35,7 @@ EVENTS = {
 
 def run(lab: Lab) -> str:
     """Measure how long a stick takes, then pull it at moments all over that time, and after."""
-    host = lab.host()
+    host = Followed.follow(lab.host())
     image = lab.stick("talker", talker())
     before = host.machine.until("an answer", lambda: seen(host))
     coming_s = _calm(host, image, before)
@@ -54,7 +54,7 @@ def run(lab: Lab) -> str:
     return f"{YANKS} yanks in {coming_s / (1 - AT_WORK):.0f} s of a stick's life: {hit}"
 
 
-def _calm(host: Installed, image: Path, before: Seen) -> float:
+def _calm(host: Followed, image: Path, before: Seen) -> float:
     """Bring the stick, take it away when it works; answers how long it took to be at work."""
     began = time.monotonic()
     stick = host.bring(image, PAYLOAD)
@@ -64,13 +64,13 @@ def _calm(host: Installed, image: Path, before: Seen) -> float:
     return coming_s
 
 
-def _yank(host: Installed, image: Path, moment_s: float, port: str) -> None:
+def _yank(host: Followed, image: Path, moment_s: float, port: str) -> None:
     stick = host.machine.plug(image, port=port)
     time.sleep(moment_s)  # the moment is what is tried, whatever the machine is at
     host.machine.pull(stick)
 
 
-def _phases(host: Installed) -> Counter[str]:
+def _phases(host: Followed) -> Counter[str]:
     """What the sticks had come to when they were pulled, by the journal; `unseen` never got in."""
     rows: list[dict[str, Any]] = host.machine.attempt("nondum journal --json --limit 5000").json()
     phases: Counter[str] = Counter()

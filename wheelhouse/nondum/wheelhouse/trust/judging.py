@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from nondum.sdk.errors import PayloadRefused, Problem
 from nondum.wheelhouse import contents as lists
 from nondum.wheelhouse.contents import Contents
-from nondum.wheelhouse.manifest import PERMISSIONS
+from nondum.wheelhouse.manifest import GRANTABLE
 from nondum.wheelhouse.signatures import EVERYTHING, Grant, Verdict
 from nondum.wheelhouse.trust import sshsig
 from nondum.wheelhouse.trust.public_key import PublicKey
@@ -251,7 +251,7 @@ def _misdirections(trust: Trust, listed: Contents, host: str) -> Iterator[Proble
 
 def _grant(trust: Trust, owners: Sequence[Role], role: Role, listed: Contents) -> Grant:
     return Grant(
-        permissions=PERMISSIONS if ANY in role.permissions else role.permissions,
+        permissions=GRANTABLE if ANY in role.permissions else role.permissions,
         role=role.name,
         owners=tuple(owner.name for owner in owners),
         most_release=trust.bound(listed.payload_id).most,

@@ -38,7 +38,7 @@ from datetime import UTC, datetime
 
 from nondum.sdk.errors import PayloadRefused, Problem, TrustRefused
 from nondum.wheelhouse import names, tables
-from nondum.wheelhouse.manifest import PERMISSIONS
+from nondum.wheelhouse.manifest import GRANTABLE
 from nondum.wheelhouse.tables import Form, Report, Table
 from nondum.wheelhouse.trust.public_key import FINGERPRINT, PublicKey, parse_line
 from nondum.wheelhouse.trust.trust import (
@@ -156,8 +156,8 @@ def _role(table: Table) -> Role:
         permissions=_texts(
             table,
             "permissions",
-            lambda one: one == ANY or one in PERMISSIONS,
-            f"one of {', '.join(PERMISSIONS)} and {ANY!r}",
+            lambda one: one == ANY or one in GRANTABLE,
+            f"one of {', '.join(GRANTABLE)} and {ANY!r}",
         ),
     )
     if not role.payloads:

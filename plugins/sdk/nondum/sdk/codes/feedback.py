@@ -5,12 +5,12 @@ from nondum.sdk.codes.code import Code
 AREA = "Feedback"
 CODES = (
     Code(
-        "HOOK_FAILED",
+        "PROGRAM_FAILED",
         "The program that is told the host's states cannot be run, or ended with an error.",
         "run it by hand with the same arguments; see `hook` under [feedback]",
     ),
     Code(
-        "HOOK_OVERDUE",
+        "PROGRAM_OVERDUE",
         "The program that is told the host's states did not end, and was killed.",
         "have it end sooner, or raise `hook_deadline_s` under [feedback]",
     ),

@@ -10,6 +10,11 @@ CODES = (
         "say what is wanted: `nondum goal WORDS`, or --pddl",
     ),
     Code(
+        "GOAL_FILE",
+        "The goal.txt of a payload is empty, too long, or not plain text.",
+        "write a goal a line, in words: up to eight lines of 200 characters",
+    ),
+    Code(
         "GOAL_TOO_EARLY",
         "The host does not know itself yet.",
         "ask again in a second",
@@ -18,6 +23,11 @@ CODES = (
         "GOAL_UNKNOWN",
         "There is no goal of that number.",
         "see `nondum goals` for those there are",
+    ),
+    Code(
+        "GOAL_UNSIGNED",
+        "A goal.txt lies on a drive where no signature covers it.",
+        "put it into a payload: `nondum payload goal WORDS -o DRIVE --sign KEY`",
     ),
     Code(
         "NO_ANSWER",

@@ -120,6 +120,11 @@ CODES = (
         "see the log, and report it with what it says",
     ),
     Code(
+        "LAB_MISSING",
+        "The laboratory, which is in nondum's sources, is not here.",
+        "stand in a checkout of nondum's sources, or name one by the variable NONDUM_LAB",
+    ),
+    Code(
         "SAFE_MODE",
         "The host leaves payloads alone: daemons before this one died, or a person asked for it.",
         "find out why (`nondum doctor`, `nondum journal`), then `nondum host resume`",

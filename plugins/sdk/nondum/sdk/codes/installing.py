@@ -30,6 +30,11 @@ CODES = (
         "correct the line that is named",
     ),
     Code(
+        "DEVICE_UNKNOWN",
+        "There is no device of that name, port, node or serial number.",
+        "see `nondum devices`",
+    ),
+    Code(
         "DISK_FULL",
         "There is too little disk.",
         "free some disk, pull payloads that are not needed, or lower `quota_mb` under [install]",

@@ -1,0 +1,40 @@
+"""The page docs/benchmarks/footprint.md, of all that is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from benchmarks.footprint.results import Footprint, kept
+
+PAGE = Path(__file__).parents[2] / "docs/benchmarks/footprint.md"
+METHOD = Path(__file__).with_name("method.md")
+Shown = Callable[[Footprint], str]
+ROWS: Sequence[tuple[str, str, Shown]] = (
+    ("memory of the idle daemon", "≤ 60 MB", lambda f: f"{f.daemon_mb:.1f} MB"),
+    ("a worker, its plugin importing nothing", "≤ 20 MB", lambda f: f"{f.worker_mb:.1f} MB"),
+    ("a worker's keeper", "", lambda f: f"{f.mb_of('keeper'):.1f} MB"),
+    ("the spare worker", "", lambda f: f"{f.mb_of('worker'):.1f} MB"),
+    ("planners, all of them", "", lambda f: f"{f.mb_of('planner'):.1f} MB"),
+    ("a child for drives, waiting", "", lambda f: f"{f.mb_of('drive child'):.1f} MB"),
+    ("processor at idle, the daemon", "≤ 1 %", lambda f: f"{f.idle['cpu_percent']:.2f} %"),
+    ("processor at idle, all", "", lambda f: f"{f.idle['cpu_percent_all']:.2f} %"),
+    ("wake-ups at idle, the daemon", "", lambda f: f"{f.idle['wakeups_per_s']:.1f} a second"),
+    (
+        *("written at idle, nondum", "small"),
+        lambda f: f"{f.idle['kb_written_per_hour']:.0f} kB an hour",
+    ),
+    ("start to ready", "≤ 3 s on an A72", lambda f: f"{f.start_s:.1f} s"),
+    ("… in yardsticks", "", lambda f: f"{f.start_s / f.yardstick_s:.1f} of {f.yardstick_s:.2f} s"),
+)
+
+
+def write() -> str:
+    """Write the page; answers its table."""
+    found = kept()
+    head = ["", "aim", *(f.machine for f in found)]
+    lines = [head, ["---"] * len(head)]
+    lines += [[what, aim, *map(shown, found)] for what, aim, shown in ROWS]
+    table = "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    PAGE.write_text(f"{METHOD.read_text(encoding='utf-8')}\n{table}", encoding="utf-8")
+    return table

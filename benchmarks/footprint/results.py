@@ -1,0 +1,55 @@
+"""What was measured on one machine, as it is kept beside this module until it is measured again."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+FOLDER = Path(__file__).with_name("results")
+
+
+@dataclass(frozen=True, slots=True)
+class Footprint:
+    """A host at rest, and one with one worker whose plugin imports nothing but the SDK."""
+
+    machine: str
+    """What it was measured on, in words; an emulated one is called so."""
+    is_emulated: bool
+    start_s: float
+    """From the start of its process to what it tells systemd: ready."""
+    yardstick_s: float
+    """What the yardstick of `probe.py` takes there."""
+    idle: dict[str, Any]
+    """`probe.look` at the host alone."""
+    with_worker: dict[str, list[int]]
+    """`probe.memory` with the worker, in kB."""
+
+    @property
+    def daemon_mb(self) -> float:
+        """Proportional set size of the idle daemon."""
+        return float(self.idle["memory_kb"]["daemon"][0]) * 1024 / 1e6
+
+    @property
+    def worker_mb(self) -> float:
+        """That of the worker: the greatest of them, the other being the spare."""
+        return max(self.with_worker["worker"]) * 1024 / 1e6
+
+    def mb_of(self, kind: str) -> float:
+        """That of all processes of a kind beside the idle daemon."""
+        return sum(self.idle["memory_kb"].get(kind, [])) * 1024 / 1e6
+
+
+def keep(name: str, footprint: Footprint) -> None:
+    """Put it in the place of what was measured on the same kind of machine before."""
+    FOLDER.mkdir(exist_ok=True)
+    text = json.dumps(asdict(footprint), indent=1) + "\n"
+    (FOLDER / f"{name}.json").write_text(text, encoding="utf-8")
+
+
+def kept() -> list[Footprint]:
+    """All that is known, those of real machines first."""
+    files = sorted(FOLDER.glob("*.json"))
+    found = [Footprint(**json.loads(file.read_text(encoding="utf-8"))) for file in files]
+    return sorted(found, key=lambda footprint: footprint.is_emulated)

@@ -1,0 +1,141 @@
+"""A lamp, a hook and the status tell each stick's way; a goal on a stick moves the robot."""
+
+from __future__ import annotations
+
+from tests.lab.machines.drives import fat_stick
+from tests.lab.machines.installed import Installed
+from tests.lab.machines.lab import Lab
+from tests.lab.machines.machine import Machine
+from tests.payloads import Part
+
+from nondum.host.feedback.patterns import PATTERNS
+from nondum.host.feedback.state import State
+from nondum.wheelhouse import goal_payload
+
+HOOK = "/usr/local/bin/tell"
+TOLD = "/run/nondum/told"
+BLINKING = "cp /opt/nondum/packaging/modules-load.d/nondum.conf /etc/modules-load.d/nondum.conf"
+LOADED = "systemctl restart systemd-modules-load.service"
+FEEDBACK = """
+[feedback]
+lamps = ["{lamp}"]
+hook = ["{hook}"]
+refused_s = 100000
+safe_s = 40
+"""
+DANCER = '''"""Dances."""
+from nondum.sdk import Fragment, Unit, behaviour, hookimpl
+
+DOMAIN = """
+(define (domain dancer)
+  (:predicates (dancing ?h - host))
+  (:action dance
+    :parameters (?u - base ?h - host)
+    :precondition (and (ready ?u) (on ?u ?h) (idle ?u))
+    :effect (and (not (idle ?u)) (dancing ?h))))
+"""
+
+@hookimpl
+def units():
+    return [Unit("legs", "base")]
+
+@hookimpl
+def fragments():
+    return [Fragment("dancer.pddl", DOMAIN)]
+
+@behaviour("dance", action="(dance ?u - base ?h - host)", lasting=True, phrase="dance")
+async def dance(ctx, u, h):
+    await ctx.established()
+    while True:
+        await ctx.sleep(60)
+'''
+
+
+def run(lab: Lab) -> str:
+    """A keyboard's lamp through all states, then a goal that waits for who can have it."""
+    host = lab.booted_once()
+    machine = host.machine
+    host.forget()
+    machine.run(f"{BLINKING} && {LOADED}")
+    keyboard = machine.plug_keyboard()
+    lamp = machine.until("a lamp", lambda: _lamp(machine))
+    before = _trigger(machine, lamp)
+    machine.put(HOOK, f'#!/bin/sh\necho "$1 $2" >>{TOLD}\n', 0o755)
+    host.configure(FEEDBACK.format(lamp=lamp, hook=HOOK))
+    host.start()
+    _until_shown(machine, lamp, State.READY)
+    dancer = lab.stick("dancer", Part("dancer", DANCER))
+    stick = machine.plug(dancer)
+    _until_shown(machine, lamp, State.WORKING)
+    _until_shown(machine, lamp, State.SAFE)
+    assert _payloads(host) == {"org.example.dancer": "active"}
+    machine.pull(stick)
+    _until_shown(machine, lamp, State.READY)
+    empty = machine.plug(fat_stick(lab.folder() / "empty.img", None))
+    _until_shown(machine, lamp, State.REFUSED)
+    machine.pull(empty)
+    _until_shown(machine, lamp, State.READY)
+    _dance_for_a_goal(lab, host, lamp)
+    told = machine.run(f"cat {TOLD}").split("\n")
+    for line in ("working", "safe-to-remove", "refused DRIVE_NOT_PAYLOAD", "ready"):
+        assert line in map(str.strip, told), told
+    host.stop()
+    machine.until("as before", lambda: _trigger(machine, lamp) == before or None)
+    machine.unplug(keyboard)
+    return f"{lamp}, told {len(told) - 1} times"
+
+
+def _dance_for_a_goal(lab: Lab, host: Installed, lamp: str) -> None:
+    """The goal comes first, and waits for the payload that knows its words."""
+    files = lab.folder()
+    goal_payload.write(files / "files", "org.example.errand", ["dance"])
+    errand = host.bring(fat_stick(files / "errand.img", files / "files"), "org.example.errand")
+    _until_shown(host.machine, lamp, State.HELP)
+    dancer = host.bring(
+        lab.stick("dancer", Part("dancer", DANCER), release=2), "org.example.dancer"
+    )
+    host.until_goal("dance", "holds")
+    host.machine.pull(errand)
+    host.until_goal("dance", "halted")
+    host.machine.pull(dancer)
+    host.until_payload("org.example.dancer", "gone")
+
+
+def _lamp(machine: Machine) -> str | None:
+    """The name of a lamp of the keyboard that hangs on USB."""
+    command = "for lamp in /sys/class/leds/*::scrolllock; do readlink -f $lamp; done"
+    found = [path for path in machine.attempt(command).out.split() if "/usb" in path]
+    return found[0].rpartition("/")[2] if found else None
+
+
+def _trigger(machine: Machine, lamp: str) -> str:
+    said = machine.run(f"cat /sys/class/leds/{lamp}/trigger")
+    return said.partition("[")[2].partition("]")[0]
+
+
+def _until_shown(machine: Machine, lamp: str, state: State) -> None:
+    """Wait until the kernel has the lamp show a state."""
+    pattern = PATTERNS[state]
+
+    def shown() -> bool | None:
+        files = machine.attempt(f"cd /sys/class/leds/{lamp} && tail -n 1 * 2>/dev/null").out
+        said = dict(_file(part) for part in files.split("==> ")[1:])
+        is_lit = said["brightness"] == said["max_brightness"]
+        delays = (said.get("delay_on"), said.get("delay_off"))
+        if f"[{pattern.trigger}]" not in said["trigger"]:
+            return None
+        if pattern.trigger == "timer":
+            return delays == (str(pattern.on_ms), str(pattern.off_ms)) or None
+        return is_lit or pattern.trigger != "none" or None
+
+    machine.until(f"{lamp} shows {state.value}", shown)
+
+
+def _file(part: str) -> tuple[str, str]:
+    name, _, text = part.partition(" <==")
+    return name, text.strip()
+
+
+def _payloads(host: Installed) -> dict[str, str]:
+    view = host.status()
+    return {row["payload"]: row["state"] for row in view["payloads"]} if view else {}

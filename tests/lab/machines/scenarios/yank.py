@@ -1,0 +1,38 @@
+"""A stick is pulled while its payload is brought in; nothing is left, and next time it works."""
+
+from __future__ import annotations
+
+from tests.lab.machines.installed import Installed
+from tests.lab.machines.lab import Lab
+from tests.lab.plugins import talker
+
+PAYLOAD = "org.example.talker"
+BEGUN = "until ls -d /var/lib/nondum/staging/*; do sleep 0.02; done"
+
+
+def run(lab: Lab) -> str:
+    """Plug, pull at the first byte copied, look, plug again."""
+    host = lab.host()
+    image = lab.stick("talker", talker())
+    stick = host.machine.plug(image)
+    host.machine.run(BEGUN)
+    host.machine.pull(stick)
+    host.until_payload(PAYLOAD, "gone")
+    host.until("no drive", lambda view: True if not view["drives"] else None)
+    host.machine.until("nothing is staged or mounted", lambda: None if _left(host) else True)
+    stick = host.bring(image, PAYLOAD)
+    host.machine.pull(stick)
+    host.until_payload(PAYLOAD, "gone")
+    return f"the last that it had come to: {_reached(host)}"
+
+
+def _left(host: Installed) -> str:
+    staged = host.machine.run("ls /var/lib/nondum/staging")
+    return staged + host.machine.attempt("grep -E '/nondum/.*mounts|usb' /proc/mounts").out
+
+
+def _reached(host: Installed) -> str:
+    """What was journalled last before the first drive was gone."""
+    rows = host.machine.attempt("nondum journal --json --limit 1000").json()
+    events = [row["event"] for row in rows]
+    return str(events[max(events.index("DriveRemoved") - 1, 0)])
