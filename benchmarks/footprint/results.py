@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-FOLDER = Path(__file__).with_name("results")
+FOLDER = Path(__file__).with_name("figures")
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,8 @@ class Footprint:
 
     def mb_of(self, kind: str) -> float:
         """That of all processes of a kind beside the idle daemon."""
-        return sum(self.idle["memory_kb"].get(kind, [])) * 1024 / 1e6
+        kilobytes: int = sum(self.idle["memory_kb"].get(kind, []))
+        return kilobytes * 1024 / 1e6
 
 
 def keep(name: str, footprint: Footprint) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from demo.robot import configuration
 from tests.lab.neighbours import BEACON, UNCONFINED
-from tests.lab.running_host import READY_S, RunningHost, goal
+from tests.lab.running_host import READY_S, Row, RunningHost, goal
 from tests.payloads import Part, seal
 from tests.signing import Key, sign_payload, trust_of
 
@@ -64,7 +64,7 @@ def until_shown(host: RunningHost, state: str, code: str = "") -> dict[str, Any]
     return host.until(f"shown: {state} {code}", found, timeout_s=READY_S)
 
 
-def until_over(host: RunningHost, id: str) -> dict[str, Any]:
+def until_over(host: RunningHost, id: str) -> Row:
     return host.until_goal(id, "halted")
 
 

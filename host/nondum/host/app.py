@@ -225,8 +225,8 @@ async def _run(
             manager.run(),
             mind.run(),
             backups.keep(catalogue.backups, lambda: catalogue.revision, config.backups.every_s),
-            tally.outlive(),
             software.run(),
+            tally.outlive(),
             service.watched(
                 (
                     Part("the component manager", lambda: bus.taken, lambda: bus.followed),

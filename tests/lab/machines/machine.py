@@ -188,10 +188,6 @@ class Machine:
         """Pull a stick out, whatever it is doing."""
         self._usb.pull(name)
 
-    def plug_keyboard(self) -> str:
-        """Plug a USB keyboard in; answers its name for `unplug`."""
-        return self._usb.plug_keyboard()
-
     def plug_hub(self, port: str | None = None) -> str:
         """Plug a USB hub in, whose ports are then `<port>.1` and on; answers its name."""
         return self._usb.plug_hub(port)

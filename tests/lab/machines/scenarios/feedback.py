@@ -57,7 +57,7 @@ def run(lab: Lab) -> str:
     machine = host.machine
     host.forget()
     machine.run(f"{BLINKING} && {LOADED}")
-    keyboard = machine.plug_keyboard()
+    keyboard = machine.plug_device("usb-kbd")
     lamp = machine.until("a lamp", lambda: _lamp(machine))
     before = _trigger(machine, lamp)
     machine.put(HOOK, f'#!/bin/sh\necho "$1 $2" >>{TOLD}\n', 0o755)

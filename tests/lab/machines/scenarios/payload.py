@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 from tests.lab.machines.drives import fat_stick
+from tests.lab.machines.followed import Followed
 from tests.lab.machines.installed import Installed
 from tests.lab.machines.lab import Lab
 from tests.lab.machines.leftovers import seen, until_as_before
@@ -21,7 +22,7 @@ def run(lab: Lab) -> str:
     content = lab.folder() / "files"
     _take(lab.brought or lab.payload("talker", talker()), content / "nondum")
     names = sorted(folder.name for folder in (content / "nondum").iterdir())
-    host = lab.host()
+    host = Followed.follow(lab.host())
     before = host.machine.until("an answer", lambda: seen(host))
     stick = host.bring(fat_stick(content.parent / "stick.img", content), names[0])
     for name in names[1:]:
