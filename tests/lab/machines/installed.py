@@ -35,6 +35,9 @@ cp /opt/nondum/packaging/sysusers.d/*.conf /usr/lib/sysusers.d/ 2>/dev/null || t
 cp /opt/nondum/packaging/tmpfiles.d/*.conf /usr/lib/tmpfiles.d/ 2>/dev/null || true
 systemd-sysusers
 systemd-tmpfiles --create
+mkdir -p /etc/systemd/system/nondum.service.d
+printf '[Service]\\nTimeoutStartSec=900\\nWatchdogSec=300\\n' \\
+    >/etc/systemd/system/nondum.service.d/slow.conf
 systemctl daemon-reload
 systemctl -q enable nondum.service
 """
