@@ -42,7 +42,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_W}/trust/editing.py": (f"{_TW}/trust/test_editing.py",),
     f"{_W}/trust/owners_folder.py": (f"{_TW}/trust/test_editing.py",),
     f"{_W}/trust/signing.py": (f"{_TW}/trust/test_signing.py",),
-    f"{_W}/signatures.py": (f"{_TW}/trust/test_judging.py",),
+    f"{_W}/signatures.py": (f"{_TW}/trust/test_judging.py", f"{_TW}/test_goal_payload.py"),
     f"{_H}/trust/chain.py": (f"{_TH}/trust/test_chain.py",),
     f"{_H}/trust/payload_trust.py": _BROUGHT,
     # What drives are, and what is read of them.
@@ -55,6 +55,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
         "::test_what_is_wrong_or_doubtful_is_told_as_a_drive_is_read",
         *_BROUGHT,
     ),
+    f"{_H}/drives/loose_goals.py": (f"{_TH}/drives/test_loose_goals.py",),
     f"{_H}/drives/reader.py": (f"{_TH}/drives/test_reader.py",),
     f"{_H}/drives/pace.py": (f"{_TH}/drives/test_pace.py",),
     f"{_H}/drives/trial.py": (f"{_TH}/drives/test_trial.py",),
@@ -67,7 +68,8 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_W}/manifest.py": (f"{_TW}/test_manifest.py",),
     f"{_W}/lock.py": (f"{_TW}/test_lock.py",),
     f"{_W}/index.py": (f"{_TW}/test_index.py",),
-    f"{_W}/payload.py": (f"{_TW}/test_payload.py",),
+    f"{_W}/goals.py": (f"{_TW}/test_goals.py",),
+    f"{_W}/payload.py": (f"{_TW}/test_payload.py", f"{_TW}/test_goal_payload.py"),
     f"{_W}/verification.py": (f"{_TW}/test_verification.py",),
     f"{_W}/preflight.py": (
         f"{_TW}/test_preflight.py",
