@@ -26,6 +26,8 @@ COMPONENTS = (
     opener("voice", interface="audio", usb="46f4:0002"),
     opener("any-hid", subsystem="hidraw"),
 )
+GRANTED = {"camera": 2, "loop": 5, "wire": 1, "line": 1, "pad": 1, "voice": 2}
+"""Component → how many nodes its device has at least."""
 WATCH = """
 import ctypes, os, struct, sys
 libc = ctypes.CDLL(None, use_errno=True)
@@ -66,16 +68,13 @@ def _seen_through(lab: Lab, host: Installed) -> str:
     plugged = [machine.plug_device(f"usb-{kind}") for kind in ("tablet", "mouse", "kbd", "audio")]
     line = machine.plug_line(serial="LAB1")
     stick = host.bring(lab.stick("instruments", *COMPONENTS), "org.example.instruments")
-    granted = {
-        **{"camera": 1, "loop": 5, "wire": 1, "line": 1, "pad": 1, "voice": 2},
-    }
-    told = {id: until_said(host, id, "opened", least) for id, least in granted.items()}
+    told = {id: until_said(host, id, "opened", least) for id, least in GRANTED.items()}
     _see_left_alone(host)
     machine.pull_line(line)
     for name in plugged:
         machine.unplug(name)
     machine.run(f"modprobe -r {' '.join(MODULES)}")
-    for id in granted:
+    for id in GRANTED:
         host.until_component(id, "waits for it")
         until_said(host, id, "nothing", 1)
     machine.pull(stick)
