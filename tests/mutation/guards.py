@@ -155,6 +155,7 @@ ASIDE: Mapping[str, str] = {
     f"{_W}/target.py": _BUILDS,
     f"{_W}/disk.py": _SPEAKS,
     f"{_H}/drives/blocks.py": "finds drives; what is on them is judged as it is read",
+    f"{_H}/drives/mounts.py": "reads what the kernel lists",
     f"{_H}/drives/steady.py": "tells once of a cable; what is read of a drive is judged elsewhere",
     f"{_H}/helper/__main__.py": "is started by systemd only",
     f"{_H}/confinement/systemd_stand_in.py": _RUNS,
