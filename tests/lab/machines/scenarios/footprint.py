@@ -13,7 +13,7 @@ from tests.lab.plugins import talker
 
 PROBE = Path(probe.__file__)
 PAYLOAD = "org.example.talker"
-SETTLED_S, WATCHED_S = 90, 120
+SETTLED_S, WATCHED_S = 60, 90
 """The first after a start: half a minute later it is written that nothing went wrong."""
 STARTS = 3
 DAEMON_MB, WORKER_MB, KB_PER_HOUR = 60.0, 20.0, 2000.0
