@@ -38,7 +38,8 @@ class Footprint:
 
     def mb_of(self, kind: str) -> float:
         """That of all processes of a kind beside the idle daemon."""
-        return float(sum(self.idle["memory_kb"].get(kind, []))) * 1024 / 1e6
+        kilobytes: int = sum(self.idle["memory_kb"].get(kind, []))
+        return kilobytes * 1024 / 1e6
 
 
 def keep(name: str, footprint: Footprint) -> None:
