@@ -14,7 +14,7 @@ INSTALLING_S = 1500.0
 """All modules are compiled, by an emulated processor."""
 LEFT = """
 find / -xdev \\( -path /proc -o -path /sys \\) -prune -o -name '*nondum*' -print \
-    | grep -v nondum-lab | grep -v ^/mnt || true
+    | grep -v -e nondum-lab -e ^/mnt -e nondum.service.d || true
 """
 
 
@@ -22,6 +22,7 @@ def run(lab: Lab) -> str:
     """As its operator would: dpkg -i, configure, plug in; dpkg -i a newer one; dpkg -r; dpkg -P."""
     machine = lab.bare(debs(lab.built))
     host = Installed(machine)
+    host.be_patient()
     machine.run("mount -o ro /dev/vdb /mnt")
     spent_s = _dpkg(machine, f"-i /mnt/{OLD}")
     _sees_it_run(host)
