@@ -72,8 +72,9 @@ def _told(host: Installed) -> None:
     """The behaviour was told, and whoever asks is told what is missing."""
     host.until_component("gauge", WAITS)
     host.until_goal(GOAL, "suspended")
-    said = host.machine.run(f'nondum why "{GOAL}"')
-    assert "gauge" in said and "line" in said, said
+    said = host.machine.run(f'nondum why "{GOAL}"; nondum why')
+    assert "(ready spot__gauge__gauge) does not hold" in said, said
+    assert "gauge is not ready: it waits for the device line" in said, said
     rows = json.loads(host.machine.run("nondum journal --subject gauge --limit 30 --json"))
     ends = [row["detail"] for row in rows if row["event"] == "BehaviourEnded"]
     assert ends[-1]["outcome"] in ("FAILED", "HALTED"), ends[-1]
