@@ -72,15 +72,19 @@ log = logging.getLogger(__name__)
 
 
 async def run_host(
-    config: HostConfig, *, more_drives: Sequence[DriveSource] = (), safety: Safety = Safety.OFF
+    config: HostConfig,
+    *,
+    more_drives: Sequence[DriveSource] = (),
+    safety: Safety = Safety.OFF,
+    notifier: Notifier | None = None,
 ) -> None:
     """Run a host until SIGTERM or SIGINT. `more_drives` are sources beside the configuration's;
-    `safety` is asked for by a person.
+    `safety` is asked for by a person; `notifier` tells a service manager how it is.
 
     Raises `ConfigRefused` (ALREADY_RUNNING, SYSTEM_TREE, …) before anything has begun.
     """
     stop = _told_to_stop()
-    async with Service(Notifier.from_environment(os.environ)) as service:
+    async with Service(notifier or Notifier()) as service:
         await _run_as(service, config, more_drives, safety, stop)
 
 

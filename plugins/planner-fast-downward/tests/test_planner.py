@@ -119,7 +119,8 @@ def test_nothing_is_left_in_the_temporary_folder(
 
 @pytest.mark.parametrize("code", [12, 20, 21, 22, 23, 24])
 def test_out_of_something_is_no_proof(code: int) -> None:
-    answer = FastDownwardPlanner(ending(f"raise SystemExit({code})")).plan(roads("(done)"), PATIENCE_S)
+    planner = FastDownwardPlanner(ending(f"raise SystemExit({code})"))
+    answer = planner.plan(roads("(done)"), PATIENCE_S)
     assert isinstance(answer, GaveUp)
     assert "last said" not in answer.why
 

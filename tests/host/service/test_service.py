@@ -66,7 +66,7 @@ def test_daemon_is_ready_once_it_answers_and_says_what_it_does(
     with served(tmp_path, manager) as daemon:
         said = heard(manager, "EXTEND_TIMEOUT_USEC=", "READY=1")
         assert daemon.run("status").ok().out.startswith("host ")
-        assert said[0] == "STATUS=starting"
+        assert "STATUS=starting" in said
         heard(manager, "STATUS=0 components at work")
         daemon.process.terminate()
         heard(manager, "STOPPING=1")

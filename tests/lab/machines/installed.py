@@ -35,9 +35,15 @@ cp /opt/nondum/packaging/sysusers.d/*.conf /usr/lib/sysusers.d/ 2>/dev/null || t
 cp /opt/nondum/packaging/tmpfiles.d/*.conf /usr/lib/tmpfiles.d/ 2>/dev/null || true
 systemd-sysusers
 systemd-tmpfiles --create
+mkdir -p /etc/systemd/system/nondum.service.d
+printf '[Service]\\nTimeoutStartSec=900\\nWatchdogSec=300\\n' \\
+    >/etc/systemd/system/nondum.service.d/slow.conf
 systemctl daemon-reload
 systemctl -q enable nondum.service
 """
+PATIENT = "/etc/systemd/system/nondum.service.d/lab.conf"
+PATIENCE = "[Service]\nTimeoutStartSec={start:.0f}\nWatchdogSec={alive:.0f}\n"
+"""Machines whose processors are emulated, and shared, get more time than real ones."""
 SERVICE = "nondum.service"
 NAME = "spot"
 LOOK_S = 2.0
@@ -57,6 +63,8 @@ class Installed:
     def install(self) -> None:
         """Install it from the machine's first further disk; nothing is started."""
         self.configure()
+        slowness = self.machine.slowness
+        self.machine.put(PATIENT, PATIENCE.format(start=600 * slowness, alive=60 * slowness))
         self.machine.run(INSTALL)
 
     def configure(self, more: str = "") -> None:

@@ -19,12 +19,43 @@ if TYPE_CHECKING:
     from nondum.transport.discovery.doctor import Finding
 
 
-@click.group()
-def doctor() -> None:
+@click.group(invoke_without_command=True)
+@click.option("--user", is_flag=True, help="For `nondum host run --user`.")
+@click.option(
+    "--config",
+    "config_file",
+    type=click.Path(path_type=Path),
+    help="The configuration to look by [default: the system's, none with --user].",
+)
+@json_option
+@click.pass_context
+def doctor(ctx: click.Context, user: bool, config_file: Path | None) -> int | None:
     """Look for what is wrong around this host, without a daemon.
 
-    Example: nondum doctor network
+    Without a command, everything is looked at. Exits with 3 when something is bad; what is doubtful
+    (`warn`) is told only.
+
+    \b
+    Examples: nondum doctor
+              nondum doctor --user --json
+              nondum doctor network
     """
+    if ctx.invoked_subcommand is not None:
+        return None
+    from nondum.host.configuration.effective import Asked
+    from nondum.host.doctor.examination import examine
+    from nondum.host.doctor.finding import is_well, row
+
+    found = list(examine(Asked(is_user=user, file=config_file)))
+    rows = [row(finding) for finding in found]
+    if ctx.obj.as_json:
+        render.as_json({"ok": is_well(found), "findings": rows})
+    else:
+        table(rows, ["result", "check", "subject", "detail"], empty="Nothing was looked at.")
+        for one in rows:
+            if one["fix"] and one["result"] != "ok":
+                render.sentence(f"{one['subject'] or one['check']}: {one['fix']}", mark="→ ")
+    return 0 if is_well(found) else EXIT_PROBLEMS
 
 
 doctor.add_command(disks)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import faulthandler
 import logging
+import os
 from pathlib import Path
 
 import click
@@ -14,6 +15,10 @@ from nondum.host.cli import render
 from nondum.host.cli.config import asked_options
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.configuration.effective import Asked, effective
+from nondum.host.service.notify import Notifier
+
+LONGEST_IMPORT_S = 300.0
+"""What a slow machine may take until all of nondum is imported."""
 
 
 @click.group()
@@ -52,9 +57,12 @@ def run(
     """
     _log(logging.DEBUG if verbose else logging.INFO)
     chosen = effective(Asked(user, config_file, name, peers))
+    notifier = Notifier.from_environment(os.environ)
+    notifier.starting(LONGEST_IMPORT_S)
     from nondum.host.app import run_host
 
-    asyncio.run(run_host(chosen, safety=Safety(safe) if safe else Safety.OFF))
+    safety = Safety(safe) if safe else Safety.OFF
+    asyncio.run(run_host(chosen, safety=safety, notifier=notifier))
 
 
 @host.command()
