@@ -41,8 +41,8 @@ class Machine:
         socket: Socket | None = None,
     ) -> None:
         """`work` keeps its disk, console and sockets (a short path: see unix(7)); `drives` are
-        read-only disks that it has for good, `/dev/vdb` and on; `socket` is where it is plugged into a
-        network, if it has one."""
+        read-only disks that it has for good, `/dev/vdb` and on; `socket` is where it is plugged
+        into a network, if it has one."""
         self.built, self.work, self.socket = built, work, socket
         self._memory_mb, self._drives = memory_mb, drives
         self._qemu: subprocess.Popen[bytes] | None = None
