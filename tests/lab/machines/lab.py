@@ -14,7 +14,7 @@ from tests.lab.machines.building import Built, built
 from tests.lab.machines.drives import fat_stick
 from tests.lab.machines.fleet import Fleet
 from tests.lab.machines.installed import NAME, Installed
-from tests.lab.machines.machine import OURS, Machine
+from tests.lab.machines.machine import Machine
 from tests.lab.machines.network import Lan
 from tests.lab.machines.recipe import RECIPES
 from tests.lab.machines.software import FOR_PAYLOADS, software
@@ -60,9 +60,9 @@ class Lab:
             self.machines.append(self._shared.machine)
         return self._shared
 
-    def booted(self, *, clock: tuple[str, ...] = OURS) -> Installed:
+    def booted(self) -> Installed:
         """A machine of the scenario's own, switched on, with nondum installed but not started."""
-        machine = self._machine(self.built, self.software, clock=clock)
+        machine = self._machine(self.built, self.software)
         (host,) = self._switched_on({NAME: machine})
         return host
 
