@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -53,3 +54,11 @@ class Kit:
     def of(self, names: Sequence[str]) -> dict[str, Path]:
         """Payload id → drive, in the order of `names`."""
         return {self.payloads[name]: self.drives[name] for name in names}
+
+
+def set_up(name: str, sources: Path, settings: str) -> Path:
+    """A copy of a plugin's folder with other settings, lines of TOML, in its manifest."""
+    folder = Path(shutil.copytree(PLUGINS / name, sources / name))
+    with (folder / "payload.toml").open("a", encoding="utf-8") as manifest:
+        manifest.write(f"\n[component.settings]\n{settings}")
+    return folder

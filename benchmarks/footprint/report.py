@@ -32,9 +32,17 @@ ROWS: Sequence[tuple[str, str, Shown]] = (
 def write() -> str:
     """Write the page; answers its table."""
     found = kept()
+    PAGE.write_text(page(found), encoding="utf-8")
+    return _table(found)
+
+
+def page(found: Sequence[Footprint]) -> str:
+    """The whole page."""
+    return f"{METHOD.read_text(encoding='utf-8')}\n{_table(found)}"
+
+
+def _table(found: Sequence[Footprint]) -> str:
     head = ["", "aim", *(f.machine for f in found)]
     lines = [head, ["---"] * len(head)]
     lines += [[what, aim, *map(shown, found)] for what, aim, shown in ROWS]
-    table = "".join(f"| {' | '.join(line)} |\n" for line in lines)
-    PAGE.write_text(f"{METHOD.read_text(encoding='utf-8')}\n{table}", encoding="utf-8")
-    return table
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)

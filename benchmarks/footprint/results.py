@@ -34,7 +34,7 @@ class Footprint:
     @property
     def worker_mb(self) -> float:
         """That of the worker: the greatest of them, the other being the spare."""
-        return max(self.with_worker["worker"]) * 1024 / 1e6
+        return float(max(self.with_worker["worker"])) * 1024 / 1e6
 
     def mb_of(self, kind: str) -> float:
         """That of all processes of a kind beside the idle daemon."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -61,11 +61,18 @@ class Carried:
         return total.hexdigest()[:12]
 
 
-def built(work: Path) -> Iterator[Carried]:
-    """Build both. Raises `NondumError`."""
-    for name in CONTENT:
+def built(names: Iterable[str], work: Path) -> Iterator[Carried]:
+    """Build them. Raises `NondumError`."""
+    for name in names:
         drive = work / f"drive-{name}"
         shutil.rmtree(drive, ignore_errors=True)
         options = build.Options(targets=(Target.here(),), libraries=(SDK,))
         folder = build.build(HERE / "plugins" / name, drive, options, lambda *_: None)
         yield Carried(name, drive, folder)
+
+
+def prepared(names: Iterable[str], work: Path) -> Iterator[Carried]:
+    """Those that were built in that folder, wherever it was then."""
+    for name in names:
+        (folder,) = (work / f"drive-{name}/nondum").iterdir()
+        yield Carried(name, work / f"drive-{name}", folder)

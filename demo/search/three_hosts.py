@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import functools
-import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -14,7 +13,7 @@ from demo import live, stages
 from demo.drives import HERE, Target
 from demo.follow_me import follow_me
 from demo.following import Reference
-from demo.kit import PLUGINS, Kit
+from demo.kit import PLUGINS, Kit, set_up
 from demo.live import Says
 from demo.performance import Programme, parser, perform
 from demo.robot import Robot, running
@@ -142,16 +141,8 @@ def _switched_on(
 
 def search_kit(work: Path, *, target: Target = HERE, settings: Mapping[str, str] = SETTINGS) -> Kit:
     """The drives of this demonstration; `settings` are lines of plugins' settings, by name."""
-    folders = {name: _copy(name, work / "sources", text) for name, text in settings.items()}
+    folders = {name: set_up(name, work / "sources", text) for name, text in settings.items()}
     return Kit.built((BASE, CAMERA, *FOR_NODE), libraries=LIBRARIES, folders=folders, target=target)
-
-
-def _copy(name: str, sources: Path, settings: str) -> Path:
-    """A plugin with other settings in its manifest."""
-    folder = Path(shutil.copytree(PLUGINS / name, sources / name))
-    with (folder / "payload.toml").open("a", encoding="utf-8") as manifest:
-        manifest.write(f"\n[component.settings]\n{settings}")
-    return folder
 
 
 def _options(arguments: Sequence[str]) -> argparse.Namespace:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = ("host", "planning", "transport", "wheelhouse", "plugins", "tests", "docs")
+FOLDERS = ("host", "planning", "transport", "wheelhouse", "plugins", "tests", "docs", "demo")
 TEXT = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
 QUOTED = sorted(set(re.findall(r"`([^`\s]+)`", TEXT)))
 PATHS = [name for name in QUOTED if re.fullmatch(r"[\w/.-]+(\.py|\.md|/)", name)]

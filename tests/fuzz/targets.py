@@ -36,7 +36,7 @@ from nondum.transport.discovery.hint import Source
 from nondum.transport.peers import certificate, messages, pairing, pairing_messages
 from nondum.transport.peers.identity import Security
 from nondum.transport.peers.keys import PeerKey
-from nondum.wheelhouse import archive, contents, index, lock, manifest, wheel
+from nondum.wheelhouse import archive, contents, goals, index, lock, manifest, wheel
 from nondum.wheelhouse.contents import Contents, Entry
 from nondum.wheelhouse.trust import sshsig, trust_file
 from nondum.wheelhouse.trust.public_key import FIDO, PublicKey
@@ -422,6 +422,7 @@ TARGETS = (
         _hostile_wheels,
         tokens=(b"PK\x01\x02", b"PK\x03\x04", b"PK\x05\x06", b"PK\x06\x06", b"\xff\xff\xff\xff"),
     ),
+    Target("goal file", lambda data: goals.parse(data, WHERE), lambda: [b"follow me\n# no\n"]),
     Target("index", lambda data: index.parse(data, WHERE), _indexes, tokens=JSON),
     Target("fragment", of_text(_read_fragment), lambda: [DOMAIN, PROBLEM], tokens=PDDL),
     Target(

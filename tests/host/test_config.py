@@ -68,6 +68,22 @@ def test_a_mistake_names_place_and_expectation(text: str, words: str) -> None:
     assert words in problem
 
 
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ('lamps = ["../../x"]', "a name in /sys/class/leds"),
+        ('hook = ["tell"]', "a program by its full path"),
+        ('player = ["aplay", "-q"]', "a program by its full path"),
+        ('hook = ["/bin/tell", "a\\u0000"]', "words without NUL"),
+        ("refused_s = 0", "a number above 0"),
+    ],
+)
+def test_a_mistake_in_what_shows_the_state_is_told(line: str, words: str) -> None:
+    (problem,) = refused(f"[feedback]\n{line}\n")
+    assert words in problem
+    assert "host.toml:2" in problem
+
+
 def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
     with pytest.raises(ConfigRefused, match="CONFIG_UNREADABLE"):
         load(tmp_path / "none.toml", HostConfig())

@@ -44,7 +44,7 @@ def is_peer(host: RunningHost, other: str) -> bool:
 def until(host: RunningHost, found: Callable[[dict[str, Any]], Any]) -> None:
     """Wait until what a host says of who is here and who is not satisfies `found`."""
     pause = threading.Event()
-    for _ in range(400):
+    for _ in range(2400):
         if found(view := host.ask("peers_why")):
             return
         pause.wait(0.05)

@@ -90,7 +90,7 @@ def test_words_become_the_plan_that_is_meant(
     assert not merged.quarantined
     goal = phrasebook(contributions, merged).goal(words)
     grounded = task(contributions, goal_text(goal.expr))
-    answer = planner().plan(grounded, 5.0)
+    answer = planner().plan(grounded, 60.0)
     assert isinstance(answer, Plan)
     steps = [grounded.actions[step].name.split()[0] for step in answer.steps]
     assert [step.partition(".")[2] for step in steps] == schemas

@@ -88,6 +88,12 @@ WRONG = {
     "unknown-in-requires": ("MANIFEST_KEY", ":10", PLAIN.replace("memory_mb", "memory-mb")),
     "unknown-in-component": ("MANIFEST_KEY", ":15", PLAIN.replace("permissions", "permission")),
     "unknown-in-device": ("MANIFEST_KEY", ":21", PLAIN.replace("optional", "option")),
+    "match-by-no-word": ("MANIFEST_VALUE", ":20", PLAIN.replace("SUBSYSTEM", "subsytem")),
+    "match-by-half-an-id": (
+        "MANIFEST_VALUE",
+        ":20",
+        PLAIN.replace('ID_VENDOR_ID = "1a86"', 'usb = "1a86"'),
+    ),
     "unknown-in-unit": ("MANIFEST_KEY", ":26", PLAIN.replace("rpy", "rpi")),
     "missing-id": ("MANIFEST_KEY", "", PLAIN.replace('id = "org.example.blinker"\n', "")),
     "missing-component": ("MANIFEST_KEY", "", PLAIN.partition("[[component]]")[0]),

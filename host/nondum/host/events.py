@@ -684,10 +684,13 @@ class DeviceAppeared(Event):
 class DeviceChanged(Event):
     """A device that is there has other nodes or properties than before."""
 
-    JOURNALLED: ClassVar[bool] = False
     device: str
     found: DeviceRecord = field(repr=False)
     """As its source sees it now."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Only what it is, as `DeviceAppeared` has it."""
+        return DeviceAppeared(self.device, self.found).to_dict()
 
 
 @dataclass(frozen=True, slots=True)

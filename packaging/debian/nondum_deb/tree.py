@@ -38,6 +38,7 @@ DOCS = "usr/share/doc/nondum"
 FOLDERS = {
     "systemd": "lib/systemd/system",
     "systemd/user": f"{DOCS}/examples/user",
+    "modules-load.d": "usr/lib/modules-load.d",
     "sysusers.d": "usr/lib/sysusers.d",
     "tmpfiles.d": "usr/lib/tmpfiles.d",
     "udev": "lib/udev/rules.d",

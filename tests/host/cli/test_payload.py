@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from tests.host.cli.daemon import BEACON, BEACON_ID, in_terminal, nondum
 from tests.payloads import Part, make_payload
+from tests.signing import Key
 
 INSPECTED = """\
 org.example.beacon 1.0 (release 1): Made by a test  SIZE
@@ -46,6 +47,18 @@ def test_a_drive_is_shown_as_it_says(drive: Path) -> None:
     (payload,) = nondum("payload", "inspect", drive, "--json").ok().json["payloads"]
     assert (payload["id"], payload["release"]) == (BEACON_ID, 1)
     assert [component["id"] for component in payload["components"]] == ["beacon"]
+
+
+def test_a_goal_is_written_signed_and_shown(tmp_path: Path) -> None:
+    key, drive = Key("alice").write(tmp_path), tmp_path / "drive"
+    goal = nondum("payload", "goal", "follow me", "come back", "-o", drive, "--sign", key)
+    folder = drive / "nondum/org.example.goal"
+    assert goal.ok().out == f"{folder}\n"
+    shown = nondum("payload", "inspect", drive).ok().out
+    assert "  goal: follow me\n  goal: come back\n" in shown
+    assert "signed by SHA256:" in shown
+    nondum("payload", "check", drive).ok()
+    nondum("payload", "goal", "go\x07", "-o", drive).refused(1, "GOAL_FILE")
 
 
 def test_a_sound_drive_is_accepted(drive: Path) -> None:

@@ -7,7 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from nondum.host.catalogue.records import DriveRecord, DriveState, PayloadRecord, Snapshot, Step
+from nondum.host.catalogue.records import (
+    DriveRecord,
+    DriveState,
+    PayloadRecord,
+    Safety,
+    Snapshot,
+    Step,
+)
 from nondum.host.feedback.concerns import Known, concerns
 from nondum.host.feedback.state import Concern, State
 from nondum.host.mind.goals import GivenGoal, GoalState
@@ -106,6 +113,11 @@ def test_a_goal_that_cannot_be_had_needs_help() -> None:
     [help] = concerns(Known(Snapshot("spot", 1), goals=(goal,)))
     assert (help.state, help.code) == (State.HELP, "NO_PLAN")
     assert help.sentence == "goal 3 cannot be had now, follow me: nobody can see"
+
+
+def test_safe_mode_needs_help() -> None:
+    [help] = concerns(Known(Snapshot("spot", 1, safety=Safety.INITIAL)))
+    assert (help.state, help.code) == (State.HELP, "SAFE_MODE")
 
 
 def test_initial_components_are_no_drives_that_anybody_pulls() -> None:

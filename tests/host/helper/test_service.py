@@ -34,6 +34,27 @@ def root(stick: Machine, tmp_path: Path) -> Service:
     return Service(NOBODY, tmp_path / "mounts", stick.disks, nodes, NoTree(), lambda: lamps)
 
 
+def test_lamps_are_those_of_root_alone(stick: Machine, tmp_path: Path) -> None:
+    lamp = tmp_path / "leds/ACT"
+    lamp.mkdir(parents=True)
+    for name, text in (("trigger", "[mmc0] none"), ("brightness", "0"), ("max_brightness", "9")):
+        (lamp / name).write_text(text)
+    names: list[str] = []
+    nodes = Nodes(tmp_path / "nodes", NOBODY, sys=tmp_path / "sys")
+
+    def lamps() -> Lamps:
+        return Lamps(tuple(names), tmp_path / "run/lamps.json", tmp_path / "leds")
+
+    root = Service(NOBODY, tmp_path / "mounts", stick.disks, nodes, NoTree(), lamps)
+    root.serve(requests.ShowLamps("ready"))
+    assert (lamp / "brightness").read_text() == "0"
+    names.append("ACT")
+    root.serve(requests.ShowLamps("ready"))
+    assert (lamp / "brightness").read_text() == "9"
+    root.serve(requests.EndLamps())
+    assert (lamp / "trigger").read_text() == "mmc0"
+
+
 def refused(root: Service, request: Request) -> str:
     with pytest.raises(NondumError) as error:
         root.serve(request)

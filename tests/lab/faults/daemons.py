@@ -106,7 +106,7 @@ def note(word):
 '''
 
 
-def lamp(log: Path, *, when_lost: str, signal_s: float = 2.5) -> Part:
+def lamp(log: Path, *, when_lost: str, signal_s: float = 6.0) -> Part:
     """A lamp that writes down when it shines, and when it signals, which takes a while."""
     code = LAMP.replace("LOST", when_lost).replace("SIGNAL_S", str(signal_s))
     return Part("lamp", code.replace("LOG", str(log)))

@@ -147,10 +147,11 @@ def test_paired_hosts_need_no_clock(skew_s: float, hosts: Crew) -> None:
     mule.kill()
     mule.start(skew_s=skew_s)
     hosts.all_see({"rover": {}, "mule": {}, "base": {}})
-    call = {"peer": "mule", "method": "work.stop", "deadline_s": 1}
-    answer = rover.ask("call", args={"piece": "one", "for_s": 0.1}, **call)
+    call = {"peer": "mule", "method": "work.stop"}
+    args: dict[str, object] = {"piece": "one", "for_s": 0.1}
+    answer = rover.ask("call", args=args, deadline_s=LONG_S, **call)
     assert answer["answer"] == {"piece": "one"}
-    answer = rover.ask("call", args={"piece": "two", "for_s": LONG_S}, **call)
+    answer = rover.ask("call", args={"piece": "two", "for_s": LONG_S}, deadline_s=1, **call)
     assert answer["failure"] == "DEADLINE"
 
 

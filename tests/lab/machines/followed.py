@@ -17,6 +17,7 @@ FOLLOW = """
 mkdir -p /run/lab
 cat >/run/lab/follow <<'END'
 while :; do
+    until [ -S /run/nondum/control.sock ]; do sleep 1; done
     nondum status --follow --json >/run/lab/status 2>/run/lab/follow.log
     : >/run/lab/status
     sleep 1

@@ -41,6 +41,8 @@ printf '[Service]\\nTimeoutStartSec=900\\nWatchdogSec=300\\n' \\
 systemctl daemon-reload
 systemctl -q enable nondum.service
 """
+PATIENT = "/etc/systemd/system/nondum.service.d/lab.conf"
+PATIENCE = "[Service]\nTimeoutStartSec={start:.0f}\nWatchdogSec={alive:.0f}\n"
 """Machines whose processors are emulated, and shared, get more time than real ones."""
 SERVICE = "nondum.service"
 NAME = "spot"
@@ -61,6 +63,8 @@ class Installed:
     def install(self) -> None:
         """Install it from the machine's first further disk; nothing is started."""
         self.configure()
+        slowness = self.machine.slowness
+        self.machine.put(PATIENT, PATIENCE.format(start=600 * slowness, alive=60 * slowness))
         self.machine.run(INSTALL)
 
     def configure(self, more: str = "") -> None:

@@ -89,7 +89,7 @@ async def start(ctx):
 '''
 
 
-READER = '''"""Asks a smart card reader, which has no driver in the kernel, for the slot's state."""
+READER = '''"""Asks a smart card reader, which has no driver in the kernel, for its state."""
 import asyncio
 from nondum.sdk import DeviceNeed, Unit, hookimpl
 from nondum.sdk.usb import open_usb

@@ -58,18 +58,16 @@ def held(node: Path, drive: str = "", ours: Path | None = None) -> Iterator[Path
 
 @contextmanager
 def _claimed(path: Path, node: Path, ours: Path | None) -> Iterator[None]:
-    """Have a device that nobody else has, as long as the context lasts. Raises `DriveGone`,
-    `PayloadRefused` (DRIVE_MOUNTED).
+    """Have a device that nobody else has, as long as the context lasts. Raises `PayloadRefused`
+    (DRIVE_MOUNTED).
 
     O_EXCL claims it as mounts and swaps do (open(2)): were it only asked whether somebody has it,
     the answer might be true no more. What this host has mounted itself, or has just let go, is
-    claimed already.
+    claimed already; and what has gone meanwhile, nobody can mount.
     """
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_EXCL)
     except OSError as error:
-        if error.errno != errno.EBUSY:
-            raise _gone(node, f"went away before it was read ({error.strerror})") from error
         use = Machine().uses(ours or Path("/nowhere")).get(node.resolve().name)
         if use is not None:
             raise PayloadRefused(mounted_elsewhere(node, use.why)) from error

@@ -11,6 +11,7 @@ from nondum.host.catalogue.records import (
     DriveRecord,
     DriveState,
     PayloadRecord,
+    Safety,
     Snapshot,
     Step,
 )
@@ -45,6 +46,7 @@ def concerns(known: Known) -> tuple[Concern, ...]:
         *(c for drive in known.snapshot.drives for c in _of_drive(drive, known)),
         *_of_components(known.snapshot),
         *(_of_goal(goal) for goal in known.goals if _cannot_be_had(goal)),
+        *_of_host(known.snapshot),
         *known.more,
     )
     return tuple(found)
@@ -83,6 +85,12 @@ def is_safe(drive: DriveRecord, known: Known) -> bool:
     brought is in force, and it is unmounted."""
     brought = [p for p in known.snapshot.payloads if drive.id in p.sources]
     return drive.id in known.unmounted and all(payload.step in _WELL for payload in brought)
+
+
+def _of_host(snapshot: Snapshot) -> Iterator[Concern]:
+    if snapshot.safety is not Safety.OFF:
+        told = "the host is in safe mode, and leaves payloads alone"
+        yield Concern(State.HELP, "host", told, "SAFE_MODE")
 
 
 def _of_components(snapshot: Snapshot) -> Iterator[Concern]:

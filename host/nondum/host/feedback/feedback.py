@@ -54,7 +54,7 @@ class Feedback:
         """`on_change` is called whenever another state is shown."""
         self._sources, self._durations, self._now_s = sources, durations, now_s
         self._on_change = on_change
-        self._outlets = tuple(map(Outlet, outputs))
+        self._outlets = tuple(Outlet(output, on_change) for output in outputs)
         self._unmounted: frozenset[str] = frozenset()
         self._unwritten: tuple[Problem, ...] = ()
         self._since: showing.Since = {}

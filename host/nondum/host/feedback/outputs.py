@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Callable
 from typing import Protocol
 
 from nondum.host.feedback.state import Concern
@@ -28,7 +29,9 @@ class Output(Protocol):
 class Outlet:
     """Shows one output the newest state, one at a time, while `run` runs."""
 
-    def __init__(self, output: Output) -> None:
+    def __init__(self, output: Output, on_change: Callable[[], None] = lambda: None) -> None:
+        """`on_change` is called when there are other `problems`."""
+        self._on_change = on_change
         self.problems: tuple[str, ...] = ()
         """Why the last state could not be shown; told in every status."""
         self._output = output
@@ -73,4 +76,6 @@ class Outlet:
             log.warning("feedback: %s", "; ".join(problems))
         elif self.problems and not problems:
             log.info("feedback: it works again: %s", "; ".join(self.problems))
-        self.problems = problems
+        if problems != self.problems:
+            self.problems = problems
+            self._on_change()

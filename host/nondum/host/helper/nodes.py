@@ -22,6 +22,7 @@ _RAW = frozenset({"scsi_generic", "bsg", "nvme", "nvme-generic"})
 KEYBOARD = ("03", "01")
 """Interface class and protocol (USB HID 1.11, 4.2): what is typed is nobody's but the machine's."""
 HUB = "09"
+STORAGE = "08"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +68,8 @@ class Nodes:
             raise refused("there is no such device", f"{major}:{minor}")
         device = link.resolve()
         subsystem = (device / "subsystem").resolve().name
-        if subsystem in _RAW or _is_keyboard(device) or _attribute(device, "bDeviceClass") == HUB:
+        is_hub = _attribute(device, "bDeviceClass") == HUB
+        if subsystem in _RAW or is_hub or _is_keyboard(device) or _is_drive(device):
             raise refused("a component is not given disks, keyboards or hubs", f"{major}:{minor}")
         if not _usb(device) and subsystem not in self.subsystems:
             raise refused("it does not hang on USB", f"{major}:{minor}")
@@ -97,6 +99,12 @@ def _is_keyboard(device: Path) -> bool:
         (_attribute(at, "bInterfaceClass"), _attribute(at, "bInterfaceProtocol")) == KEYBOARD
         for at in interfaces
     )
+
+
+def _is_drive(device: Path) -> bool:
+    """Whether an interface that it hangs on, or one that it has, is a drive's."""
+    interfaces = (*_usb(device), *device.glob("*:*"))
+    return any(_attribute(at, "bInterfaceClass") == STORAGE for at in interfaces)
 
 
 def _attribute(device: Path, name: str) -> str:

@@ -207,9 +207,17 @@ class Bench:
             if not self._changed.wait_for(is_so, timeout_s):
                 raise AssertionError(f"waited {timeout_s} s in vain for {what}; logs: {self.logs}")
 
-    def attach(self, device: str, node: str, properties: Mapping[str, str] | None = None) -> None:
-        """Grant a device."""
-        self.ask("attach", device=device, node=node, properties=dict(properties or {}))
+    def attach(
+        self,
+        device: str,
+        node: str,
+        properties: Mapping[str, str] | None = None,
+        *others: tuple[str, Mapping[str, str]],
+    ) -> None:
+        """Grant a device; `others` are further nodes of it, with their properties."""
+        first = {"node": node, "properties": dict(properties or {})}
+        nodes = [first, *({"node": path, "properties": dict(more)} for path, more in others)]
+        self.ask("attach", device=device, nodes=nodes, **first)
 
     def detach(self, device: str) -> None:
         """Take a device away."""

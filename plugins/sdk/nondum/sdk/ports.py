@@ -12,11 +12,10 @@ from collections.abc import Callable
 
 from nondum.sdk.errors import NondumError, ProtocolViolation
 from nondum.sdk.messages import MESSAGES, Message
+from nondum.sdk.pace import STALL_S, Pace
 from nondum.sdk.packets import Packets
 from nondum.sdk.streams import Consumer, Producer
 
-STALL_S = 1.0
-"""An output that sends nothing for so long has stopped to flow."""
 FRESH_S = 0.3
 """A message older than this is not what a newly opened input begins with."""
 
@@ -33,7 +32,8 @@ class OutputPort:
         self._message_class = MESSAGES[kind]
         self._on_flow = on_flow
         self._users = 0
-        self._last_s = 0.0
+        self._pace: Pace | None = None
+        """None: nothing has come since it was opened."""
         self._watch: asyncio.TimerHandle | None = None
 
     @property
@@ -53,7 +53,8 @@ class OutputPort:
             )
         self.producer.send(message)
         loop = asyncio.get_running_loop()
-        self._last_s = loop.time()
+        now_s = loop.time()
+        self._pace = self._pace.after(now_s) if self._pace is not None else Pace(now_s)
         if self._watch is None:
             self._watch = loop.call_later(STALL_S, self._look)
             self._on_flow(self)
@@ -67,6 +68,7 @@ class OutputPort:
         self._users -= 1
         if not self._users:
             self._end_flow()
+            self._pace = None  # who uses it next may have another one
 
     def close(self) -> None:
         """End the stream and drop its consumers."""
@@ -75,11 +77,11 @@ class OutputPort:
 
     def _look(self) -> None:
         loop = asyncio.get_running_loop()
-        quiet_s = loop.time() - self._last_s
-        if quiet_s >= STALL_S:
+        left_s = self._pace.overdue_s - loop.time() if self._pace is not None else 0.0
+        if left_s <= 0:
             self._end_flow()
-        else:
-            self._watch = loop.call_later(STALL_S - quiet_s, self._look)
+        else:  # the pace may quicken meanwhile
+            self._watch = loop.call_later(min(left_s, STALL_S), self._look)
 
     def _end_flow(self) -> None:
         if self._watch is not None:

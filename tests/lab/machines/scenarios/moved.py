@@ -7,6 +7,7 @@ import json
 from tests.lab.machines.gauge import Gauge, reader, switched_on
 from tests.lab.machines.installed import Installed
 from tests.lab.machines.lab import Lab
+from tests.lab.machines.machine import ITS_OWN
 
 PAYLOAD = "org.example.gauge"
 GOAL = "(flowing spot__gauge__level)"
@@ -18,7 +19,8 @@ WAITS = "waits for line"
 def run(lab: Lab) -> str:
     """A port, another one, behind a hub, behind a hub behind that; then where it was at first,
     under another name, since something else has taken its own."""
-    host = lab.host()
+    host = lab.booted(clock=ITS_OWN)
+    host.start()
     machine = host.machine
     host.bring(lab.stick("gauge", reader(MATCH)), PAYLOAD, port="1")
     host.until_component("gauge", WAITS)

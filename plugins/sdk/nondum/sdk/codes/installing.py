@@ -125,4 +125,15 @@ CODES = (
         "The new release's worker ended while it was watched, so the old one stays.",
         "see `nondum logs`; plug in a release that works",
     ),
+    Code(
+        "USB_LIBRARY",
+        "A plugin cannot use a USB device itself: pyusb or libusb is not to be had.",
+        "its author: lock pyusb with it (`nondum-sdk[usb]`); whoever runs the host: install libusb "
+        "(Debian: `libusb-1.0-0`)",
+    ),
+    Code(
+        "USB_UNUSABLE",
+        "A granted device cannot be used by libusb.",
+        "its author: match it with subsystem = 'usb'; else plug it in again",
+    ),
 )

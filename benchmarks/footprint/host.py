@@ -1,0 +1,66 @@
+"""A host on this machine, measured: a user's, with slots, and with peers as a service has them."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from benchmarks.footprint import probe
+
+PATIENCE_S = 300.0
+CONFIGURATION = """
+[host]
+name = "rover"
+state = "{folder}/state"
+control = "{folder}/control"
+[drives]
+slots = ["{folder}/slots"]
+allow_unsigned = true
+[peers]
+enabled = true
+listen = ["tcp://127.0.0.1:0"]
+"""
+
+
+@contextmanager
+def running(folder: Path) -> Iterator[tuple[int, float]]:
+    """A host that has said that it is ready (sd_notify(3)): its process, and how many seconds that
+    took. `folder` has a short path (unix(7)), and keeps its state from one to the next."""
+    ready = folder / "ready"
+    ready.unlink(missing_ok=True)
+    (folder / "host.toml").write_text(CONFIGURATION.format(folder=folder), encoding="utf-8")
+    command = [sys.executable, "-m", "nondum.host.cli", "host", "run", "--user"]
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as told:
+        told.bind(str(ready))
+        told.settimeout(PATIENCE_S)
+        began = time.monotonic()
+        process = subprocess.Popen(
+            [*command, "--config", folder / "host.toml"],
+            env={**os.environ, "NOTIFY_SOCKET": str(ready)},
+            stderr=subprocess.DEVNULL,
+        )
+        try:
+            while b"READY=1" not in told.recv(4096):
+                pass
+            yield process.pid, time.monotonic() - began
+        finally:
+            process.terminate()
+            process.wait()
+
+
+def await_worker(pid: int) -> None:
+    """Wait until there are two workers: that of the payload, and the spare.
+
+    Raises `TimeoutError`.
+    """
+    until = time.monotonic() + PATIENCE_S
+    while len(probe.memory(pid).get("worker", [])) < 2:
+        if time.monotonic() > until:
+            raise TimeoutError("the payload has no worker")
+        time.sleep(0.2)

@@ -1,0 +1,42 @@
+"""How often something comes, and when it is overdue: pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+STALL_S = 1.0
+"""Nothing is overdue sooner."""
+PERIODS = 3
+"""What comes slowly is overdue when so many of its own periods have passed."""
+FIRST_S = 5.0
+"""How long a second one is waited for: nothing is known of the period yet."""
+_KEPT = 0.8
+"""What counts of the longest period when one comes sooner."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """The pace of what has come so far.
+
+    >>> slow = Pace(last_s=10.0).after(12.0)
+    >>> slow.overdue_s
+    18.0
+    >>> Pace(last_s=10.0).after(10.1).overdue_s
+    11.1
+    """
+
+    last_s: float
+    """When the last one came."""
+    period_s: float | None = None
+    """The longest of late between two; None: only one has come."""
+
+    def after(self, now_s: float) -> Pace:
+        """The pace once one more has come."""
+        return Pace(now_s, max(now_s - self.last_s, _KEPT * (self.period_s or 0.0)))
+
+    @property
+    def overdue_s(self) -> float:
+        """When the next one is overdue."""
+        if self.period_s is None:
+            return self.last_s + FIRST_S
+        return self.last_s + max(STALL_S, PERIODS * self.period_s)
