@@ -53,6 +53,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/drives/reading.py": (
         f"{_TH}/trust/test_payload_trust.py"
         "::test_what_is_wrong_or_doubtful_is_told_as_a_drive_is_read",
+        f"{_TH}/drives/test_reading.py::test_a_goal_that_lies_loose_is_told_with_its_drive",
         *_BROUGHT,
     ),
     f"{_H}/drives/loose_goals.py": (f"{_TH}/drives/test_loose_goals.py",),

@@ -18,7 +18,13 @@ from nondum.host.drives import steady
 from nondum.host.drives.blocks import BlockSource
 from nondum.host.drives.source import DriveSource
 from nondum.host.drives.steady import Steady
-from nondum.host.events import DriveFlapping, DriveInserted, PayloadFound, WheelsStored
+from nondum.host.events import (
+    DriveFlapping,
+    DriveInserted,
+    DriveRead,
+    PayloadFound,
+    WheelsStored,
+)
 from nondum.host.lifecycle.folders import Folders
 
 pytestmark = pytest.mark.anyio
@@ -46,6 +52,17 @@ async def test_payloads_of_one_drive_are_judged_each_alone(tmp_path: Path) -> No
         host.pull()
         await host.until(lambda: not host.snapshot.payloads)
         assert not left_over(host.folders)
+
+
+async def test_a_goal_that_lies_loose_is_told_with_its_drive(tmp_path: Path) -> None:
+    make_payload(tmp_path / "drive", Part("lamp", LAMP), payload_id=LAMP_ID)
+    (tmp_path / "drive/nondum/goal.txt").write_text("shine")
+    async with living(tmp_path) as host:
+        host.plug(tmp_path / "drive")
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+        await host.until(lambda: bool(heard(host, DriveRead)))
+        (drive,) = host.snapshot.drives
+        assert [problem.code for problem in drive.problems] == ["GOAL_UNSIGNED"]
 
 
 async def test_copies_of_a_payload_are_installed_once(tmp_path: Path) -> None:
