@@ -17,6 +17,8 @@ from tests.lab.machines.drives import MEGABYTE
 
 FILE_SYSTEMS = ("vfat", "exfat", "ext4")
 """Those that drives may have."""
+ODD_LABELS = {"vfat": "$(reboot)&", "exfat": "Stöck ☂ ½", "ext4": "../../etc\\x0a"}
+"""Labels that are no good names, file system by file system."""
 PARTITION_MB = 16
 START_MB = 1
 LITTER = (

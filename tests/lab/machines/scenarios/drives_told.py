@@ -11,8 +11,6 @@ from tests.lab.machines.lab import Lab
 from tests.lab.machines.machine import Machine
 from tests.lab.machines.plugins import doer
 
-ODD = {"vfat": "$(reboot)&", "exfat": "Stöck ☂ ½", "ext4": "../../etc\\x0a"}
-"""Labels that are no good names, file system by file system."""
 WATCH = """
 import asyncio, json
 from pathlib import Path
@@ -70,7 +68,9 @@ def run(lab: Lab) -> str:
 
 def _see_read(lab: Lab, machine: Machine, kind: str) -> None:
     content = images.with_litter(lab.payload(kind, doer(kind, "pass")))
-    image = images.file_system(content.parent / "disk.img", kind, content, label=ODD[kind])
+    image = images.file_system(
+        content.parent / "disk.img", kind, content, label=images.ODD_LABELS[kind]
+    )
     count = len(_told(machine))
     stick = machine.plug(image)
     (row,) = _until(machine, count + 1)[count:]

@@ -10,8 +10,6 @@ from tests.lab.machines.followed import Followed, Stick
 from tests.lab.machines.lab import Lab
 from tests.lab.machines.plugins import doer
 
-ODD = {"vfat": "$(reboot)&", "exfat": "Stöck ☂ ½", "ext4": "../../etc\\x0a"}
-"""Labels that are no good names, file system by file system."""
 TABLES = {"vfat": "dos", "exfat": "gpt", "ext4": "gpt"}
 
 
@@ -46,7 +44,9 @@ def _content(lab: Lab, name: str) -> Path:
 def _whole(lab: Lab, kind: str) -> Path:
     """A disk without a partition table."""
     content = _content(lab, f"whole-{kind}")
-    return images.file_system(content.parent / "disk.img", kind, content, label=ODD[kind])
+    return images.file_system(
+        content.parent / "disk.img", kind, content, label=images.ODD_LABELS[kind]
+    )
 
 
 def _with_table(lab: Lab, kind: str) -> Path:
