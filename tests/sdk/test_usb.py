@@ -1,4 +1,4 @@
-"""pyusb on a granted device: here it is refused well; that it works, scenario `raw_usb` shows."""
+"""pyusb on a granted device: here only refusals; a device is what scenario `raw-usb` is for."""
 
 from __future__ import annotations
 
