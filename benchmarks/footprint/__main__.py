@@ -30,7 +30,7 @@ def main() -> None:
 
 
 def _measured(folder: Path, seconds: float) -> results.Footprint:
-    starts = [_start_s(folder) for _ in range(STARTS)]
+    starts = [_start(folder) for _ in range(STARTS)]
     with running(folder) as (pid, _):
         time.sleep(SETTLED_S)
         await_rest(pid, timeout_s=PATIENCE_S)
@@ -43,16 +43,18 @@ def _measured(folder: Path, seconds: float) -> results.Footprint:
     return results.Footprint(
         machine=f"{platform.machine()}, {os.cpu_count()} processors",
         is_emulated=False,
-        start_s=min(starts),
+        start_s=min(wall_s for wall_s, _ in starts),
+        start_cpu_s=min(cpu_s for _, cpu_s in starts),
         yardstick_s=probe.yardstick(),
         idle=idle,
         with_worker=with_worker,
     )
 
 
-def _start_s(folder: Path) -> float:
-    with running(folder) as (_, start_s):
-        return start_s
+def _start(folder: Path) -> tuple[float, float]:
+    """Seconds until it was ready, and what it took of a processor until then."""
+    with running(folder) as (pid, start_s):
+        return start_s, probe.processor_s(pid)
 
 
 def _arguments() -> argparse.Namespace:

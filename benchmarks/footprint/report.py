@@ -25,7 +25,12 @@ ROWS: Sequence[tuple[str, str, Shown]] = (
         lambda f: f"{f.idle['kb_written_per_hour']:.0f} kB an hour",
     ),
     ("start to ready", "≤ 3 s on an A72", lambda f: f"{f.start_s:.1f} s"),
-    ("… in yardsticks", "", lambda f: f"{f.start_s / f.yardstick_s:.1f} of {f.yardstick_s:.2f} s"),
+    ("… of it, on a processor", "", lambda f: f"{f.start_cpu_s:.1f} s"),
+    (
+        "… in yardsticks",
+        "",
+        lambda f: f"{f.start_cpu_s / f.yardstick_s:.1f} of {f.yardstick_s:.2f} s",
+    ),
 )
 
 

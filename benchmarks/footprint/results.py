@@ -18,9 +18,11 @@ class Footprint:
     """What it was measured on, in words; an emulated one is called so."""
     is_emulated: bool
     start_s: float
-    """From the start of its process to what it tells systemd: ready."""
+    """From the start of its process to what it tells systemd: ready. Others delay it."""
+    start_cpu_s: float
+    """What its process took of a processor until then, whoever else worked."""
     yardstick_s: float
-    """What the yardstick of `probe.py` takes there."""
+    """What the yardstick of `probe.py` takes of one there."""
     idle: dict[str, Any]
     """`probe.look` at the host alone."""
     with_worker: dict[str, list[int]]

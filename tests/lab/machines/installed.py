@@ -63,9 +63,13 @@ class Installed:
     def install(self) -> None:
         """Install it from the machine's first further disk; nothing is started."""
         self.configure()
+        self.be_patient()
+        self.machine.run(INSTALL)
+
+    def be_patient(self) -> None:
+        """Have systemd give the service the time that an emulated processor takes."""
         slowness = self.machine.slowness
         self.machine.put(PATIENT, PATIENCE.format(start=600 * slowness, alive=60 * slowness))
-        self.machine.run(INSTALL)
 
     def configure(self, more: str = "") -> None:
         """Write its configuration, with some more lines of its table `[workers]`."""

@@ -14,7 +14,7 @@ INSTALLING_S = 1500.0
 """All modules are compiled, by an emulated processor."""
 LEFT = """
 find / -xdev \\( -path /proc -o -path /sys \\) -prune -o -name '*nondum*' -print \
-    | grep -v nondum-lab | grep -v ^/mnt || true
+    | grep -v -e nondum-lab -e ^/mnt -e nondum.service.d || true
 """
 
 
@@ -22,16 +22,22 @@ def run(lab: Lab) -> str:
     """As its operator would: dpkg -i, configure, plug in; dpkg -i a newer one; dpkg -r; dpkg -P."""
     machine = lab.bare(debs(lab.built))
     host = Installed(machine)
+    host.be_patient()
     machine.run("mount -o ro /dev/vdb /mnt")
     spent_s = _dpkg(machine, f"-i /mnt/{OLD}")
     _sees_it_run(host)
     host.configure()
     machine.run("systemctl restart nondum.service", timeout_s=INSTALLING_S)
     host.wait_until_started()
-    host.bring(lab.stick("talker", talker()), PAYLOAD)
+    image = lab.stick("talker", talker())
+    machine.pull(host.bring(image, PAYLOAD))
+    host.until_payload(PAYLOAD, "gone")
+    known = _store(machine)
     _dpkg(machine, f"-i /mnt/{NEW}")
     _sees_it_run(host)
+    assert known and _store(machine) == known, "what was installed is not known any more"
     _remembers(host)
+    host.bring(image, PAYLOAD)
     _dpkg(machine, "-r nondum")
     _sees_it_stopped(machine)
     _dpkg(machine, "-P nondum")
@@ -57,12 +63,16 @@ def _sees_it_run(host: Installed) -> None:
     assert host.shown("User") == "nondum"
 
 
+def _store(machine: Machine) -> set[str]:
+    """The wheels that it keeps, by their folders' names, which are their hashes."""
+    return set(machine.run("ls /var/lib/nondum/store").split())
+
+
 def _remembers(host: Installed) -> None:
-    """The newer one has its operator's configuration, the state, and the payload again."""
+    """The newer one has its operator's configuration, and the journal of the older one."""
     version = host.machine.run("dpkg-query -W -f '${Version}' nondum")
     assert version == VERSIONS[NEW], version
     assert "startup_s" in host.machine.run("cat /etc/nondum/host.toml")
-    host.until_payload(PAYLOAD, "active")
     journal = host.machine.run("nondum journal --limit 1000")
     assert journal.count("HostStarted") >= 2, "the journal of before is gone"
 
