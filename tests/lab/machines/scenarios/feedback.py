@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from tests.lab.machines.drives import fat_stick
-from tests.lab.machines.installed import Installed
+from tests.lab.machines.installed import REPLUGS, Installed
 from tests.lab.machines.lab import Lab
 from tests.lab.machines.machine import Machine
 from tests.payloads import Part
 
-from nondum.host.feedback.patterns import PATTERNS
+from nondum.host.feedback.patterns import PATTERNS, Pattern
 from nondum.host.feedback.state import State
 from nondum.wheelhouse import goal_payload
 
@@ -69,9 +71,7 @@ def run(lab: Lab) -> str:
     host.start()
     _until_shown(machine, lamp, State.READY)
     dancer = lab.stick("dancer", Part("dancer", DANCER))
-    stick = machine.plug(dancer)
-    _until_shown(machine, lamp, State.WORKING)
-    _until_shown(machine, lamp, State.SAFE)
+    stick = _bring(machine, dancer, lamp)
     assert _payloads(host) == {"org.example.dancer": "active"}
     machine.pull(stick)
     _until_shown(machine, lamp, State.READY)
@@ -88,6 +88,21 @@ def run(lab: Lab) -> str:
     machine.unplug(keyboard)
     machine.run(f"rm {PATIENT} && systemctl daemon-reload")
     return f"{lamp}, told {len(told) - 1} times"
+
+
+def _bring(machine: Machine, image: Path, lamp: str) -> str:
+    """Plug a stick in until the lamp says that it may be pulled; one that stalls is plugged in
+    again, as `Installed.bring` does."""
+    for _ in range(REPLUGS):
+        stick = machine.plug(image)
+        _until_shown(machine, lamp, State.WORKING)
+        if _until_shown(machine, lamp, State.SAFE, State.REFUSED) is State.SAFE:
+            return stick
+        told = machine.run(f"tail -n 3 {TOLD}")
+        assert "DRIVE_STALLED" in told, told
+        machine.pull(stick)
+        _until_shown(machine, lamp, State.READY)
+    raise AssertionError(f"the drive stalled {REPLUGS} times")
 
 
 def _dance_for_a_goal(lab: Lab, host: Installed, lamp: str) -> None:
@@ -118,22 +133,24 @@ def _trigger(machine: Machine, lamp: str) -> str:
     return said.partition("[")[2].partition("]")[0]
 
 
-def _until_shown(machine: Machine, lamp: str, state: State) -> None:
-    """Wait until the kernel has the lamp show a state."""
-    pattern = PATTERNS[state]
+def _until_shown(machine: Machine, lamp: str, *states: State) -> State:
+    """Wait until the kernel has the lamp show one of some states."""
 
-    def shown() -> bool | None:
+    def shown() -> State | None:
         files = machine.attempt(f"cd /sys/class/leds/{lamp} && tail -n 1 * 2>/dev/null").out
         said = dict(_file(part) for part in files.split("==> ")[1:])
-        is_lit = said["brightness"] == said["max_brightness"]
-        delays = (said.get("delay_on"), said.get("delay_off"))
-        if f"[{pattern.trigger}]" not in said["trigger"]:
-            return None
-        if pattern.trigger == "timer":
-            return delays == (str(pattern.on_ms), str(pattern.off_ms)) or None
-        return is_lit or pattern.trigger != "none" or None
+        return next((state for state in states if _is_shown(PATTERNS[state], said)), None)
 
-    machine.until(f"{lamp} shows {state.value}", shown)
+    return machine.until(f"{lamp} shows {' or '.join(s.value for s in states)}", shown)
+
+
+def _is_shown(pattern: Pattern, said: dict[str, str]) -> bool:
+    if f"[{pattern.trigger}]" not in said.get("trigger", ""):
+        return False
+    if pattern.trigger == "timer":
+        delays = (said.get("delay_on"), said.get("delay_off"))
+        return delays == (str(pattern.on_ms), str(pattern.off_ms))
+    return pattern.trigger != "none" or said["brightness"] == said["max_brightness"]
 
 
 def _file(part: str) -> tuple[str, str]:
