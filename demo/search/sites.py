@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import os
-import socket
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Protocol
 
 from demo.namespaces import Cable, Machine, NamespacesUnavailable, Network
+from demo.ports import free_port
 from demo.robot import Robot
 from demo.search.fleet import Fleet
 
@@ -76,7 +76,7 @@ class Loopback:
     lost = "SIGKILL to its daemon"
 
     def __init__(self, names: Sequence[str]) -> None:
-        self._ports = {name: _free_port() for name in names}
+        self._ports = {name: free_port() for name in names}
 
     def prepare(self, name: str, state: Path) -> str:
         """Tell it the others' ports."""
@@ -109,10 +109,3 @@ def _site(work: Path, names: Sequence[str], stack: ExitStack, *, is_loopback: bo
         with contextlib.suppress(NamespacesUnavailable):
             return Lan(work, stack.enter_context(Network()), names)
     return Loopback(names)
-
-
-def _free_port() -> int:
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        port: int = found.getsockname()[1]
-        return port

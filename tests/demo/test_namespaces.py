@@ -36,6 +36,21 @@ with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
             pass
     sys.exit(1)
 """
+STAND_FOR_A_MACHINE = """
+import fcntl, os, struct, sys
+IFF_TAP, IFF_NO_PI, TUNSETIFF = 0x2, 0x1000, 0x400454CA
+tap = os.open("/dev/net/tun", os.O_RDWR)
+fcntl.ioctl(tap, TUNSETIFF, struct.pack("16sH22x", sys.argv[1].encode(), IFF_TAP | IFF_NO_PI))
+print("plugged in", flush=True)
+while b"hello" not in os.read(tap, 2000):
+    pass
+"""
+CALL = """
+import socket, sys
+with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+    sock.sendto(b"hello", ("10.77.0.255", 9))
+"""
 A_WHILE, LONG = "5", "100"
 """How often is asked, ten times a second: a machine that was cut off forgets it in a second."""
 MADE = """
@@ -122,7 +137,9 @@ def test_nothing_is_left_behind_and_the_own_network_untouched() -> None:
     before = Path("/proc/net/dev").read_text(encoding="ascii").count("\n")
     with Network() as network:
         (rover,) = network.lan("rover")
-        process = rover.start("sleep", "1000")
+        process = rover.start("sh", "-c", "echo there; sleep 1000", stdout=subprocess.PIPE)
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"there\n"
         assert Path("/proc/net/dev").read_text(encoding="ascii").count("\n") == before
     assert process.returncode == -signal.SIGKILL
     assert not [name for name in left() if f"-{os.getpid()}-" in name]
@@ -138,3 +155,17 @@ def test_what_a_killed_process_has_left_is_removed_by_the_next() -> None:
     assert len([name for name in left() if f"-{killed.pid}-" in name]) == 3
     with Network():
         assert not [name for name in left() if f"-{killed.pid}-" in name]
+
+
+def test_program_that_stands_for_a_machine_hears_the_others(network: Network) -> None:
+    switch, rover = network.switch(), network.machine("rover")
+    network.plug(rover, switch)
+    switch.add_tap("tap1")
+    where = ("ip", "netns", "exec", switch.namespace)
+    command = [*where, sys.executable, "-c", STAND_FOR_A_MACHINE, "tap1"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as emulator:
+        assert emulator.stdout is not None
+        assert emulator.stdout.readline() == b"plugged in\n"
+        while emulator.poll() is None:  # bridges learn in their own time
+            rover.run(sys.executable, "-c", CALL)
+    assert emulator.returncode == 0

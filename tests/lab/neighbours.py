@@ -2,28 +2,17 @@
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+from demo.ports import free_port
 from tests.lab.running_host import READY_S, RunningHost
 from tests.payloads import Part
 from tests.transport.fleet.fleets import router
 
 UNCONFINED = '[workers]\nconfinement = "0"\nminimum_confinement = 0\n\n'
 """Plugins of these tests write down beside their rooms what they are made to do."""
-
-
-def free_port() -> int:
-    """A port that is given to nobody else, as long as this process lives, but who asks for it by
-    its number, as daemons do."""
-    reserved = socket.socket()
-    reserved.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    reserved.bind(("127.0.0.1", 0))
-    port: int = reserved.getsockname()[1]
-    reserved.detach()
-    return port
 
 
 @contextmanager

@@ -14,9 +14,10 @@ from random import Random
 from typing import Any
 
 import pytest
+from demo.ports import free_port
 from demo.robot import nondum
 from tests.host.drives.test_blocks import image
-from tests.lab.neighbours import UNCONFINED, beacon, free_port, until_peer, until_shared, written
+from tests.lab.neighbours import UNCONFINED, beacon, until_peer, until_shared, written
 from tests.lab.plugins import talker
 from tests.lab.running_host import DAEMON, READY_S, RunningHost
 from tests.lab.traces import until_unmounted

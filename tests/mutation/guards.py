@@ -91,8 +91,16 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_W}/venvs.py": (f"{_TW}/test_venvs.py",),
     # Whether it may come in, among what is here.
     f"{_H}/lifecycle/admission.py": _RELEASES,
-    f"{_H}/lifecycle/payload_rules.py": (*_RELEASES, f"{_TH}/lifecycle/test_tries.py"),
-    f"{_H}/lifecycle/drive_rules.py": (f"{_TH}/lifecycle/test_tries.py",),
+    f"{_H}/lifecycle/payload_rules.py": (
+        *_RELEASES,
+        f"{_TH}/lifecycle/test_tries.py",
+        f"{_TH}/lifecycle/test_safe_mode.py",
+    ),
+    f"{_H}/lifecycle/drive_rules.py": (
+        f"{_TH}/lifecycle/test_tries.py",
+        f"{_TH}/lifecycle/test_safe_mode.py",
+    ),
+    f"{_H}/lifecycle/safe_mode.py": (f"{_TH}/lifecycle/test_safe_mode.py",),
     f"{_H}/lifecycle/tries.py": (f"{_TH}/lifecycle/test_tries.py",),
     f"{_H}/lifecycle/installing.py": (
         f"{_TH}/lifecycle/test_promises.py::test_what_was_promised_while_it_was_copied_counts",

@@ -5,7 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.host.lifecycle.test_advance import AT, active, after, at_step, drive, way_to_active
+from tests.host.lifecycle.test_advance import (
+    AT,
+    active,
+    after,
+    at_step,
+    drive,
+    found,
+    way_to_active,
+)
 
 from nondum.host import effects, events
 from nondum.host.catalogue.records import DriveState, Safety, Step
@@ -69,6 +77,13 @@ def test_drives_are_not_looked_at(kind: str) -> None:
     state, done = after(drive("b", kind), state=state)
     assert not any(isinstance(effect, effects.ReadDrive) for effect in done)
     assert [problem.code for problem in state.drives["b"].problems] == ["SAFE_MODE"]
+
+
+def test_payload_of_a_drive_is_refused_whoever_found_it() -> None:
+    state = recover(HostState("spot"), AT, safety=Safety.INITIAL).state
+    state, _ = after(drive("b"), found("k2", "b"), state=state)
+    assert state.payloads["k2"].step is Step.REFUSED
+    assert [problem.code for problem in state.payloads["k2"].problems] == ["SAFE_MODE"]
 
 
 def test_payload_that_is_installed_now_is_taken_in() -> None:

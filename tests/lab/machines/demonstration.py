@@ -22,7 +22,6 @@ from demo.one_host import LIBRARIES
 from demo.scenario import Scenario
 from tests.lab.machines.installed import Installed
 from tests.lab.machines.lab import Lab
-from tests.lab.machines.machine import ITS_OWN
 from tests.lab.machines.robot import MachineRobot
 from tests.lab.machines.software import PYTHON
 
@@ -42,9 +41,8 @@ def kit(lab: Lab, names: Sequence[str], settings: Mapping[str, str]) -> Kit:
 
 
 def robot(lab: Lab, made: Kit, initial: str) -> MachineRobot:
-    """A host that trusts the demonstrations' maker, with its initial component; its clock is its
-    own, so that what is in a hurry there has no need of one here."""
-    host = lab.booted(clock=ITS_OWN)
+    """A host that trusts the demonstrations' maker, with its initial component."""
+    host = lab.booted()
     host.start()
     met = MachineRobot(host, {made.drives[name].name: id for name, id in made.payloads.items()})
     threading.Thread(target=met.watch, daemon=True).start()

@@ -45,8 +45,9 @@ def fragments():
 
 @behaviour("read", action="(read ?u - sensor ?o - scalar ?h - host)", lasting=True)
 async def read(ctx, u, o, h):
-    output, heard, told = ctx.output(o), b"", False
-    line, port = select.poll(), os.open(ctx.device("line").node, os.O_RDWR | os.O_NOCTTY)
+    output, heard, begun = ctx.output(o), b"", False
+    line, flags = select.poll(), os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK
+    port = os.open(ctx.device("line").node, flags)
     line.register(port, select.POLLIN)
     try:
         tty.setraw(port)
@@ -56,11 +57,11 @@ async def read(ctx, u, o, h):
                     raise OSError("hung up")
                 heard += os.read(port, 4096)
             *whole, heard = heard.split(b"\\n")
-            for number in whole[1:]:  # the first may have been cut
-                output.send(Scalar(Header(frame_id=u), float(number), "1"))
-                if not told:
+            for number in whole:
+                if begun:  # the first may have been cut
+                    output.send(Scalar(Header(frame_id=u), float(number), "1"))
                     await ctx.established()
-                    told = True
+                begun = True
             await ctx.sleep(0.05)
     except (OSError, tty.error) as error:
         raise BehaviourFailed(f"nothing is heard any more: {error}", code="GAUGE_GONE")

@@ -6,7 +6,7 @@ import itertools
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +14,11 @@ from tests.lab.machines.building import Built, built
 from tests.lab.machines.drives import fat_stick
 from tests.lab.machines.fleet import Fleet
 from tests.lab.machines.installed import NAME, Installed
-from tests.lab.machines.machine import OURS, Machine
+from tests.lab.machines.machine import Machine
 from tests.lab.machines.network import Lan
 from tests.lab.machines.recipe import RECIPES
-from tests.lab.machines.software import software
-from tests.payloads import Part, make_payload
+from tests.lab.machines.software import FOR_PAYLOADS, software
+from tests.payloads import Part, make_payload, sdk_wheel
 
 
 @dataclass
@@ -60,9 +60,9 @@ class Lab:
             self.machines.append(self._shared.machine)
         return self._shared
 
-    def booted(self, *, clock: tuple[str, ...] = OURS) -> Installed:
+    def booted(self) -> Installed:
         """A machine of the scenario's own, switched on, with nondum installed but not started."""
-        machine = self._machine(self.built, self.software, clock=clock)
+        machine = self._machine(self.built, self.software)
         (host,) = self._switched_on({NAME: machine})
         return host
 
@@ -133,8 +133,16 @@ class Lab:
     def payload(self, name: str, *parts: Part, **options: Any) -> Path:
         """What is on such a stick: a folder, in a folder of its own."""
         content = self.folder() / "files"
-        make_payload(content, *parts, payload_id=f"org.example.{name}", **options)
+        fitting = [self._fitting(part) for part in parts]
+        make_payload(content, *fitting, payload_id=f"org.example.{name}", **options)
         return content
+
+    def _fitting(self, part: Part) -> Part:
+        """The part with the SDK for the machines' processor, which may be another than ours."""
+        if not part.with_sdk:
+            return part
+        needed = sorted((self.software.parent / FOR_PAYLOADS).iterdir())
+        return replace(part, with_sdk=False, wheels=(*part.wheels, sdk_wheel(), *needed))
 
     def folder(self) -> Path:
         """A new folder, for what is made on the way."""

@@ -26,12 +26,6 @@ an x86_64, and multiplied by the recipe's slowness."""
 POLL_S = 0.2
 TICKS_HZ = os.sysconf("SC_CLK_TCK")
 T = TypeVar("T")
-OURS = ("-accel", "tcg,thread=multi,tb-size=512")
-"""A clock that goes with ours: where a processor has to wait for a real one, time passes for it."""
-ITS_OWN = ("-accel", "tcg,thread=single,tb-size=512", "-icount", "shift=1,sleep=on")
-"""A clock that goes by instructions, 500 million a second, and with ours while there is nothing to
-do: however slow the emulation is, and whoever shares the real processors, it is a computer of one
-speed. It takes half as much again."""
 
 
 class Machine:
@@ -44,13 +38,12 @@ class Machine:
         *,
         memory_mb: int = 2048,
         drives: tuple[Path, ...] = (),
-        clock: tuple[str, ...] = OURS,
         socket: Socket | None = None,
     ) -> None:
         """`work` keeps its disk, console and sockets (a short path: see unix(7)); `drives` are
-        read-only disks that it has for good, `/dev/vdb` and on; `clock` is what its time is;
-        `socket` is where it is plugged into a network, if it has one."""
-        self.built, self.work, self.socket, self._clock = built, work, socket, clock
+        read-only disks that it has for good, `/dev/vdb` and on; `socket` is where it is plugged
+        into a network, if it has one."""
+        self.built, self.work, self.socket = built, work, socket
         self._memory_mb, self._drives = memory_mb, drives
         self._qemu: subprocess.Popen[bytes] | None = None
         self._agent: Agent | None = None
@@ -266,8 +259,7 @@ class Machine:
         return [
             *("setpriv", "--pdeathsig", "KILL", *around, *MODEST, recipe.program),
             *("-nodefaults", "-display", "none", "-no-reboot"),
-            *self._clock,
-            *recipe.machine,
+            *("-accel", "tcg,thread=multi,tb-size=512", *recipe.machine),
             *("-smp", "2", "-m", str(self._memory_mb)),
             *("-kernel", self.built.kernel, "-initrd", self.built.initramfs),
             *("-append", " ".join(filter(None, (*kernel, more)))),

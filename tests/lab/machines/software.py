@@ -31,6 +31,9 @@ SOURCES = (
 )
 EXTRAS = {"nondum": "fast", "nondum_planner_fast_downward": "engine"}
 """What is installed with our own distributions."""
+SDK_NEEDS = ("pluggy", "msgpack")
+FOR_PAYLOADS = "for-payloads"
+"""The folder beside the image with wheels of what the SDK needs, for that machine's processor."""
 PREFIX = "/opt/nondum"
 DISK_MB = 768
 PYTHON = "3.11"
@@ -83,6 +86,10 @@ def _make(machine: Built, commit: str | None, folder: Path) -> None:
     shutil.copytree(_packaging(source), venv / "packaging")
     _compile(machine, venv)
     make_disk(venv, folder / "disk.img", DISK_MB, label="nondum")
+    (folder / FOR_PAYLOADS).mkdir()
+    for name in SDK_NEEDS:
+        (wheel,) = wheels.glob(f"{name}-*.whl")
+        shutil.copy(wheel, folder / FOR_PAYLOADS)
     for done_with in (venv, wheels, folder / "source"):
         shutil.rmtree(done_with, ignore_errors=True)
 
@@ -110,7 +117,9 @@ def _sources(commit: str) -> list[str]:
 
 
 def _commit_key(commit: str) -> str:
-    return call("git", "-C", CHECKOUT, "rev-parse", "--verify", f"{commit}^{{commit}}")[:16]
+    """A hash of a commit, and of how this module installs it."""
+    name = call("git", "-C", CHECKOUT, "rev-parse", "--verify", f"{commit}^{{commit}}")
+    return hashlib.sha256(name.encode() + Path(__file__).read_bytes()).hexdigest()[:16]
 
 
 def _packaging(source: Path) -> Path:

@@ -115,22 +115,26 @@ def record(parts: Iterable[Part]) -> DeviceRecord | None:
 
 
 def described(properties: Mapping[str, str]) -> dict[str, Any]:
-    """What properties of udev say that a device is: fields of its record.
+    """What properties of udev say that a device is: fields of its record. Its own words come before
+    those of udev's database, which may know one number for several devices.
 
     >>> described({"ID_VENDOR_ID": "0403", "ID_MODEL_ID": "6001", "ID_MODEL": "FT232R_UART"})
     {'vendor': '0403', 'product': '6001', 'serial': '', 'name': 'FT232R UART'}
     """
 
+    vendor, product = properties.get("ID_VENDOR_ID", ""), properties.get("ID_MODEL_ID", "")
+
     def first(*names: str) -> str:
-        return next((properties[name] for name in names if properties.get(name)), "")
+        found = (properties.get(name, "") for name in names)
+        return next((one for one in found if one and one not in (vendor, product)), "")
 
     words = (
-        first("ID_VENDOR_FROM_DATABASE", "ID_VENDOR"),
-        first("ID_MODEL_FROM_DATABASE", "ID_MODEL", "ID_V4L_PRODUCT"),
+        first("ID_VENDOR", "ID_VENDOR_FROM_DATABASE"),
+        first("ID_MODEL", "ID_V4L_PRODUCT", "ID_MODEL_FROM_DATABASE"),
     )
     return {
-        "vendor": first("ID_VENDOR_ID"),
-        "product": first("ID_MODEL_ID"),
+        "vendor": vendor,
+        "product": product,
         "serial": first("ID_SERIAL_SHORT"),
         "name": " ".join(word for word in words if word).replace("_", " "),
     }

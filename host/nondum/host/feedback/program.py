@@ -33,13 +33,22 @@ async def run(
     """Run a program with `data` at its standard input, until it ends; then, or at its deadline, all
     that is left of its process group is killed. Cancelling does the same. Raises `OSError`."""
     inherited = {name: os.environ[name] for name in _INHERITED if name in os.environ}
-    transport, talk = await asyncio.get_running_loop().subprocess_exec(
-        _Talk,
-        *command,
-        stderr=subprocess.STDOUT,
-        env={**inherited, **environment},
-        start_new_session=True,
+    starting = asyncio.ensure_future(
+        asyncio.get_running_loop().subprocess_exec(
+            _Talk,
+            *command,
+            stderr=subprocess.STDOUT,
+            env={**inherited, **environment},
+            start_new_session=True,
+        )
     )
+    try:  # cancelled with half of its pipes connected, asyncio would wait for ever
+        transport, talk = await asyncio.shield(starting)
+    except asyncio.CancelledError:
+        await asyncio.wait([starting])
+        if starting.exception() is None:
+            await _end(*starting.result())
+        raise
     _tell(transport, data)
     status: int | None = None
     try:

@@ -26,6 +26,8 @@ COMPONENTS = (
     opener("voice", interface="audio", usb="46f4:0002"),
     opener("any-hid", subsystem="hidraw"),
 )
+GRANTED = {"camera": 2, "loop": 5, "wire": 1, "line": 1, "pad": 1, "voice": 2}
+"""Component → how many nodes its device has at least."""
 WATCH = """
 import ctypes, os, struct, sys
 libc = ctypes.CDLL(None, use_errno=True)
@@ -39,6 +41,8 @@ while data := os.read(watching, 4096):
         data = data[16 + length:]
 """
 WATCHED = "/run/watched"
+KEYBOARD, MOUSE = "03:01:01", "03:01:02"
+"""Of USB's interface classes, those of QEMU's keyboard and mouse."""
 
 
 def run(lab: Lab) -> str:
@@ -64,16 +68,13 @@ def _seen_through(lab: Lab, host: Installed) -> str:
     plugged = [machine.plug_device(f"usb-{kind}") for kind in ("tablet", "mouse", "kbd", "audio")]
     line = machine.plug_line(serial="LAB1")
     stick = host.bring(lab.stick("instruments", *COMPONENTS), "org.example.instruments")
-    granted = {
-        **{"camera": 1, "loop": 5, "wire": 1, "line": 1, "pad": 1, "voice": 2},
-    }
-    told = {id: until_said(host, id, "opened", least) for id, least in granted.items()}
+    told = {id: until_said(host, id, "opened", least) for id, least in GRANTED.items()}
     _see_left_alone(host)
     machine.pull_line(line)
     for name in plugged:
         machine.unplug(name)
     machine.run(f"modprobe -r {' '.join(MODULES)}")
-    for id in granted:
+    for id in GRANTED:
         host.until_component(id, "waits for it")
         until_said(host, id, "nothing", 1)
     machine.pull(stick)
@@ -85,9 +86,9 @@ def _see_left_alone(host: Installed) -> None:
     """Nothing that nobody has is opened while a daemon starts and grants the rest anew."""
     machine = host.machine
     rows: list[dict[str, Any]] = machine.attempt("nondum devices --json").json()
-    users = {row["name"]: row["component"] for row in rows}
-    assert not users["QEMU QEMU USB Mouse"], users
-    keyboard = next(row for row in rows if row["name"] == "QEMU QEMU USB Keyboard")
+    kinds = {one["kind"]: row for row in rows for one in row.get("interfaces", ())}
+    assert not kinds[MOUSE]["component"], kinds[MOUSE]
+    keyboard = kinds[KEYBOARD]
     assert keyboard["left_alone"] == "it is a keyboard", keyboard
     said = machine.run("nondum devices --why " + keyboard["device"])
     assert "any-hid (it): does not match" in said, said

@@ -12,6 +12,8 @@ from nondum.host.feedback.patterns import PATTERNS
 from nondum.host.feedback.state import State
 from nondum.wheelhouse import goal_payload
 
+PATIENT = "/run/systemd/system/nondum.service.d/patient.conf"
+"""A new keyboard, a new service, and emulated processors: nothing here is judged by its time."""
 HOOK = "/usr/local/bin/tell"
 TOLD = "/run/nondum/told"
 BLINKING = "cp /opt/nondum/packaging/modules-load.d/nondum.conf /etc/modules-load.d/nondum.conf"
@@ -62,6 +64,8 @@ def run(lab: Lab) -> str:
     before = _trigger(machine, lamp)
     machine.put(HOOK, f'#!/bin/sh\necho "$1 $2" >>{TOLD}\n', 0o755)
     host.configure(FEEDBACK.format(lamp=lamp, hook=HOOK))
+    machine.put(PATIENT, "[Service]\nTimeoutStartSec=1000\nWatchdogSec=0\n")
+    machine.run("systemctl daemon-reload")
     host.start()
     _until_shown(machine, lamp, State.READY)
     dancer = lab.stick("dancer", Part("dancer", DANCER))
@@ -82,6 +86,7 @@ def run(lab: Lab) -> str:
     host.stop()
     machine.until("as before", lambda: _trigger(machine, lamp) == before or None)
     machine.unplug(keyboard)
+    machine.run(f"rm {PATIENT} && systemctl daemon-reload")
     return f"{lamp}, told {len(told) - 1} times"
 
 

@@ -7,7 +7,6 @@ import json
 from tests.lab.machines.gauge import Gauge, reader, switched_on
 from tests.lab.machines.installed import Installed
 from tests.lab.machines.lab import Lab
-from tests.lab.machines.machine import ITS_OWN
 
 PAYLOAD = "org.example.gauge"
 GOAL = "(flowing spot__gauge__level)"
@@ -19,8 +18,7 @@ WAITS = "waits for line"
 def run(lab: Lab) -> str:
     """A port, another one, behind a hub, behind a hub behind that; then where it was at first,
     under another name, since something else has taken its own."""
-    host = lab.booted(clock=ITS_OWN)
-    host.start()
+    host = lab.host()
     machine = host.machine
     host.bring(lab.stick("gauge", reader(MATCH)), PAYLOAD, port="1")
     host.until_component("gauge", WAITS)
@@ -72,8 +70,9 @@ def _told(host: Installed) -> None:
     """The behaviour was told, and whoever asks is told what is missing."""
     host.until_component("gauge", WAITS)
     host.until_goal(GOAL, "suspended")
-    said = host.machine.run(f'nondum why "{GOAL}"')
-    assert "gauge" in said and "line" in said, said
+    said = host.machine.run(f'nondum why "{GOAL}"; nondum why')
+    assert "(ready spot__gauge__gauge) does not hold" in said, said
+    assert "gauge is not ready: it waits for the device line" in said, said
     rows = json.loads(host.machine.run("nondum journal --subject gauge --limit 30 --json"))
     ends = [row["detail"] for row in rows if row["event"] == "BehaviourEnded"]
     assert ends[-1]["outcome"] in ("FAILED", "HALTED"), ends[-1]

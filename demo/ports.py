@@ -1,0 +1,16 @@
+"""Ports of this machine's loopback for daemons that are not started yet."""
+
+from __future__ import annotations
+
+import socket
+
+
+def free_port() -> int:
+    """A port that is given to nobody else, as long as this process lives, but who asks for it by
+    its number, as daemons do (with SO_REUSEADDR, as here)."""
+    reserved = socket.socket()
+    reserved.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    reserved.bind(("127.0.0.1", 0))
+    port: int = reserved.getsockname()[1]
+    reserved.detach()
+    return port
