@@ -41,7 +41,7 @@ def _measured(folder: Path, seconds: float) -> results.Footprint:
         await_rest(pid, timeout_s=PATIENCE_S)
         with_worker = probe.memory(pid)
     return results.Footprint(
-        machine=f"{platform.machine()}, {os.cpu_count()} processors",
+        machine=f"{platform.machine()}, {os.cpu_count()} processors, load {os.getloadavg()[0]:.0f}",
         is_emulated=False,
         start_s=min(wall_s for wall_s, _ in starts),
         start_cpu_s=min(cpu_s for _, cpu_s in starts),

@@ -12,6 +12,8 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 BUILDER = ROOT / "packaging/debian"
+EPOCH = "1767225600"
+"""One time for all, whatever is committed meanwhile."""
 Build = Callable[..., Path]
 
 
@@ -22,7 +24,8 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
     def run(*words: str, **variables: str) -> Path:
         folder = tmp_path_factory.mktemp("packages")
         command = [sys.executable, "-m", "nondum_deb", "-o", str(folder), *words]
-        surroundings = {**os.environ, "PYTHONPATH": str(BUILDER), **variables}
+        ours = {"PYTHONPATH": str(BUILDER), "SOURCE_DATE_EPOCH": EPOCH}
+        surroundings = {**os.environ, **ours, **variables}
         done = subprocess.run(command, env=surroundings, capture_output=True, text=True, cwd="/")
         assert done.returncode == 0, done.stderr
         return folder
