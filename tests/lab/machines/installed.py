@@ -49,6 +49,8 @@ NAME = "spot"
 LOOK_S = 2.0
 """Between two looks at the status: each takes a second of an emulated processor."""
 REPLUGS = 3
+SLOW = ("DRIVE_STALLED", "HELPER_SILENT")
+"""What drives have that were not served in time, since emulated processors had to wait."""
 T = TypeVar("T")
 View = dict[str, Any]
 
@@ -204,4 +206,4 @@ def active_or_stalled(payload: str, view: View) -> bool | None:
     if _payload_in(payload, "active", view):
         return True
     said = [problem for drive in view["drives"] for problem in drive["problems"]]
-    return False if any(problem.startswith("DRIVE_STALLED") for problem in said) else None
+    return False if any(problem.startswith(SLOW) for problem in said) else None
