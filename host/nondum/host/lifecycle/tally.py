@@ -12,6 +12,7 @@ from nondum.host.catalogue.records import Safety
 from nondum.host.events import Event, HostStarted
 from nondum.host.lifecycle import safe_mode
 from nondum.host.lifecycle.lanes import in_thread
+from nondum.wheelhouse import disk
 
 SOON_S = 60.0
 """Whoever lives so long once it serves has not died soon."""
@@ -72,7 +73,8 @@ class Tally:
         """A host whose disk is full or damaged goes on; it is only not counted."""
         try:
             if deaths:
-                self._deaths.write_text(f"{deaths}\n", encoding="ascii")
+                # Also whoever takes the machine down at once is to be counted.
+                disk.write(self._deaths, b"%d\n" % deaths)
             else:
                 self._deaths.unlink(missing_ok=True)
         except OSError as error:
