@@ -79,7 +79,7 @@ def _make(machine: Built, commit: str | None, folder: Path) -> None:
     wheels, venv = folder / "wheels", folder / "venv"
     source = _archived(commit, folder / "source") if commit else CHECKOUT
     _own_wheels(source, wheels)
-    for wheel in _dependencies(machine, source, wheels).glob("*.whl"):
+    for wheel in _dependencies(machine, wheels).glob("*.whl"):
         shutil.copy(wheel, wheels)
     venv.mkdir()
     call("unshare", "--mount", "sh", "-c", INSTALL, "sh", venv, machine.root, wheels)
@@ -133,19 +133,20 @@ def _own_wheels(source: Path, folder: Path) -> None:
     call(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", folder, *places)
 
 
-def _dependencies(machine: Built, source: Path, own: Path) -> Path:
+def _dependencies(machine: Built, own: Path) -> Path:
     """Wheels of everything that nondum needs, fetched again when what it needs has changed."""
-    declared = "".join((source / d / "pyproject.toml").read_text() for d in DISTRIBUTIONS)
-    key = hashlib.sha256(f"{PLATFORMS}{declared}".encode()).hexdigest()[:16]
-    return kept(f"wheels-{machine.recipe.name}-{key}", lambda folder: _fetch(machine, own, folder))
+    needs = sorted({need for wheel in own.iterdir() for need in _needs(machine, wheel)})
+    key = hashlib.sha256(f"{PLATFORMS}{needs}".encode()).hexdigest()[:16]
+    name = f"wheels-{machine.recipe.name}-{key}"
+    return kept(name, lambda folder: _fetch(machine, needs, folder))
 
 
-def _fetch(machine: Built, own: Path, folder: Path) -> None:
+def _fetch(machine: Built, needs: list[str], folder: Path) -> None:
     call(
         *(sys.executable, "-m", "pip", "download", "-q", "--only-binary", ":all:"),
         *("--python-version", PYTHON, "-d", folder),
         *(f"--platform={name}_{machine.recipe.name}" for name in PLATFORMS),
-        *sorted({need for wheel in own.iterdir() for need in _needs(machine, wheel)}),
+        *needs,
     )
 
 
