@@ -55,4 +55,4 @@ def shortened(text: str, longest: int) -> str:
     """
     if len(text) <= longest:
         return text
-    return f"{text[: longest - 1].rpartition(' ')[0] or text[: longest - 1]}…"
+    return f"{text[:longest].rpartition(' ')[0] or text[: longest - 1]}…"
