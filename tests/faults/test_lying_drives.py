@@ -123,7 +123,7 @@ async def test_foreign_drive_is_left_alone(tmp_path: Path) -> None:
             await host.until(lambda: any(d.problems for d in host.snapshot.drives))
             (found,) = host.snapshot.drives
             assert [problem.code for problem in found.problems] == ["DRIVE_NOT_PAYLOAD"]
-            assert drive.asked == {"nondum", "nondum-peers", "nondum-trust"}
+            assert drive.asked == {"goal.txt", "nondum", "nondum-peers", "nondum-trust"}
             assert not drive.reads
             assert drive.listed <= {""}
             host.pull()

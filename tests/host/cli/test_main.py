@@ -47,6 +47,7 @@ Commands:
   host        Run the daemon.
   journal     What happened on this host, oldest first.
   keys        Whose payloads robots run, and which hosts a fleet certifies.
+  lab         Plug a payload into an emulated computer, and tell what became of it.
   logs        What components have written.
   mount       Tell where on the body a unit is mounted.
   payload     Make, judge and install payloads.
@@ -136,7 +137,7 @@ def test_every_help_has_an_example_that_is_understood(name: str) -> None:
 )
 def test_every_command_but_those_without_a_result_knows_json(name: str) -> None:
     options = {option for param in ALL_COMMANDS[name].params for option in param.opts}
-    assert ("--json" in options) == (name not in ("completion", "host run"))
+    assert ("--json" in options) == (name not in ("completion", "host run", "lab"))
 
 
 def test_a_misspelt_command_is_guessed() -> None:

@@ -57,7 +57,9 @@ VIEWS: dict[str, set[str]] = {
         "host",
         "revision",
         "state",
+        "safe_mode",
         "warnings",
+        "feedback",
         "peers",
         "payloads",
         "drives",
@@ -168,6 +170,7 @@ def normalised(text: str) -> str:
     text = re.sub(r"(?<=  )\d+ (?:s|min)(?= )", lambda age: "AGE".ljust(len(age[0])), text)
     text = re.sub(r"AGE +(?=STATE|UNITS)|(?<=  )\d+ d +", "AGE  ", text)
     text = re.sub(r"(confined at level) \d: .*", r"\1 N: WALLS", text)
+    text = re.sub(r"^shown: .*\n", "", text, flags=re.MULTILINE)  # it is another one soon
     text = re.sub(r"(lamp   )\d( +-)", r"\1N\2", text)
     return re.sub(r"(revision|world model  —|people  —) \d+", r"\1 N", text)
 

@@ -22,6 +22,7 @@ NOTHING: dict[str, list[str]] = {
     "payloads": [],
     "certificates": [],
     "trust": [],
+    "flaws": [],
     "trust_problems": [],
 }
 """What is found on an empty drive."""

@@ -91,7 +91,8 @@ class Pursuit:
         self._failures: dict[str, str] = {}
         self._search: asyncio.Task[Planned | NoPlan] | None = None
         self._searched_for: Situation | None = None
-        self._tried: dict[str, Situation] = {}
+        self._tried: dict[int, Situation] = {}
+        """By the number of a goal: one that is given again under its id was not tried yet."""
         self._excluded_until_s: dict[str, float] = {}
         self._left_over: tuple[Run, ...] = ()
 
@@ -141,7 +142,7 @@ class Pursuit:
         self._take_found()
         if self._composition is None:
             return
-        wanted = self.queue.wanted(lambda g: self._tried.get(g.id) != self._situation(g.id))
+        wanted = self.queue.wanted(lambda g: self._tried.get(g.number) != self._situation(g.id))
         if self.current and (wanted is None or self.queue[self.current.goal].state.is_final):
             self.drop("its goal is over")
         if wanted is None:
@@ -236,7 +237,7 @@ class Pursuit:
     def _start_search(self, wanted: GivenGoal) -> None:
         assert self._composition is not None  # `step` waits for one
         situation = self._situation(wanted.id)
-        if self._tried.get(wanted.id) == situation:
+        if self._tried.get(wanted.number) == situation:
             self._give_up_plan(wanted)
             return
         self._cancel_search()
@@ -272,14 +273,15 @@ class Pursuit:
         goal = found.situation.goal
         if self.queue[goal].state.is_final or not found.situation.is_like(self._situation(goal)):
             return
-        self._tried[goal] = found.situation
+        number = self.queue[goal].number
+        self._tried[number] = found.situation
         self._note_left_out(found.left_out)
         if isinstance(found, NoPlan):
             self._suspend(found)
         elif self._still_works(found):
             self._take_up(found)
         else:
-            del self._tried[goal]  # the world has moved on; `step` searches again
+            del self._tried[number]  # the world has moved on; `step` searches again
 
     def _note_left_out(self, left_out: Mapping[str, Problem]) -> None:
         for component, problem in left_out.items():
@@ -305,7 +307,7 @@ class Pursuit:
 
     def _suspend(self, found: NoPlan) -> None:
         goal = self.queue[found.situation.goal]
-        self._tried[goal.id] = found.situation
+        self._tried[goal.number] = found.situation
         if self.current is not None and self.current.goal == goal.id:
             self.drop("there is no plan any more")
         if goal.state is not GoalState.SUSPENDED or goal.problems != found.problems:
@@ -322,7 +324,8 @@ class Pursuit:
         goal = self.queue[found.situation.goal]
         reason = self._why_another_plan(goal.id)
         if self.current is not None and self.current.goal != goal.id:
-            self._tried.pop(self.current.goal, None)  # it is put aside, not given up
+            put_aside = self.queue[self.current.goal].number
+            self._tried.pop(put_aside, None)  # it is put aside, not given up
         for replaced in self.queue.activate(goal.id):
             self._people.tell(f"goal {replaced.id} is {replaced.reason}: {replaced.text}")
             self._emit(GoalEnded(replaced.id, replaced.reason))
