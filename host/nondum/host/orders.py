@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import socket
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import cast
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import MountPose, PayloadRecord, Safety, Snapshot, Step
 from nondum.host.control.arguments import Arguments, Triple
+from nondum.host.control.server import Handing
 from nondum.host.events import ForgetAsked, MountSet, RetryAsked, SafeModeLeft
 from nondum.host.lifecycle import going_back, installed
 from nondum.host.lifecycle.bus import Bus
@@ -26,8 +26,8 @@ from nondum.host.rows import Row, gone_back, is_at_rest, payload_row, unknown
 from nondum.host.workers.workers import Workers
 from nondum.planning.goal import GoalKind
 from nondum.sdk.errors import ConfigRefused, GoalRefused, InstallFailed, NondumError, Problem
+from nondum.transport import link_sockets
 
-TAP_TIMEOUT_S = 5.0
 COMMIT_TIMEOUT_S = 5.0
 HIGHEST_PRIORITY = 1000
 
@@ -148,21 +148,20 @@ class Orders:
         )
         return {"payload": payload_id}
 
-    async def tap(self, arguments: Arguments) -> Row:
-        """Connect a stream to the socket that the client listens on. Raises `NondumError`."""
-        name, address = arguments.text("stream"), arguments.text("address")
+    async def tap(self, arguments: Arguments) -> Handing:
+        """Hand the client a consumer's end of a stream. Raises `NondumError`."""
+        name = arguments.text("stream")
         found = {s.stream: s for s in self.workers.streams.listing()}
         if name not in found:
             raise NondumError(unknown("stream", name, found))
-        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as connection:
-            connection.settimeout(TAP_TIMEOUT_S)
+        ours, theirs = link_sockets()
+        with ours:
             try:
-                await asyncio.to_thread(connection.connect, address)
-            except OSError as error:
-                problem = Problem("TAP_UNREACHABLE", str(error), where=address)
-                raise InstallFailed(problem) from error
-            await self.workers.streams.tap(name, connection)
-        return {"stream": name, "type": found[name].type}
+                await self.workers.streams.tap(name, ours)
+            except BaseException:
+                theirs.close()
+                raise
+        return Handing({"stream": name, "type": found[name].type}, theirs)
 
     async def install(self, arguments: Arguments) -> AsyncIterator[Row]:
         """Install a payload folder for good: how far it is, and at last that it is `done`.

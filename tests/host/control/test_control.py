@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from nondum.host.control import protocol
 from nondum.host.control.client import ControlClient
-from nondum.host.control.server import ControlServer
+from nondum.host.control.server import ControlServer, Handing
 from nondum.sdk.errors import (
     ConfigRefused,
     GoalRefused,
@@ -48,6 +48,13 @@ async def crash(arguments: Mapping[str, Any]) -> Any:
     raise RuntimeError("a fault of the daemon")
 
 
+async def hand(arguments: Mapping[str, Any]) -> Handing:
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with ours:
+        ours.send(b"handed")
+    return Handing(dict(arguments), theirs)
+
+
 async def never(arguments: Mapping[str, Any]) -> AsyncIterator[Any]:
     try:
         yield "begun"
@@ -72,7 +79,7 @@ async def serving(
 ) -> AsyncIterator[ControlServer]:
     server = ControlServer(
         path,
-        {"echo": echo, "refuse": refuse, "crash": crash},
+        {"echo": echo, "refuse": refuse, "crash": crash, "hand": hand},
         {"count": count, "stumble": stumble, "never": lambda _: never({"ended": on_end})},
     )
     await server.open()
@@ -98,6 +105,53 @@ async def test_a_refusal_keeps_its_words(tmp_path: Path) -> None:
         with pytest.raises(GoalRefused) as refused:
             await asyncio.to_thread(ask, tmp_path / "control.sock", "refuse")
     assert str(refused.value) == "GOAL_UNKNOWN_WORDS no such goal → see `nondum goals`"
+
+
+async def test_a_connection_comes_with_an_answer_and_the_next_question_is_answered(
+    tmp_path: Path,
+) -> None:
+    def talk() -> tuple[Any, bytes, Any]:
+        with ControlClient(tmp_path / "control.sock") as client:
+            client.ask("echo", words="x" * 2**20)
+            answer, connection = client.ask_for_connection("hand", words="y" * 2**17)
+            with connection:
+                return answer, connection.recv(100), client.ask("echo", still="here")
+
+    async with serving(tmp_path / "control.sock"):
+        answer, received, after = await asyncio.to_thread(talk)
+    assert answer == {"words": "y" * 2**17}
+    assert received == b"handed"
+    assert after == {"still": "here"}
+
+
+async def test_a_refused_connection_keeps_the_words_of_the_refusal(tmp_path: Path) -> None:
+    def talk() -> Any:
+        with ControlClient(tmp_path / "control.sock") as client:
+            return client.ask_for_connection("refuse")
+
+    async with serving(tmp_path / "control.sock"):
+        with pytest.raises(GoalRefused, match="GOAL_UNKNOWN_WORDS"):
+            await asyncio.to_thread(talk)
+
+
+async def test_an_answer_that_lacks_its_connection_is_a_violation(tmp_path: Path) -> None:
+    def talk() -> Any:
+        with ControlClient(tmp_path / "control.sock") as client:
+            return client.ask_for_connection("echo")
+
+    async with serving(tmp_path / "control.sock"):
+        with pytest.raises(ProtocolViolation, match="no connection"):
+            await asyncio.to_thread(talk)
+
+
+async def test_a_daemon_that_goes_before_a_connection_came_is_told(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(tmp_path / "control.sock"))
+        listener.listen()
+        client = ControlClient(tmp_path / "control.sock")
+        listener.accept()[0].close()
+    with client, pytest.raises(HostUnreachable):
+        client.ask_for_connection("hand")
 
 
 async def test_an_unknown_verb_names_the_nearest(tmp_path: Path) -> None:

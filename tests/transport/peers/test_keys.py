@@ -50,6 +50,11 @@ def test_keys_are_made_once_and_kept_private(tmp_path: Path) -> None:
     assert pair.secret not in repr(pair)
 
 
+def test_no_public_key_looks_like_an_option_on_a_command_line() -> None:
+    made = [HostKeys.generate().public for _ in range(1000)]
+    assert not [key for key in made if key.startswith("-")]
+
+
 @pytest.mark.parametrize("mode", [0o640, 0o604, 0o660])
 def test_key_that_others_can_read_is_refused(tmp_path: Path, mode: int) -> None:
     path = tmp_path / "host.key"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,7 +10,22 @@ from types import TracebackType
 from typing import Any
 
 from nondum.host.control import protocol
-from nondum.sdk.errors import GoalRefused, HostUnreachable, NondumError, Problem
+from nondum.sdk.errors import (
+    GoalRefused,
+    HostUnreachable,
+    NondumError,
+    Problem,
+    ProtocolViolation,
+)
+
+_ANSWER_PART = 64 * 1024
+"""Bytes taken at once of an answer that a connection comes with."""
+_NO_CONNECTION = Problem(
+    "CONTROL_ANSWER",
+    "the answer has no connection with it",
+    where="control socket",
+    fix="is command and daemon of one version?",
+)
 
 
 class ControlClient:
@@ -35,6 +51,29 @@ class ControlClient:
         """
         self._send(verb, arguments)
         return self._receive()
+
+    def ask_for_connection(self, verb: str, **arguments: Any) -> tuple[Any, socket.socket]:
+        """The same for a verb whose answer a connection goes along with; the caller closes it."""
+        self._send(verb, arguments)
+        line, handles = b"", []
+        try:
+            while not line.endswith(b"\n"):
+                part, given, _, _ = socket.recv_fds(
+                    self._socket, _ANSWER_PART, 1, socket.MSG_CMSG_CLOEXEC
+                )
+                line += part
+                handles += given
+                if not part:
+                    break
+            result = self._result(line)
+            if not handles:
+                raise ProtocolViolation(_NO_CONNECTION)
+            return result, socket.socket(fileno=handles.pop())
+        except OSError as error:
+            raise _unreachable(self._path, error) from error
+        finally:
+            for handle in handles:
+                os.close(handle)
 
     def follow(self, verb: str, **arguments: Any) -> Iterator[Any]:
         """Send one request and yield results until the caller has enough: it then hangs up, or
@@ -70,6 +109,9 @@ class ControlClient:
             line = self._lines.readline()
         except OSError as error:
             raise _unreachable(self._path, error) from error
+        return self._result(line)
+
+    def _result(self, line: bytes) -> Any:
         if not line.endswith(b"\n"):  # nothing, or what was left of an answer
             raise _unreachable(self._path, ConnectionResetError("the daemon hung up"))
         result, problems = protocol.decode_answer(line)

@@ -6,7 +6,9 @@ import asyncio
 import contextlib
 import difflib
 import logging
+import socket
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,14 @@ Follow = Callable[[Mapping[str, Any]], AsyncIterator[Any]]
 """Answers until the client leaves."""
 
 log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Handing:
+    """An answer that a descriptor goes along with: `connection`, closed here once it is sent."""
+
+    result: Any
+    connection: socket.socket
 
 
 class ControlServer:
@@ -94,7 +104,11 @@ class ControlServer:
             if request.verb in self._follows:
                 items = self._follows[request.verb](request.arguments)
                 return await _follow(items, reader, writer)
-            answer = protocol.encode_result(await self._verb(request.verb)(request.arguments))
+            result = await self._verb(request.verb)(request.arguments)
+            if isinstance(result, Handing):
+                await _hand(result, writer)
+                return await reader.readline()
+            answer = protocol.encode_result(result)
         except NondumError as error:
             answer = protocol.encode_problems(error.problems)
         except ConnectionError:
@@ -116,6 +130,21 @@ class ControlServer:
         raise ProtocolViolation(
             Problem("CONTROL_VERB", f"unknown verb {name!r}", where="control socket", fix=fix)
         )
+
+
+async def _hand(handing: Handing, writer: asyncio.StreamWriter) -> None:
+    """Send an answer with its descriptor, past asyncio, which sends none (unix(7), SCM_RIGHTS)."""
+    line = protocol.encode_result(handing.result)
+    with handing.connection:
+        writer.transport.set_write_buffer_limits(high=0)
+        await writer.drain()  # what was written before goes first
+        with writer.get_extra_info("socket").dup() as client:
+            try:
+                sent = socket.send_fds(client, [line], [handing.connection.fileno()])
+            except BlockingIOError as error:
+                raise ConnectionError("the client does not read what it asked for") from error
+    writer.write(line[sent:])
+    await writer.drain()
 
 
 async def _follow(

@@ -1,16 +1,15 @@
 """Listening in on a stream from outside the daemon.
 
-The client listens on a socket of its own and names it; the daemon connects to it and hands the
-connection to the producing worker, like any consumer's. The daemon stays out of the data path.
+The daemon makes a connection, gives one end to the producing worker, like any consumer's, and the
+other to the client along with its answer. The daemon stays out of the data path, and no path is
+needed: client and daemon may see different file systems, as with a service's `PrivateTmp`.
 """
 
 from __future__ import annotations
 
 import asyncio
-import socket
-import tempfile
+import functools
 from collections.abc import AsyncIterator
-from pathlib import Path
 
 from nondum.host.control.client import ControlClient
 from nondum.sdk.errors import NondumError
@@ -25,10 +24,11 @@ async def messages(client: ControlClient, stream: str) -> AsyncIterator[Message]
 
     Raises `NondumError` when the host knows no such stream, or the producer breaks the protocol.
     """
-    kind, connection = await asyncio.to_thread(_connect, client, stream)
+    asking = functools.partial(client.ask_for_connection, "tap", stream=stream)
+    told, connection = await asyncio.to_thread(asking)
     news: asyncio.Queue[NondumError | str] = asyncio.Queue()
     consumer = Consumer(
-        kind,
+        told["type"],
         SocketPackets(connection, MAX_PACKET),
         lambda: news.put_nowait("message"),
         lambda violation: news.put_nowait(violation or "end"),
@@ -41,16 +41,3 @@ async def messages(client: ControlClient, stream: str) -> AsyncIterator[Message]
                 yield message
     finally:
         consumer.close()
-
-
-def _connect(client: ControlClient, stream: str) -> tuple[str, socket.socket]:
-    with (
-        tempfile.TemporaryDirectory(prefix="nondum-tap-") as folder,
-        socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener,
-    ):
-        address = Path(folder) / "tap"
-        listener.bind(str(address))
-        listener.listen(1)
-        kind = client.ask("tap", stream=stream, address=str(address))["type"]
-        connection, _ = listener.accept()
-        return kind, connection

@@ -35,8 +35,10 @@ class HostKeys:
 
     @classmethod
     def generate(cls) -> HostKeys:
-        """Make a fresh pair."""
-        public, secret = zmq.curve_keypair()
+        """Make a fresh pair. Its public key does not look like an option where people type it."""
+        public = b"-"
+        while public.startswith(b"-"):  # a letter of Z85: one key of 85 would
+            public, secret = zmq.curve_keypair()
         return cls(PeerKey(public.decode("ascii")), secret.decode("ascii"))
 
 

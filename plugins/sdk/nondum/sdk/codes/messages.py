@@ -185,9 +185,4 @@ CODES = (
         "The other host cannot be reached for its stream.",
         "look at the network and at firewalls between the hosts: `nondum doctor network`",
     ),
-    Code(
-        "TAP_UNREACHABLE",
-        "What is sent on a stream cannot be shown.",
-        "see that the stream's source runs: `nondum streams`",
-    ),
 )
