@@ -10,9 +10,10 @@ import pytest
 
 from nondum.host.config import HostConfig, InstallSection, parse
 from nondum.host.configuration.effective import Asked
-from nondum.host.doctor import account, beliefs, clock, daemon, machine, space
+from nondum.host.doctor import account, beliefs, clock, daemon, drives, machine, space
 from nondum.host.doctor.examination import examine
 from nondum.host.doctor.finding import Finding, Result
+from nondum.host.drives.whose import Disk, Owner
 
 FULL = ("cpuset", "cpu", "io", "memory", "pids")
 TODAY_S = datetime(2026, 6, 1, tzinfo=UTC).timestamp()
@@ -45,6 +46,10 @@ CARDS = " 0 [Loopback       ]: Loopback - Loopback\n                      Loopba
         (space.judge_free(64, 64, 4096), "bad", "no payload is taken in"),
         (space.judge_free(900, 64, 4096), "warn", "quota_mb"),
         (space.judge_free(9000, 64, 4096), "ok", "9000 MB are free"),
+        (drives.judge(Disk("sda", 9, True, Owner.DRIVE, "")), "ok", "read as a drive"),
+        (drives.judge(Disk("sda", 9, True, Owner.NOBODY, "has partitions")), "ok", "partitions"),
+        (drives.judge(Disk("sda", 9, True, Owner.HOST, "it is /srv")), "ok", "alone: it is /srv"),
+        (drives.judge(Disk("sda", 9, True, Owner.SOMEBODY, "at /mnt")), "warn", "at /mnt unmount"),
         (clock.judge(0.0, is_kept=False, is_synchronised=False), "bad", "1970-01-01"),
         (clock.judge(TODAY_S, is_kept=False, is_synchronised=False), "warn", "battery"),
         (clock.judge(TODAY_S, is_kept=True, is_synchronised=None), "warn", "timesyncd"),

@@ -35,15 +35,13 @@ cp /opt/nondum/packaging/sysusers.d/*.conf /usr/lib/sysusers.d/ 2>/dev/null || t
 cp /opt/nondum/packaging/tmpfiles.d/*.conf /usr/lib/tmpfiles.d/ 2>/dev/null || true
 systemd-sysusers
 systemd-tmpfiles --create
-mkdir -p /etc/systemd/system/nondum.service.d
-printf '[Service]\\nTimeoutStartSec=900\\nWatchdogSec=300\\n' \\
-    >/etc/systemd/system/nondum.service.d/slow.conf
 systemctl daemon-reload
 systemctl -q enable nondum.service
 """
 PATIENT = "/etc/systemd/system/nondum.service.d/lab.conf"
 PATIENCE = "[Service]\nTimeoutStartSec={start:.0f}\nWatchdogSec={alive:.0f}\n"
 """Machines whose processors are emulated, and shared, get more time than real ones."""
+START_S, ALIVE_S = 600.0, 300.0
 SERVICE = "nondum.service"
 NAME = "spot"
 LOOK_S = 2.0
@@ -71,7 +69,8 @@ class Installed:
     def be_patient(self) -> None:
         """Have systemd give the service the time that an emulated processor takes."""
         slowness = self.machine.slowness
-        self.machine.put(PATIENT, PATIENCE.format(start=600 * slowness, alive=60 * slowness))
+        patience = PATIENCE.format(start=START_S * slowness, alive=ALIVE_S * slowness)
+        self.machine.put(PATIENT, patience)
 
     def configure(self, more: str = "") -> None:
         """Write its configuration, with some more lines of its table `[workers]`."""
@@ -84,7 +83,7 @@ class Installed:
 
         Raises `AssertionError`, with what it said, when systemd has to start it again.
         """
-        self.machine.run(f"systemctl start {SERVICE}", timeout_s=PATIENCE_S)
+        self.machine.run(f"systemctl start {SERVICE}", timeout_s=START_S)
         self.machine.until("an answer", self._first_answer, PATIENCE_S)
 
     def begin_to_start(self) -> None:

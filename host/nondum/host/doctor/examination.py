@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from nondum.host.config import HostConfig
 from nondum.host.configuration.effective import Asked, effective, file_of
 from nondum.host.confinement import choice, probe
-from nondum.host.doctor import account, beliefs, clock, daemon, machine, space
+from nondum.host.doctor import account, beliefs, clock, daemon, drives, machine, space
 from nondum.host.doctor.finding import Finding, bad, ok
 from nondum.sdk.errors import ConfigRefused
 from nondum.transport.discovery import doctor as network
@@ -68,6 +68,7 @@ PARTS: tuple[Examine, ...] = (
     machine.examine,
     confinement,
     space.examine,
+    drives.examine,
     clock.examine,
     beliefs.examine,
     others,
