@@ -7,6 +7,7 @@ from tests.host.devices.sightings import (
     camera_with_microphone,
     interface,
     node,
+    platform,
     serial_adapter,
     usb,
 )
@@ -88,6 +89,14 @@ def test_what_people_point_with_goes_to_who_names_it(pointer: DeviceRecord) -> N
     assert names(pointer, {"subsystem": "hidraw", "usb": "*:*"}) == []
     assert names(pointer, {"subsystem": "hidraw", "usb": "0627:0001"}) == ["hidraw0"]
     assert not left_alone(pointer)
+
+
+def test_picture_is_given_although_people_touch_the_same_device() -> None:
+    board = platform("vivid.0")
+    touch = node(board, "input", "input/event4", ID_INPUT_TOUCHSCREEN="1")
+    screen = made([board, node(board, "video4linux", "video0"), touch])
+    assert names(screen, {"driver": "vivid"}) == ["video0"]
+    assert names(screen, {"subsystem": "input"}) == []
 
 
 def test_other_hids_go_to_who_asks() -> None:

@@ -15,6 +15,8 @@ KEYBOARD, POINTER = "01", "02"
 _HID, _HUB, _STORAGE = "03", "09", "08"
 _DISKS = frozenset({"scsi_generic", "bsg", "nvme", "nvme-generic", "block"})
 """Subsystems whose nodes give away whole disks."""
+_HANDS = frozenset({"input", "hidraw"})
+"""Subsystems whose nodes tell what hands do: a camera's picture stays one beside a touch node."""
 _POINTS = ("ID_INPUT_MOUSE", "ID_INPUT_TOUCHPAD", "ID_INPUT_TOUCHSCREEN", "ID_INPUT_POINTINGSTICK")
 
 
@@ -105,5 +107,7 @@ def _points(device: DeviceRecord, node: DeviceNode) -> bool:
         kind = one.kind.split(":")
         if node.interface in ("", one.number) and (kind[0], kind[-1]) == (_HID, POINTER):
             return True
+    if node.subsystem not in _HANDS:
+        return False
     beside = (other for other in device.nodes if other.interface == node.interface)
     return any(other.properties.get(name) == "1" for other in beside for name in _POINTS)

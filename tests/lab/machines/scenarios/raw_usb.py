@@ -13,7 +13,7 @@ def run(lab: Lab) -> str:
     host = lab.host()
     stick = host.bring(lab.stick("reader", card_reader()), PAYLOAD)
     said = ""
-    for port in ("1", "2"):
+    for port in ("5", "6"):
         reader = host.machine.plug_device("usb-ccid", port=port)
         host.until_component("reader", "ready")
         said = until_said(host, "reader", "answers")
