@@ -98,9 +98,18 @@ def _wrapped(libusb1: Any, descriptor: int) -> Iterator[Any]:
     from usb.util import dispose_resources
 
     class OneDevice(libusb1._LibUSB):  # type: ignore[misc]  # pyusb has no types
-        """libusb with one device, which is open already."""
+        """libusb with one device, which is open already.
 
-        handle: Any = None
+        All share the process's one context: devices that are still referred to, or wait for the
+        garbage collector, must not outlive theirs.
+        """
+
+        def __init__(self, shared: Any) -> None:
+            self.lib, self.ctx = shared.lib, shared.ctx
+            self.handle: Any = None
+
+        def _finalize_object(self) -> None:
+            """The context stays."""
 
         def enumerate_devices(self) -> Iterator[Any]:
             yield libusb1._Device(self.handle.devid)
@@ -113,7 +122,7 @@ def _wrapped(libusb1: Any, descriptor: int) -> Iterator[Any]:
         def close_device(self, dev_handle: Any) -> None:
             """Whoever opened it closes it."""
 
-    backend = OneDevice(libusb1.get_backend().lib)
+    backend = OneDevice(libusb1.get_backend())
     wrapped = ctypes.c_void_p()
     status = backend.lib.libusb_wrap_sys_device(backend.ctx, descriptor, ctypes.byref(wrapped))
     if status != 0:
