@@ -37,6 +37,7 @@ systemd-sysusers
 systemd-tmpfiles --create
 systemctl daemon-reload
 systemctl -q enable nondum.service
+sync  # power may be cut next
 """
 PATIENT = "/etc/systemd/system/nondum.service.d/lab.conf"
 PATIENCE = "[Service]\nTimeoutStartSec={start:.0f}\nWatchdogSec={alive:.0f}\n"
