@@ -71,6 +71,15 @@ async def test_device_is_granted_and_withdrawn(house: House) -> None:
     assert await node(house) == "none"
 
 
+async def test_device_that_is_being_pulled_is_not_told_as_another(house: House) -> None:
+    await guest(house)
+    await house.workers.attach("guest", "line", "/dev/zero", {})
+    await house.workers.attach("guest", "line", "/dev/pulled", {})
+    assert await node(house) == seen(house)
+    await house.workers.detach("guest", "line")
+    assert await node(house) == "none"
+
+
 async def test_device_granted_before_the_start_is_there(house: House) -> None:
     await house.workers.attach("guest", "line", "/dev/zero", {})
     await guest(house)

@@ -110,7 +110,11 @@ async def look(ctx):
         device = ctx.device("it")
         if device != had:
             had = device
-            ctx.log.info("has: %s", await asyncio.to_thread(asked, device) if device else "nothing")
+            try:
+                said = await asyncio.to_thread(asked, device) if device else "nothing"
+            except Exception as error:  # it may be pulled at any moment
+                said = f"nothing, for {error}"
+            ctx.log.info("has: %s", said)
         await asyncio.sleep(0.2)
 
 def asked(device):

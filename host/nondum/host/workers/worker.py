@@ -6,6 +6,7 @@ import asyncio
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from nondum.host.cgroups import Usage
@@ -104,7 +105,12 @@ class Worker:
         self._beat()
 
     async def attach(self, need: str, device: Mapping[str, Any]) -> None:
-        """Grant it a device. Raises `WorkerFailed`, `LinkClosed`."""
+        """Grant it a device. Raises `WorkerFailed`, `LinkClosed`.
+
+        One that is being pulled changes before it is withdrawn: what has lost a node is not told.
+        """
+        if not await asyncio.to_thread(_is_there, device):
+            return
         found = await self._let_in(need, device)
         await self.link.request("attach", {"device": need, **found})
 
@@ -360,3 +366,7 @@ async def start_worker(
                 raise WorkerFailed(*problems.located(spec.component, error)) from error
         raise
     return worker
+
+
+def _is_there(device: Mapping[str, Any]) -> bool:
+    return all(Path(node["node"]).exists() for node in device["nodes"])
