@@ -12,6 +12,9 @@ from tests.lab.machines.cache import call
 from tests.lab.machines.recipe import Recipe
 
 FORMATS = Path("/proc/sys/fs/binfmt_misc")
+KEPT = Path("/run/nondum-lab/binfmt_misc")
+"""Where it stays mounted, so that the kernel keeps what it was told: something mounted below /proc
+changes what rooms of workers may mount (mount_namespaces(7))."""
 
 
 def see_it_run(recipe: Recipe) -> None:
@@ -21,9 +24,14 @@ def see_it_run(recipe: Recipe) -> None:
     """
     if _runs(recipe):
         return
-    if not (FORMATS / "register").exists():
+    was_there = (FORMATS / "register").exists()
+    if not was_there:
         call("mount", "-t", "binfmt_misc", "none", FORMATS)
     call("update-binfmts", "--enable", f"qemu-{recipe.name}")
+    if not was_there:
+        KEPT.mkdir(parents=True, exist_ok=True)
+        call("mount", "-t", "binfmt_misc", "none", KEPT)
+        call("umount", FORMATS)
     if not _runs(recipe):
         raise RuntimeError(f"programs of {recipe.debian} do not run here, even under qemu-user")
 
