@@ -18,6 +18,7 @@ ROOT = Path(__file__).parent.parent
 PYTEST = [sys.executable, "-m", "pytest"]
 # `.` on the path gives tests/ and demo/ only: nondum itself is what is installed.
 INSTALLED = ["-o", "pythonpath=."]
+SLOWEST = ["--durations", "20", "--durations-min", "5"]
 TWO_AT_ONCE = ["-n", "2", "--dist", "loadfile"]
 
 
@@ -30,7 +31,7 @@ def main(arguments: list[str]) -> int:
         [*TWO_AT_ONCE, "-m", "beside"],
         ["-m", "lab and not beside"],
     )
-    statuses = [_run(ROOT, [*INSTALLED, *options]) for options in runs]
+    statuses = [_run(ROOT, [*INSTALLED, *SLOWEST, *options]) for options in runs]
     with ThreadPoolExecutor(max_workers=2) as two_at_once:
         folders = (folder.parent for folder in sorted(ROOT.glob("plugins/*/tests")))
         statuses += two_at_once.map(_of_plugin, folders)
