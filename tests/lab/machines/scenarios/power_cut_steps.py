@@ -16,7 +16,8 @@ STEPS = (
     *("staged", "stored", "probed", "active"),
 )
 """In this order there are never five cuts without a payload that came to life in between: after so
-many the drive would be left alone. After eight without a minute of peace the host would enter safe mode."""
+many the drive would be left alone. After eight without a minute of peace the host would enter safe
+mode."""
 SEEN = "/run/seen"
 WATCH = """
 import os, signal, sqlite3, sys
