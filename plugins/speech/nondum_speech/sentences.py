@@ -13,6 +13,7 @@ LONGEST_S = 12.0
 _WINDOW_S = 0.5
 _RATIO = 0.8
 """A sentence begins or ends when so much of a window is voice, or is none."""
+_SILENT_SAMPLE = bytes(2)
 
 
 class Sentences:
@@ -39,7 +40,8 @@ class Sentences:
         """No more samples come: give the sentence that was being said."""
         frame = self._rest[: len(self._rest) // 2 * 2]
         self._rest = b""
-        voiced = self._endpointer.end_stream(frame)
+        # It takes no empty frame (IndexError), which is what whole frames leave behind.
+        voiced = self._endpointer.end_stream(frame or _SILENT_SAMPLE)
         self._voiced += voiced or b""
         if self._voiced:
             yield self._taken()

@@ -20,6 +20,8 @@ SAID = (
     ("please locate the radiation source", "en-us+m3", 180),
     ("locate the zorgon", "en-us", 150),
 )
+FRAME = 480
+"""Samples that are looked at for a voice at a time: 30 ms."""
 
 
 def noise(seconds: float, rms: float) -> Sound:
@@ -102,6 +104,19 @@ def test_pauses_part_sentences(espeak: Espeak, ears: Recogniser) -> None:
 def test_endless_humming_is_cut_off(espeak: Espeak) -> None:
     many = np.concatenate([said(espeak, "follow people everywhere").samples] * 30)
     assert all(sentence.seconds < 13 for sentence in sentences_of(Sound(many)))
+
+
+@pytest.mark.parametrize("samples", [0, 1, FRAME, FRAME + 1, 50 * FRAME])
+def test_silence_of_any_length_has_no_sentences(samples: int) -> None:
+    assert sentences_of(Sound(np.zeros(samples, np.int16))) == ()
+
+
+def test_a_sentence_that_ends_with_a_frame_is_heard(espeak: Espeak, ears: Recogniser) -> None:
+    samples = said(espeak, "follow people").samples
+    whole = np.pad(samples, (0, -len(samples) % FRAME))
+    assert [ears.hear(sentence).said for sentence in sentences_of(Sound(whole))] == [
+        "follow people"
+    ]
 
 
 def said(espeak: Espeak, text: str) -> Sound:
