@@ -1,8 +1,9 @@
 """`python -m tests`: all tests in the order that CI runs them; with arguments, pytest with those.
 
-Whole hosts (marker `lab`) run after the rest. Those that are judged in real time run by themselves:
-other tests beside them would be load that no robot has; two of the others (`beside`) run at once.
-Each plugin's own tests run as its author runs them, in its folder, two plugins at once.
+Two tests run at once. Whole hosts (marker `lab`) come after the rest. Those of them that are judged
+in real time (`alone`) have the processors to themselves: another host beside them would be load
+that no robot has. What they leave of the processors goes, at the lowest priority, to tests that
+only compute. Each plugin's own tests run as its author runs them, in its folder.
 """
 
 from __future__ import annotations
@@ -15,38 +16,60 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-PYTEST = [sys.executable, "-m", "pytest"]
+PYTEST = [sys.executable, "-m", "pytest", "-q"]
 # `.` on the path gives tests/ and demo/ only: nondum itself is what is installed.
 INSTALLED = ["-o", "pythonpath=."]
 SLOWEST = ["--durations", "20", "--durations-min", "5"]
-TWO_AT_ONCE = ["-n", "2", "--dist", "loadfile"]
+TWO_AT_ONCE = ["-n", "2", "--dist", "loadfile", "--no-loadscope-reorder"]
+COMPUTE = [
+    "tests/demo/shuffle",
+    "tests/demo/test_following_loop.py",
+    "tests/fuzz",
+    "tests/mutation",
+    "tests/packages/test_debian_package.py",
+    "tests/planning",
+    "tests/wheelhouse",
+]
+"""Tests that nobody waits for in real time."""
 
 
 def main(arguments: list[str]) -> int:
     """Run what was asked for; the worst exit status of all runs."""
     if arguments:
-        return subprocess.run([*PYTEST, *INSTALLED, *arguments], cwd=ROOT, check=False).returncode
-    runs = (
-        [*TWO_AT_ONCE, "-m", "not lab"],
-        [*TWO_AT_ONCE, "-m", "beside"],
-        ["-m", "lab and not beside"],
-    )
-    statuses = [_run(ROOT, [*INSTALLED, *SLOWEST, *options]) for options in runs]
+        command = [sys.executable, "-m", "pytest", *INSTALLED, *arguments]
+        return subprocess.run(command, cwd=ROOT, check=False).returncode
+    ignored = [f"--ignore={place}" for place in COMPUTE]
+    statuses = [
+        _run(*TWO_AT_ONCE, "-m", "not lab", *ignored),
+        _run(*TWO_AT_ONCE, "-m", "lab and not alone"),
+    ]
     with ThreadPoolExecutor(max_workers=2) as two_at_once:
+        computing = two_at_once.submit(_compute)
+        statuses.append(_run("-m", "alone"))
+        statuses.append(computing.result())
         folders = (folder.parent for folder in sorted(ROOT.glob("plugins/*/tests")))
         statuses += two_at_once.map(_of_plugin, folders)
     return max(statuses)
 
 
-def _run(folder: Path, options: Sequence[str]) -> int:
-    return subprocess.run([*PYTEST, "-q", *options], cwd=folder, check=False).returncode
+def _run(*options: str) -> int:
+    command = [*PYTEST, *INSTALLED, *SLOWEST, *options]
+    return subprocess.run(command, cwd=ROOT, check=False).returncode
+
+
+def _compute() -> int:
+    options = [*INSTALLED, *SLOWEST, *TWO_AT_ONCE, "-m", "not lab", *COMPUTE]
+    return _shown_when_over(ROOT, ["nice", "-n", "19", *PYTEST, *options])
 
 
 def _of_plugin(folder: Path) -> int:
-    """Run a plugin's own tests; what they write is shown when they are over."""
-    done = subprocess.run(
-        [*PYTEST, "-q"], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    )
+    return _shown_when_over(folder, PYTEST)
+
+
+def _shown_when_over(folder: Path, command: Sequence[str]) -> int:
+    """Run beside something else that writes."""
+    pipe = subprocess.PIPE
+    done = subprocess.run(command, cwd=folder, stdout=pipe, stderr=subprocess.STDOUT, text=True)
     sys.stdout.write(f"{folder.name}\n{done.stdout}")
     return done.returncode
 

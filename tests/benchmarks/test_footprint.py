@@ -67,7 +67,6 @@ def test_daemon_imports_few_modules(modules: set[str]) -> None:
 
 
 @pytest.mark.lab
-@pytest.mark.beside
 def test_host_keeps_to_its_memory(folder: Path) -> None:
     with running(folder) as (pid, _):
         assert probe.memory(pid)["daemon"][0] * 1024 <= DAEMON_MB * MB

@@ -12,7 +12,7 @@ import pytest
 from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, running
 from tests.payloads import Part
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 LIBRARIES = ("libfaketimeMT.so.1", "libfaketime.so.1")
 JUMPS = ("-10y", "+10y")

@@ -15,7 +15,7 @@ from tests.payloads import Part, make_payload
 
 from nondum.host.lifecycle.installation import AT_ONCE
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 DRIVES = 16
 

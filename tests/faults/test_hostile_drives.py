@@ -15,7 +15,7 @@ from tests.loops import can_be_made
 
 from nondum.host.lifecycle.children import KEPT
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.lab, pytest.mark.timeout(300)]
 
 AT_ONCE = 16
 MOST_GROWTH_MB = 20.0

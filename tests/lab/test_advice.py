@@ -13,7 +13,7 @@ from tests.lab.plugins import scribe, talker
 from tests.lab.running_host import RunningHost
 from tests.payloads import Part, make_payload
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 KNOBS = " ".join(f"k{number}" for number in range(60))
 WIDE = f'''"""Says that sixty knobs, three at a time, make anything be written."""

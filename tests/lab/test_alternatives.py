@@ -11,7 +11,7 @@ from tests.lab.plugins import scribe, talker
 from tests.lab.running_host import READY_S, Row, RunningHost, steps
 from tests.payloads import Part
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 
 def test_task_goes_on_with_the_other_when_one_is_pulled(host: RunningHost) -> None:

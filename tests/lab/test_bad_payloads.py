@@ -12,7 +12,7 @@ from tests.lab.plugins import scribe, talker
 from tests.lab.running_host import READY_S, Row, RunningHost, running
 from tests.payloads import make_payload
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 IMPATIENT = '[workers]\nstartup_s = 2.0\nconfinement = "0"\nminimum_confinement = 0\n'
 """And without walls, so that who demands some is refused."""

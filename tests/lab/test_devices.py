@@ -15,7 +15,7 @@ from demo.emulators.port import Port
 from tests.lab.plugins import gauge
 from tests.lab.running_host import RunningHost
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 TIOCSPTLCK, TIOCGPTN = 0x40045431, 0x80045430
 """Unlock the other end of a line, and tell its number (ioctl_tty(2))."""

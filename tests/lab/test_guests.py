@@ -15,7 +15,7 @@ from tests.payloads import Part
 
 from nondum.transport.peers import CallFailed
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 LAMP = "mule__beacon__lamp"
 

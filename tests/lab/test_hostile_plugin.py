@@ -13,7 +13,7 @@ from tests.lab.plugins import talker
 from tests.lab.running_host import RunningHost
 from tests.payloads import Part
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 FLOODS = {
     *("fill tmp", "fill shared memory", "fork without end", "take all memory"),

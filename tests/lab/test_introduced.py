@@ -16,7 +16,7 @@ from tests.lab.running_host import RunningHost
 from nondum.transport.peers import fingerprint
 from nondum.transport.peers.keys import load_or_create
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 
 @contextmanager

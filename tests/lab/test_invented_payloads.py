@@ -15,7 +15,7 @@ from tests.demo.invented import Invented, listener, sentence, talker
 from nondum.wheelhouse.build import Options, build
 from nondum.wheelhouse.target import Target
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside, pytest.mark.slow]
+pytestmark = [pytest.mark.lab, pytest.mark.slow]
 
 SDK = Path(__file__).parents[2] / "plugins/sdk"
 READY_S, GOAL_S = 120.0, 120.0

@@ -12,7 +12,7 @@ from tests.lab.neighbours import beacon, ear, neighbours, routed, say, until_sha
 from tests.lab.plugins import scribe, talker
 from tests.lab.running_host import READY_S, RunningHost
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 
 def until_written(log: Path, *words: str) -> None:

@@ -9,7 +9,7 @@ import pytest
 from tests.lab.plugins import scribe, talker
 from tests.lab.running_host import RunningHost, running
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 
 def test_pip_makes_the_same_components(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from tests.payloads import make_payload, seal
 from nondum.sdk.wire import Body
 from nondum.transport.peers import CallFailed, Errand, Lease, Loss
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 Twist = Callable[[str, int, bytes], Any]
 """Path of a file, offset and its bytes there → what is sent."""

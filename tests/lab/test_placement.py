@@ -26,7 +26,7 @@ from tests.payloads import Part
 
 from nondum.sdk.errors import NondumError
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 OTHER_MACHINE = ("setarch", "linux32")
 """What is run so is told by the kernel that it is on a 32-bit machine: wheels for this one do not

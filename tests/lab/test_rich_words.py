@@ -6,7 +6,7 @@ import pytest
 from tests.lab.plugins import attic, lamps
 from tests.lab.running_host import READY_S, RunningHost
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 
 def test_goal_that_follows_from_a_rule_is_reached(host: RunningHost) -> None:

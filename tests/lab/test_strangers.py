@@ -18,7 +18,7 @@ from tests.lab.running_host import RunningHost
 
 from nondum.host.control.client import ControlClient
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 
 @contextmanager

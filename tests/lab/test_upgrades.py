@@ -13,7 +13,7 @@ from tests.lab.plugins import TALKER, scribe, talker
 from tests.lab.running_host import READY_S, RunningHost
 from tests.payloads import Part, make_payload
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 TALK = "org.example.talk"
 

@@ -10,7 +10,7 @@ import pytest
 from tests.lab.running_host import RunningHost
 from tests.payloads import Part, make_wheel
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 USER = '''"""Says which version of a library it runs with."""
 from nondum.sdk import Fragment, Header, Text, Unit, hookimpl

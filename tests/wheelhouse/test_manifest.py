@@ -199,10 +199,10 @@ def test_everything_wrong_is_told_at_once() -> None:
 
 
 def test_dotted_keys_cost_no_time() -> None:
-    begun = time.perf_counter()
+    begun = time.process_time()
     problems(" . ".join(f"a{n}" for n in range(10_000)) + " = 1\n")
     problems("'a'." * 10_000 + "b = 1\n")
-    assert time.perf_counter() - begun < 1
+    assert time.process_time() - begun < 1
 
 
 @given(st.text(max_size=200))

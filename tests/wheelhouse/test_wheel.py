@@ -252,9 +252,9 @@ def test_too_many_members_are_a_bomb(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_many_members_are_judged_quickly() -> None:
     crowd = ZipBuilder(tuple(ZipMember(f"m{number}", b"") for number in range(60_000)))
     data = memoryview(crowd.bytes())
-    begun = time.perf_counter()
+    begun = time.process_time()
     assert {p.code for p in archive.read(data, NAME).problems} == {"WHEEL_BOMB"}
-    assert time.perf_counter() - begun < 10
+    assert time.process_time() - begun < 10
 
 
 @pytest.mark.parametrize(

@@ -131,7 +131,6 @@ def test_payloads_are_signed_by_many(owner: Path) -> None:
 
 
 @pytest.mark.lab
-@pytest.mark.beside
 def test_a_host_is_given_its_trust_and_keeps_to_it(owner: Path) -> None:
     trust, alice = owner / "trust.toml", owner / "alice"
     drive = owner / "drive"

@@ -14,7 +14,7 @@ from tests.lab.faults.remote import PORT, Member
 
 from nondum.transport.peers import HostKeys
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 BAD = HostKeys.generate()
 GROWTH_KB = 100_000

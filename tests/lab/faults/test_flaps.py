@@ -12,7 +12,7 @@ import pytest
 from tests.lab.faults.crew import Crew, crew, note, until
 from tests.lab.faults.remote import Member
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 NAMES = ("rover", "mule", "scout", "base")
 WARM_UP = 40

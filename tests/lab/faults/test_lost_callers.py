@@ -10,7 +10,7 @@ import pytest
 from tests.lab.faults.daemons import WiredHost, lamp, until_written, wired
 from tests.lab.neighbours import until_shared
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 
 @pytest.mark.parametrize(

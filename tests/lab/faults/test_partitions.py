@@ -11,7 +11,7 @@ import pytest
 from tests.lab.faults.crew import Crew, crew, note
 from tests.lab.faults.remote import Member
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 ROUNDS = 4
 NAMES = ("rover", "mule", "scout", "base")

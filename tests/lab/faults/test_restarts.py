@@ -13,7 +13,7 @@ from tests.lab.faults.crew import Crew, Trusting, crew
 
 from nondum.transport.peers import HostKeys
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 RESTARTS = 12
 LONG_S = 60.0

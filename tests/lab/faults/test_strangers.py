@@ -12,7 +12,7 @@ from tests.lab.faults.crew import Crew, crew, until
 from tests.lab.faults.figures import measured
 from tests.lab.faults.remote import PORT, Member
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 GROWTH_KB = 40_000
 DESCRIPTORS = 400

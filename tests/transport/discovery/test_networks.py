@@ -8,7 +8,7 @@ import pytest
 from demo.namespaces import Network
 from tests.transport.discovery.hosts import Host
 
-pytestmark = [pytest.mark.lab, pytest.mark.beside]
+pytestmark = pytest.mark.lab
 
 
 @pytest.fixture
