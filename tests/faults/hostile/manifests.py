@@ -68,9 +68,12 @@ DRIVES: tuple[HostileDrive, ...] = (
     component("permissions-a-word", VALUE, "permissions = 'network'"),
     component("device-without-match", VALUE, "[[component.device]]\nname = 'a'\n"),
     component("device-empty-match", VALUE, "[[component.device]]\nname='a'\nmatch={}"),
-    component("device-climbs", VALUE, "[[component.device]]\nname='../sda'\nmatch={a='b'}"),
+    component("device-climbs", VALUE, "[[component.device]]\nname='../sda'\nmatch={ID_BUS='usb'}"),
+    component("device-odd-rule", VALUE, "[[component.device]]\nname='a'\nmatch={a='b'}"),
     component(
-        "device-with-path", KEY, "[[component.device]]\nname='a'\nmatch={a='b'}\nnode='/dev/sda'"
+        "device-with-path",
+        KEY,
+        "[[component.device]]\nname='a'\nmatch={ID_BUS='usb'}\nnode='/dev/sda'",
     ),
     component("unit-at-nowhere", VALUE, "[[component.unit]]\nname='a'\nxyz=[nan,0,0]"),
     component("unit-flat", VALUE, "[[component.unit]]\nname='a'\nxyz=[0,0]"),

@@ -154,6 +154,23 @@ async def test_cancelled_start_leaves_no_process(house: House) -> None:
     assert not is_alive(pid)
 
 
+async def test_cancelled_start_that_is_stopped_too_leaves_no_process(house: House) -> None:
+    """As when a daemon ends while a payload is brought up."""
+    source = "import asyncio\n" + HOOKED.format(
+        "async def start(ctx):\n    print('here', __import__('os').getpid())\n"
+        "    await asyncio.Event().wait()"
+    )
+    starting = asyncio.create_task(house.start("guest", source))
+    said = await house.until(WorkerLogged, lambda line: line.message.startswith("here"))
+    pid = house.pid("guest", said.message.split()[1])
+    starting.cancel()
+    await asyncio.sleep(0)
+    await house.workers.close()
+    assert not is_alive(pid)
+    with pytest.raises((asyncio.CancelledError, WorkerFailed)):
+        await starting
+
+
 async def test_start_waits_for_the_one_that_is_being_stopped(house: House) -> None:
     source = HOOKED.format("async def stop(ctx):\n    await __import__('asyncio').sleep(0.3)")
     spec = await house.start("guest", source)

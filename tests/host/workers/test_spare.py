@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import os
+import resource
 import signal
+import socket
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
@@ -16,6 +20,7 @@ from nondum.host.inside.bootstrap import PRELOADED
 from nondum.host.workers import base_interpreter
 from nondum.host.workers.launcher import MARK, WorkerLauncher
 from nondum.host.workers.leftovers import end_leftovers
+from nondum.sdk.errors import WorkerFailed
 
 pytestmark = pytest.mark.anyio
 
@@ -94,6 +99,36 @@ async def test_a_spare_that_died_is_not_missed(house: House) -> None:
     await asyncio.to_thread(os.waitid, os.P_PID, spare, os.WEXITED | os.WNOWAIT)
     await house.start("cam", QUIET)
     assert spare not in ancestors(house.workers.pids()["cam"])
+
+
+async def test_a_worker_that_cannot_be_watched_is_ended(house: House) -> None:
+    """The last descriptor that there is would have told of its end (pidfd_open(2))."""
+    house.workers.keep_spare()
+    spare = spare_of(house)
+    spec = house.spec("cam", QUIET)
+    launcher = house.workers.launcher
+    ours, theirs = socket.socketpair()
+    with ours, theirs, no_descriptors_left(), pytest.raises(WorkerFailed) as failed:
+        launcher.launch(spec, theirs)
+    assert failed.value.code == "LAUNCH_FAILED"
+    assert "Too many open files" in str(failed.value)
+    assert not is_alive(spare)
+
+
+@contextmanager
+def no_descriptors_left() -> Iterator[None]:
+    """Nothing more can be opened by this process."""
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with ExitStack() as stack:
+        highest = max(int(entry.name) for entry in Path("/proc/self/fd").iterdir())
+        while (filled := os.open(os.devnull, os.O_RDONLY)) <= highest:
+            stack.callback(os.close, filled)
+        os.close(filled)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (filled, before[1]))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, before)
 
 
 async def test_an_unused_spare_ends_with_the_workers(house: House) -> None:

@@ -83,9 +83,13 @@ class WorkerLauncher:
                         started.close()
                         continue
                     spare = started or Spare(self._confinement, ground, self._cages, self._owner)
-                    spare.limit(spec.limits)
-                    if spare.become(told, sock, entry.ruleset):
-                        return spare.process(entry.service)
+                    try:
+                        spare.limit(spec.limits)
+                        if spare.become(told, sock, entry.ruleset):
+                            return spare.process(entry.service)
+                    except OSError:
+                        spare.close()
+                        raise
                     said = spare.said
         except OSError as error:
             problem = Problem("LAUNCH_FAILED", str(error), where=spec.component)

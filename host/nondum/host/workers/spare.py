@@ -88,10 +88,15 @@ class Spare:
     def process(self, service: Callable[[int], ServiceGroup] | None = None) -> WorkerProcess:
         """The worker that it has become, or the one for which it stands in (see `Entry`).
 
-        Call it once, on the loop.
+        Call it once, on the loop. Raises `OSError`; then it is still to be closed.
         """
         if self._has_keeper:
-            return WorkerProcess(self.popen, self.cage, Keeper(self._orders))
+            keeper = Keeper(self._orders)
+            try:
+                return WorkerProcess(self.popen, self.cage, keeper)
+            except OSError:
+                keeper.close()
+                raise
         self._orders.close()
         found = service(self.popen.pid) if service is not None else None
         return WorkerProcess(self.popen, self.cage, service=found)

@@ -174,6 +174,22 @@ class Worker:
         if self._ending is None:
             self._ending = self._loop.create_task(self._end(problem, term_s))
 
+    async def ended(self) -> Problem:
+        """Wait until nothing of it is left, and say why. Call it after `end`.
+
+        Cancelling it does not shorten it: it takes seconds at most.
+        """
+        assert self._ending is not None
+        cancelled: asyncio.CancelledError | None = None
+        while not self._ending.done():
+            try:
+                await asyncio.wait([self._ending])
+            except asyncio.CancelledError as error:
+                cancelled = error
+        if cancelled is not None:
+            raise cancelled
+        return self.gone.result()
+
     async def _end(self, problem: Problem, term_s: float) -> None:
         if self._watchdog is not None:
             self._watchdog.cancel()
@@ -346,7 +362,8 @@ async def start_worker(
 ) -> Worker:
     """Launch a worker and see it through its start.
 
-    Raises `WorkerFailed` with what went wrong; then, or when cancelled, nothing of it is left.
+    Raises `WorkerFailed` with what went wrong; then, or when cancelled, however often, nothing of
+    it is left.
     """
     worker = Worker(spec, launcher, timing, emit)
     try:
@@ -354,7 +371,7 @@ async def start_worker(
             await worker.introduce(welcome)
     except BaseException as error:
         worker.end(Problem("WORKER_START_FAILED", "it did not start", where=spec.component))
-        problem = await asyncio.shield(worker.gone)
+        problem = await worker.ended()
         match error:
             case LinkClosed():
                 raise WorkerFailed(problems.before_start(problem)) from None
