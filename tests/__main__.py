@@ -1,13 +1,15 @@
 """`python -m tests`: all tests in the order that CI runs them; with arguments, pytest with those.
 
-Two tests run at once. Whole hosts (marker `lab`) come after the rest. Those of them that are judged
-in real time (`alone`) have the processors to themselves: another host beside them would be load
-that no robot has. What they leave of the processors goes, at the lowest priority, to tests that
-only compute. Each plugin's own tests run as its author runs them, in its folder.
+Tests run beside each other, one more than there are processors, since most wait now and then. Whole
+hosts (marker `lab`) come after the rest. Those of them that are judged in real time (`alone`) have
+the processors to themselves: another host beside them would be load that no robot has. What they
+leave of the processors goes, at the lowest priority, to tests that only compute. Each plugin's own
+tests run as its author runs them, in its folder.
 """
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -20,11 +22,13 @@ PYTEST = [sys.executable, "-m", "pytest", "-q"]
 # `.` on the path gives tests/ and demo/ only: nondum itself is what is installed.
 INSTALLED = ["-o", "pythonpath=."]
 SLOWEST = ["--durations", "20", "--durations-min", "5"]
-TWO_AT_ONCE = ["-n", "2", "--dist", "loadfile", "--no-loadscope-reorder"]
+PROCESSORS = os.cpu_count() or 1
 COMPUTE = [
     "tests/demo/shuffle",
+    "tests/demo/test_compton.py",
     "tests/demo/test_following_loop.py",
     "tests/fuzz",
+    "tests/host/cli/test_pddl.py",
     "tests/mutation",
     "tests/packages/test_debian_package.py",
     "tests/planning",
@@ -40,16 +44,20 @@ def main(arguments: list[str]) -> int:
         return subprocess.run(command, cwd=ROOT, check=False).returncode
     ignored = [f"--ignore={place}" for place in COMPUTE]
     statuses = [
-        _run(*TWO_AT_ONCE, "-m", "not lab", *ignored),
-        _run(*TWO_AT_ONCE, "-m", "lab and not alone"),
+        _run(*_at_once(PROCESSORS + 1), "-m", "not lab", *ignored),
+        _run(*_at_once(PROCESSORS + 1), "-m", "lab and not alone"),
     ]
-    with ThreadPoolExecutor(max_workers=2) as two_at_once:
-        computing = two_at_once.submit(_compute)
+    with ThreadPoolExecutor(PROCESSORS) as pool:
+        computing = pool.submit(_compute)
         statuses.append(_run("-m", "alone"))
         statuses.append(computing.result())
         folders = (folder.parent for folder in sorted(ROOT.glob("plugins/*/tests")))
-        statuses += two_at_once.map(_of_plugin, folders)
+        statuses += pool.map(_of_plugin, folders)
     return max(statuses)
+
+
+def _at_once(number: int) -> list[str]:
+    return ["-n", str(number), "--dist", "loadfile", "--no-loadscope-reorder"]
 
 
 def _run(*options: str) -> int:
@@ -58,7 +66,7 @@ def _run(*options: str) -> int:
 
 
 def _compute() -> int:
-    options = [*INSTALLED, *SLOWEST, *TWO_AT_ONCE, "-m", "not lab", *COMPUTE]
+    options = [*INSTALLED, *SLOWEST, *_at_once(PROCESSORS), "-m", "not lab", *COMPUTE]
     return _shown_when_over(ROOT, ["nice", "-n", "19", *PYTEST, *options])
 
 

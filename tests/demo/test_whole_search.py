@@ -15,7 +15,7 @@ LIMIT_S = 400
 STAGES = ["panther", "scout", "steered", "node lost"]
 IN_ORDER = ("found", "payloads in", "understood", "in plan", "alert")
 
-pytestmark = [pytest.mark.lab, pytest.mark.alone, pytest.mark.timeout(LIMIT_S)]
+pytestmark = [pytest.mark.lab, pytest.mark.timeout(LIMIT_S)]
 
 
 def search(*options: str) -> subprocess.CompletedProcess[str]:
@@ -29,6 +29,7 @@ def search(*options: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("options", [(), ("--loopback",)], ids=["as shipped", "loopback"])
 def test_two_robots_search_with_the_node_and_miss_it(options: tuple[str, ...]) -> None:
     done = search(*options)

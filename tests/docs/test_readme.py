@@ -52,7 +52,7 @@ def environment(folder: Path) -> dict[str, str]:
     kept = {
         name: value
         for name, value in os.environ.items()
-        if not name.startswith(("XDG_", "PYTEST_"))
+        if not name.startswith(("XDG_", "PYTEST_", "COLUMNS"))  # readline sets the last
     }
     return kept | {"HOME": str(folder / "home"), "PATH": path, "PYTHONUNBUFFERED": "1"}
 

@@ -54,7 +54,7 @@ MARK = "NONDUM_FAULTS"
 
 OPTIONS = InstallOptions(allow_unsigned=True, reserve_mb=0)
 """Some of the disks that it lives on are small."""
-QUICK = Timing(startup_s=2.0, settle_beats=1)
+QUICK = Timing(startup_s=5.0, settle_beats=1)
 
 _AT_REST = frozenset({Step.ACTIVE, Step.SUPERSEDED, Step.REFUSED, Step.QUARANTINED})
 

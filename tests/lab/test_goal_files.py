@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import pytest
 from demo.robot import configuration
 from tests.lab.neighbours import BEACON, UNCONFINED
 from tests.lab.running_host import READY_S, Row, RunningHost, goal
@@ -15,6 +16,8 @@ from tests.signing import Key, sign_payload, trust_of
 
 from nondum.wheelhouse import goal_payload, goals
 from nondum.wheelhouse.trust import trust_text
+
+pytestmark = pytest.mark.lab
 
 ALICE = Key("alice")
 GOAL = "org.example.errand/1"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import pytest
 from tests.host.workers.house import HOST, House, is_alive
 
@@ -20,6 +22,15 @@ from nondum.sdk.errors import WorkerFailed
 
 pytestmark = pytest.mark.anyio
 
+LINGERING = """
+import asyncio
+from nondum.sdk import hookimpl
+
+@hookimpl
+async def stop(ctx):
+    print("leaving")
+    await asyncio.Event().wait()
+"""
 GREETER = '''
 """Greets."""
 import asyncio
@@ -106,6 +117,19 @@ async def test_lasting_behaviour_is_established_until_halted(house: House) -> No
     assert await call.ended() is RunState.HALTED
     await house.until(FactForgotten)
     assert house.ends() == [("hum", "HALTED")]
+
+
+async def test_stopping_that_is_cancelled_leaves_no_process(house: House) -> None:
+    """As when a daemon ends while a payload is withdrawn."""
+    await house.start("guest", LINGERING)
+    pid = house.workers.pids()["guest"]
+    stopping = asyncio.create_task(house.workers.stop("guest"))
+    await house.until(WorkerLogged, lambda line: line.message == "leaving")
+    stopping.cancel()
+    await house.workers.close()
+    assert not is_alive(pid)
+    with pytest.raises(asyncio.CancelledError):
+        await stopping
 
 
 async def test_stopping_halts_and_ends_the_process(house: House) -> None:

@@ -85,9 +85,9 @@ def _look(confinement: Confinement, folder: Path) -> dict[str, Any]:
     spec = _spec(folder)
     spec.scratch.mkdir()
     ground = confinement.ground(spec)
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     spare = Spare(confinement, ground)
     try:
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with ours, theirs:
             with confinement.entry(spec, ground) as entry:
                 spare.become(parameters(spec, entry, looks=True), theirs, entry.ruleset)

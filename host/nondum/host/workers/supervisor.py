@@ -15,6 +15,7 @@ from nondum.host.workers.launcher import Launcher
 from nondum.host.workers.spec import Timing, WorkerSpec
 from nondum.host.workers.standing import HEARD, Standing
 from nondum.host.workers.supervision import Supervision
+from nondum.host.workers.waiting import until_done
 from nondum.host.workers.worker import Worker, start_worker
 from nondum.sdk.errors import Problem, WorkerFailed
 
@@ -98,14 +99,20 @@ class Supervisor:
         self.standing = Standing.LEAVING
 
     async def stop(self, grace_s: float) -> None:
-        """End the worker, if there is one, and start no more. Stopping twice is allowed."""
+        """End the worker, if there is one, and start no more. Stopping twice is allowed.
+
+        Cancelled, it is over when nothing of the worker is left, too.
+        """
         self.is_stopping = True
-        if self._worker is not None:
-            self._on_gone()
-            await self._worker.stop(grace_s, problems.removed(self.spec.component))
-        elif self._task is not None:
-            self._task.cancel()
-        await self.ended()
+        try:
+            if self._worker is not None:
+                self._on_gone()
+                await self._worker.stop(grace_s, problems.removed(self.spec.component))
+            elif self._task is not None:
+                self._task.cancel()
+        finally:
+            if self._task is not None:
+                await until_done(self._task)
 
     async def ended(self) -> None:
         """Wait until there is no worker and none will be started."""

@@ -24,6 +24,7 @@ from nondum.host.workers.news import Claims, parse_news, parse_progress
 from nondum.host.workers.output import Output, Valve
 from nondum.host.workers.process import WorkerProcess, names_of
 from nondum.host.workers.spec import Timing, WorkerSpec
+from nondum.host.workers.waiting import until_done
 from nondum.planning.running import RunState
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import LinkClosed, NondumError, Problem, ProtocolViolation, WorkerFailed
@@ -157,14 +158,18 @@ class Worker:
             beaten.cancel()
 
     async def stop(self, grace_s: float, problem: Problem) -> None:
-        """Have the plugin leave everything safe, then end the process, all within `grace_s`."""
+        """Have the plugin leave everything safe, then end the process, all within `grace_s`.
+
+        Cancelled, it ends the process sooner, and is over when nothing of it is left.
+        """
         try:
             async with asyncio.timeout(grace_s * 0.7):
                 await self.link.request("stop", {})
         except (TimeoutError, NondumError):
             pass  # it is ended all the same
-        self.end(problem, term_s=grace_s * 0.2)
-        await asyncio.shield(self.gone)
+        finally:
+            self.end(problem, term_s=grace_s * 0.2)
+            await self.ended()
 
     def end(self, problem: Problem, term_s: float = 0.0) -> None:
         """End the whole group, by SIGTERM first if it has `term_s` for that.
@@ -180,14 +185,7 @@ class Worker:
         Cancelling it does not shorten it: it takes seconds at most.
         """
         assert self._ending is not None
-        cancelled: asyncio.CancelledError | None = None
-        while not self._ending.done():
-            try:
-                await asyncio.wait([self._ending])
-            except asyncio.CancelledError as error:
-                cancelled = error
-        if cancelled is not None:
-            raise cancelled
+        await until_done(self._ending)
         return self.gone.result()
 
     async def _end(self, problem: Problem, term_s: float) -> None:
