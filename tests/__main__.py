@@ -24,6 +24,7 @@ INSTALLED = ["-o", "pythonpath=."]
 SLOWEST = ["--durations", "20", "--durations-min", "5"]
 PROCESSORS = os.cpu_count() or 1
 COMPUTE = [
+    "tests/benchmarks",
     "tests/demo/shuffle",
     "tests/demo/test_compton.py",
     "tests/demo/test_following_loop.py",
