@@ -10,6 +10,7 @@ import pytest
 from tests.host.workers.house import House, is_alive
 
 from nondum.host.events import WorkerLogged, WorkerReady
+from nondum.host.workers import WorkerSpec
 from nondum.sdk.description import Label, PluginDescription
 from nondum.sdk.errors import WorkerFailed
 
@@ -126,14 +127,19 @@ async def test_failed_start_can_be_tried_again(house: House) -> None:
     assert list(house.workers.pids()) == ["guest"]
 
 
-async def test_component_removed_while_it_starts(house: House) -> None:
+async def endless_start(house: House) -> tuple[asyncio.Task[WorkerSpec], int]:
+    """A start that does not end by itself, and the worker's process."""
     source = "import asyncio\n" + HOOKED.format(
         "async def start(ctx):\n    print('here', __import__('os').getpid())\n"
         "    await asyncio.Event().wait()"
     )
     starting = asyncio.create_task(house.start("guest", source))
     said = await house.until(WorkerLogged, lambda line: line.message.startswith("here"))
-    pid = house.pid("guest", said.message.split()[1])
+    return starting, house.pid("guest", said.message.split()[1])
+
+
+async def test_component_removed_while_it_starts(house: House) -> None:
+    starting, pid = await endless_start(house)
     await house.workers.stop("guest")
     with pytest.raises(WorkerFailed, match="COMPONENT_REMOVED"):
         await starting
@@ -141,13 +147,7 @@ async def test_component_removed_while_it_starts(house: House) -> None:
 
 
 async def test_cancelled_start_leaves_no_process(house: House) -> None:
-    source = "import asyncio\n" + HOOKED.format(
-        "async def start(ctx):\n    print('here', __import__('os').getpid())\n"
-        "    await asyncio.Event().wait()"
-    )
-    starting = asyncio.create_task(house.start("guest", source))
-    said = await house.until(WorkerLogged, lambda line: line.message.startswith("here"))
-    pid = house.pid("guest", said.message.split()[1])
+    starting, pid = await endless_start(house)
     starting.cancel()
     with pytest.raises(asyncio.CancelledError):
         await starting
@@ -156,13 +156,7 @@ async def test_cancelled_start_leaves_no_process(house: House) -> None:
 
 async def test_cancelled_start_that_is_stopped_too_leaves_no_process(house: House) -> None:
     """As when a daemon ends while a payload is brought up."""
-    source = "import asyncio\n" + HOOKED.format(
-        "async def start(ctx):\n    print('here', __import__('os').getpid())\n"
-        "    await asyncio.Event().wait()"
-    )
-    starting = asyncio.create_task(house.start("guest", source))
-    said = await house.until(WorkerLogged, lambda line: line.message.startswith("here"))
-    pid = house.pid("guest", said.message.split()[1])
+    starting, pid = await endless_start(house)
     starting.cancel()
     await asyncio.sleep(0)
     await house.workers.close()
