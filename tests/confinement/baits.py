@@ -6,6 +6,7 @@ import ctypes
 import json
 import os
 import pty
+import secrets
 import socket
 import subprocess
 import sys
@@ -26,7 +27,7 @@ from nondum.host.workers.confinements import Confinement
 ESCAPE = Path(__file__).with_name("escape.py")
 SMALL = Limits(memory_mb=256, tasks=100, descriptors=64, file_mb=16)
 TOKEN = "nondum-bait"  # a word to look for
-SHARED_KEY = 0x6E6F6E64
+IPC_CREAT, IPC_EXCL = 0o1000, 0o2000  # sys/ipc.h
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def laid(folder: Path, cgroup: str = "") -> Iterator[dict[str, Any]]:
         master, terminal = pty.openpty()
         stack.callback(os.close, master)
         stack.callback(os.close, terminal)
-        stack.enter_context(_shared_memory())
+        shared_key = stack.enter_context(_shared_memory())
         stack.enter_context(_environment())
         tmp = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="nondum-bait-")))
         yield {
@@ -80,7 +81,7 @@ def laid(folder: Path, cgroup: str = "") -> Iterator[dict[str, Any]]:
             "session": os.getsid(0),
             "terminal": os.ttyname(terminal),
             "host_name": socket.gethostname(),
-            "shared_key": SHARED_KEY,
+            "shared_key": shared_key,
             "tmp": str(tmp),
             "cgroup": cgroup,
         }
@@ -97,13 +98,17 @@ def _environment() -> Iterator[None]:
 
 
 @contextmanager
-def _shared_memory() -> Iterator[None]:
-    """A segment of System V shared memory that everybody may attach (shmget(2))."""
+def _shared_memory() -> Iterator[int]:
+    """A segment of System V shared memory that everybody may attach (shmget(2)), by its key.
+
+    Keys are the machine's: one that other tests may take too would end with theirs.
+    """
     libc = ctypes.CDLL(None, use_errno=True)
-    identifier = libc.shmget(SHARED_KEY, 4096, 0o1000 | 0o666)
+    key = secrets.randbelow(0x7FFFFFFF) + 1  # zero stands for no key
+    identifier = libc.shmget(key, 4096, IPC_CREAT | IPC_EXCL | 0o666)
     assert identifier >= 0, os.strerror(ctypes.get_errno())
     try:
-        yield
+        yield key
     finally:
         libc.shmctl(identifier, 0, None)
 
