@@ -182,7 +182,6 @@ ASIDE: Mapping[str, str] = {
     f"{_H}/workers/keeper.py": _RUNS,
     f"{_H}/workers/problems.py": _SPEAKS,
     f"{_H}/workers/supervisor.py": _RUNS,
-    f"{_H}/workers/waiting.py": _RUNS,
     f"{_H}/workers/worker.py": _SPEAKS,
     f"{_H}/workers/workers.py": _RUNS,
 }

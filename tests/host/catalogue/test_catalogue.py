@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import sqlite3
 from collections.abc import AsyncIterator, Callable
@@ -174,6 +175,26 @@ async def opened(path: Path) -> AsyncIterator[Catalogue]:
 def entry(subject: str = "org.example.eye") -> JournalEntry:
     detail = {"n": 1, "folder": "/x"}
     return JournalEntry(0, AT, "boot", "PayloadFound", subject, "received", (PROBLEM,), detail)
+
+
+@pytest.mark.anyio
+async def test_what_is_written_counts_however_often_its_writer_is_cancelled(
+    tmp_path: Path,
+) -> None:
+    async with opened(tmp_path) as catalogue:
+        with contextlib.closing(sqlite3.connect(tmp_path / "catalogue.sqlite")) as other:
+            other.execute("BEGIN IMMEDIATE")
+            writing = asyncio.create_task(catalogue.commit(FULL, [entry()]))
+            for _ in range(3):
+                await asyncio.wait([writing], timeout=0.01)
+                writing.cancel()
+            other.rollback()
+        with pytest.raises(asyncio.CancelledError):
+            await writing
+        assert catalogue.state == FULL
+        assert catalogue.snapshot() == FULL.snapshot()
+    async with opened(tmp_path) as again:
+        assert again.state == FULL
 
 
 @pytest.mark.anyio

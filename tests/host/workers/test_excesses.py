@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator
 from dataclasses import replace
 from pathlib import Path
 
+import anyio
 import pytest
 from tests.host.workers.house import HOST, QUICK, House, is_alive
 
@@ -120,6 +121,26 @@ async def test_too_much_ends_that_worker_alone(caged: House, body: str, code: st
     await caged.until(WorkerReady, lambda _: len(caged.told(WorkerReady)) == 3)
     if code == "SCRATCH_FULL":
         assert os.listdir(caged.folder / "guest/scratch") == []  # noqa: PTH208
+
+
+async def test_what_cannot_be_deleted_is_told_and_holds_nothing_up(caged: House) -> None:
+    held = caged.folder / "guest/scratch/held"
+    body = (
+        "os.mkdir('held'); subprocess.run(['mount', '-t', 'tmpfs', 'tmpfs', 'held'], check=True)\n"
+        "with open('zeros', 'wb') as file:\n    file.write(bytes(9 << 20))\n"
+        "await asyncio.sleep(60)"
+    )
+    await begin(caged, "guest", body)
+    caged.behave("guest", "do", u=f"{HOST}__guest__it")
+    try:
+        exited = await caged.until(WorkerExited)
+        assert exited.reason.startswith("SCRATCH_FULL"), exited.reason
+        told = [line.message for line in caged.told(WorkerLogged) if line.level == "error"]
+        assert [line for line in told if "not all that it left could be cleared away" in line]
+        await caged.until(WorkerReady, lambda _: len(caged.told(WorkerReady)) == 3)
+        assert [each.name for each in held.parent.iterdir()] == ["held"], "all else is deleted"
+    finally:
+        await anyio.run_process(["umount", str(held)])
 
 
 async def test_worker_that_nobody_asks_and_spins_is_told_once(

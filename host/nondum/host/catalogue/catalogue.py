@@ -22,6 +22,7 @@ from nondum.host.catalogue.opening import Instead, Loss, Opened
 from nondum.host.catalogue.records import JournalEntry, Moment, Snapshot
 from nondum.host.catalogue.reserve import Reserve
 from nondum.host.catalogue.state import HostState
+from nondum.host.waiting import until_done
 from nondum.sdk.errors import Problem
 
 _P = ParamSpec("_P")
@@ -89,15 +90,13 @@ class Catalogue:
         A file that proves damaged is replaced by a new one with this state. Raises
         `sqlite3.Error`, `OSError`; then the state is what it was.
         """
-        work = asyncio.ensure_future(self._run(self._write, after, (*self._owed, *entries)))
+        work = asyncio.create_task(self._run(self._write, after, (*self._owed, *entries)))
         try:
-            await asyncio.shield(work)
-        except asyncio.CancelledError:
-            await asyncio.wait([work])  # the thread goes on: what it came to counts
+            await until_done(work)  # the thread goes on, cancelled or not: what it came to counts
+        finally:
             if work.exception() is None:
                 self._wrote(after)
-            raise
-        self._wrote(after)
+        await work
 
     def owe(self, after: HostState, entries: Sequence[JournalEntry], why: Exception) -> None:
         """Go on with a state that cannot be written: whoever starts next may not find it.

@@ -38,13 +38,22 @@ def empty(folder: Path) -> None:
     """Delete all that is in a folder, however deep it is; nothing there is fine.
 
     A folder's folders are moved up before they are gone into, so that no path grows long; each is
-    reached by descriptor, so that none leads out.
+    reached by descriptor, so that none leads out. Raises `OSError` for the first that cannot be
+    deleted, such as a mount, once all others are.
     """
     names = (f".{number}" for number in itertools.count())
+    stuck: dict[str, OSError] = {}
     with contextlib.suppress(FileNotFoundError), _opened(str(folder)) as top:
-        while entries := os.listdir(top):  # noqa: PTH208  # of a descriptor
+        while entries := sorted(set(os.listdir(top)) - stuck.keys()):  # noqa: PTH208  # of a descriptor
             for name in entries:
-                _clear(top, name, names)
+                try:
+                    _clear(top, name, names)
+                except FileNotFoundError:  # it has just gone, or something in it
+                    continue
+                except OSError as error:
+                    stuck[name] = error
+    for name, why in stuck.items():
+        raise OSError(why.errno, why.strerror, str(folder / name))
 
 
 def _clear(top: int, name: str, names: Iterator[str]) -> None:

@@ -10,12 +10,12 @@ from typing import Any, Protocol
 
 from nondum.host import events
 from nondum.host.events import Event
+from nondum.host.waiting import until_done
 from nondum.host.workers import problems, supervision
 from nondum.host.workers.launcher import Launcher
 from nondum.host.workers.spec import Timing, WorkerSpec
 from nondum.host.workers.standing import HEARD, Standing
 from nondum.host.workers.supervision import Supervision
-from nondum.host.workers.waiting import until_done
 from nondum.host.workers.worker import Worker, start_worker
 from nondum.sdk.errors import Problem, WorkerFailed
 

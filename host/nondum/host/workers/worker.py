@@ -13,6 +13,7 @@ from nondum.host.cgroups import Usage
 from nondum.host.events import BehaviourProgressed, Event, StreamFlowing, WorkerLogged
 from nondum.host.helper.grants import reachable, withdrawn
 from nondum.host.printable import printable
+from nondum.host.waiting import until_done
 from nondum.host.workers import problems, scratch
 from nondum.host.workers.call import Call
 from nondum.host.workers.excess import Reading, Watch
@@ -24,7 +25,6 @@ from nondum.host.workers.news import Claims, parse_news, parse_progress
 from nondum.host.workers.output import Output, Valve
 from nondum.host.workers.process import WorkerProcess, names_of
 from nondum.host.workers.spec import Timing, WorkerSpec
-from nondum.host.workers.waiting import until_done
 from nondum.planning.running import RunState
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import LinkClosed, NondumError, Problem, ProtocolViolation, WorkerFailed
@@ -195,9 +195,14 @@ class Worker:
         self.link.close()
         if is_exited:
             self._close_outputs()
-        await asyncio.to_thread(self._clear_away, problem)
-        self._close_outputs()
-        self.gone.set_result(problem)
+        try:
+            await asyncio.to_thread(self._clear_away, problem)
+        except OSError as error:  # what is left is the next sweep's
+            left = f"not all that it left could be cleared away: {error}"
+            self._emit(WorkerLogged(self.spec.component, "error", left))
+        finally:
+            self._close_outputs()
+            self.gone.set_result(problem)
 
     def _clear_away(self, problem: Problem) -> None:
         """End what the process has started. Blocks."""
