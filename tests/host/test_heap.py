@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -36,3 +37,36 @@ def test_big_block_is_mapped_though_one_was_freed(how: str, is_mapped: str) -> N
     command = [sys.executable, "-c", MAPPED, how]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     assert done.stdout.strip() == is_mapped
+
+
+DAEMON = """
+import asyncio, gc, os, signal, sys
+from pathlib import Path
+from nondum.host.app import run_host
+from nondum.host.config import load, user_config
+
+class Looker:
+    kind = "looker"
+
+    async def watch(self, emit):
+        frozen = gc.get_freeze_count()
+        gc.collect()
+        print(frozen, len(gc.get_objects()))
+        os.kill(os.getpid(), signal.SIGTERM)
+        await asyncio.Event().wait()
+
+asyncio.run(run_host(load(Path(sys.argv[1]), user_config()), more_drives=[Looker()]))
+"""
+
+
+def test_full_collection_of_a_daemon_passes_over_its_modules(tmp_path: Path) -> None:
+    config = tmp_path / "nondum.toml"
+    config.write_text(
+        f'[host]\nname = "rover"\nstate = "{tmp_path}/state"\n'
+        f'control = "{tmp_path}/control"\n[peers]\nenabled = false\n'
+        "[drives]\nblock_devices = false\n[devices]\nudev = false\n"
+    )
+    command = [sys.executable, "-c", DAEMON, str(config)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    kept, looked_through = map(int, done.stdout.split())
+    assert kept > 4 * looked_through, (kept, looked_through)

@@ -220,6 +220,7 @@ async def _run(
         workers.keep_spare()
         if neighbours is not None:
             await neighbours.start()
+        heap.keep_what_is_loaded()
         await _until(
             stop,
             manager.run(),

@@ -9,6 +9,7 @@ Two megabytes for each few hundred drives were measured.
 from __future__ import annotations
 
 import ctypes
+import gc
 
 BIG_BYTES = 128 * 1024
 """glibc's own, before it changes it."""
@@ -21,3 +22,13 @@ def give_back_what_is_big() -> None:
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:
         mallopt(_M_MMAP_THRESHOLD, BIG_BYTES)
+
+
+def keep_what_is_loaded() -> None:
+    """Have the garbage collector pass over all that is there now: modules, which stay to the end.
+
+    A full collection looks through it on the loop, whenever what has come since is a quarter of it:
+    10 ms for 64,000 objects, measured on a fast machine.
+    """
+    gc.collect()
+    gc.freeze()

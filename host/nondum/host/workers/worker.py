@@ -256,16 +256,20 @@ class Worker:
         await asyncio.to_thread(withdrawn, self.spec.component, name)
 
     async def _reading(self) -> Reading:
-        pids, folder = self._gauge.pids(), self.spec.scratch
         is_flowing = any(isinstance(claim, StreamFlowing) for claim in self.claims)
-        return Reading(
-            at_s=time.monotonic(),
-            usage=self._gauge.usage(),
-            descriptors=self._gauge.descriptors(),
-            wanted_s=self._gauge.wanted_s(),
-            scratch_bytes=await asyncio.to_thread(scratch.used_bytes, folder, pids),
-            is_asked=bool(self._calls) or is_flowing,
-        )
+        is_asked = bool(self._calls) or is_flowing
+
+        def read() -> Reading:
+            return Reading(
+                at_s=time.monotonic(),
+                usage=self._gauge.usage(),
+                descriptors=self._gauge.descriptors(),
+                wanted_s=self._gauge.wanted_s(),
+                scratch_bytes=scratch.used_bytes(self.spec.scratch, self._gauge.pids()),
+                is_asked=is_asked,
+            )
+
+        return await asyncio.to_thread(read)  # hundreds of its threads are as many files to read
 
     def _why_exited(self, status: int) -> Problem:
         holder, said = self._process.service or self._process.cage, tuple(self._tail)
