@@ -310,9 +310,9 @@ last, and so is the daemon.
 
 {table}
 
-Machine: {machine}. A kernel that is not preempted in its own work, as this one, lets others wait
-while it makes hundreds of processes, clears memory, or ends what has much of it; those ways last a
-quarter of a second, so that their 99th percentile is the second or third slowest of some 200 calls.
+Machine: {machine}.
+A way that is ended after some tenths of a second leaves some 200 calls: their 99th percentile is
+one of the two or three slowest.
 
 A worker that hangs is found by its heartbeat, which it sends every 2 s and of which it may miss
 three. What it uses is looked at every 2 s, and as soon as 64 MB of disk have gone. It is started
