@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,7 +17,10 @@ pytestmark = pytest.mark.lab
 
 GROWTH_KB = 40_000
 DESCRIPTORS = 400
-"""256 connections that are no peers yet, and what a host has anyway."""
+"""256 connections that are no peers yet, and what a host has anyway. At a moment there may be more:
+ZeroMQ accepts before anybody can count."""
+SAMPLES = 100
+"""Over five seconds: longer than a connection may take to become a peer's."""
 
 
 @pytest.fixture
@@ -43,8 +47,14 @@ def test_nobody_gets_in(kind: str, reasons: set[str], times: int, hosts: Crew) -
         mule.loses(base)
         base.start()  # whoever belongs there gets in meanwhile
         mule.meets(base)
-        until(lambda: refused(mule, reasons) >= times)
-        assert mule.descriptors() < DESCRIPTORS
+        held: list[int] = []
+
+        def has_seen_enough() -> bool:
+            held.append(mule.descriptors())
+            return len(held) >= SAMPLES and refused(mule, reasons) >= times
+
+        until(has_seen_enough)
+        assert statistics.median(held) < DESCRIPTORS, held
     assert figures.growth_kb < GROWTH_KB
     assert_no_stranger_is_in(mule)
 
