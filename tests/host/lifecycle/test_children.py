@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from nondum.host.lifecycle.children import KEPT, Children
+from nondum.host.lifecycle.children import KEPT, Children, watch_without_threads
 from nondum.sdk.errors import DriveGone, InstallFailed
 
 pytestmark = pytest.mark.anyio
@@ -145,6 +145,25 @@ async def test_work_aside_is_idle_and_ends_with_its_child(tmp_path: Path) -> Non
         assert not pool.pids()
 
 
+@pytest.mark.skipif(os.geteuid() != 0, reason="the way back from idle needs root or RLIMIT_NICE")
+async def test_work_aside_is_not_idle_when_it_is_to_end(tmp_path: Path) -> None:
+    """It would wait for a processor that others have, and be taken for one that hangs in a disk."""
+    with reaped_on_the_loop():
+        async with children() as pool:
+            job = asyncio.create_task(pool.run_aside("verify", staged_fifo(tmp_path)))
+            while not pool.pids():
+                await asyncio.wait([job], timeout=0.01)
+            (pid,) = pool.pids()
+            job.cancel()
+            seen = []
+            with contextlib.suppress(ProcessLookupError):
+                while True:
+                    seen.append(os.sched_getscheduler(pid))
+                    await asyncio.sleep(0)
+            assert seen[-1] == os.SCHED_OTHER
+            await asyncio.wait([job])
+
+
 async def test_slow_start_is_not_the_drive_s(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -178,6 +197,17 @@ async def test_one_spare_stays_when_work_has_ended(tmp_path: Path) -> None:
             await ended.wait()
         assert not pool.kept()
         assert len(pool.pids()) <= 1
+
+
+@contextlib.contextmanager
+def reaped_on_the_loop() -> Iterator[None]:
+    """Children that ended are there until the loop sees to them, as in the daemon."""
+    watch_without_threads()
+    try:
+        yield
+    finally:
+        if sys.version_info < (3, 12):
+            asyncio.set_child_watcher(None)
 
 
 @contextlib.contextmanager

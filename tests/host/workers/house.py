@@ -32,8 +32,8 @@ from nondum.sdk.description import Behaviour, Input, Output, PluginDescription, 
 SDK = Path(__file__).parents[3] / "plugins/sdk"
 LIBRARIES = Path(pluggy.__file__).parents[1]
 HOST = "rover"
-QUICK = Timing(startup_s=5.0, heartbeat_s=0.8, missed=4, halt_s=0.4, term_s=0.3)
-"""Impatient, so that tests of hanging workers are short; the SDK beats every 2 s."""
+QUICK = Timing(startup_s=20.0, heartbeat_s=0.8, missed=4, halt_s=0.4, term_s=0.3)
+"""Impatient once they run, so that tests of hanging workers are short; the SDK beats every 2 s."""
 
 LEVEL = os.environ.get("NONDUM_TEST_LEVEL", choice.AUTO)
 """Level of confinement at which workers are tested; `auto`: the best of this machine."""

@@ -203,6 +203,7 @@ class Children:
     async def _end(self, child: Process) -> None:
         self._busy.discard(child)
         self._left_behind.add(child)  # whoever waits here may be cancelled: then `close` waits
+        _make_ordinary(child.pid)  # or, while others work, it gets no processor to end with
         with contextlib.suppress(ProcessLookupError):
             child.kill()
         try:
@@ -273,6 +274,11 @@ def _make_idle(pid: int) -> None:
     """SCHED_IDLE (sched(7)): below any niceness, and its disk accesses are idle, too."""
     with contextlib.suppress(OSError):  # it died, which is told later, or a sandbox forbids it
         os.sched_setscheduler(pid, os.SCHED_IDLE, os.sched_param(0))
+
+
+def _make_ordinary(pid: int) -> None:
+    with contextlib.suppress(OSError):  # it died, or RLIMIT_NICE leaves no way back
+        os.sched_setscheduler(pid, os.SCHED_OTHER, os.sched_param(0))
 
 
 def _result(answer: Mapping[str, Any]) -> Any:
