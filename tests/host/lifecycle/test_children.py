@@ -202,12 +202,15 @@ async def test_one_spare_stays_when_work_has_ended(tmp_path: Path) -> None:
 @contextlib.contextmanager
 def reaped_on_the_loop() -> Iterator[None]:
     """Children that ended are there until the loop sees to them, as in the daemon."""
+    if sys.version_info >= (3, 12):
+        yield
+        return
+    former = asyncio.get_child_watcher()
     watch_without_threads()
     try:
         yield
     finally:
-        if sys.version_info < (3, 12):
-            asyncio.set_child_watcher(None)
+        asyncio.set_child_watcher(former)
 
 
 @contextlib.contextmanager
