@@ -162,10 +162,12 @@ def test_what_a_peer_makes_up_is_told_and_changes_nothing_else(
                 "fact/lamp/lit": {"predicate": "lit", "arguments": ["mule"], "value": None},
             }
         )
-        goal = host.want("(lit mule)")
-        host.until_goal(goal, "holds")
-        (row,) = host.ask("peers")
-        assert "PEER_ENTRY" in row["problems"][0]
+        host.until(
+            "what cannot be understood is told",
+            lambda _: any("PEER_ENTRY" in told for told in host.ask("peers")[0]["problems"]),
+            timeout_s=READY_S,
+        )
+        host.until_goal(host.want("(lit mule)"), "holds")
 
 
 def test_devices_of_a_peer_are_shown_with_who_has_them(mule: tuple[RunningHost, str]) -> None:
