@@ -71,6 +71,8 @@ def test_other_places_where_the_machine_names_its_disks_are_read() -> None:
 def test_whatever_these_files_say_only_paths_below_dev_are_named(text: str) -> None:
     for read in (own.in_fstab, own.in_crypttab, own.in_swaps, own.in_command_line):
         assert all(named.path.startswith("/dev/") for named in read(text))
+    for what in (text, f"What={text}"):
+        assert all(named.path.startswith("/dev/") for named in own.in_unit(what, "a.mount"))
 
 
 @given(words)

@@ -27,7 +27,13 @@ class Desk:
     @property
     def machine(self) -> Machine:
         root = self.root
-        return Machine(root / "sys", root / "proc", root / "dev", root / "etc")
+        return Machine(
+            root / "sys",
+            root / "proc",
+            root / "dev",
+            root / "etc",
+            (root / "vendor", root / "site"),
+        )
 
     def write(self, path: str, text: str) -> None:
         file = self.root / path
@@ -89,6 +95,32 @@ def test_mounted_by_a_person_is_somebody_s_until_fstab_says_so_too(desk: Desk) -
     assert desk.whose()["sdb1"] == desk.whose()["sdb2"] == Owner.HOST.value
 
 
+@pytest.mark.parametrize(
+    ("file", "text", "why"),
+    [
+        ("srv-data.mount", "[Mount]\nWhat=/dev/sdb1\nWhere=/srv/data\n", "mounts it"),
+        ("srv-data.mount.d/disk.conf", "[Mount]\nWhat = /dev/sdb1\n", "mounts it"),
+        ("dev-sdb1.swap", "[Swap]\nWhat=/dev/sdb1\n", "swaps to it"),
+    ],
+)
+@pytest.mark.parametrize("folder", ["vendor", "site"])
+def test_named_by_a_unit_is_the_machine_s_own_mounted_or_not(
+    desk: Desk, folder: str, file: str, text: str, why: str
+) -> None:
+    desk.write(f"{folder}/{file}", text)
+    unit = file.partition(".d/")[0]
+    assert desk.machine.uses(OURS)["sdb1"].why == f"the machine {why} ({unit})"
+    assert desk.whose() == dict.fromkeys(("sda", "sdb", "sdb1", "sdb2"), "host")
+
+
+def test_units_that_mount_nothing_of_a_disk_or_are_masked_say_nothing(desk: Desk) -> None:
+    desk.write("vendor/tmp.mount", "[Mount]\nWhat=tmpfs\nWhere=/tmp\n")
+    desk.write("vendor/disk.service", "[Mount]\nWhat=/dev/sdb1\n")
+    desk.write("vendor/old.mount", "[Mount]\n#What=/dev/sdb1\nWhere=/dev/sdb1\n")
+    (desk.root / "vendor/gone.mount").symlink_to("/dev/null")
+    assert desk.whose()["sdb1"] == Owner.DRIVE.value
+
+
 def test_mounted_by_this_host_to_be_read_is_still_a_drive(desk: Desk) -> None:
     desk.write("proc/self/mountinfo", f"23 22 8:17 / {OURS}/sdb1-7 ro - vfat /dev/sdb1 ro\n")
     assert desk.whose()["sdb1"] == Owner.DRIVE.value
@@ -102,7 +134,8 @@ def test_decrypted_and_swapped_to_are_the_machine_s_own(desk: Desk) -> None:
 
 
 def test_what_is_not_there_and_what_goes_meanwhile_says_nothing(desk: Desk, tmp_path: Path) -> None:
-    assert Machine(*(tmp_path / "nothing" for _ in range(4))).uses(OURS) == {}
+    nothing = tmp_path / "nothing"
+    assert Machine(nothing, nothing, nothing, nothing, (nothing,)).uses(OURS) == {}
     (desk.root / "sys" / USB / "sdb1/dev").unlink()
     assert [block.name for block in desk.machine.blocks()] == ["sda", "sdb", "sdb2"]
 

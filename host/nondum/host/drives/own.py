@@ -69,6 +69,20 @@ def in_fstab(text: str) -> Iterator[Named]:
         yield from _named(words[0], f"the machine {use} (/etc/fstab)")
 
 
+def in_unit(text: str, unit: str) -> Iterator[Named]:
+    """What a unit that mounts or swaps names, or what is dropped in for one (systemd.mount(5),
+    systemd.swap(5)).
+
+    >>> [named.path for named in in_unit("[Mount]\\nWhat = LABEL=OURS", "srv.mount")]
+    ['/dev/disk/by-label/OURS']
+    """
+    verb = "swaps to" if unit.endswith(".swap") else "mounts"
+    for line in text.splitlines():
+        key, _, spec = line.partition("=")
+        if key.strip() == "What":
+            yield from _named(spec.strip().replace("%%", "%"), f"the machine {verb} it ({unit})")
+
+
 def in_crypttab(text: str) -> Iterator[Named]:
     """What crypttab(5) names."""
     for words in _lines(text):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import stat
 from collections.abc import Iterator
@@ -10,12 +11,30 @@ from pathlib import Path, PurePosixPath
 
 from nondum.host.drives import own
 from nondum.host.drives.mounts import Mount, device_number, mounts
-from nondum.host.drives.own import Block, Use
+from nondum.host.drives.own import Block, Named, Use
+
+UNITS = tuple(
+    map(
+        Path,
+        (
+            "/etc/systemd/system",
+            "/run/systemd/system",
+            "/run/systemd/generator.early",
+            "/run/systemd/generator",
+            "/run/systemd/generator.late",
+            "/usr/local/lib/systemd/system",
+            "/usr/lib/systemd/system",
+        ),
+    )
+)
+"""Where units are (systemd.unit(5)); not transient ones: those mount what somebody asked for."""
+_UNIT = (".mount", ".swap")
 
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """Where a machine tells of its disks: sysfs(5), proc(5), fstab(5), crypttab(5), udev's links.
+    """Where a machine tells of its disks: sysfs(5), proc(5), fstab(5), crypttab(5), udev's links,
+    units of systemd.
 
     What is not there, cannot be read or goes meanwhile says nothing.
     """
@@ -24,6 +43,7 @@ class Machine:
     proc: Path = Path("/proc")
     dev: Path = Path("/dev")
     etc: Path = Path("/etc")
+    units: tuple[Path, ...] = UNITS
 
     def uses(self, ours: Path) -> dict[str, Use]:
         """What block devices are needed for, by their names, but for what is mounted below `ours`;
@@ -72,6 +92,7 @@ class Machine:
             *own.in_crypttab(_text(self.etc / "crypttab")),
             *own.in_swaps(_text(self.proc / "swaps")),
             *own.in_command_line(_text(self.proc / "cmdline")),
+            *(named for folder in self.units for named in _in_units(folder)),
         ):
             yield from self._numbered(named.path, Use(named.why))
 
@@ -91,6 +112,19 @@ class Machine:
             yield found.st_rdev, use
 
 
+def _in_units(folder: Path) -> Iterator[Named]:
+    """What the units of a folder name, and what is dropped in for units, wherever those are."""
+    for name in _names(folder):
+        unit = name.removesuffix(".d")
+        if not unit.endswith(_UNIT):
+            continue
+        if unit == name:
+            yield from own.in_unit(_text(folder / name), unit)
+        else:
+            for part in _names(folder / name):
+                yield from own.in_unit(_text(folder / name / part), unit)
+
+
 def _mounts(proc: Path) -> tuple[Mount, ...]:
     try:
         return mounts(proc / "self/mountinfo")
@@ -100,7 +134,8 @@ def _mounts(proc: Path) -> tuple[Mount, ...]:
 
 def _names(folder: Path) -> tuple[str, ...]:
     try:
-        return tuple(sorted(entry.name for entry in folder.iterdir()))
+        with os.scandir(folder) as entries:
+            return tuple(sorted(entry.name for entry in entries))
     except OSError:
         return ()
 

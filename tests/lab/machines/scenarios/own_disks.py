@@ -1,4 +1,4 @@
-"""USB disks that fstab mounts and swaps to stay untouched, beside a stick that works."""
+"""USB disks that fstab or a unit names stay untouched, beside a stick that works."""
 
 from __future__ import annotations
 
@@ -16,8 +16,16 @@ FSTAB = """
 LABEL=DATA\\040OF\\040OURS /srv/data ext4 nofail 0 2
 LABEL=SPARE none swap nofail 0 0
 """
-OWN = ("data", "blank", "swap")
-"""What of it could be plugged in: two partitions, and a disk without any."""
+UNIT = """
+[Mount]
+What=/dev/disk/by-label/KEPT
+Where=/srv/kept
+"""
+"""Wanted by nobody: it is not mounted."""
+OWN = ("data", "blank", "swap", "kept")
+"""What of it could be plugged in: two partitions, and two disks without any."""
+DISKS = 1
+"""What of it holds partitions."""
 
 
 def run(lab: Lab) -> str:
@@ -28,9 +36,11 @@ def run(lab: Lab) -> str:
     data = images.file_system(folder / "data.img", "ext4", bait, label="DATA OF OURS")
     disk = images.partitioned(folder / "disk.img", "gpt", [data, None])
     swap = images.file_system(folder / "swap.img", "swap", label="SPARE")
-    for image in (disk, swap):
+    kept = images.file_system(folder / "kept.img", "ext4", bait, label="KEPT")
+    for image in (disk, swap, kept):
         machine.machine.plug(image)
     machine.machine.run(f"mkdir -p /srv/data; cat >>/etc/fstab <<'END'{FSTAB}END\nsync")
+    machine.machine.run(f"cat >/etc/systemd/system/srv-kept.mount <<'END'{UNIT}END\nsync")
     machine.machine.reset()
     host = Followed.follow(machine)
     host.wait_until_started()
@@ -65,7 +75,7 @@ def _see_untouched(host: Followed) -> None:
     assert "bait" not in str(view), view["payloads"]
     disks = json.loads(host.machine.run("nondum doctor disks --json"))
     own = [disk for disk in disks if disk["usb"] and disk["whose"] == "host"]
-    assert len(own) == len(OWN) + 1, disks
+    assert len(own) == len(OWN) + DISKS, disks
 
 
 def _see_mounted_one_told(lab: Lab, host: Followed) -> None:

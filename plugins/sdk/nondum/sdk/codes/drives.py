@@ -62,8 +62,8 @@ CODES = (
         "The disk is the machine's own, whatever it hangs on, and is left alone.",
         "nothing is wrong; `nondum doctor disks` tells which disks are whose, and why",
         causes=(
-            "the machine boots from it, mounts it by /etc/fstab, swaps to it, or has made another "
-            "device of it; a stick that has the label of such a disk"
+            "the machine boots from it, mounts it by /etc/fstab or a unit, swaps to it, or has "
+            "made another device of it; a stick that has the label of such a disk"
         ),
     ),
     Code(
