@@ -65,6 +65,37 @@ async def write(ctx, u, s, h):
 '''
 
 
+WATCHER = '''"""Keeps its eye on whatever speaks, without a pause."""
+from nondum.sdk import Bearing, Fragment, Header, Unit, behaviour, hookimpl
+
+DOMAIN = """
+(define (domain watcher)
+  (:predicates (watched ?h - host))
+  (:action watch
+    :parameters (?u - sensor ?m - speaker ?s - text ?h - host)
+    :precondition (and (ready ?u) (output ?m ?s) (flowing ?s))
+    :effect (watched ?h)))
+"""
+
+@hookimpl
+def units():
+    return [Unit("eye", "sensor")]
+
+@hookimpl
+def fragments():
+    return [Fragment("watcher.pddl", DOMAIN)]
+
+@behaviour("watch", action="(watch ?u - sensor ?m - speaker ?s - text ?h - host)", lasting=True)
+async def watch(ctx, u, m, s, h):
+    ahead = Bearing(Header(frame_id=m), (1.0, 0.0, 0.0), 0.1)
+    ctx.transform(ahead, to=h)
+    await ctx.established()
+    while True:
+        ctx.transform(ahead, to=h)
+        await ctx.sleep(0)
+'''
+
+
 def talker(id: str = "talker", **options: Any) -> Part:
     """Speaks on its stream `voice`, lasting; two of them are alternatives."""
     return Part(id, TALKER, **options)
@@ -73,6 +104,11 @@ def talker(id: str = "talker", **options: Any) -> Part:
 def scribe(id: str = "scribe", **options: Any) -> Part:
     """Makes `(written <host>)` true while it reads what is spoken."""
     return Part(id, SCRIBE, **options)
+
+
+def watcher(id: str = "watcher") -> Part:
+    """Makes `(watched <host>)` true as long as it knows where a speaker is mounted."""
+    return Part(id, WATCHER)
 
 
 GAUGE = '''"""Listens to a gauge for as long as it is there."""

@@ -6,7 +6,7 @@ import os
 from dataclasses import replace
 
 import pytest
-from tests.lab.plugins import scribe, talker
+from tests.lab.plugins import scribe, talker, watcher
 from tests.lab.running_host import Row, RunningHost, happened, payload, steps
 from tests.lab.traces import former_payloads
 from tests.payloads import Part, make_wheel
@@ -89,6 +89,34 @@ def test_drive_pulled_in_the_middle_of_a_behaviour(host: RunningHost) -> None:
         ("BehaviourEnded", "talker"),
         ("PayloadCleared", "org.example.talk"),
     )
+
+
+def test_what_looked_from_a_place_that_is_gone_is_halted_and_does_not_fail(
+    host: RunningHost,
+) -> None:
+    host.bring("watch", watcher())
+    mouth = '[[component.unit]]\nname = "mouth"\nxyz = [0, 0, 1]\nrpy = [0, 0, 0]\n'
+    drive = host.drive("talk", talker(manifest=mouth))
+    goal = host.want("(watched spot)")
+    for _ in range(3):
+        before = endings(host, "watcher")
+        host.plug(drive)
+        host.until_goal(goal, "holds")
+        host.pull("talk")
+        host.until_gone("talk")
+        assert until_one_more(host, "watcher", before) == "HALTED"
+
+
+def until_one_more(host: RunningHost, component: str, before: list[str]) -> str:
+    """Wait until another behaviour of a component has ended; how it did."""
+    (outcome,) = host.until("it has ended", lambda _: endings(host, component)[len(before) :])
+    return str(outcome)
+
+
+def endings(host: RunningHost, component: str) -> list[str]:
+    """How the behaviours of a component ended, oldest first."""
+    ends = (row for row in host.journal(component) if row["event"] == "BehaviourEnded")
+    return [row["detail"]["outcome"] for row in ends]
 
 
 def test_same_drive_plugged_again_is_at_work_again(host: RunningHost) -> None:

@@ -74,6 +74,7 @@ class Mind:
         self._emit = emit
         self._halts = Halts()
         self._news = asyncio.Event()
+        self._afterwards: list[Callable[[], None]] = []
         self._viewers = asyncio.Condition()
         self._composing: asyncio.Task[Composition | str] | None = None
         self._told_version: tuple[object, ...] = ()
@@ -122,6 +123,10 @@ class Mind:
     def wake(self) -> None:
         """Ask for a tick."""
         self._news.set()
+
+    def after_tick(self, do: Callable[[], None]) -> None:
+        """Do something once, after the next tick: what cannot go on has been asked to halt then."""
+        self._afterwards.append(do)
 
     # Goals
 
@@ -197,6 +202,9 @@ class Mind:
                 self._news.clear()
                 earliest_s = loop.time() + PAUSE_S
                 self._tick_safely()
+                afterwards, self._afterwards = self._afterwards, []
+                for do in afterwards:
+                    do()
                 if self._may_look_different():
                     async with self._viewers:
                         self._viewers.notify_all()
