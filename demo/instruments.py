@@ -16,6 +16,7 @@ from demo.scenario import Scenario
 
 EMULATORS = Path(__file__).parent / "emulators"
 LOG_DEADLINE_S = 5.0
+SWITCHED_S = 30.0
 _PORTS = (("camera",), ("head", "relay"))
 """Of each emulator, in the order that it names them in."""
 _ADAPTERS = {
@@ -43,6 +44,18 @@ class Instruments:
         """Pull them out again."""
         for name in self.nodes:
             slots.unplug(folder, name)
+
+    def switched(self, *, on: bool) -> float:
+        """Wait until the laser is on, or off, and say when it was so for certain (monotonic clock):
+        relays do not answer, and what a driver has sent may be on its way. Raises `TimeoutError`.
+        """
+        deadline = time.monotonic() + SWITCHED_S
+        while time.monotonic() < deadline:
+            truths = read_log(self.log)
+            if truths and truths[-1].laser is on:
+                return truths[-1].at_s
+            time.sleep(0.02)  # a plain file tells nobody that it has grown
+        raise TimeoutError(f"the laser is not switched {'on' if on else 'off'}")
 
     def score(self, end_s: float) -> Score:
         """Judge the second before `end_s` (monotonic clock), once that time has come."""

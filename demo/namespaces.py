@@ -173,7 +173,8 @@ class Network:
         for namespace in _namespaces():
             owner = _owner(namespace)
             if owner is not None and not Path(f"/proc/{owner}").exists():
-                _remove(namespace)
+                with contextlib.suppress(subprocess.CalledProcessError):  # another removes it, too
+                    _remove(namespace)
         return self
 
     def __exit__(

@@ -198,3 +198,5 @@ async def test_without_that_wall_it_would_not() -> None:
     finally:
         os.kill(outer, signal.SIGKILL)
         os.kill(keeper, signal.SIGKILL)
+        for pid in (outer, keeper):  # their control group is removed next
+            await until_gone(pid)

@@ -4,8 +4,8 @@ The orders are one JSON object: `root`, and optionally
 
 - `kill` ([when, step, event]): SIGKILL itself `BEFORE` or `AFTER` the commit of that transition, of
   a payload or (step is then a component's state) of a component,
-- `nudge` ([[step, what], …]): `pull` the drive, `retry` the payload, report its worker `lost`, … as
-  soon as that step was committed, one after the other,
+- `nudge` ([[step, what], …]): `pull` the drive, `plug` another one, `retry` the payload, report its
+  worker `lost`, … as soon as that step was committed, one after the other,
 - `kill_while` (a drive's state): SIGKILL itself once a drive was committed to be in it,
 - `script`: things to do one after the other, each when all that came before has settled: `plug`
   and `pull` slots, `tried` (something is on trial), `steady` (wait until nothing is), `end`; or
@@ -43,7 +43,7 @@ from nondum.host.workers import Timing, Workers
 from nondum.sdk.errors import Problem
 
 HOST = "spot"
-SLOT = "a"
+SLOT, OTHER = "a", "b"
 COMPONENT = "lamp"
 ROWS = {(step, event.__name__): row for (step, event), row in TRANSITIONS.items()}
 COMPONENT_ROWS = {
@@ -54,7 +54,7 @@ MARK = "NONDUM_FAULTS"
 
 OPTIONS = InstallOptions(allow_unsigned=True, reserve_mb=0)
 """Some of the disks that it lives on are small."""
-QUICK = Timing(startup_s=5.0, settle_beats=1)
+QUICK = Timing(startup_s=30.0, settle_beats=1)
 
 _AT_REST = frozenset({Step.ACTIVE, Step.SUPERSEDED, Step.REFUSED, Step.QUARANTINED})
 
@@ -123,6 +123,9 @@ class DeadlyCatalogue(Catalogue):
         lost = (Problem("WORKER_CRASH_LOOP", "made up by a test"),)
         key = payload or next(iter(self.state.payloads), "")
         match what:
+            case "plug":
+                root = Path(self.orders["root"])
+                (root / "slots" / OTHER).symlink_to(root / "drives" / OTHER)
             case "pull":
                 (Path(self.orders["root"]) / "slots" / SLOT).unlink()
                 self.bus.emit(events.DriveRemoved(SLOT))

@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-PATIENCE_S = 12.0
+PATIENCE_S = 30.0
 POLL_S = 0.02
 
 _AT_REST = ("active", "superseded", "refused", "quarantined")

@@ -40,6 +40,12 @@ def test_payload_stays_until_its_last_drive_goes(tmp_path: Path) -> None:
     with running(tmp_path / "host") as host:
         for drive in drives:
             host.plug(drive)
+        host.until(
+            "it is read from each of them",
+            lambda view: any(
+                len(row["drive"].split(", ")) == len(drives) for row in view["payloads"]
+            ),
+        )
         keys = {host.until_step("same", "active")["key"]}
         for drive in drives[:-1]:
             host.pull(drive.name)

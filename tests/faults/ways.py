@@ -22,7 +22,7 @@ SLOW = """
 @hookimpl
 def start(ctx):
     import time
-    time.sleep(1.0)
+    time.sleep(3.0)
 """
 
 Write = Callable[[Path], None]
@@ -145,7 +145,9 @@ SPECIAL: Mapping[tuple[Step, type[Event]], Way] = {
     (Step.ACTIVE, events.PayloadFailed): Way(
         BOTH, ("plug a", "plug b"), nudge=(("SUPERSEDED", "lost"),)
     ),
-    (Step.STORED, events.PayloadSuperseded): Way({"a": slow, "b": newer}, ("plug a b",)),
+    (Step.STORED, events.PayloadSuperseded): Way(
+        {"a": slow, "b": newer}, nudge=(("STORED", "plug"),)
+    ),
     (Step.ACTIVE, events.PayloadSuperseded): Way(BOTH, ("plug a", "plug b")),
     (Step.SUPERSEDED, events.PayloadResumed): Way(BOTH, ("plug a", "plug b", "pull b")),
     (Step.SUPERSEDED, events.PayloadSentAway): Way(

@@ -53,7 +53,7 @@ def test_a_better_bearing_takes_longer(camera: Camera, worker: Any) -> None:
 
 
 def test_events_of_another_line_are_no_source(camera: Camera, worker: Any) -> None:
-    plugin = started(worker, camera, line_kev=1332.5, timeout_s=3.0)
+    plugin = started(worker, camera, line_kev=1332.5, timeout_s=10.0)
     camera.send(encoded(event) for event in events(SOURCE))
     call = plugin.behave("localise", **LOCALISE).assert_failed("COMPTON_NO_SOURCE")
     assert "0 of them at 1332.5 keV" in call.problem.message

@@ -173,7 +173,7 @@ WAYS = (
 @pytest.fixture
 async def host(tmp_path: Path) -> Any:
     make_payload(tmp_path / "good", Part("good", LAMP), payload_id=GOOD)
-    async with living(tmp_path, timing=Timing(startup_s=2.0)) as host:
+    async with living(tmp_path, timing=Timing(startup_s=5.0)) as host:
         host.plug(tmp_path / "good", "good")
         await host.until_step(GOOD, Step.ACTIVE)
         yield host

@@ -24,7 +24,7 @@ from nondum.sdk.errors import PayloadRefused
 from nondum.wheelhouse.memory import Promised, free_memory_mb
 
 FIRST, SECOND = "org.example.first", "org.example.second"
-QUICK = Timing(startup_s=5.0, settle_beats=0)
+QUICK = Timing(startup_s=20.0, settle_beats=0)
 BY_PAYLOAD = st.dictionaries(st.text("abc", max_size=2), st.integers(0, 10_000))
 
 

@@ -21,9 +21,9 @@ from nondum.sdk.errors import InstallFailed, PayloadRefused
 pytestmark = pytest.mark.anyio
 
 LAMP_ID = "org.example.lamp"
-WATCHED = Timing(startup_s=2.0, settle_beats=1)
+WATCHED = Timing(startup_s=5.0, settle_beats=1)
 """Long enough to see a worker fall, short enough to wait for."""
-QUICK = Timing(startup_s=5.0, settle_beats=0)
+QUICK = Timing(startup_s=20.0, settle_beats=0)
 """Where it does not matter how long a release is watched."""
 
 FALLS = (

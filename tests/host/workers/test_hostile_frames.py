@@ -26,7 +26,7 @@ from nondum.sdk.wire import PROTOCOL_VERSIONS
 pytestmark = pytest.mark.anyio
 
 SDK = Path(__file__).parents[3] / "plugins/sdk"
-QUICK = Timing(startup_s=2.0, heartbeat_s=0.8, missed=4, halt_s=0.4, term_s=0.1)
+QUICK = Timing(startup_s=5.0, heartbeat_s=0.8, missed=4, halt_s=0.4, term_s=0.1)
 PROLOGUE = f"""
 import os, socket, sys, time
 sys.path[:0] = {[str(SDK), *(p for p in sys.path if p.endswith("site-packages"))]!r}
