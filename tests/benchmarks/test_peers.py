@@ -81,7 +81,6 @@ def test_the_page_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 
 @pytest.mark.lab
-@pytest.mark.alone  # a peer that is silent for a second is lost
 @pytest.mark.parametrize("where", [ground, lambda: nullcontext(LOOPBACK)], ids=["best", "loopback"])
 def test_hosts_are_seen_to_come_and_go(where: Where) -> None:
     with where() as here:
