@@ -1,10 +1,10 @@
 """`python -m tests`: all tests in the order that CI runs them; with arguments, pytest with those.
 
-Tests run beside each other, one more than there are processors, since most wait now and then. Whole
-hosts (marker `lab`) come after the rest. Those of them that are judged in real time (`alone`) have
-the processors to themselves: another host beside them would be load that no robot has. What they
-leave of the processors goes, at the lowest priority, to tests that only compute. Each plugin's own
-tests run as its author runs them, in its folder.
+Tests run beside each other, one more than there are processors, since most wait now and then.
+Whole daemons (marker `daemon`) come after the rest. Those of them that are judged in real time
+(`alone`) have the processors to themselves: another host beside them would be load that no robot
+has. What they leave of the processors goes, at the lowest priority, to tests that only compute.
+Each plugin's own tests run as its author runs them, in its folder.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ def main(arguments: list[str]) -> int:
         return subprocess.run(command, cwd=ROOT, check=False).returncode
     ignored = [f"--ignore={place}" for place in COMPUTE]
     statuses = [
-        _run(*_at_once(PROCESSORS + 1), "-m", "not lab", *ignored),
-        _run(*_at_once(PROCESSORS + 1), "-m", "lab and not alone"),
+        _run(*_at_once(PROCESSORS + 1), "-m", "not daemon", *ignored),
+        _run(*_at_once(PROCESSORS + 1), "-m", "daemon and not alone"),
     ]
     with ThreadPoolExecutor(PROCESSORS) as pool:
         computing = pool.submit(_compute)
@@ -75,7 +75,7 @@ def _run(*options: str) -> int:
 
 
 def _compute() -> int:
-    options = [*INSTALLED, *SLOWEST, *_at_once(PROCESSORS), "-m", "not lab", *COMPUTE]
+    options = [*INSTALLED, *SLOWEST, *_at_once(PROCESSORS), "-m", "not daemon", *COMPUTE]
     return _shown_when_over(ROOT, ["nice", "-n", "19", *PYTEST, *options])
 
 

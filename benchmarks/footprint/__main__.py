@@ -12,8 +12,8 @@ from pathlib import Path
 from benchmarks.footprint import probe, report, results
 from benchmarks.footprint.host import PATIENCE_S, await_worker, running
 from benchmarks.recompose.processes import await_rest
-from tests.lab.plugins import talker
-from tests.payloads import make_payload
+from tests.daemon.plugins import talker
+from tests.kit.payloads import make_payload
 
 STARTS = 3
 SETTLED_S = 60.0

@@ -16,8 +16,8 @@ from pathlib import Path
 import pytest
 from benchmarks.footprint import probe, report, results
 from benchmarks.footprint.host import await_worker, running
-from tests.lab.plugins import talker
-from tests.payloads import make_payload
+from tests.daemon.plugins import talker
+from tests.kit.payloads import make_payload
 
 MB = 1_000_000
 DAEMON_MB, WORKER_MB = 60, 20
@@ -66,7 +66,7 @@ def test_daemon_imports_few_modules(modules: set[str]) -> None:
     assert len(modules) <= MODULES
 
 
-@pytest.mark.lab
+@pytest.mark.daemon
 def test_host_keeps_to_its_memory(folder: Path) -> None:
     with running(folder) as (pid, _):
         assert probe.memory(pid)["daemon"][0] * 1024 <= DAEMON_MB * MB

@@ -80,7 +80,7 @@ def test_the_page_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         assert row_of(text, way).count("|") == 7
 
 
-@pytest.mark.lab
+@pytest.mark.daemon
 @pytest.mark.parametrize("where", [ground, lambda: nullcontext(LOOPBACK)], ids=["best", "loopback"])
 def test_hosts_are_seen_to_come_and_go(where: Where) -> None:
     with where() as here:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tests.host.workers.house import House
+from tests.kit.house import House
 
 from nondum.host.cgroups import Cages
 from nondum.host.events import WorkerLogged

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.host.workers.house import HOST, LIBRARIES, SDK, House, until_gone
+from tests.kit.house import HOST, LIBRARIES, SDK, House, until_gone
 
 from nondum.host.confinement import bubblewrap
 from nondum.host.events import WorkerLogged

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from demo.namespaces import ROOT, Cable, Machine, Network
 
-pytestmark = pytest.mark.lab
+pytestmark = pytest.mark.daemon
 
 LISTEN = """
 import socket

@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 LIMIT_S = 600
 STAGES = ["I", "pulled", "put back", "offered", "killed", "II", "III"]
 
-pytestmark = [pytest.mark.lab, pytest.mark.alone, pytest.mark.timeout(LIMIT_S)]
+pytestmark = [pytest.mark.daemon, pytest.mark.alone, pytest.mark.timeout(LIMIT_S)]
 
 
 def demonstrate(*options: str) -> subprocess.CompletedProcess[str]:

@@ -15,7 +15,7 @@ LIMIT_S = 400
 STAGES = ["panther", "scout", "steered", "node lost"]
 IN_ORDER = ("found", "payloads in", "understood", "in plan", "alert")
 
-pytestmark = [pytest.mark.lab, pytest.mark.timeout(LIMIT_S)]
+pytestmark = [pytest.mark.daemon, pytest.mark.timeout(LIMIT_S)]
 
 
 def search(*options: str) -> subprocess.CompletedProcess[str]:

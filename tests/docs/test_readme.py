@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 PATIENCE_S = 60.0
 """For a host to get where the page says it is."""
 
-pytestmark = [pytest.mark.lab, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.daemon, pytest.mark.timeout(300)]
 
 
 def session() -> Iterator[tuple[str, str]]:

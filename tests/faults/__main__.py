@@ -23,8 +23,8 @@ from functools import partial
 from pathlib import Path
 
 from tests.faults import points, power, table
-from tests.faults.nursery import Nursery
 from tests.faults.points import Point, Result, clean
+from tests.kit.fork_server import Nursery
 
 FOLDER = Path("build/faults")
 """What was done so far; and what the points are made from, so that they stay what they are."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from tests.faults.nursery import Nursery
+from tests.kit.fork_server import Nursery
 
 
 @pytest.fixture(scope="session")

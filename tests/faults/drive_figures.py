@@ -26,7 +26,7 @@ from tests.faults.footprint import slope
 from tests.faults.hostile import FAMILIES, Bench, HostileDrive
 from tests.faults.hostile.gauntlet import gauntlet
 from tests.faults.yanks import PHASES, bench, yank_all
-from tests.lab.running_host import running
+from tests.kit.running_host import running
 
 from nondum.host.lifecycle.children import QUIET_S
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.faults.daemon import HOST, OPTIONS, QUICK
-from tests.host.lifecycle.living import Living, left_over, living
+from tests.kit.living import Living, left_over, living
 
 from nondum.host import events
 from nondum.host.catalogue.catalogue import Catalogue, now

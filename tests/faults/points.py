@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from tests.faults.model import Ended, check
-from tests.faults.nursery import Nursery
 from tests.faults.play import Player, codes_of, has_stopped, trace
 from tests.faults.ways import COMPONENT_WAYS, newer, sound, way
+from tests.kit.fork_server import Nursery
 
 from nondum.host.catalogue.records import Step
 from nondum.host.transitions import COMPONENT_TRANSITIONS, TRANSITIONS

@@ -16,11 +16,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tests.faults.model import Ended, Told, check
-from tests.faults.nursery import Nursery
 from tests.faults.play import Player
 from tests.faults.points import prepare
 from tests.faults.recorded_disk import Write, cut, recorded, writes
 from tests.faults.ways import newer, sound
+from tests.kit.fork_server import Nursery
 
 SIZE_MB = 48
 SCRIPT = ("plug a", "plug b", "pull b", "pull a")

@@ -8,8 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.faults.nursery import Nursery
 from tests.faults.points import Point
+from tests.kit.fork_server import Nursery
 
 pytestmark = pytest.mark.slow
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, running
-from tests.payloads import Part
+from tests.kit.payloads import Part
 
-pytestmark = pytest.mark.lab
+pytestmark = pytest.mark.daemon
 
 LIBRARIES = ("libfaketimeMT.so.1", "libfaketime.so.1")
 JUMPS = ("-10y", "+10y")

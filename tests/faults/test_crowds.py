@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 from tests.faults.crowds import SOUND, make, plug_all
-from tests.lab.running_host import RunningHost, running
-from tests.payloads import Part, make_payload
+from tests.kit.payloads import Part, make_payload
+from tests.kit.running_host import RunningHost, running
 
 from nondum.host.lifecycle.installation import AT_ONCE
 
-pytestmark = pytest.mark.lab
+pytestmark = pytest.mark.daemon
 
 DRIVES = 16
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 from tests.faults.ways import LAMP_ID, newer, sound
-from tests.host.lifecycle.living import LAMP, left_over, living
-from tests.payloads import Part, make_payload, make_wheel
+from tests.kit.living import LAMP, left_over, living
+from tests.kit.payloads import Part, make_payload, make_wheel
 
 from nondum.host import events
 from nondum.host.catalogue.records import Step

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, killed, running
-from tests.payloads import Part
+from tests.kit.payloads import Part
 
 LIT = "(lit self)"
 ADVICE = {"payload": BEACON_ID, "plan": ["test-beacon.shine"]}

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, killed, running
-from tests.payloads import Part
+from tests.kit.payloads import Part
 
 
 def goals(view: dict[str, Any]) -> dict[str, tuple[str, str]]:

@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from tests.faults.hostile import DRIVES, FAMILIES, HostileDrive
 from tests.faults.hostile.gauntlet import Gauntlet, gauntlet
-from tests.loops import can_be_made
+from tests.kit.loop_devices import can_be_made
 
 from nondum.host.lifecycle.children import KEPT
 
-pytestmark = [pytest.mark.lab, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.daemon, pytest.mark.timeout(300)]
 
 AT_ONCE = 16
 MOST_GROWTH_MB = 20.0

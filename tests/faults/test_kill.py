@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 from tests.faults.model import Ended, check
-from tests.faults.nursery import Nursery
 from tests.faults.ways import COMPONENT_WAYS, LAMP_ID, Way, sound, way
-from tests.host.lifecycle.living import living
+from tests.kit.fork_server import Nursery
+from tests.kit.living import living
 
 from nondum.host import events
 from nondum.host.catalogue.records import ComponentState, Step

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 from tests.faults.fuse import Answer, FuseDrive, served
-from tests.host.lifecycle.living import LAMP, Living, left_over, living
-from tests.payloads import Part, make_payload, make_wheel
+from tests.kit.living import LAMP, Living, left_over, living
+from tests.kit.payloads import Part, make_payload, make_wheel
 
 from nondum.host.catalogue.records import PayloadRecord, Step
 from nondum.host.lifecycle import installation

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 from tests.faults import power
-from tests.faults.nursery import Nursery
 from tests.faults.points import out_of_place
 from tests.faults.power import Life, cuts, fail
 from tests.faults.recorded_disk import cut, recorded, writes
+from tests.kit.fork_server import Nursery
 
 pytestmark = pytest.mark.slow
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from tests.faults.model import processes_of
 from tests.faults.ways import LAMP_ID, sound
-from tests.host.lifecycle.living import LAMP, Living, left_over, living
-from tests.payloads import Part, make_payload
+from tests.kit.living import LAMP, Living, left_over, living
+from tests.kit.payloads import Part, make_payload
 
 from nondum.host import events
 from nondum.host.catalogue.records import Step

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 from tests.faults.model import check
-from tests.faults.nursery import Nursery
 from tests.faults.play import Player, codes_of
 from tests.faults.points import prepare
 from tests.faults.ways import Way, sound
+from tests.kit.fork_server import Nursery
 
 pytestmark = pytest.mark.slow
 

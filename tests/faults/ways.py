@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tests.host.lifecycle.living import LAMP
-from tests.payloads import Part, make_payload, seal, sha256
+from tests.kit.living import LAMP
+from tests.kit.payloads import Part, make_payload, seal, sha256
 
 from nondum.host import events
 from nondum.host.catalogue.records import ComponentState, Step

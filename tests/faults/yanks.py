@@ -16,9 +16,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tests.host.drives.test_blocks import make_ext4, on
-from tests.host.lifecycle.living import LAMP, Living, living
-from tests.loops import attach, cut_off, detach
-from tests.payloads import Part, make_payload, make_wheel
+from tests.kit.living import LAMP, Living, living
+from tests.kit.loop_devices import attach, cut_off, detach
+from tests.kit.payloads import Part, make_payload, make_wheel
 
 from nondum.host.catalogue.records import Step
 from nondum.host.drives.blocks import BlockSource

@@ -16,7 +16,7 @@ from typing import Any
 
 from packaging.tags import sys_tags
 from tests.fuzz.target import LONGEST, Target
-from tests.payloads import lock_text, make_wheel
+from tests.kit.payloads import lock_text, make_wheel
 from tests.wheelhouse.hostile import WHEELS
 from tests.wheelhouse.hostile_wheels import NAME, WheelBuilder
 

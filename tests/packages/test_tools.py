@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.lab.plugins import talker
+from tests.daemon.plugins import talker
+from tests.kit.payloads import make_payload
 from tests.packages.conftest import ROOT
-from tests.payloads import make_payload
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 DISTRIBUTIONS = ("plugins/sdk", "plugins/planner-pyperplan", ".")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from tests.payloads import installed_wheel, make_wheel, sdk_wheel
+from tests.kit.payloads import installed_wheel, make_wheel, sdk_wheel
 from tests.wheelhouse.hostile_wheels import WheelBuilder
 from tests.wheelhouse.sources import PLUGIN, make_source
 from tests.wheelhouse.test_lock import host

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.payloads import installed_wheel
+from tests.kit.payloads import installed_wheel
 from tests.wheelhouse.hostile.machines import ARM, ARM_32, MODULE, X86, X86_32, elf, native
 
 from nondum.sdk.errors import Problem

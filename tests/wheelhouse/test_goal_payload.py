@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.payloads import seal
-from tests.signing import Key, sign_payload, trust_of
+from tests.kit.payloads import seal
+from tests.kit.signing import Key, sign_payload, trust_of
 
 from nondum.sdk.errors import PayloadRefused
 from nondum.wheelhouse import drive, goal_payload, goals, preflight

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.payloads import Part, make_payload, make_wheel, seal
+from tests.kit.payloads import Part, make_payload, make_wheel, seal
 from tests.wheelhouse.hostile_wheels import WheelBuilder
 
 from nondum.sdk.errors import PayloadRefused, Problem

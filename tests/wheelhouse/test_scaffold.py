@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from tests.payloads import SDK
+from tests.kit.payloads import SDK
 
 from nondum.sdk.errors import ConfigRefused
 from nondum.wheelhouse import build, manifest, preflight

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from tests.payloads import make_wheel, sha256
+from tests.kit.payloads import make_wheel, sha256
 from tests.wheelhouse.hostile_wheels import INFO, METADATA, WHEEL, Lie, WheelBuilder, record_of
 from tests.wheelhouse.test_drive import file_system, needs_mount
 

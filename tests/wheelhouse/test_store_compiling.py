@@ -10,7 +10,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from tests.payloads import make_wheel, sha256
+from tests.kit.payloads import make_wheel, sha256
 from tests.wheelhouse.test_drive import file_system, needs_mount
 
 from nondum.sdk.errors import InstallFailed

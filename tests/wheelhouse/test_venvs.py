@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from tests.payloads import installed_wheel, make_wheel, sha256
+from tests.kit.payloads import installed_wheel, make_wheel, sha256
 from tests.wheelhouse.test_drive import file_system, needs_mount
 
 from nondum.sdk.errors import InstallFailed

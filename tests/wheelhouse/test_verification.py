@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.payloads import Part, make_payload, make_wheel, seal
-from tests.signing import Key, sign_payload, trust_of
+from tests.kit.payloads import Part, make_payload, make_wheel, seal
+from tests.kit.signing import Key, sign_payload, trust_of
 from tests.wheelhouse.hostile import WHEELS, HostileWheel
 from tests.wheelhouse.hostile_wheels import WheelBuilder
 

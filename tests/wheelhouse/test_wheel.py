@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.payloads import installed_wheel, make_wheel, sdk_wheel
+from tests.kit.payloads import installed_wheel, make_wheel, sdk_wheel
 from tests.wheelhouse.hostile import WHEELS, HostileWheel
 from tests.wheelhouse.hostile_wheels import (
     INFO,

@@ -11,7 +11,7 @@ from tests.faults.hostile.case import NO_PAYLOAD, Bench, HostileDrive
 from tests.faults.hostile.folders import bare, sound_beside
 from tests.faults.hostile.objects import bound_socket
 from tests.faults.hostile.signing import MAKER, MALFORMED, PURPOSE, ROOT, STRANGER, TOO_LARGE, trust
-from tests.signing import Key
+from tests.kit.signing import Key
 
 from nondum.wheelhouse.trust import sshsig
 

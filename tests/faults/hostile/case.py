@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.faults.hostile.draft import Draft, Sign, draft, plain, unsigned
-from tests.payloads import make_payload
+from tests.kit.payloads import make_payload
 
 from nondum.wheelhouse import contents
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from tests.payloads import Part, lock_text, make_wheel, manifest_text
+from tests.kit.payloads import Part, lock_text, make_wheel, manifest_text
 
 from nondum.sdk.description import PluginDescription
 from nondum.wheelhouse import contents

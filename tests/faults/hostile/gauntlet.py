@@ -11,15 +11,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tests.daemon.plugins import scribe, talker
 from tests.faults.footprint import Footprint
 from tests.faults.hostile.case import Bench, HostileDrive
 from tests.faults.hostile.signing import MAKER, sign, trust
-from tests.lab.plugins import scribe, talker
-from tests.lab.running_host import Row, RunningHost
-from tests.lab.traces import Traces
-from tests.loops import attach, detach
-from tests.payloads import Part
-from tests.signing import sign_payload
+from tests.kit.loop_devices import attach, detach
+from tests.kit.payloads import Part
+from tests.kit.running_host import Row, RunningHost
+from tests.kit.signing import sign_payload
+from tests.kit.traces import Traces
 
 HEALTHY = ("talker", "scribe")
 GOAL = "(written spot)"
@@ -256,7 +256,7 @@ def gauntlet(root: Path) -> Iterator[Gauntlet]:
         folder.mkdir(parents=True)
     home, temporary, config = elsewhere
     surroundings = (f"HOME={home}", f"TMPDIR={temporary}", f"XDG_CONFIG_HOME={config}")
-    daemon = (sys.executable, "-m", "tests.lab.loop_daemon", str(work))
+    daemon = (sys.executable, "-m", "tests.daemon.loop_daemon", str(work))
     program = ("env", *surroundings, *daemon)
     anchor = root / "trust.toml"
     anchor.write_text(trust())

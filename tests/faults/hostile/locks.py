@@ -8,7 +8,7 @@ from dataclasses import replace
 from tests.faults.hostile.case import LOCK, HostileDrive, edited, spoilt
 from tests.faults.hostile.changes import wheel_of
 from tests.faults.hostile.draft import Draft, plain, sha256
-from tests.payloads import make_wheel
+from tests.kit.payloads import make_wheel
 
 NOT_WHEEL, PATH, INVALID, HASHES = "LOCK_NOT_WHEEL", "LOCK_PATH", "LOCK_INVALID", "LOCK_HASH"
 TOML = "LOCK_TOML"

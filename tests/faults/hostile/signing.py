@@ -10,7 +10,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 from tests.faults.hostile.case import Bench, HostileDrive
-from tests.signing import Key, armour, blob, trust_of
+from tests.kit.signing import Key, armour, blob, trust_of
 
 from nondum.wheelhouse.trust import sshsig, trust_text
 from nondum.wheelhouse.trust.trust import Revocation

@@ -12,7 +12,7 @@ from tests.host.bridge.test_bridge import sent
 
 from nondum.sdk.messages import Header, Text
 
-pytestmark = [pytest.mark.anyio, pytest.mark.lab]
+pytestmark = [pytest.mark.anyio, pytest.mark.daemon]
 
 AHEAD_S = 1000
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 from tests.host.bridge.hosts import HERE, PATIENCE_S
-from tests.host.workers.house import House, is_alive, until_gone
 from tests.host.workers.test_streams import CAMERA, STREAM, WATCH, WATCHER, sees
+from tests.kit.house import House, is_alive, until_gone
 
 from nondum.host.bridge.bridge import Bridge
 from nondum.host.bridge.remote_streams import RemoteStreams

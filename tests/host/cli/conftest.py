@@ -10,7 +10,7 @@ from typing import Protocol
 
 import pytest
 from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, running
-from tests.payloads import Part
+from tests.kit.payloads import Part
 
 
 @pytest.fixture(scope="module")

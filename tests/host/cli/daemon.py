@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tests.payloads import Part, make_payload
+from tests.kit.payloads import Part, make_payload
 
 from nondum.host.control.client import ControlClient
 

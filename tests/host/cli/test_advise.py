@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.daemon.plugins import gauge, scribe, talker
 from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, nondum
-from tests.lab.plugins import gauge, scribe, talker
-from tests.payloads import Part, make_payload
+from tests.kit.payloads import Part, make_payload
 
 from nondum.host.cli.mind import GLANCES
 from nondum.wheelhouse.lock import file_name

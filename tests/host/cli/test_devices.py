@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 from demo import slots
+from tests.daemon.plugins import gauge
 from tests.host.cli.daemon import Daemon, nondum, running
-from tests.lab.plugins import gauge
-from tests.payloads import make_payload
+from tests.kit.payloads import make_payload
 
 GAUGE = "org.example.gauge"
 SERVING = {"ID_MODEL": "Gauge", "ID_VENDOR_ID": "0403", "ID_MODEL_ID": "6001"}

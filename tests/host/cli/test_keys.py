@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 from tests.host.cli.daemon import BEACON, BEACON_ID, nondum, running
-from tests.payloads import Part, make_payload
-from tests.signing import MADE, Key
+from tests.kit.payloads import Part, make_payload
+from tests.kit.signing import MADE, Key
 
 from nondum.wheelhouse.trust import editing, owners_folder, trust_file
 from nondum.wheelhouse.trust.succession import successor
@@ -130,7 +130,7 @@ def test_payloads_are_signed_by_many(owner: Path) -> None:
     nondum("payload", "sign", drive, "--key", owner / "trust.toml").refused(1, "SSH_KEYGEN")
 
 
-@pytest.mark.lab
+@pytest.mark.daemon
 def test_a_host_is_given_its_trust_and_keeps_to_it(owner: Path) -> None:
     trust, alice = owner / "trust.toml", owner / "alice"
     drive = owner / "drive"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from tests.host.cli.daemon import nondum
-from tests.payloads import Part, make_payload
+from tests.kit.payloads import Part, make_payload
 
 LAMP = "from nondum.sdk import hookimpl\n"
 PROGRAM = '#!/bin/sh\nprintf "%s\\n" "$@"\n'
@@ -22,7 +22,7 @@ def drive(tmp_path: Path) -> Path:
 def checkout(tmp_path: Path) -> Path:
     """Where nondum's sources would be; its program says what it was asked for."""
     folder = tmp_path / "sources"
-    (folder / "tests/lab/machines").mkdir(parents=True)
+    (folder / "tests/lab").mkdir(parents=True)
     (folder / "run").write_text(PROGRAM, encoding="utf-8")
     (folder / "run").chmod(0o755)
     return folder

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from tests.host.cli.daemon import BEACON, BEACON_ID, BRIGHTNESS, LAMP, Daemon
-from tests.payloads import Part, make_payload
+from tests.kit.payloads import Part, make_payload
 
 from nondum.sdk.description import PluginDescription
 

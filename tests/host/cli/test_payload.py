@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 from tests.host.cli.daemon import BEACON, BEACON_ID, in_terminal, nondum
-from tests.payloads import Part, make_payload
-from tests.signing import Key
+from tests.kit.payloads import Part, make_payload
+from tests.kit.signing import Key
 
 INSPECTED = """\
 org.example.beacon 1.0 (release 1): Made by a test  SIZE

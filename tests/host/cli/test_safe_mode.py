@@ -16,7 +16,7 @@ from tests.host.cli.daemon import (
     quiet_environment,
     running,
 )
-from tests.payloads import Part
+from tests.kit.payloads import Part
 
 from nondum.host.lifecycle.safe_mode import DEATHS
 

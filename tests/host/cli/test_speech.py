@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.host.cli.daemon import BEACON, running
-from tests.payloads import Part
+from tests.kit.payloads import Part
 
 ECHO = """
 '''Hears what it has been told, and answers.'''

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, at_terminal, running
-from tests.payloads import Part
+from tests.kit.payloads import Part
 
 INTERPRETER = """
 '''Understands what it is told to.'''

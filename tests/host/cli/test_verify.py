@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from tests.host.cli.daemon import nondum, running
-from tests.payloads import Part, make_payload, make_wheel, seal
+from tests.kit.payloads import Part, make_payload, make_wheel, seal
 
 ID = "org.example.test"
 PLAIN = Part("blinker", "X = 1\n", with_sdk=False)

@@ -16,10 +16,11 @@ from pathlib import Path
 import pytest
 import pyudev
 from tests.host.drives.test_usb import stick
-from tests.host.lifecycle.living import LAMP, Living, left_over, living
-from tests.lab.traces import until_unmounted
-from tests.loops import attached, can_be_made, detach
-from tests.payloads import Part, make_payload, make_wheel
+from tests.kit import loop_devices
+from tests.kit.living import LAMP, Living, left_over, living
+from tests.kit.loop_devices import attached, can_be_made, detach
+from tests.kit.payloads import Part, make_payload, make_wheel
+from tests.kit.traces import until_unmounted
 
 from nondum.host import events
 from nondum.host.catalogue.records import DriveState, Step
@@ -29,7 +30,6 @@ from nondum.host.drives.mounts import mounted_below
 from nondum.host.drives.source import DriveSource
 from nondum.host.lifecycle.folders import Folders
 from nondum.sdk.errors import DriveGone, PayloadRefused
-from tests import loops
 
 LAMP_ID = "org.example.lamp"
 
@@ -65,7 +65,7 @@ def make_ext4(content: Path, file: Path, size_mb: int = 24) -> None:
 
 def cut_off(file: Path) -> None:
     """Most of an image is gone."""
-    loops.cut_off(file, 6 * 1024**2)
+    loop_devices.cut_off(file, 6 * 1024**2)
 
 
 def on(tmp_path: Path) -> Accepts:

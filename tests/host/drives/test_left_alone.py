@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from tests.host.drives.test_blocks import attribute, image, on
 from tests.host.drives.test_usb import stick
-from tests.host.lifecycle.living import LAMP
-from tests.loops import attached, can_be_made
-from tests.payloads import Part
+from tests.kit.living import LAMP
+from tests.kit.loop_devices import attached, can_be_made
+from tests.kit.payloads import Part
 
 from nondum.host.drives import mounting
 from nondum.host.drives.blocks import BlockSource

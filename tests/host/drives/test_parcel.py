@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.payloads import Part, make_payload, seal
+from tests.kit.payloads import Part, make_payload, seal
 
 from nondum.host.drives import parcel
 from nondum.sdk.errors import NondumError

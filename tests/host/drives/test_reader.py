@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from tests.host.drives.test_parcel import PAYLOAD, code, lamp, told
-from tests.payloads import seal
-from tests.signing import Key, sign_payload, trust_of
+from tests.kit.payloads import seal
+from tests.kit.signing import Key, sign_payload, trust_of
 from tests.wheelhouse.hostile_wheels import WheelBuilder
 
 from nondum.host.drives import reader

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 from tests.host.drives.test_blocks import image, on
-from tests.host.lifecycle.living import LAMP, Living, left_over, living
-from tests.loops import attached, can_be_made
-from tests.payloads import Part, make_payload
+from tests.kit.living import LAMP, Living, left_over, living
+from tests.kit.loop_devices import attached, can_be_made
+from tests.kit.payloads import Part, make_payload
 
 from nondum.host.catalogue.records import Step
 from nondum.host.drives import steady

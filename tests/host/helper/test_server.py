@@ -21,7 +21,7 @@ from typing import Any, TypeVar
 
 import pytest
 from tests.host.drives.test_blocks import make_ext4
-from tests.loops import attached
+from tests.kit.loop_devices import attached
 
 from nondum.host.cgroups import CageLimits, Cages
 from nondum.host.drives import nodes

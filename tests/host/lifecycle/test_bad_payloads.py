@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.host.lifecycle.living import LAMP, Living, left_over, living
-from tests.payloads import Part, make_payload, make_wheel, manifest_text, seal
+from tests.kit.living import LAMP, Living, left_over, living
+from tests.kit.payloads import Part, make_payload, make_wheel, manifest_text, seal
 
 from nondum.host.catalogue.records import ComponentState, Step
 from nondum.host.workers import Timing

@@ -9,8 +9,8 @@ import time
 from pathlib import Path
 
 import pytest
-from tests.host.lifecycle.living import HOST, LAMP, Living, left_over, living
-from tests.payloads import Part, make_payload
+from tests.kit.living import HOST, LAMP, Living, left_over, living
+from tests.kit.payloads import Part, make_payload
 
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import ComponentState, Step

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.host.lifecycle.living import LAMP, Living, living
-from tests.payloads import Part, make_payload
+from tests.kit.living import LAMP, Living, living
+from tests.kit.payloads import Part, make_payload
 
 from nondum.host import events
 from nondum.host.catalogue.records import Step

@@ -7,8 +7,8 @@ import os
 from pathlib import Path
 
 import pytest
-from tests.host.lifecycle.living import LAMP, Living, left_over, living
-from tests.payloads import Part, make_payload
+from tests.kit.living import LAMP, Living, left_over, living
+from tests.kit.payloads import Part, make_payload
 
 from nondum.host import events
 from nondum.host.catalogue.records import PayloadRecord, Step

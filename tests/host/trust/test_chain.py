@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from tests.host.drives.test_parcel import lamp, told
-from tests.signing import Key, sign_payload, signed, trust_of
+from tests.kit.signing import Key, sign_payload, signed, trust_of
 
 from nondum.host.trust import chain
 from nondum.sdk.errors import PayloadRefused

@@ -22,7 +22,7 @@ from tests.host.trust.trusted import (
     until_read,
     with_trust,
 )
-from tests.signing import Key, sign_payload, signed
+from tests.kit.signing import Key, sign_payload, signed
 
 from nondum.host.catalogue.records import Step
 from nondum.host.events import PayloadFound, TrustChanged, TrustFileRefused

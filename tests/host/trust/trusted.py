@@ -6,9 +6,9 @@ import contextlib
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-from tests.host.lifecycle.living import LAMP, Living, living
-from tests.payloads import Part, make_payload, seal
-from tests.signing import Key, sign_payload, signed, trust_of
+from tests.kit.living import LAMP, Living, living
+from tests.kit.payloads import Part, make_payload, seal
+from tests.kit.signing import Key, sign_payload, signed, trust_of
 
 from nondum.host.events import DriveRead
 from nondum.host.lifecycle.installation import InstallOptions

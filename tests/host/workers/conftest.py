@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
-from tests.host.workers.house import House, is_alive
+from tests.kit.house import House, is_alive
 
 
 @pytest.fixture

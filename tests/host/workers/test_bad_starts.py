@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.host.workers.house import House, is_alive
+from tests.kit.house import House, is_alive
 
 from nondum.host.events import WorkerLogged, WorkerReady
 from nondum.host.workers import WorkerSpec

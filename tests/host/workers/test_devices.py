@@ -6,7 +6,7 @@ import os
 import signal
 
 import pytest
-from tests.host.workers.house import HOST, House
+from tests.kit.house import HOST, House
 
 from nondum.host.confinement import Level
 from nondum.host.events import FactKnown, WorkerReady

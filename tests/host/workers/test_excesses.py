@@ -9,7 +9,7 @@ from pathlib import Path
 
 import anyio
 import pytest
-from tests.host.workers.house import HOST, QUICK, House, is_alive
+from tests.kit.house import HOST, QUICK, House, is_alive
 
 from nondum.host.cgroups import Cages
 from nondum.host.events import WorkerExited, WorkerLogged, WorkerReady, WorkerStrained

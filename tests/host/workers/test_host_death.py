@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from tests.host.workers.house import House, is_alive, until_gone
+from tests.kit.house import House, is_alive, until_gone
 
 from nondum.host.workers import end_leftovers
 from nondum.host.workers.launcher import owner_mark
@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[3]
 DAEMON = """
 import asyncio, sys
 from pathlib import Path
-from tests.host.workers.house import House
+from tests.kit.house import House
 
 async def main():
     house = House(Path(sys.argv[1]))

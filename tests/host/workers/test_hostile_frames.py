@@ -13,7 +13,7 @@ from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
 
 import pytest
-from tests.host.workers.house import HOST, House
+from tests.kit.house import HOST, House
 
 from nondum.host.events import WorkerReady
 from nondum.host.workers import Timing, Workers, WorkerSpec

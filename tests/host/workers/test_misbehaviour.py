@@ -8,7 +8,7 @@ import signal
 import time
 
 import pytest
-from tests.host.workers.house import HOST, House, is_alive, until_gone
+from tests.kit.house import HOST, House, is_alive, until_gone
 
 from nondum.host.events import (
     BehaviourEstablished,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from tests.host.workers.house import House
+from tests.kit.house import House
 
 from nondum.sdk.description import Unit
 

@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.host.workers.house import HOST, QUICK, House
 from tests.host.workers.test_excesses import DO, FORK, PLUGIN
+from tests.kit.house import HOST, QUICK, House
 
 from nondum.host.cgroups import CageLimits
 from nondum.host.cgroups.cages import Cage, owner, tree

@@ -6,7 +6,7 @@ import asyncio
 from dataclasses import replace
 
 import pytest
-from tests.host.workers.house import HOST, House, is_alive
+from tests.kit.house import HOST, House, is_alive
 
 from nondum.host.events import FactKnown, TrialFailed, WorkerExited, WorkerReady
 from nondum.host.workers import WorkerSpec

@@ -14,7 +14,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from tests.host.workers.house import SDK, House, is_alive, until_gone
+from tests.kit.house import SDK, House, is_alive, until_gone
 
 from nondum.host.inside.bootstrap import PRELOADED
 from nondum.host.workers import base_interpreter

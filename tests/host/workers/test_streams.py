@@ -8,7 +8,7 @@ import signal
 from collections.abc import Callable
 
 import pytest
-from tests.host.workers.house import HOST, House
+from tests.kit.house import HOST, House
 
 from nondum.host.events import BehaviourEstablished, FactKnown, StreamFlowing, WorkerReady
 from nondum.host.workers import Call

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from tests.host.workers.house import HOST, House, is_alive
+from tests.kit.house import HOST, House, is_alive
 
 from nondum.host.events import (
     BehaviourEnded,

@@ -85,7 +85,7 @@ class TestPorts:
         assert (found.result, "rover" in found.detail) == (Result.OK, True)
 
 
-@pytest.mark.lab
+@pytest.mark.daemon
 class TestMachines:
     @pytest.fixture
     def network(self) -> Iterator[Network]:

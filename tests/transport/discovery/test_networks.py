@@ -8,7 +8,7 @@ import pytest
 from demo.namespaces import Network
 from tests.transport.discovery.hosts import Host
 
-pytestmark = pytest.mark.lab
+pytestmark = pytest.mark.daemon
 
 
 @pytest.fixture

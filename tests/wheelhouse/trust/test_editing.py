@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.signing import MADE, Key, trust_of
+from tests.kit.signing import MADE, Key, trust_of
 
 from nondum.sdk.errors import TrustRefused
 from nondum.wheelhouse.trust import editing, owners_folder, sshsig, trust_file

@@ -9,7 +9,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.signing import MADE, NOW, Key, trust_of
+from tests.kit.signing import MADE, NOW, Key, trust_of
 
 from nondum.wheelhouse.contents import Contents, Entry
 from nondum.wheelhouse.manifest import PERMISSIONS, ComponentManifest, Manifest, Requires

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric.ec import SECP256R1, generate_private_key
-from tests.signing import Key
+from tests.kit.signing import Key
 
 from nondum.sdk.errors import TrustRefused
 from nondum.wheelhouse.trust import signing

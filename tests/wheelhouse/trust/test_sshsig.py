@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.signing import Key, armour, blob
+from tests.kit.signing import Key, armour, blob
 
 from nondum.sdk.errors import PayloadRefused
 from nondum.wheelhouse.trust import signing, sshsig

@@ -8,7 +8,7 @@ from datetime import timedelta
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.signing import MADE, Key, signed, trust_of
+from tests.kit.signing import MADE, Key, signed, trust_of
 
 from nondum.sdk.errors import NondumError
 from nondum.wheelhouse.trust import sshsig, succession

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.signing import MADE, Key, trust_of
+from tests.kit.signing import MADE, Key, trust_of
 
 from nondum.sdk.errors import Problem, TrustRefused
 from nondum.wheelhouse.trust import trust_file, trust_text

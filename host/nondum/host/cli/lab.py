@@ -12,7 +12,7 @@ from nondum.sdk.errors import ConfigRefused, Problem
 
 CHECKOUT = "NONDUM_LAB"
 """The variable that names nondum's sources."""
-LABORATORY = Path("tests/lab/machines")
+LABORATORY = Path("tests/lab")
 ARCHITECTURES = ("x86_64", "aarch64")
 
 

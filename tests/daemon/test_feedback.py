@@ -1,0 +1,65 @@
+"""A host without a screen: its states reach an integrator's program, and what fails is told."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from tests.daemon.neighbours import BEACON, UNCONFINED
+from tests.kit.payloads import Part
+from tests.kit.running_host import READY_S, RunningHost, running
+
+
+def hook(work: Path, text: str) -> Path:
+    """A program that is told the host's states."""
+    path = work / "hook"
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(0o755)
+    return path
+
+
+def feedback(*lines: str) -> str:
+    return "\n".join((UNCONFINED, "[feedback]", *lines, ""))
+
+
+def until_warned(host: RunningHost, words: str) -> None:
+    def found(view: Any) -> bool:
+        return any(words in warning for warning in view["warnings"])
+
+    host.until(f"warned: {words}", found, timeout_s=READY_S)
+
+
+def test_a_program_is_told_how_a_payload_fares(tmp_path: Path) -> None:
+    told = tmp_path / "told"
+    more = feedback(f'hook = ["{hook(tmp_path, f"cat >> {told}")}"]', "hook_deadline_s = 600")
+    source = BEACON.replace("LAMP", "light").replace("LOST", "stop")
+    with running(tmp_path, more=more) as host:
+        host.bring("beacon", Part("beacon", source.replace("LOG", str(tmp_path / "log"))))
+        host.until("safe", lambda v: v["feedback"]["state"] == "safe-to-remove", timeout_s=READY_S)
+        host.drive("wrong", manifest="no toml")
+        host.plug(tmp_path / "drives/wrong")
+        host.until("refused", lambda v: v["feedback"]["state"] == "refused", timeout_s=READY_S)
+        while "refused" not in told.read_text():  # the program runs beside the host
+            host.ask("status")
+    states = [json.loads(line) for line in told.read_text().splitlines()]
+    assert states[-1]["state"] == "refused"
+    assert (states[-1]["code"], states[-1]["payload"]) == ("MANIFEST_TOML", "org.example.wrong")
+    assert "working" in [state["state"] for state in states]
+
+
+def test_what_cannot_be_shown_is_told_in_every_status(tmp_path: Path) -> None:
+    broken = hook(tmp_path, "exit 7")
+    more = feedback(f'hook = ["{broken}"]', 'lamps = ["no-such-lamp"]', 'player = ["/no/player"]')
+    with running(tmp_path, more=more) as host:
+        for words in ("ended with status 7", "LAMP_MISSING no-such-lamp", "SOUND_FAILED"):
+            until_warned(host, words)
+        hook(tmp_path, "exit 0")
+        host.drive("wrong", manifest="no toml")
+        host.plug(tmp_path / "drives/wrong")
+        host.until(
+            "the hook works again",
+            lambda view: not any("status 7" in warning for warning in view["warnings"]),
+            timeout_s=READY_S,
+        )
+        assert host.log.count("LAMP_MISSING") == 1

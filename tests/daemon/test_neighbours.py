@@ -1,0 +1,194 @@
+"""What one host can do, another one plans with and uses, until either is gone."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from pathlib import Path
+
+import pytest
+from tests.daemon.neighbours import beacon, ear, neighbours, routed, say, until_shared, written
+from tests.daemon.plugins import scribe, talker
+from tests.kit.running_host import READY_S, RunningHost
+
+pytestmark = pytest.mark.daemon
+
+
+def until_written(log: Path, *words: str) -> None:
+    """Wait for a beacon to have written exactly that."""
+    pause = threading.Event()
+    for _ in range(int(READY_S / 0.05)):
+        if written(log) == list(words):
+            return
+        pause.wait(0.05)
+    raise AssertionError(written(log))
+
+
+def until_lost(host: RunningHost, component: str) -> None:
+    """Wait until a component is not known any more."""
+    host.until(
+        f"{component} is gone",
+        lambda view: all(row["component"] != component for row in view["components"]),
+        timeout_s=READY_S,
+    )
+
+
+def test_what_is_plugged_into_one_host_is_used_by_the_other(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    with neighbours(tmp_path, "rover", "mule") as (rover, mule):
+        mule.bring("light", beacon(log))
+        until_shared(rover, "beacon@mule")
+        goal = rover.want("(lit rover)")
+        rover.until_goal(goal, "holds")
+        assert written(log) == ["on"]
+        rover.ask("halt", id=goal)
+        until_written(log, "on", "off")
+
+
+def test_phrase_of_a_peers_component_is_understood(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    with neighbours(tmp_path, "rover", "mule") as (rover, mule):
+        mule.bring("light", beacon(log))
+        until_shared(rover, "beacon@mule")
+        given = rover.ask("goal", words="blink")
+        rover.until_goal(given["id"], "reached")
+        assert written(log) == ["blink"]
+
+
+def test_pulled_drive_is_withdrawn_everywhere(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    with neighbours(tmp_path, "rover", "mule") as (rover, mule):
+        mule.bring("light", beacon(log))
+        until_shared(rover, "beacon@mule")
+        goal = rover.want("(lit rover)")
+        rover.until_goal(goal, "holds")
+        mule.pull("light")
+        until_lost(rover, "beacon@mule")
+        rover.until_goal(goal, "suspended")
+        assert "bring the host mule back" in str(rover.ask("why")["problems"])
+
+
+@pytest.mark.parametrize("end", ["kill", "stop", "SIGSTOP"])
+def test_host_that_is_lost_is_pruned_and_its_goal_waits_for_it(end: str, tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    with neighbours(tmp_path, "rover", "mule") as (rover, mule):
+        mule.bring("light", beacon(log))
+        until_shared(rover, "beacon@mule")
+        goal = rover.want("(lit rover)")
+        rover.until_goal(goal, "holds")
+        stopped = mule.pid
+        {"kill": mule.kill, "stop": mule.stop}.get(end, lambda: os.kill(stopped, signal.SIGSTOP))()
+        try:
+            rover.until_told("the host mule is gone")
+            until_lost(rover, "beacon@mule")
+            rover.until_goal(goal, "suspended")
+            assert "bring the host mule back" in str(rover.ask("why")["problems"])
+        finally:
+            if end == "SIGSTOP":
+                os.kill(stopped, signal.SIGCONT)
+        if end != "SIGSTOP":
+            mule.start()
+        rover.until_goal(goal, "holds")
+
+
+@pytest.mark.parametrize(
+    ("when_lost", "after"), [("stop", ["on", "off"]), ("hold", ["on"]), ("finish", ["on"])]
+)
+def test_behaviour_ends_with_its_caller_as_its_author_declared(
+    when_lost: str, after: list[str], tmp_path: Path
+) -> None:
+    log = tmp_path / "log"
+    with neighbours(tmp_path, "rover", "mule") as (rover, mule):
+        mule.bring("light", beacon(log, when_lost=when_lost))
+        until_shared(rover, "beacon@mule")
+        rover.until_goal(rover.want("(lit rover)"), "holds")
+        rover.kill()
+        mule.until_told("the host rover is gone")
+        until_written(log, *after)
+        if when_lost != "stop":
+            mule.ask("halt", now=True)
+            until_written(log, "on", "off")
+
+
+def test_unit_in_use_by_one_host_is_planned_with_by_no_other(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    with neighbours(tmp_path, "rover", "scout", "mule") as (rover, scout, mule):
+        mule.bring("light", beacon(log))
+        for host in (rover, scout):
+            until_shared(host, "beacon@mule")
+        goal = rover.want("(lit rover)")
+        rover.until_goal(goal, "holds")
+        for host in (scout, mule):
+            waiting = host.want(f"(lit {host.name})")
+            host.until_goal(waiting, "suspended")
+            assert "idle mule__beacon__lamp" not in host.facts()
+            host.ask("halt", id=waiting)
+        waiting = scout.want("(lit scout)")
+        rover.ask("halt", id=goal)
+        scout.until_goal(waiting, "holds")
+        assert written(log) == ["on", "off", "on"]
+
+
+def test_actuators_are_not_offered_unless_the_integrator_says_so(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    with neighbours(tmp_path, "rover", "mule") as (rover, mule):
+        mule.bring("light", beacon(log, type="pointer"))
+        until_shared(rover, "beacon@mule")
+        (row,) = [r for r in rover.ask("components") if r["component"] == "beacon@mule"]
+        assert (row["units"], row["behaviours"]) == ([], [])
+        assert row["problem"] == "its host does not offer lamp"
+    more = 'offer_actuators = ["beacon"]\n'
+    with neighbours(tmp_path / "again", "rover", "mule", more=more) as (rover, mule):
+        mule.bring("light", beacon(log, type="pointer"))
+        until_shared(rover, "beacon@mule")
+        rover.until_goal(rover.want("(lit rover)"), "holds")
+
+
+def test_stream_of_one_host_is_read_on_the_other(tmp_path: Path) -> None:
+    with neighbours(tmp_path, "rover", "mule") as (rover, mule):
+        rover.bring("talk", talker("talker"))
+        mule.bring("write", scribe())
+        until_shared(rover, "scribe@mule")
+        goal = rover.want("(written rover)")
+        rover.until_goal(goal, "holds")
+        (row,) = mule.ask("streams")
+        assert (row["component"], row["consumers"]) == ("talker@rover", ["scribe"])
+        rover.ask("halt", id=goal)
+        mule.until("it is read no more", lambda view: not view["streams"], timeout_s=READY_S)
+
+
+def test_hosts_by_way_of_a_router_use_each_other_all_the_same(tmp_path: Path) -> None:
+    with routed(tmp_path, "rover", "mule") as (rover, mule):
+        assert {row["by"] for row in rover.ask("peers")} == {"development"}
+        rover.bring("talk", talker("talker"))
+        mule.bring("write", scribe())
+        until_shared(rover, "scribe@mule")
+        rover.until_goal(rover.want("(written rover)"), "holds")
+        mule.kill()
+        until_lost(rover, "scribe@mule")
+        rover.until_goal("1", "suspended")
+
+
+def test_camera_of_another_body_is_not_planned_with(tmp_path: Path) -> None:
+    with neighbours(tmp_path, "rover", "scout", "mule") as (rover, scout, mule):
+        rover.bring("talk", talker("talker"))
+        mule.bring("write", scribe())
+        for component in ("talker@rover", "scribe@mule"):
+            until_shared(scout, component)
+        scout.until_goal(scout.want("(written scout)"), "suspended")
+        rover.until_goal(rover.want("(written rover)"), "holds")
+
+
+def test_goal_that_is_heard_goes_to_the_peer_that_can_have_it(tmp_path: Path) -> None:
+    said, log = tmp_path / "said", tmp_path / "log"
+    with neighbours(tmp_path, "rover", "mule") as (rover, mule):
+        mule.bring("ears", ear(said))
+        rover.bring("light", beacon(log, type="pointer"))
+        until_shared(mule, "beacon@rover")
+        say(said, "rover, blink")
+        mule.until_told("'rover, blink': that is goal 1 of rover")
+        rover.until_goal("1", "reached")
+        mule.until_told("rover: 'blink' is reached")
+        say(said, "blink")
+        mule.until_told("'blink': that is goal 2 of rover")

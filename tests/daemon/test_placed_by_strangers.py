@@ -1,0 +1,232 @@
+"""What a host takes from a peer that hands it payloads, and what it refuses, whatever is sent."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.daemon.guest import Guest, guest
+from tests.daemon.neighbours import beacon, open_host
+from tests.kit.payloads import make_payload, seal
+from tests.kit.running_host import RunningHost
+
+from nondum.sdk.wire import Body
+from nondum.transport.peers import CallFailed, Errand, Lease, Loss
+
+pytestmark = pytest.mark.daemon
+
+Twist = Callable[[str, int, bytes], Any]
+"""Path of a file, offset and its bytes there → what is sent."""
+
+
+class Hands:
+    """Hands out the files of one payload folder, not always as they are."""
+
+    def __init__(self, folder: Path, twist: Twist = lambda path, offset, data: data) -> None:
+        self.folder, self._twist = folder, twist
+        files = (path for path in folder.rglob("*") if path.is_file())
+        self._files = {hashlib.sha256(path.read_bytes()).hexdigest(): path for path in files}
+
+    def offer(self, **more: Any) -> dict[str, Any]:
+        """The arguments of `place.take`."""
+        contents = (self.folder / "CONTENTS").read_bytes()
+        return {
+            "digest": hashlib.sha256(contents).hexdigest(),
+            "payload": self.folder.name,
+            "contents": len(contents),
+            "signature": None,
+            "why": "it likes it better there",
+        } | more
+
+    def serve(self, errand: Errand) -> Body:
+        if errand.method == "place.want":
+            return {}
+        path, offset = self._files[errand.args["sha256"]], errand.args["offset"]
+        data = path.read_bytes()[offset : offset + errand.args["length"]]
+        return {"data": self._twist(path.relative_to(self.folder).as_posix(), offset, data)}
+
+    def notice(self, *_: Any) -> None: ...
+
+    def orphaned(self, errand: Errand, reason: Loss) -> Lease:
+        return Lease.STOP
+
+
+@pytest.fixture
+def mule(tmp_path: Path) -> Iterator[tuple[RunningHost, str]]:
+    with open_host(tmp_path / "mule", "mule") as (host, address):
+        yield host, address
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return make_payload(
+        tmp_path / "drive", beacon(tmp_path / "log"), payload_id="org.example.light", release=7
+    )
+
+
+def refused(one: Guest, hands: Hands, **more: Any) -> tuple[str, str]:
+    """Code and place of a refusal."""
+    with pytest.raises(CallFailed) as caught:
+        one.ask("mule", "place.take", **hands.offer(**more))
+    return caught.value.code, caught.value.problems[0].where
+
+
+def check_nothing_is_left(host: RunningHost) -> None:
+    assert not any((host.state / "placed").glob("*"))
+    assert not any((host.state / "store").glob("[0-9a-f]*"))
+    assert all(row["event"] != "DriveInserted" for row in host.journal())
+
+
+def flipped(path: str) -> Twist:
+    def twist(sent: str, offset: int, data: bytes) -> bytes:
+        return bytes([data[0] ^ 1]) + data[1:] if path in sent and offset == 0 else data
+
+    return twist
+
+
+def only(path: str, change: Callable[[bytes], Any]) -> Twist:
+    return lambda sent, offset, data: change(data) if path in sent else data
+
+
+TWISTS = {
+    "a bit of the contents list": ("CONTENTS", flipped("CONTENTS")),
+    "a bit of the manifest": ("payload.toml", flipped("payload.toml")),
+    "a bit of a wheel": ("wheels/test_beacon", flipped("wheels/test_beacon")),
+    "a byte too many": ("payload.toml", only("payload.toml", lambda data: data + b"\n")),
+    "a byte too few": ("wheels/pluggy", only("wheels/pluggy", lambda data: data[:-1])),
+    "nothing": ("index.json", only("index.json", lambda data: b"")),
+    "text": ("index.json", only("index.json", lambda data: "it is a fine index")),
+}
+
+
+@pytest.mark.parametrize("twist", TWISTS)
+def test_file_that_is_not_as_listed_is_refused(
+    mule: tuple[RunningHost, str], folder: Path, twist: str
+) -> None:
+    host, address = mule
+    where, change = TWISTS[twist]
+    hands = Hands(folder, change)
+    with guest("liar", ("mule", address), handler=hands) as one:
+        code, place = refused(one, hands)
+        assert code == "HASH_MISMATCH"
+        assert place.startswith(where)
+    check_nothing_is_left(host)
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        {"digest": "../../etc/passwd"},
+        {"payload": "../../etc"},
+        {"payload": 7},
+        {"contents": 0},
+        {"contents": 1 << 20},
+        {"contents": "many"},
+        {"signature": b"x" * 9000},
+        {"signature": "signed"},
+        {"why": None},
+    ],
+    ids=str,
+)
+def test_offer_that_is_none_is_refused(
+    mule: tuple[RunningHost, str], folder: Path, args: dict[str, Any]
+) -> None:
+    host, address = mule
+    hands = Hands(folder)
+    with guest("liar", ("mule", address), handler=hands) as one:
+        assert refused(one, hands, **args)[0] == "CALL_MALFORMED"
+    check_nothing_is_left(host)
+
+
+def test_payload_of_another_name_is_refused(mule: tuple[RunningHost, str], folder: Path) -> None:
+    host, address = mule
+    hands = Hands(folder)
+    with guest("liar", ("mule", address), handler=hands) as one:
+        assert refused(one, hands, payload="org.example.dark")[0] == "CALL_MALFORMED"
+    check_nothing_is_left(host)
+
+
+def test_list_that_leads_out_of_the_folder_is_refused(
+    mule: tuple[RunningHost, str], folder: Path
+) -> None:
+    host, address = mule
+    listed = (folder / "CONTENTS").read_text(encoding="ascii")
+    hostile = listed.replace("payload.toml", "../../../../payload.toml")
+    (folder / "CONTENTS").write_text(hostile, encoding="ascii")
+    hands = Hands(folder)
+    with guest("liar", ("mule", address), handler=hands) as one:
+        code, _ = refused(one, hands)
+        assert code in ("PATH_UNSAFE", "CONTENTS_ENTRY")
+    check_nothing_is_left(host)
+
+
+def test_more_to_judge_than_is_read_is_refused(mule: tuple[RunningHost, str], folder: Path) -> None:
+    host, address = mule
+    with (folder / "leaflet.txt").open("wb") as leaflet:
+        leaflet.truncate(17 << 20)
+    seal(folder, payload_id=folder.name)
+    hands = Hands(folder)
+    with guest("liar", ("mule", address), handler=hands) as one:
+        assert refused(one, hands)[0] == "TOO_LARGE"
+    check_nothing_is_left(host)
+
+
+def test_sound_payload_is_here_for_as_long_as_the_call(
+    mule: tuple[RunningHost, str], folder: Path
+) -> None:
+    host, address = mule
+    hands = Hands(folder)
+    with guest("rover", ("mule", address), handler=hands) as one:
+        steps = one.reports("mule", "place.take", until={"step": "active"}, **hands.offer())
+        assert steps[0]["step"] == "checking"
+        host.until_component("beacon", "ready")
+        (row,) = host.ask("places")
+        assert (row["payload"], row["for"]) == ("org.example.light", "rover")
+        assert not any((host.state / "placed").rglob("*.whl")), "the store has them"
+    host.until_gone("light")
+    assert not any((host.state / "placed").glob("*"))
+
+
+def test_older_release_than_was_here_is_refused(
+    mule: tuple[RunningHost, str], folder: Path
+) -> None:
+    host, address = mule
+    drive = folder.parents[1]
+    slot = host.plug(drive)
+    host.until_step("light", "active")
+    host.pull(slot)
+    host.until_gone("light")
+    seal(folder, payload_id=folder.name, release=6)
+    hands = Hands(folder)
+    with guest("rover", ("mule", address), handler=hands) as one:
+        assert refused(one, hands)[0] == "ROLLBACK"
+
+
+def test_component_that_is_here_already_is_refused(
+    mule: tuple[RunningHost, str], folder: Path, tmp_path: Path
+) -> None:
+    host, address = mule
+    host.bring("lamp", beacon(tmp_path / "log"))
+    hands = Hands(folder)
+    with guest("rover", ("mule", address), handler=hands) as one:
+        assert refused(one, hands)[0] == "COMPONENT_TAKEN"
+    assert host.component("beacon") is not None
+
+
+def test_only_who_takes_a_payload_may_fetch_it(mule: tuple[RunningHost, str], folder: Path) -> None:
+    host, address = mule
+    host.plug(folder.parents[1])
+    host.until_step("light", "active")
+    hands = Hands(folder)
+    digest = hands.offer()["digest"]
+    with guest("thief", ("mule", address), handler=hands) as one:
+        for method, args in (
+            ("place.read", {"sha256": digest, "offset": 0, "length": 9}),
+            ("place.want", {"wanted": [digest]}),
+        ):
+            with pytest.raises(CallFailed) as caught:
+                one.ask("mule", method, digest=digest, **args)
+            assert caught.value.code == "NOT_OFFERED"

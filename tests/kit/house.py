@@ -1,0 +1,191 @@
+"""A small world for tests of workers: plugins written as files, real processes, news gathered."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import functools
+import os
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import pluggy
+
+from nondum.host.confinement import Level, choice
+from nondum.host.events import BehaviourEnded, Event
+from nondum.host.workers import (
+    Call,
+    Limits,
+    Timing,
+    WorkerLauncher,
+    Workers,
+    WorkerSpec,
+    base_interpreter,
+)
+from nondum.host.workers.confinements import Confinement
+from nondum.host.workers.launcher import MARK
+from nondum.sdk.description import Behaviour, Input, Output, PluginDescription, Unit
+
+SDK = Path(__file__).parents[2] / "plugins/sdk"
+LIBRARIES = Path(pluggy.__file__).parents[1]
+HOST = "rover"
+QUICK = Timing(startup_s=20.0, heartbeat_s=0.8, missed=4, halt_s=0.4, term_s=0.3)
+"""Impatient once they run, so that tests of hanging workers are short; the SDK beats every 2 s."""
+
+LEVEL = os.environ.get("NONDUM_TEST_LEVEL", choice.AUTO)
+"""Level of confinement at which workers are tested; `auto`: the best of this machine."""
+
+_E = TypeVar("_E", bound=Event)
+
+
+@functools.cache
+def level() -> Level:
+    """The level at which workers are tested."""
+    return choice.standing(LEVEL, 0).level
+
+
+@dataclass
+class House:
+    """Workers of one host, and all that they emitted."""
+
+    folder: Path
+    timing: Timing = QUICK
+    confinement: Confinement | None = None
+    """What holds the workers; the machine's best, if not given."""
+    events: list[Event] = field(default_factory=list)
+    _arrived: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def __post_init__(self) -> None:
+        places = (self.folder, SDK, LIBRARIES)
+        launcher = WorkerLauncher(self.confinement or choice.confinement(level(), places))
+        self.workers = Workers(HOST, self._on_event, launcher=launcher, timing=self.timing)
+
+    def spec(
+        self,
+        component: str,
+        source: str,
+        *,
+        behaviours: tuple[Behaviour, ...] = (),
+        units: tuple[Unit, ...] = (),
+        summary: str = "",
+        limits: Limits | None = None,
+        settings: dict[str, Any] | None = None,
+    ) -> WorkerSpec:
+        """Write a plugin of one module and say how to start it."""
+        module = component.replace("-", "_") + "_plugin"
+        site = self.folder / component / "site-packages"
+        site.mkdir(parents=True)
+        (site / f"{module}.py").write_text(source, encoding="utf-8")
+        return WorkerSpec(
+            component=component,
+            payload="0" * 16,
+            distribution=component,
+            entry_point=module,
+            site_packages=(site, SDK, LIBRARIES),
+            python=base_interpreter(),
+            scratch=self.folder / component / "scratch",
+            index=PluginDescription(
+                component, "0", summary=summary, behaviours=behaviours, units=units
+            ),
+            settings=settings or {},
+            limits=limits or Limits(),
+        )
+
+    async def start(self, component: str, source: str, **about: Any) -> WorkerSpec:
+        """Write a plugin and start its worker."""
+        spec = self.spec(component, source, **about)
+        await self.workers.start(spec)
+        return spec
+
+    def behave(self, component: str, behaviour: str, **arguments: str) -> Call:
+        """Ask for a behaviour; `u` is the component's unit of that name."""
+        return self.workers.behave(component, behaviour, arguments)
+
+    async def until(
+        self, kind: type[_E], test: Callable[[_E], bool] = lambda _: True, timeout_s: float = 60.0
+    ) -> _E:
+        """Wait for an event that has come, or comes."""
+        async with asyncio.timeout(timeout_s):
+            while True:
+                for event in self.events:
+                    if isinstance(event, kind) and test(event):
+                        return event
+                self._arrived.clear()
+                await self._arrived.wait()
+
+    def told(self, kind: type[_E]) -> list[_E]:
+        """All events of a kind, so far."""
+        return [event for event in self.events if isinstance(event, kind)]
+
+    def ends(self) -> list[tuple[str, str]]:
+        """Behaviour and outcome of every call that ended, in order."""
+        return [(event.behaviour, event.outcome) for event in self.told(BehaviourEnded)]
+
+    def lines(self, component: str) -> list[str]:
+        """What a component wrote and logged."""
+        return [line.text for line in self.workers.logs.of(component)]
+
+    def pid(self, component: str, told: str) -> int:
+        """A process of a component's worker, as this host counts, by what its own `getpid()` is."""
+        mark = f"{MARK}={self.folder / component / 'scratch'}".encode()
+        for entry in Path("/proc").iterdir():
+            with contextlib.suppress(OSError):
+                if entry.name.isdigit() and mark in (entry / "environ").read_bytes():
+                    status = (entry / "status").read_text(encoding="ascii")
+                    (inner,) = re.findall(r"^NSpid:.*\s(\d+)$", status, re.MULTILINE)
+                    if inner == told:
+                        return int(entry.name)
+        raise LookupError(f"{component} has no process {told}")
+
+    def _on_event(self, event: Event) -> None:
+        self.events.append(event)
+        self._arrived.set()
+
+
+def is_alive(pid: int) -> bool:
+    """Whether a process exists and is no zombie."""
+    try:
+        status = Path(f"/proc/{pid}/stat").read_text(encoding="ascii")
+    except OSError:
+        return False
+    return status.rpartition(")")[2].split()[0] not in {"Z", "X"}
+
+
+async def until_gone(pid: int, timeout_s: float = 30.0) -> None:
+    """Wait for a process to end, whosever child it is."""
+    try:
+        descriptor = os.pidfd_open(pid)
+    except ProcessLookupError:
+        return
+    ended = asyncio.Event()
+    asyncio.get_running_loop().add_reader(descriptor, ended.set)
+    try:
+        await asyncio.wait_for(ended.wait(), timeout_s)
+    finally:
+        asyncio.get_running_loop().remove_reader(descriptor)
+        os.close(descriptor)
+
+
+def camera(name: str = "camera", *, always: bool = False) -> Unit:
+    """A unit with one image output, `frames`."""
+    return Unit(name, "camera", outputs=(Output("frames", "image", always=always),))
+
+
+def pose_reader(name: str = "reader") -> Unit:
+    """A unit with an optional pose input, `odometry`."""
+    return Unit(name, "sensor", inputs=(Input("odometry", "pose"),))
+
+
+__all__ = [
+    "HOST",
+    "QUICK",
+    "House",
+    "camera",
+    "is_alive",
+    "pose_reader",
+    "replace",
+    "until_gone",
+]

@@ -1,0 +1,272 @@
+"""A whole host under test: a daemon with a life of its own, met only as people meet it.
+
+Everything is done through its control socket, its command line, its slots and its ports; what it
+leaves behind is looked for in /proc and on disk.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import subprocess
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from demo.robot import NONDUM, Robot, TooLate, View, configuration
+from tests.kit.payloads import Part, make_payload
+from tests.kit.traces import Traces
+
+READY_S = 120.0
+GONE_S = 60.0
+END_S = 60.0
+DAEMON = (*NONDUM, "host", "run", "--user")
+
+Row = View
+"""A line of a table, as JSON has it."""
+
+
+class RunningHost(Robot):
+    """One daemon after the other on one state folder; every view that it showed is kept."""
+
+    def __init__(
+        self, work: Path, *, name: str = "spot", more: str = "", program: Sequence[str] = DAEMON
+    ) -> None:
+        """`more` are further lines of its configuration; `program` runs a daemon."""
+        super().__init__(work, name=name)
+        self.state = work / "state"
+        self.views: list[View] = []
+        """All that it showed, oldest first, until the daemon was started again."""
+        self._program = program
+        self._daemon: subprocess.Popen[bytes] | None = None
+        self._threads: list[threading.Thread] = []
+        for folder in (self.slots, self.devices):
+            folder.mkdir(parents=True)
+        (work / "host.toml").write_text(configuration(self) + more, encoding="utf-8")
+
+    # The daemon's life
+
+    def start(self) -> None:
+        """Start a daemon and wait until it listens. Raises `TooLate` with its last words."""
+        listens = threading.Event()
+        command = [*self._program, "--config", str(self.work / "host.toml")]
+        self._daemon = subprocess.Popen(command, stderr=subprocess.PIPE)
+        self._view, self.views, self._watching = {}, [], True
+        self._run(self._keep_log, listens)
+        if not listens.wait(READY_S) or self._daemon.poll() is not None:
+            raise TooLate(f"the daemon does not listen:\n{self.log}")
+        self._run(self.watch)
+        self.until("a first view", lambda view: view, timeout_s=READY_S)
+
+    def kill(self) -> None:
+        """SIGKILL the daemon."""
+        assert self._daemon is not None, "it was never started"
+        self._daemon.kill()
+        self._see_end()
+
+    def stop(self) -> None:
+        """Stop the daemon as an operator does, if it runs."""
+        if self._daemon is not None:
+            self._daemon.terminate()
+            self._see_end()
+
+    @property
+    def pid(self) -> int:
+        """The daemon's process."""
+        assert self._daemon is not None, "it was never started"
+        return self._daemon.pid
+
+    @property
+    def log(self) -> str:
+        """What the daemons wrote."""
+        return (self.work / "daemon.log").read_text(encoding="utf-8")
+
+    def see(self, view: View) -> None:
+        """Take in a newer view, and keep it."""
+        self.views.append(view)
+        super().see(view)
+
+    # What people do
+
+    def drive(self, name: str, *parts: Part, **options: Any) -> Path:
+        """Write a drive with one payload, `org.example.<name>`."""
+        drive = self.work / "drives" / name
+        make_payload(drive, *parts, payload_id=f"org.example.{name}", **options)
+        return drive
+
+    def bring(self, name: str, *parts: Part, **options: Any) -> Path:
+        """Write a drive, plug it in and wait until its payload is active."""
+        drive = self.drive(name, *parts, **options)
+        self.plug(drive)
+        self.until_step(name, "active")
+        return drive
+
+    def want(self, pddl: str, kind: str = "maintain") -> str:
+        """Give a goal; returns its id."""
+        return str(self.ask("goal", pddl=pddl, kind=kind)["id"])
+
+    # What people see
+
+    def components(self) -> list[Row]:
+        """All components when they are asked for, but for their ages."""
+        return [_ageless(row) for row in self.ask("components")]
+
+    def component(self, id: str) -> Row | None:
+        """A component as it is shown now, but for its age."""
+        row = _one(self.view["components"], "component", id)
+        return row and _ageless(row)
+
+    def payload(self, name: str) -> Row | None:
+        """A payload of a drive that `drive` wrote, as it is shown now."""
+        return payload(self.view, name)
+
+    def until_step(self, name: str, *steps: str) -> Row:
+        """Wait until a payload is at one of some steps."""
+
+        def found(view: View) -> Row | None:
+            row = payload(view, name)
+            if row is None or row["state"] in steps:
+                return row
+            assert row["state"] not in ("refused", "quarantined"), row["problems"]
+            return None
+
+        return self.until(f"{name}: {' or '.join(steps)}", found, timeout_s=READY_S)
+
+    def until_gone(self, name: str) -> None:
+        """Wait until a payload is not shown any more."""
+        self.until(f"{name}: gone", lambda v: payload(v, name) is None, timeout_s=GONE_S)
+
+    def until_component(self, id: str, state: str) -> Row:
+        """Wait until a component is in a state; without its age."""
+
+        def found(view: View) -> Row | None:
+            row = _one(view["components"], "component", id)
+            return _ageless(row) if row is not None and row["state"] == state else None
+
+        return self.until(f"{id}: {state}", found, timeout_s=READY_S)
+
+    def until_goal(self, id: str, state: str) -> Row:
+        """Wait until a goal is in a state; an active one that is true `holds`."""
+
+        def found(view: View) -> Row | None:
+            row = goal(view, id)
+            if row is None:
+                return None
+            is_kept = row["state"] == "active" and row["holds"]
+            return row if state == ("holds" if is_kept else row["state"]) else None
+
+        return self.until(f"goal {id}: {state}", found, timeout_s=READY_S)
+
+    def until_told(self, words: str, *, since: int = 0) -> str:
+        """Wait for a sentence with these words in it."""
+
+        def found(view: View) -> str | None:
+            told = (row["text"] for row in view["told"] if row["number"] > since)
+            return next((text for text in told if words in text), None)
+
+        return self.until(f"told: {words}", found, timeout_s=READY_S)
+
+    def until_runs(self, behaviour: str) -> Row:
+        """Wait until a step of the plan that is called so is established."""
+
+        def found(view: View) -> Row | None:
+            rows = (r for r in view["plan"]["steps"] if r["state"] == "established")
+            return next((row for row in rows if f".{behaviour} " in row["action"]), None)
+
+        return self.until(f"{behaviour}: established", found, timeout_s=READY_S)
+
+    def facts(self) -> dict[str, Any]:
+        """What is believed now: fact → value."""
+        return {row["fact"]: row["value"] for row in self.ask("facts")}
+
+    def journal(self, subject: str | None = None) -> list[Row]:
+        """What happened, oldest first."""
+        rows: list[Row] = self.ask("journal", subject=subject, limit=10_000)
+        return rows
+
+    def traces(self) -> Traces:
+        """All that payloads have on this machine through this host."""
+        return Traces.of(self.state, self.work / "drives")
+
+    # Inside
+
+    def _run(self, work: Any, *arguments: Any) -> None:
+        thread = threading.Thread(target=work, args=arguments, daemon=True)
+        self._threads.append(thread)
+        thread.start()
+
+    def _keep_log(self, listens: threading.Event) -> None:
+        assert self._daemon is not None
+        assert self._daemon.stderr is not None
+        with self._daemon.stderr as lines, (self.work / "daemon.log").open("ab") as log:
+            for line in lines:
+                log.write(line)
+                log.flush()
+                if b" listens at " in line:
+                    listens.set()
+        listens.set()
+
+    def _see_end(self) -> None:
+        assert self._daemon is not None
+        self._daemon.wait(END_S)
+        while self._threads:
+            self._threads.pop().join(END_S)
+        self._daemon = None
+
+
+@contextmanager
+def running(work: Path, **options: Any) -> Iterator[RunningHost]:
+    """A host that runs, and is stopped at last."""
+    host = RunningHost(work, **options)
+    try:
+        host.start()
+        yield host
+    finally:
+        host.stop()
+
+
+def payload(view: View, name: str) -> Row | None:
+    """A payload of a drive that `RunningHost.drive` wrote."""
+    return _one(view["payloads"], "payload", f"org.example.{name}")
+
+
+def goal(view: View, id: str) -> Row | None:
+    """A goal by its id; one that was just given may not be shown yet."""
+    return _one(view["goals"], "id", id)
+
+
+def steps(view: View) -> dict[str, str]:
+    """Action → state, of the plan at hand."""
+    return {row["action"]: row["state"] for row in view["plan"]["steps"]}
+
+
+def happened(journal: Sequence[Row], *wanted: tuple[str, str]) -> bool:
+    """Whether these (event, subject) stand in a journal in this order, whatever is between."""
+    rows = iter([(row["event"], row["subject"]) for row in journal])
+    return all(want in rows for want in wanted)
+
+
+def until_ended(pid: int, timeout_s: float = END_S) -> None:
+    """Wait for a process to end, whosever child it is. Raises `TooLate`."""
+    try:
+        descriptor = os.pidfd_open(pid)
+    except ProcessLookupError:
+        return
+    try:
+        poll = select.poll()
+        poll.register(descriptor, select.POLLIN)
+        if not poll.poll(timeout_s * 1000):
+            raise TooLate(f"process {pid} still runs after {timeout_s:.0f} s")
+    finally:
+        os.close(descriptor)
+
+
+def _one(rows: Sequence[Row], key: str, value: str) -> Row | None:
+    return next((row for row in rows if row[key] == value), None)
+
+
+def _ageless(row: Row) -> Row:
+    """Without what is another at each look."""
+    return {key: value for key, value in row.items() if key != "age_s"}

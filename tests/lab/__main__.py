@@ -1,0 +1,93 @@
+"""`./run lab`: whole machines, booted and used; see docs/lab.md."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from tests.lab.building import built
+from tests.lab.lab import Lab
+from tests.lab.recipe import RECIPES, X86_64
+from tests.lab.scenario import SHORT, Result, Scenario, keep, run_all, scenarios
+from tests.lab.shell import talk
+from tests.lab.software import software
+
+
+def main(words: Sequence[str]) -> int:
+    """Run what is asked for; answers the exit status."""
+    known = scenarios()
+    asked = _arguments(known, words)
+    if asked.list:
+        width = max(map(len, known))
+        print(*(f"{s.name:{width}}  {s.sentence}" for s in known.values()), sep="\n")
+        return 0
+    began = time.monotonic()
+    machine = built(RECIPES[asked.arch])
+    _told("the machine is built", began)
+    began = time.monotonic()
+    disk = software(machine, asked.commit)
+    _told("nondum is built for it", began)
+    work = Path(tempfile.mkdtemp(prefix="nondum-lab-"))
+    lab = Lab(machine, disk, asked.commit, work, brought=asked.payload)
+    try:
+        if asked.shell:
+            return talk(lab)
+        names = asked.scenario or (SHORT if asked.short else known)
+        return _run(lab, [known[name] for name in names], asked)
+    finally:
+        lab.close()
+        shutil.rmtree(work)
+
+
+def _run(lab: Lab, wanted: Sequence[Scenario], asked: argparse.Namespace) -> int:
+    results = []
+    for result in run_all(wanted, lab):
+        results.append(result)
+        _show(result)
+        if asked.keep and result.kept is None:
+            print(f"    kept: {keep(result.scenario.name, lab)}")
+    failed = sum(1 for r in results if r.failure)
+    for result in results:
+        if result.failure:
+            print(f"\n{result.scenario.name}\n{result.failure}\nkept: {result.kept}")
+    boots = ", ".join(f"{seconds:.0f}" for seconds in lab.boots_s)
+    print(f"\nboots: {boots} s\n{len(results) - failed} passed, {failed} failed")
+    return 1 if failed else 0
+
+
+def _show(result: Result) -> None:
+    mark = "FAILED" if result.failure else "passed"
+    times = f"{result.seconds:5.0f} s  {result.cpu_s:5.0f} s cpu"
+    print(f"{mark}  {times}  {result.scenario.name:14}  {result.note}", flush=True)
+
+
+def _told(what: str, began: float) -> None:
+    print(f"{what}: {time.monotonic() - began:.0f} s", flush=True)
+
+
+def _arguments(known: dict[str, Scenario], words: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="./run lab", description="Whole machines under test.")
+    parser.add_argument(
+        "scenario", nargs="*", metavar="SCENARIO", help="which ones (all)", choices=[*known, []]
+    )
+    parser.add_argument(
+        "--arch", choices=RECIPES, default=X86_64.name, help="its processor (%(default)s)"
+    )
+    parser.add_argument("--payload", type=Path, metavar="DIR", help="what `payload` plugs in")
+    parser.add_argument("--list", action="store_true", help="tell which scenarios there are")
+    parser.add_argument("--short", action="store_true", help=f"only {', '.join(SHORT)}")
+    parser.add_argument("--keep", action="store_true", help="keep consoles and journals of all")
+    parser.add_argument("--commit", help="nondum as of a commit, not as the checkout is now")
+    parser.add_argument("--shell", action="store_true", help="boot one and run what you type")
+    return parser.parse_args(words)
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that all is switched off
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,102 @@
+"""Scenarios: one file each, found by their names, run one after the other."""
+
+from __future__ import annotations
+
+import importlib
+import shutil
+import time
+import traceback
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.lab.agent import MachineSilent
+from tests.lab.cache import cache_folder
+from tests.lab.lab import Lab
+
+FOLDER = Path(__file__).parent / "scenarios"
+PACKAGE = "tests.lab.scenarios"
+SHORT = ("starts", "stick", "yank")
+"""Those that every change is tried with (`./run tests`): two minutes of two processors."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """Something that must hold on a real machine."""
+
+    name: str
+    sentence: str
+    """What holds."""
+    run: Callable[[Lab], str | None]
+    """Does it; answers what is worth saying of it, and raises when it does not hold."""
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """How one went."""
+
+    scenario: Scenario
+    seconds: float
+    cpu_s: float
+    """Processor time of its machines: what it takes however many others there are."""
+    note: str
+    """Of one that failed: why, in a line."""
+    failure: str = ""
+    kept: Path | None = None
+    """Where consoles and journals of a failed one are."""
+
+
+def scenarios() -> dict[str, Scenario]:
+    """All there are, by name."""
+    return {s.name: s for s in map(_loaded, sorted(FOLDER.glob("[a-z]*.py")))}
+
+
+def run_all(wanted: Iterable[Scenario], lab: Lab) -> Iterator[Result]:
+    """Run scenarios, each whatever became of the others."""
+    for scenario in wanted:
+        began, before_s = time.monotonic(), lab.cpu_s()
+        try:
+            with lab.scenario():
+                note, failure, kept = _run(scenario, lab)
+                if failure:
+                    raise _Failed
+        except _Failed:
+            pass
+        spent_s = lab.cpu_s() - before_s
+        yield Result(scenario, time.monotonic() - began, spent_s, note, failure, kept)
+
+
+class _Failed(Exception):
+    """Has the laboratory switch off what a failed scenario used."""
+
+
+def _run(scenario: Scenario, lab: Lab) -> tuple[str, str, Path | None]:
+    try:
+        return scenario.run(lab) or "", "", None
+    except Exception as error:
+        words = str(error).strip().splitlines() or [type(error).__name__]
+        kept = keep(scenario.name, lab)
+        return words[0], "".join(traceback.format_exception(error)), kept
+
+
+def keep(name: str, lab: Lab) -> Path:
+    """Copy consoles, commands and journals to where they stay, in place of those of last time."""
+    folder = cache_folder() / "kept" / lab.built.recipe.name / name
+    shutil.rmtree(folder, ignore_errors=True)
+    for number, machine in enumerate(lab.machines):
+        target = folder / str(number)
+        target.mkdir(parents=True)
+        for log in machine.work.glob("*.log"):
+            shutil.copy(log, target)
+        try:
+            journal = machine.run("journalctl -b --no-pager -o short-monotonic")
+        except (MachineSilent, AssertionError, OSError) as error:
+            journal = f"{error}\n"
+        (target / "journal.log").write_text(journal, encoding="utf-8")
+    return folder
+
+
+def _loaded(path: Path) -> Scenario:
+    module = importlib.import_module(f"{PACKAGE}.{path.stem}")
+    sentence = (module.__doc__ or "").strip().splitlines()[0]
+    return Scenario(path.stem.replace("_", "-"), sentence, module.run)

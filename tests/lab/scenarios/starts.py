@@ -1,0 +1,15 @@
+"""A host starts as a service of systemd, and says how it confines its workers."""
+
+from __future__ import annotations
+
+from tests.lab.lab import Lab
+
+
+def run(lab: Lab) -> str:
+    """Start it, look at its status and at systemd's."""
+    host = lab.host()
+    shown = host.machine.run("systemctl is-active nondum.service").strip()
+    assert shown == "active", shown
+    view = host.until("a status", lambda view: view)
+    assert view["host"] == "spot"
+    return f"{view['state']}, {view.get('confinement')}"

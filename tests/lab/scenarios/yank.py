@@ -1,0 +1,51 @@
+"""A stick is pulled while its payload is brought in; nothing is left, and next time it works."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tests.daemon.plugins import talker
+from tests.lab.installed import REPLUGS, Installed
+from tests.lab.lab import Lab
+
+PAYLOAD = "org.example.talker"
+BEGUN = "until ls -d /var/lib/nondum/staging/*; do sleep 0.02; done"
+BEGUN_S = 120.0
+
+
+def run(lab: Lab) -> str:
+    """Plug, pull at the first byte copied, look, plug again."""
+    host = lab.host()
+    image = lab.stick("talker", talker())
+    _yank(host, image)
+    host.until_payload(PAYLOAD, "gone")
+    host.until("no drive", lambda view: True if not view["drives"] else None)
+    host.machine.until("nothing is staged or mounted", lambda: None if _left(host) else True)
+    stick = host.bring(image, PAYLOAD)
+    host.machine.pull(stick)
+    host.until_payload(PAYLOAD, "gone")
+    return f"the last that it had come to: {_reached(host)}"
+
+
+def _yank(host: Installed, image: Path) -> None:
+    """Pull it as soon as its files are copied; one that the processors had no time for is plugged
+    in again (see `Installed.bring`)."""
+    for _ in range(REPLUGS):
+        stick = host.machine.plug(image)
+        begun = host.machine.attempt(BEGUN, timeout_s=BEGUN_S)
+        host.machine.pull(stick)
+        if begun.status == 0:
+            return
+    raise AssertionError(f"nothing was copied from a drive that was plugged in {REPLUGS} times")
+
+
+def _left(host: Installed) -> str:
+    staged = host.machine.run("ls /var/lib/nondum/staging")
+    return staged + host.machine.attempt("grep -E '/nondum/.*mounts|usb' /proc/mounts").out
+
+
+def _reached(host: Installed) -> str:
+    """What was journalled last before the first drive was gone."""
+    rows = host.machine.attempt("nondum journal --json --limit 1000").json()
+    events = [row["event"] for row in rows]
+    return str(events[max(events.index("DriveRemoved") - 1, 0)])
