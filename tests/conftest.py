@@ -9,9 +9,19 @@ import pytest
 from hypothesis import HealthCheck, settings
 from tests.kit.clock import VirtualClock
 
-# Whoever runs the tests has a machine of their own, and other work on it.
-settings.register_profile("nondum", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("nondum")
+pytest_plugins = ["tests.runner.plugin"]
+
+_QUIET = [HealthCheck.too_slow]
+"""How fast examples are made says something of the machine, nothing of nondum."""
+
+# One commit is one test: the full run draws the same examples each time, a campaign other ones.
+settings.register_profile(
+    "gate", deadline=None, derandomize=True, database=None, suppress_health_check=_QUIET
+)
+settings.register_profile(
+    "campaign", deadline=None, max_examples=1000, print_blob=True, suppress_health_check=_QUIET
+)
+settings.load_profile("gate")
 
 
 @pytest.fixture

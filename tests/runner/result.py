@@ -1,0 +1,37 @@
+"""What became of one test, and how a run writes it down."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """One test of one pytest session."""
+
+    test: str
+    """Its node id, relative to the checkout."""
+    outcome: str
+    """passed, failed or skipped."""
+    seconds: float
+    """Of set-up, call and tear-down, by the clock on the wall."""
+    folder: str = ""
+    """The temporary folder of a test that failed."""
+    reason: str = ""
+    """Why it was skipped."""
+    message: str = ""
+    """What pytest says about a failure."""
+
+    def to_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def read(file: Path) -> tuple[Result, ...]:
+    """The results that a session wrote. Nothing, if it died before it wrote any."""
+    if not file.exists():
+        return ()
+    lines = file.read_text(encoding="utf-8").splitlines()
+    return tuple(Result(**json.loads(line)) for line in lines)
