@@ -14,7 +14,7 @@ from typing import Any
 from tests.faults.model import Ended, check
 from tests.faults.play import Player, codes_of, has_stopped, trace
 from tests.faults.ways import COMPONENT_WAYS, newer, sound, way
-from tests.kit.fork_server import Nursery
+from tests.kit.fork_server import Nursery, logged
 
 from nondum.host.catalogue.records import Step
 from nondum.host.transitions import COMPONENT_TRANSITIONS, TRANSITIONS
@@ -196,7 +196,7 @@ def _call(point: Point, nursery: Nursery, folder: Path, what: str) -> Result:
     code, player = _play(nursery, folder, options)
     # What fails when all is written down, and nothing runs any more, is nobody's trouble.
     fine = code == 0 or has_stopped(folder) or (point.kind == "kill" and code == -9)
-    wrong = [] if fine else [f"it ended with {code}"]
+    wrong = [] if fine else [f"it ended with {code}; {logged(folder / 'log')}"]
     codes = codes_of(folder)
     if "INTERNAL" in codes:
         wrong.append("an error was not told as what it is")

@@ -57,8 +57,8 @@ def live(nursery: Nursery, folder: Path, script: Sequence[str] = SCRIPT) -> Life
     (folder / "disk").mkdir()
     with recorded(folder / "disk", SIZE_MB, root / "state") as log:
         player = Player(root, script)
-        code = nursery.run({"root": str(root), "log": str(log)}, player.play)
-        assert (code, player.stuck) == (0, "")
+        nursery.run({"root": str(root), "log": str(log)}, player.play, expect=0)
+        assert not player.stuck
     return Life(folder, tuple(writes(log)))
 
 

@@ -67,7 +67,7 @@ def test_kill_at_a_transition(
 ) -> None:
     came = way(step, event)
     orders = came.orders(tmp_path, kill=(when, step.name, event.__name__))
-    assert nursery.run(orders) == KILLED, "the transition never happened"
+    nursery.run(orders, expect=KILLED)
     judge(check(tmp_path), came)
 
 
@@ -77,7 +77,7 @@ def test_kill_at_a_transition_of_a_component(
 ) -> None:
     came = COMPONENT_WAYS[state, event]
     orders = came.orders(tmp_path, kill=("AFTER", state.name, event.__name__))
-    assert nursery.run(orders) == KILLED, "the transition never happened"
+    nursery.run(orders, expect=KILLED)
     judge(check(tmp_path), came)
 
 
@@ -87,7 +87,7 @@ def test_kill_at_any_moment(nursery: Nursery, tmp_path: Path) -> None:
     orders = Way().orders(tmp_path)
     for _ in range(ATTEMPTS - 1):
         late = moments.uniform(0.05, 1.2)
-        assert nursery.run(orders, late_s=late) == KILLED
+        nursery.run(orders, late_s=late, expect=KILLED)
         orders["script"] = ()
     judge(check(tmp_path), Way())
 
@@ -105,7 +105,7 @@ async def test_payload_that_takes_the_daemon_along_is_left_alone(
 ) -> None:
     orders = Way().orders(tmp_path, kill=("BEFORE", step, event))
     for _ in range(ATTEMPTS):
-        assert nursery.run(orders) == KILLED
+        nursery.run(orders, expect=KILLED)
         orders["script"] = ()
     async with living(tmp_path) as host:
         record = await host.until_step(LAMP_ID, left_alone)
@@ -125,7 +125,7 @@ async def test_drive_that_takes_the_daemon_along_is_left_alone(
     (tmp_path / "slots").mkdir()
     orders = {"root": str(tmp_path), "script": ("plug a",), "kill_while": "READING"}
     for _ in range(ATTEMPTS):
-        assert nursery.run(orders) == KILLED
+        nursery.run(orders, expect=KILLED)
         orders["script"] = ()
     async with living(tmp_path) as host:
         await host.until(lambda: bool(host.snapshot.drives and host.snapshot.drives[0].problems))
@@ -141,7 +141,7 @@ async def test_drive_that_takes_the_daemon_along_is_left_alone(
 def test_daemons_that_are_told_to_end_count_for_nothing(nursery: Nursery, tmp_path: Path) -> None:
     orders = Way(script=("plug a", "end now")).orders(tmp_path)
     for _ in range(ATTEMPTS):
-        assert nursery.run(orders) == 0
+        nursery.run(orders, expect=0)
         orders["script"] = ("end now",)
     ended = check(tmp_path)
     judge(ended, Way())

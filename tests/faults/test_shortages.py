@@ -49,7 +49,7 @@ def test_shortage_is_told_and_survived(
     prepare(tmp_path, {"a": sound})
     script = ("plug a", "pull a", "plug a")
     player = Player(tmp_path, script, before=shortage, between={2: relieve})
-    assert nursery.run({"root": str(tmp_path)}, player.play) == 0
+    nursery.run({"root": str(tmp_path)}, player.play, expect=0)
     assert not player.stuck
     assert set(codes_of(tmp_path)) <= {"NO_RESOURCES", "NO_MEMORY", "LAUNCH_FAILED"}
     ended = check(tmp_path)

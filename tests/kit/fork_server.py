@@ -24,6 +24,8 @@ from typing import Any, Self
 
 ROOT = Path(__file__).parent.parent.parent
 PATIENCE_S = 90.0
+LONGEST_LOG = 8000
+"""Bytes of a log that a message shows."""
 
 
 class Nursery:
@@ -57,19 +59,35 @@ class Nursery:
         at_birth: Callable[[int], None] = lambda pid: None,
         *,
         late_s: float | None = None,
+        expect: int | None = None,
     ) -> int:
         """Run a daemon to its end; its return code, negative for a signal.
 
         `at_birth` is called with its pid. It is killed when its time is over. Raises `TimeoutError`
-        then, unless `late_s` says that this is meant.
+        then, unless `late_s` says that this is meant; and `AssertionError` for another return code
+        than the expected one. Both say what this daemon logged.
         """
+        log = Path(orders["root"], "log")
+        start = log.stat().st_size if log.exists() else 0
+        code, was_late = self._run(orders, at_birth, late_s or PATIENCE_S)
+        if was_late and late_s is None:
+            raise TimeoutError(f"it did not end within {PATIENCE_S:g} s\n{logged(log, start)}")
+        if expect is not None and code != expect:
+            text = f"the daemon ended with {code} instead of {expect}"
+            raise AssertionError(f"{text}\n{logged(log, start)}")
+        return code
+
+    def _run(
+        self, orders: dict[str, Any], at_birth: Callable[[int], None], late_s: float
+    ) -> tuple[int, bool]:
+        """The return code, and whether the daemon's time was over."""
         with self._one_at_a_time:
             assert self._process.stdin is not None  # both are pipes
             assert self._process.stdout is not None
             self._process.stdin.write(json.dumps(orders) + "\n")
             self._process.stdin.flush()
             pid = int(self._process.stdout.readline())
-            late = threading.Timer(late_s or PATIENCE_S, lambda: _kill(pid))
+            late = threading.Timer(late_s, lambda: _kill(pid))
             late.start()
             try:
                 at_birth(pid)
@@ -77,9 +95,16 @@ class Nursery:
             finally:
                 was_late = not late.is_alive()
                 late.cancel()
-            if was_late and late_s is None:
-                raise TimeoutError("it did not end")
-            return code
+            return code, was_late
+
+
+def logged(log: Path, start: int = 0) -> str:
+    """The end of a log, from a position on, as far as a person reads it."""
+    with contextlib.suppress(FileNotFoundError), log.open("rb") as file:
+        file.seek(max(start, log.stat().st_size - LONGEST_LOG))
+        said = file.read().decode(errors="replace").rstrip()
+        return f"{log} ends with:\n{said}" if said else f"{log}: nothing was logged"
+    return f"{log} was never made"
 
 
 def _kill(pid: int) -> None:
