@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tests.kit.house import House
+from tests.kit.workers import WorkersUnderTest
 
 from nondum.host.cgroups import Cages
 from nondum.host.events import WorkerLogged
@@ -121,20 +121,20 @@ async def attempted(
     limits: Limits = SMALL,
 ) -> dict[str, Result]:
     """What the hostile plugin can do, or some of it, so confined."""
-    house = House(folder, confinement=confinement)
+    tested = WorkersUnderTest(folder, confinement=confinement)
     cages = Cages.open(folder)
-    house.workers.launcher = WorkerLauncher(confinement, cages)
-    house.workers.timing = house.timing.__class__(startup_s=120.0)
+    tested.workers.launcher = WorkerLauncher(confinement, cages)
+    tested.workers.timing = tested.timing.__class__(startup_s=120.0)
     source = ESCAPE.read_text(encoding="utf-8")
     summary = source.removeprefix('"""').partition("\n")[0]
     settings = {"bait": json.dumps({**bait, "attempts": list(attempts)})}
     try:
-        await house.start("escape", source, summary=summary, settings=settings, limits=limits)
-        await house.until(WorkerLogged, lambda line: line.message == "tried all", timeout_s=120)
+        await tested.start("escape", source, summary=summary, settings=settings, limits=limits)
+        await tested.until(WorkerLogged, lambda line: line.message == "tried all", timeout_s=120)
     finally:
-        await house.workers.close(grace_s=1.0)
+        await tested.workers.close(grace_s=1.0)
         cages.close()
-    said = [line.message for line in house.told(WorkerLogged)]
+    said = [line.message for line in tested.told(WorkerLogged)]
     rows = [json.loads(s.removeprefix("tried ")) for s in said if s.startswith("tried {")]
     return {row["name"]: _result(row) for row in rows}
 

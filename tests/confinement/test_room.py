@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.kit.house import HOST, LIBRARIES, SDK, House, until_gone
+from tests.kit.workers import HOST, LIBRARIES, SDK, WorkersUnderTest, until_gone
 
 from nondum.host.confinement import bubblewrap
 from nondum.host.events import WorkerLogged
@@ -49,10 +49,10 @@ async def do(ctx, u):
 
 
 @pytest.fixture
-async def house(tmp_path: Path) -> AsyncIterator[House]:
-    house = House(tmp_path, confinement=Boxed(shutil.which("bwrap") or "bwrap"))
-    yield house
-    await house.workers.close(grace_s=1.0)
+async def tested(tmp_path: Path) -> AsyncIterator[WorkersUnderTest]:
+    tested = WorkersUnderTest(tmp_path, confinement=Boxed(shutil.which("bwrap") or "bwrap"))
+    yield tested
+    await tested.workers.close(grace_s=1.0)
 
 
 @pytest.fixture
@@ -65,65 +65,65 @@ def line() -> Iterator[tuple[int, str]]:
             os.close(end)
 
 
-async def guest(house: House, body: str, permissions: tuple[str, ...] = ()) -> None:
+async def guest(tested: WorkersUnderTest, body: str, permissions: tuple[str, ...] = ()) -> None:
     source = PLUGIN.replace("{body}", body.replace("\n", "\n    "))
-    spec = house.spec("guest", source, behaviours=(DO,), units=(Unit("it", "sensor"),))
-    await house.workers.start(replace(spec, permissions=permissions))
+    spec = tested.spec("guest", source, behaviours=(DO,), units=(Unit("it", "sensor"),))
+    await tested.workers.start(replace(spec, permissions=permissions))
 
 
-async def does(house: House) -> str:
+async def does(tested: WorkersUnderTest) -> str:
     """Have it do its thing; why it failed, if so."""
-    call = house.behave("guest", "do", u=f"{HOST}__guest__it")
+    call = tested.behave("guest", "do", u=f"{HOST}__guest__it")
     return "" if await call.ended() is RunState.SUCCEEDED else call.reason
 
 
 async def test_device_appears_and_vanishes_while_it_runs(
-    house: House, line: tuple[int, str]
+    tested: WorkersUnderTest, line: tuple[int, str]
 ) -> None:
     far, node = line
     await guest(
-        house,
+        tested,
         "assert os.listdir('/dev/nondum') == ([] if device is None else ['line'])\n"
         "if device is not None:\n"
         "    port = os.open(device.node, os.O_RDWR | os.O_NOCTTY)\n"
         "    os.write(port, b'hello')\n"
         "    os.close(port)",
     )
-    assert await does(house) == ""
-    await house.workers.attach("guest", "line", node, {})
-    assert await does(house) == ""
+    assert await does(tested) == ""
+    await tested.workers.attach("guest", "line", node, {})
+    assert await does(tested) == ""
     assert await asyncio.to_thread(os.read, far, 5) == b"hello"
-    await house.workers.detach("guest", "line")
-    assert await does(house) == ""
+    await tested.workers.detach("guest", "line")
+    assert await does(tested) == ""
 
 
-async def test_only_devices_are_handed_in(house: House, tmp_path: Path) -> None:
+async def test_only_devices_are_handed_in(tested: WorkersUnderTest, tmp_path: Path) -> None:
     secret = tmp_path / "secret"
     secret.write_text("of the host")
-    await guest(house, "assert os.listdir('/dev/nondum') == []")
+    await guest(tested, "assert os.listdir('/dev/nondum') == []")
     for node in (secret, tmp_path, Path("/dev/pts/no-such")):
-        await house.workers.attach("guest", "line", str(node), {})
-        said = house.told(WorkerLogged)[-1].message
+        await tested.workers.attach("guest", "line", str(node), {})
+        said = tested.told(WorkerLogged)[-1].message
         assert said.startswith("DEVICE_REFUSED"), said
-        assert await does(house) == ""
+        assert await does(tested) == ""
 
 
 async def test_link_to_a_device_is_followed_outside(
-    house: House, tmp_path: Path, line: tuple[int, str]
+    tested: WorkersUnderTest, tmp_path: Path, line: tuple[int, str]
 ) -> None:
     link = tmp_path / "by-id"
     link.symlink_to(line[1])
-    await guest(house, "os.close(os.open(device.node, os.O_RDWR | os.O_NOCTTY))")
-    await house.workers.attach("guest", "line", str(link), {})
-    assert await does(house) == ""
+    await guest(tested, "os.close(os.open(device.node, os.O_RDWR | os.O_NOCTTY))")
+    await tested.workers.attach("guest", "line", str(link), {})
+    assert await does(tested) == ""
 
 
 async def test_device_is_there_before_the_plugin_starts(
-    house: House, line: tuple[int, str]
+    tested: WorkersUnderTest, line: tuple[int, str]
 ) -> None:
-    await house.workers.attach("guest", "line", line[1], {})
-    await guest(house, "os.close(os.open('/dev/nondum/line', os.O_RDWR | os.O_NOCTTY))")
-    assert await does(house) == ""
+    await tested.workers.attach("guest", "line", line[1], {})
+    await guest(tested, "os.close(os.open('/dev/nondum/line', os.O_RDWR | os.O_NOCTTY))")
+    assert await does(tested) == ""
 
 
 CONNECT = "socket.create_connection(('127.0.0.1', {port}), 2).close()"
@@ -135,35 +135,35 @@ async def test_network_is_a_permission(tmp_path: Path, make: type[Boxed] | type[
     with socket.create_server(("127.0.0.1", 0)) as listener:
         body = CONNECT.replace("{port}", str(listener.getsockname()[1]))
         for number, permissions in enumerate(((), ("network",))):
-            house = House(tmp_path / str(number), confinement=confinement)
-            await guest(house, body, permissions)
-            assert (await does(house) == "") is bool(permissions)
-            await house.workers.close()
+            tested = WorkersUnderTest(tmp_path / str(number), confinement=confinement)
+            await guest(tested, body, permissions)
+            assert (await does(tested) == "") is bool(permissions)
+            await tested.workers.close()
 
 
-async def test_network_is_not_the_sockets_of_other_programs(house: House) -> None:
+async def test_network_is_not_the_sockets_of_other_programs(tested: WorkersUnderTest) -> None:
     with socket.socket(socket.AF_UNIX) as listener:
         listener.bind("\0nondum-of-another-program")
         listener.listen()
         body = "socket.socket(socket.AF_UNIX).connect('\\0nondum-of-another-program')"
-        await guest(house, body, ("network",))
-        assert "Address family not supported" in await does(house)
+        await guest(tested, body, ("network",))
+        assert "Address family not supported" in await does(tested)
 
 
 async def test_permission_brings_its_device_nodes(
-    house: House, monkeypatch: pytest.MonkeyPatch
+    tested: WorkersUnderTest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(confinements, "NODES", {"audio": ("/dev/kms*", "/dev/no-such")})
     body = "print('sees', sorted(n for n in os.listdir('/dev') if n.startswith('k')))"
-    await guest(house, body, ("audio",))
-    assert await does(house) == ""
-    said = await house.until(WorkerLogged, lambda event: event.message.startswith("sees"))
+    await guest(tested, body, ("audio",))
+    assert await does(tested) == ""
+    said = await tested.until(WorkerLogged, lambda event: event.message.startswith("sees"))
     assert said.message == "sees ['kmsg']"
 
 
-async def test_what_is_left_in_a_room_is_reaped(house: House) -> None:
+async def test_what_is_left_in_a_room_is_reaped(tested: WorkersUnderTest) -> None:
     await guest(
-        house,
+        tested,
         "if os.fork() == 0:\n"
         "    if os.fork() == 0:\n"
         "        os._exit(0)\n"
@@ -172,10 +172,10 @@ async def test_what_is_left_in_a_room_is_reaped(house: House) -> None:
         "while len([p for p in os.listdir('/proc') if p.isdigit()]) > 2:\n"
         "    await ctx.sleep(0.01)",
     )
-    assert await does(house) == ""
+    assert await does(tested) == ""
 
 
-async def test_room_ends_with_its_worker(house: House) -> None:
+async def test_room_ends_with_its_worker(tested: WorkersUnderTest) -> None:
     body = (
         "if os.fork() == 0:\n"
         "    os.setsid()\n"
@@ -183,17 +183,17 @@ async def test_room_ends_with_its_worker(house: House) -> None:
         "    os.execve('/usr/bin/sleep', ['sleep', '600'], {})\n"
         "await ctx.sleep(600)"
     )
-    await guest(house, body)
-    house.behave("guest", "do", u=f"{HOST}__guest__it")
-    await house.until(WorkerLogged, lambda event: event.message.startswith("child"))
-    keeper = parent(house.workers.pids()["guest"])
+    await guest(tested, body)
+    tested.behave("guest", "do", u=f"{HOST}__guest__it")
+    await tested.until(WorkerLogged, lambda event: event.message.startswith("child"))
+    keeper = parent(tested.workers.pids()["guest"])
     others = children(keeper)
-    await house.workers.stop("guest")
+    await tested.workers.stop("guest")
     for pid in (keeper, *others):
         await until_gone(pid)
 
 
-async def test_outside_is_not_told_by_what_a_worker_is(house: House) -> None:
+async def test_outside_is_not_told_by_what_a_worker_is(tested: WorkersUnderTest) -> None:
     body = (
         "assert os.getuid() == os.getgid() == 65534\n"
         "assert os.environ['HOME'] == os.getcwd() == str(ctx.scratch)\n"
@@ -204,8 +204,8 @@ async def test_outside_is_not_told_by_what_a_worker_is(house: House) -> None:
         "assert sorted(os.listdir('/dev')) == sorted(['core', 'fd', 'full', 'nondum', 'null',"
         " 'ptmx', 'pts', 'random', 'shm', 'stderr', 'stdin', 'stdout', 'tty', 'urandom', 'zero'])"
     )
-    await guest(house, body)
-    assert await does(house) == ""
+    await guest(tested, body)
+    assert await does(tested) == ""
 
 
 @contextlib.contextmanager
@@ -231,16 +231,16 @@ async def test_worker_of_root_gets_a_user_of_its_own(monkeypatch: pytest.MonkeyP
     """Where all may read what it needs: Debian's interpreter, unlike one in root's home."""
     monkeypatch.setattr(bubblewrap, "prefixes", lambda: (Path("/usr/lib"),))
     with open_folder() as folder:
-        house = House(folder, confinement=Held())
+        tested = WorkersUnderTest(folder, confinement=Held())
         source = "import os; print('users', os.getuid(), os.getgroups(), os.stat('.').st_uid)"
-        spec = house.spec("guest", source)
+        spec = tested.spec("guest", source)
         site = spec.site_packages[0]
         for package in (SDK / "nondum", LIBRARIES / "pluggy", LIBRARIES / "msgpack"):
             shutil.copytree(package, site / package.name)  # where they are, not all may read
         spec = replace(spec, site_packages=(site,), python=Path("/usr/bin/python3"))
-        await house.workers.start(spec)
-        said = await house.until(WorkerLogged, lambda event: event.message.startswith("users"))
+        await tested.workers.start(spec)
+        said = await tested.until(WorkerLogged, lambda event: event.message.startswith("users"))
         user = user_for(spec)
-        await house.workers.close()
+        await tested.workers.close()
     assert user in range(FIRST_USER, FIRST_USER + USERS)
     assert said.message == f"users {user} [] {user}"

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 from tests.confinement.baits import SMALL, attempted, laid
 from tests.confinement.test_room import children
-from tests.kit.house import until_gone
+from tests.kit.workers import until_gone
 
 from nondum.host.confinement import bubblewrap, refusals
 from nondum.host.workers.confinements import Boxed, Held

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.faults.daemon import HOST, OPTIONS, QUICK
-from tests.kit.living import Living, left_over, living
+from tests.kit.host import HostInProcess, host_in_process, left_over
 
 from nondum.host import events
 from nondum.host.catalogue.catalogue import Catalogue, now
@@ -169,7 +169,7 @@ async def bring_to_an_end(root: Path) -> Ended:
     pull everything, and see that nothing is left."""
     begun = time.monotonic()
     wrong: list[str] = []
-    async with living(root, options=OPTIONS, timing=QUICK) as host:
+    async with host_in_process(root, options=OPTIONS, timing=QUICK) as host:
         restart_s = time.monotonic() - begun
         await until_settled(host)
         refused = [p for p in host.snapshot.payloads if p.problems]
@@ -193,7 +193,7 @@ async def bring_to_an_end(root: Path) -> Ended:
     return Ended(restart_s, steps, codes, tuple(wrong))
 
 
-async def until_settled(host: Living) -> None:
+async def until_settled(host: HostInProcess) -> None:
     """Wait until every drive was read and every payload is where it stays."""
     at_rest = {Step.ACTIVE, Step.SUPERSEDED, Step.REFUSED, Step.QUARANTINED}
 

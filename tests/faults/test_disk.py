@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from tests.faults.ways import LAMP_ID, newer, sound
-from tests.kit.living import LAMP, left_over, living
+from tests.kit.host import LAMP, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload, make_wheel
 
 from nondum.host import events
@@ -67,7 +67,7 @@ async def test_too_big_a_payload_is_refused_before_it_is_copied(
     lamp = Part("lamp", LAMP, wheels=[big])
     make_payload(tmp_path / "drive", lamp, payload_id=LAMP_ID)
     options = InstallOptions(allow_unsigned=True, reserve_mb=0)
-    async with living(small_disk, options=options) as host:
+    async with host_in_process(small_disk, options=options) as host:
         host.plug(tmp_path / "drive")
         record = await host.until_step(LAMP_ID, Step.REFUSED)
         (problem,) = record.problems
@@ -85,7 +85,7 @@ async def test_full_disk_while_installing_rolls_back(small_disk: Path, tmp_path:
     lamp = Part("lamp", LAMP, wheels=[zeros])
     make_payload(tmp_path / "drive", lamp, payload_id=LAMP_ID)
     options = InstallOptions(allow_unsigned=True, reserve_mb=0)
-    async with living(small_disk, options=options) as host:
+    async with host_in_process(small_disk, options=options) as host:
         host.plug(tmp_path / "drive")
         record = await host.until_step(LAMP_ID, Step.REFUSED)
         assert [problem.code for problem in record.problems] == ["DISK_FULL"]
@@ -100,7 +100,7 @@ async def test_full_disk_does_not_keep_the_catalogue_from_being_written(
     """Some of it was set aside, and is so again once there is room."""
     sound(tmp_path / "drive")
     root = mounted("size=160m")
-    async with living(root) as host:
+    async with host_in_process(root) as host:
         filler = root / "state/filler"
         fill(filler)
         host.plug(tmp_path / "drive")
@@ -120,7 +120,7 @@ async def test_withdrawal_does_not_wait_for_a_disk_that_cannot_be_written(
     """It has no reserve, as when the card has become read-only."""
     sound(tmp_path / "drive")
     options = InstallOptions(allow_unsigned=True, reserve_mb=0)
-    async with living(small_disk, options=options) as host:
+    async with host_in_process(small_disk, options=options) as host:
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
         filler = small_disk / "state/filler"
@@ -132,7 +132,7 @@ async def test_withdrawal_does_not_wait_for_a_disk_that_cannot_be_written(
         filler.unlink()
         await host.until(lambda: isinstance(host.heard[-1], events.CatalogueWritten))
         assert "PayloadCleared" in [entry.event for entry in await host.journal()]
-    async with living(small_disk, options=options) as host:
+    async with host_in_process(small_disk, options=options) as host:
         assert not host.snapshot.payloads
 
 
@@ -141,7 +141,7 @@ async def test_disk_without_room_for_files_is_told(
 ) -> None:
     sound(tmp_path / "drive")
     root = mounted("size=128m,nr_inodes=40")
-    async with living(root) as host:
+    async with host_in_process(root) as host:
         host.plug(tmp_path / "drive")
         record = await host.until_step(LAMP_ID, Step.REFUSED)
         (problem,) = record.problems
@@ -156,7 +156,7 @@ async def test_host_does_not_start_on_a_disk_that_is_read_only(
 ) -> None:
     root = mounted("size=64m,ro")
     with pytest.raises(ConfigRefused) as refused:
-        async with living(root):
+        async with host_in_process(root):
             pass
     assert refused.value.code == "STATE_UNWRITABLE"
     with pytest.raises(ConfigRefused) as refused:
@@ -184,7 +184,7 @@ async def test_all_that_is_here_outlives_the_catalogue(
     """One payload is installed for good, another on a drive."""
     installed = make_payload(tmp_path / "usb", Part("torch", LAMP), payload_id=TORCH_ID)
     sound(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         await install(installed, host.catalogue, host.bus)
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
@@ -192,7 +192,7 @@ async def test_all_that_is_here_outlives_the_catalogue(
             host.catalogue.backups.make()
     shutil.rmtree(tmp_path / "usb")
     HARMS[harm](host.folders.catalogue)
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         await host.until_step(TORCH_ID, Step.ACTIVE)
         await host.until_step(LAMP_ID, Step.ACTIVE)
         told = [event for event in host.heard if isinstance(event, events.CatalogueSetAside)]
@@ -209,12 +209,12 @@ async def test_older_release_is_refused_by_a_catalogue_made_anew(tmp_path: Path)
     """What is installed for good tells what was active here."""
     newer(tmp_path / "usb")
     installed = tmp_path / "usb/nondum" / LAMP_ID
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         await install(installed, host.catalogue, host.bus)
     host.folders.catalogue.unlink()
     HARMS["damaged"](host.folders.catalogue)
     sound(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         await host.until(lambda: host.snapshot.component("lamp") is not None)
         host.plug(tmp_path / "drive")
         await host.until(lambda: any(p.step is Step.REFUSED for p in host.snapshot.payloads))
@@ -226,12 +226,12 @@ async def test_files_that_were_taken_away_are_told(tmp_path: Path) -> None:
     """A guest comes back from its drive; what was installed for good must be installed again."""
     installed = make_payload(tmp_path / "usb", Part("torch", LAMP), payload_id=TORCH_ID)
     sound(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         await install(installed, host.catalogue, host.bus)
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
     shutil.rmtree(host.folders.payloads)
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         await host.until_step(LAMP_ID, Step.ACTIVE)
         record = await host.until_step(TORCH_ID, Step.QUARANTINED)
         assert [problem.code for problem in record.problems] == ["PAYLOAD_LOST"]

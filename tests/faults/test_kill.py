@@ -11,7 +11,7 @@ import pytest
 from tests.faults.model import Ended, check
 from tests.faults.ways import COMPONENT_WAYS, LAMP_ID, Way, sound, way
 from tests.kit.fork_server import Nursery
-from tests.kit.living import living
+from tests.kit.host import host_in_process
 
 from nondum.host import events
 from nondum.host.catalogue.records import ComponentState, Step
@@ -107,10 +107,10 @@ async def test_payload_that_takes_the_daemon_along_is_left_alone(
     for _ in range(ATTEMPTS):
         nursery.run(orders, expect=KILLED)
         orders["script"] = ()
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         record = await host.until_step(LAMP_ID, left_alone)
         assert [problem.code for problem in record.problems] == ["QUARANTINED"]
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         record = await host.until_step(LAMP_ID, left_alone)
         host.bus.emit(events.RetryAsked(record.key))
         await host.until(lambda: host.snapshot.component("lamp") is not None)
@@ -127,7 +127,7 @@ async def test_drive_that_takes_the_daemon_along_is_left_alone(
     for _ in range(ATTEMPTS):
         nursery.run(orders, expect=KILLED)
         orders["script"] = ()
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         await host.until(lambda: bool(host.snapshot.drives and host.snapshot.drives[0].problems))
         (drive,) = host.snapshot.drives
         assert [problem.code for problem in drive.problems] == ["QUARANTINED"]

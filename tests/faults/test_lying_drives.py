@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from tests.faults.fuse import Answer, FuseDrive, served
-from tests.kit.living import LAMP, Living, left_over, living
+from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload, make_wheel
 
 from nondum.host.catalogue.records import PayloadRecord, Step
@@ -35,12 +35,12 @@ LIST, MANIFEST = f"{FOLDER}/CONTENTS", f"{FOLDER}/payload.toml"
 @asynccontextmanager
 async def lying(
     tmp_path: Path, *, answers: dict[str, Answer], options: InstallOptions | None = None
-) -> AsyncIterator[tuple[Living, FuseDrive]]:
+) -> AsyncIterator[tuple[HostInProcess, FuseDrive]]:
     """A host, and a drive with a sound payload on a device that gives these answers."""
     root = tmp_path / "root"
     ballast = make_wheel(tmp_path, "ballast", "1.0", {"ballast.bin": os.urandom(2**20)})
     make_payload(root, Part("lamp", LAMP, wheels=[ballast]), payload_id=LAMP_ID)
-    async with living(tmp_path, options=options) as host:
+    async with host_in_process(tmp_path, options=options) as host:
         with served(root, tmp_path / "fuse") as drive:
             drive.answers |= answers
             host.plug(drive.mount)
@@ -74,11 +74,11 @@ def endless(opening: int, offset: int, size: int) -> bytes:
     return b"x" * size
 
 
-async def refused(host: Living) -> PayloadRecord:
+async def refused(host: HostInProcess) -> PayloadRecord:
     return await host.until_step(LAMP_ID, Step.REFUSED)
 
 
-async def unreadable(host: Living, code: str) -> None:
+async def unreadable(host: HostInProcess, code: str) -> None:
     """The drive is told with a code, and nothing of its payload stays."""
     await host.until(lambda: any(drive.problems for drive in host.snapshot.drives))
     (drive,) = host.snapshot.drives
@@ -117,7 +117,7 @@ async def test_foreign_drive_is_left_alone(tmp_path: Path) -> None:
     (root / "DCIM/100CANON").mkdir(parents=True)
     (root / "DCIM/100CANON/IMG_0001.JPG").write_bytes(b"beach")
     (root / "tax.ods").write_bytes(b"private")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         with served(root, tmp_path / "fuse") as drive:
             host.plug(drive.mount)
             await host.until(lambda: any(d.problems for d in host.snapshot.drives))
@@ -169,7 +169,7 @@ async def test_folder_without_end_is_read_no_further_than_a_person_fills_it(
     tmp_path: Path, name: str
 ) -> None:
     root = tmp_path / "root"
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         make_payload(root, Part("lamp", LAMP), payload_id=LAMP_ID)
         (root / name).mkdir(exist_ok=True)
         with served(root, tmp_path / "fuse") as drive:

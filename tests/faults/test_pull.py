@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from tests.faults.model import processes_of
 from tests.faults.ways import LAMP_ID, sound
-from tests.kit.living import LAMP, Living, left_over, living
+from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 
 from nondum.host import events
@@ -34,7 +34,7 @@ PHASES: tuple[type[Event], ...] = (
 )
 
 
-async def check_undone(host: Living, root: Path) -> None:
+async def check_undone(host: HostInProcess, root: Path) -> None:
     """Nothing of the lamp is left, and the good payload never noticed."""
     await host.until(lambda: "a" not in {drive.id for drive in host.snapshot.drives})
     # It went with its drive, in one commit: nothing was waited for, no worker and no folder.
@@ -49,7 +49,7 @@ async def check_undone(host: Living, root: Path) -> None:
         assert not await asyncio.to_thread(processes_of, scratch)
 
 
-async def plug_good(host: Living, root: Path) -> None:
+async def plug_good(host: HostInProcess, root: Path) -> None:
     make_payload(root / "good", Part("good", LAMP), payload_id=GOOD)
     host.plug(root / "good", "good")
     await host.until_step(GOOD, Step.ACTIVE)
@@ -58,7 +58,7 @@ async def plug_good(host: Living, root: Path) -> None:
 @pytest.mark.parametrize("phase", PHASES, ids=lambda phase: phase.__name__)
 async def test_pull_at_a_phase(tmp_path: Path, phase: type[Event]) -> None:
     sound(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         await plug_good(host, tmp_path)
         host.heard.clear()
         host.plug(tmp_path / "drive")
@@ -71,7 +71,7 @@ async def test_pull_at_a_phase(tmp_path: Path, phase: type[Event]) -> None:
 async def test_pull_at_any_moment(tmp_path: Path) -> None:
     sound(tmp_path / "drive")
     moments = random.Random(11)
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         await plug_good(host, tmp_path)
         for _ in range(12):
             host.plug(tmp_path / "drive")
@@ -82,7 +82,7 @@ async def test_pull_at_any_moment(tmp_path: Path) -> None:
 
 async def test_pull_in_the_middle_of_a_behaviour(tmp_path: Path) -> None:
     sound(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         await plug_good(host, tmp_path)
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)

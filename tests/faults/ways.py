@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tests.kit.living import LAMP
+from tests.kit.host import LAMP
 from tests.kit.payloads import Part, make_payload, seal, sha256
 
 from nondum.host import events

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tests.host.drives.test_blocks import make_ext4, on
-from tests.kit.living import LAMP, Living, living
+from tests.kit.host import LAMP, HostInProcess, host_in_process
 from tests.kit.loop_devices import attach, cut_off, detach
 from tests.kit.payloads import Part, make_payload, make_wheel
 
@@ -58,7 +58,7 @@ class Yanks:
 class Bench:
     """A host with a good payload, and a drive to be yanked. Made by `bench`."""
 
-    def __init__(self, host: Living, image: Path, root: Path) -> None:
+    def __init__(self, host: HostInProcess, image: Path, root: Path) -> None:
         self.host, self._image, self._root = host, image, root
         self.told = Yanks()
         self._good = host.workers.pids()["good"]
@@ -145,7 +145,7 @@ async def bench(root: Path) -> AsyncIterator[Bench]:
     def sources(folders: Folders) -> list[BlockSource]:
         return [BlockSource(folders.mounts, accepts=on(root))]
 
-    async with living(root, sources=sources) as host:
+    async with host_in_process(root, sources=sources) as host:
         host.plug(root / "good", "good")
         await host.until_step(GOOD, Step.ACTIVE)
         made = Bench(host, image, root)

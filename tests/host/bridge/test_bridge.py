@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from benchmarks.slow_link import slow_link
 from tests.host.bridge.hosts import HERE, Over, Pair, Reader, pair, sending
-from tests.kit.house import until_gone
+from tests.kit.workers import until_gone
 
 from nondum.host.bridge.bridge import Bridge
 from nondum.sdk.errors import WorkerFailed

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from tests.host.bridge.hosts import HERE, PATIENCE_S
 from tests.host.workers.test_streams import CAMERA, STREAM, WATCH, WATCHER, sees
-from tests.kit.house import House, is_alive, until_gone
+from tests.kit.workers import WorkersUnderTest, is_alive, until_gone
 
 from nondum.host.bridge.bridge import Bridge
 from nondum.host.bridge.remote_streams import RemoteStreams
@@ -36,7 +36,7 @@ BASE = PeerKey("the base's long-term key")
 FRAMES = "rover__cam__frames"
 
 
-class BaseHouse(House):
+class BaseWorkers(WorkersUnderTest):
     """Workers of another host than the rover."""
 
     def __post_init__(self) -> None:
@@ -47,8 +47,8 @@ class BaseHouse(House):
 class Fleet:
     """A rover with cameras and a base that reads them; calls go straight to the other side."""
 
-    rover: House
-    base: House
+    rover: WorkersUnderTest
+    base: WorkersUnderTest
     shared: SharedStreams
     rover_bridge: Bridge
     base_bridge: Bridge
@@ -84,7 +84,7 @@ class Fleet:
 
 @pytest.fixture
 async def fleet(tmp_path: Path) -> AsyncIterator[Fleet]:
-    rover, base = House(tmp_path / "rover"), BaseHouse(tmp_path / "base")
+    rover, base = WorkersUnderTest(tmp_path / "rover"), BaseWorkers(tmp_path / "base")
     bridges = Bridge(HERE, idle_s=0.5), Bridge(HERE, idle_s=0.5)
     shared = SharedStreams(bridges[0], rover.workers.streams)
     made = Fleet(rover, base, shared, *bridges)

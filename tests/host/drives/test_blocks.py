@@ -17,7 +17,7 @@ import pytest
 import pyudev
 from tests.host.drives.test_usb import stick
 from tests.kit import loop_devices
-from tests.kit.living import LAMP, Living, left_over, living
+from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.loop_devices import attached, can_be_made, detach
 from tests.kit.payloads import Part, make_payload, make_wheel
 from tests.kit.traces import until_unmounted
@@ -83,13 +83,13 @@ def sources(tmp_path: Path) -> Sequence[DriveSource]:
     return [BlockSource(tmp_path / "state/mounts", accepts=on(tmp_path))]
 
 
-async def until_drive_is(host: Living, state: DriveState) -> None:
+async def until_drive_is(host: HostInProcess, state: DriveState) -> None:
     await host.until(lambda: any(drive.state is state for drive in host.snapshot.drives))
 
 
 async def test_block_device_becomes_a_drive_and_is_safe_to_pull(tmp_path: Path) -> None:
     file = image(tmp_path, Part("lamp", LAMP))
-    async with living(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
+    async with host_in_process(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
         with attached(file) as node:
             await host.until_step(LAMP_ID, Step.ACTIVE)
             await until_drive_is(host, DriveState.IDLE)
@@ -102,14 +102,14 @@ async def test_block_device_becomes_a_drive_and_is_safe_to_pull(tmp_path: Path) 
 
 async def test_device_that_was_there_before_the_daemon_is_read(tmp_path: Path) -> None:
     with attached(image(tmp_path, Part("lamp", LAMP))):
-        async with living(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
+        async with host_in_process(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
             await host.until_step(LAMP_ID, Step.ACTIVE)
 
 
 async def test_drive_that_fails_while_it_is_copied_is_let_go(tmp_path: Path) -> None:
     ballast = make_wheel(tmp_path, "ballast", "1.0", {"ballast.bin": os.urandom(12 * 1024**2)})
     file = image(tmp_path, Part("lamp", LAMP, wheels=[ballast]), size_mb=40)
-    async with living(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
+    async with host_in_process(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
         with attached(file):
             cut_off(file)
             await host.until(lambda: any(drive.problems for drive in host.snapshot.drives))
@@ -123,7 +123,7 @@ async def test_drive_that_fails_while_it_is_copied_is_let_go(tmp_path: Path) -> 
 async def test_unknown_file_system_is_refused_by_name(tmp_path: Path) -> None:
     file = tmp_path / "drive.img"
     file.write_bytes(bytes(1024**2))
-    async with living(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
+    async with host_in_process(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
         with attached(file):
             await host.until(lambda: any(drive.problems for drive in host.snapshot.drives))
             (drive,) = host.snapshot.drives
@@ -157,7 +157,7 @@ async def test_file_system_that_tears_under_a_reader_is_told_as_that(tmp_path: P
     """Its list lies, by its own word, where the device has no bytes."""
     file = image(tmp_path, Part("lamp", LAMP))
     _run("debugfs", "-w", "-R", f"sif /nondum/{LAMP_ID}/CONTENTS block[5] 999999999", str(file))
-    async with living(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
+    async with host_in_process(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
         with attached(file):
             await host.until(lambda: bool(host.snapshot.payloads))
             record = await host.until_step(LAMP_ID, Step.REFUSED)
@@ -168,7 +168,7 @@ async def test_mounts_left_by_a_killed_daemon_are_undone(tmp_path: Path) -> None
     folders = Folders(tmp_path / "state")
     with attached(image(tmp_path, Part("lamp", LAMP))) as node:
         mounting.mount(node, folders.mounts / "left", "ext4")
-        async with living(tmp_path):
+        async with host_in_process(tmp_path):
             assert not mounted_below(folders.mounts)
             assert not list(folders.mounts.iterdir())
 
@@ -264,7 +264,7 @@ def dirty(tmp_path: Path) -> Path:
 async def test_nothing_is_written_to_a_drive(tmp_path: Path) -> None:
     file = dirty(tmp_path)
     before = digest(file)
-    async with living(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
+    async with host_in_process(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
         with attached(file) as node:
             await host.until_step(LAMP_ID, Step.ACTIVE)
             await until_drive_is(host, DriveState.IDLE)
@@ -292,7 +292,7 @@ async def test_drive_that_came_in_place_of_another_is_not_taken_for_it(tmp_path:
 async def test_next_stick_in_the_same_node_is_another_drive(tmp_path: Path) -> None:
     first, second = tmp_path / "first", tmp_path / "second"
     other = image(second, Part("other", LAMP), payload_id="org.example.other")
-    async with living(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
+    async with host_in_process(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
         with attached(image(first, Part("lamp", LAMP))) as node:
             await host.until_step(LAMP_ID, Step.ACTIVE)
             (before,) = (drive.id for drive in host.snapshot.drives)
@@ -312,7 +312,7 @@ async def test_drive_without_payloads_is_let_go_unread(tmp_path: Path) -> None:
     (content / "holiday/beach.jpg").write_bytes(b"sand")
     file = tmp_path / "drive.img"
     make_ext4(content, file)
-    async with living(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
+    async with host_in_process(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
         with attached(file):
             await until_drive_is(host, DriveState.IDLE)
             (drive,) = host.snapshot.drives
@@ -346,7 +346,7 @@ async def test_each_partition_is_judged_alone(tmp_path: Path) -> None:
     good = image(tmp_path / "good", Part("lamp", LAMP))
     bad = image(tmp_path / "bad", Part("worse", LAMP), payload_id="org.example.worse", spoilt=True)
     disk = partitioned(tmp_path, good, bad)
-    async with living(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
+    async with host_in_process(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
         with attached(disk) as node:
             for number in (1, 2):
                 partition(node, number)
@@ -369,7 +369,7 @@ async def test_composite_stick_is_refused_unread(tmp_path: Path) -> None:
         def composite(folders: Folders) -> Sequence[DriveSource]:
             return [BlockSource(folders.mounts, accepts=on(tmp_path), sysfs=sysfs)]
 
-        async with living(tmp_path, sources=composite) as host:
+        async with host_in_process(tmp_path, sources=composite) as host:
             await until_drive_is(host, DriveState.IDLE)
             (drive,) = host.snapshot.drives
             assert [problem.code for problem in drive.problems] == ["USB_EXTRA_INTERFACE"]
@@ -381,7 +381,7 @@ async def test_composite_stick_is_refused_unread(tmp_path: Path) -> None:
             rule = BlockSource(folders.mounts, accepts=accepts, sysfs=sysfs, single_function=False)
             return [rule]
 
-        async with living(tmp_path, sources=allowed) as host:
+        async with host_in_process(tmp_path, sources=allowed) as host:
             await host.until_step(LAMP_ID, Step.ACTIVE)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from tests.host.drives.test_blocks import attribute, image, on
 from tests.host.drives.test_usb import stick
-from tests.kit.living import LAMP
+from tests.kit.host import LAMP
 from tests.kit.loop_devices import attached, can_be_made
 from tests.kit.payloads import Part
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from tests.host.drives.test_blocks import image, on
-from tests.kit.living import LAMP, Living, left_over, living
+from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.loop_devices import attached, can_be_made
 from tests.kit.payloads import Part, make_payload
 
@@ -32,7 +32,7 @@ pytestmark = pytest.mark.anyio
 LAMP_ID = "org.example.lamp"
 
 
-def heard(host: Living, kind: type) -> list[object]:
+def heard(host: HostInProcess, kind: type) -> list[object]:
     return [event for event in host.heard if type(event) is kind]
 
 
@@ -42,7 +42,7 @@ async def test_payloads_of_one_drive_are_judged_each_alone(tmp_path: Path) -> No
         make_payload(tmp_path / "drive", Part(name, LAMP), payload_id=f"org.example.{name}")
     with (tmp_path / "drive/nondum/org.example.bad/index.json").open("ab") as index:
         index.write(b" ")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
         for name in names:
             end = Step.REFUSED if name == "bad" else Step.ACTIVE
@@ -57,7 +57,7 @@ async def test_payloads_of_one_drive_are_judged_each_alone(tmp_path: Path) -> No
 async def test_a_goal_that_lies_loose_is_told_with_its_drive(tmp_path: Path) -> None:
     make_payload(tmp_path / "drive", Part("lamp", LAMP), payload_id=LAMP_ID)
     (tmp_path / "drive/nondum/goal.txt").write_text("shine")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
         await host.until(lambda: bool(heard(host, DriveRead)))
@@ -68,7 +68,7 @@ async def test_a_goal_that_lies_loose_is_told_with_its_drive(tmp_path: Path) -> 
 async def test_copies_of_a_payload_are_installed_once(tmp_path: Path) -> None:
     make_payload(tmp_path / "one", Part("lamp", LAMP), payload_id=LAMP_ID)
     shutil.copytree(tmp_path / "one", tmp_path / "other")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "one", "one")
         host.plug(tmp_path / "other", "other")
         record = await host.until_step(LAMP_ID, Step.ACTIVE)
@@ -95,7 +95,7 @@ async def test_bad_cable_is_told_and_read_once_it_holds(
     def sources(folders: Folders) -> Sequence[DriveSource]:
         return [Steady(BlockSource(folders.mounts, accepts=on(tmp_path)))]
 
-    async with living(tmp_path, sources=sources) as host:
+    async with host_in_process(tmp_path, sources=sources) as host:
         with attached(image(tmp_path, Part("lamp", LAMP))) as node:
             say = Path(f"/sys/block/{node.name}/uevent")
             for _ in range(10):

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.kit.living import LAMP, Living, left_over, living
+from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload, make_wheel, manifest_text, seal
 
 from nondum.host.catalogue.records import ComponentState, Step
@@ -173,14 +173,16 @@ WAYS = (
 @pytest.fixture
 async def host(tmp_path: Path) -> Any:
     make_payload(tmp_path / "good", Part("good", LAMP), payload_id=GOOD)
-    async with living(tmp_path, timing=Timing(startup_s=5.0)) as host:
+    async with host_in_process(tmp_path, timing=Timing(startup_s=5.0)) as host:
         host.plug(tmp_path / "good", "good")
         await host.until_step(GOOD, Step.ACTIVE)
         yield host
 
 
 @pytest.mark.parametrize("bad", WAYS, ids=lambda bad: bad.id)
-async def test_bad_payload_is_told_with_its_code(host: Living, bad: Bad, tmp_path: Path) -> None:
+async def test_bad_payload_is_told_with_its_code(
+    host: HostInProcess, bad: Bad, tmp_path: Path
+) -> None:
     bad.write(tmp_path / "bad")
     untouched = host.workers.pids()["good"], host.snapshot.component("good")
     host.plug(tmp_path / "bad", "bad")
@@ -198,7 +200,7 @@ async def test_bad_payload_is_told_with_its_code(host: Living, bad: Bad, tmp_pat
     assert not left_over(host.folders)
 
 
-async def test_preflight_tells_all_problems_at_once(host: Living, tmp_path: Path) -> None:
+async def test_preflight_tells_all_problems_at_once(host: HostInProcess, tmp_path: Path) -> None:
     requires = 'python = ">=3.99"\nmemory_mb = 99999999\ndisk_mb = 999999999'
     make_payload(tmp_path / "bad", bare(""), payload_id=BAD, requires=requires)
     host.plug(tmp_path / "bad", "bad")
@@ -209,7 +211,7 @@ async def test_preflight_tells_all_problems_at_once(host: Living, tmp_path: Path
 
 
 async def test_plugin_that_ends_again_and_again_is_quarantined(
-    host: Living, tmp_path: Path
+    host: HostInProcess, tmp_path: Path
 ) -> None:
     make_payload(tmp_path / "bad", bare(EXITS_LATER), payload_id=BAD)
     host.plug(tmp_path / "bad", "bad")
@@ -226,7 +228,7 @@ async def test_plugin_that_ends_again_and_again_is_quarantined(
 
 
 async def test_second_payload_with_the_same_component_is_refused(
-    host: Living, tmp_path: Path
+    host: HostInProcess, tmp_path: Path
 ) -> None:
     make_payload(tmp_path / "bad", Part("good", LAMP), payload_id=BAD)
     host.plug(tmp_path / "bad", "bad")
@@ -235,7 +237,9 @@ async def test_second_payload_with_the_same_component_is_refused(
     assert host.snapshot.component("good") is not None
 
 
-async def test_drive_without_payload_is_told_and_let_go(host: Living, tmp_path: Path) -> None:
+async def test_drive_without_payload_is_told_and_let_go(
+    host: HostInProcess, tmp_path: Path
+) -> None:
     (tmp_path / "holiday").mkdir()
     host.plug(tmp_path / "holiday", "holiday")
     await host.until(lambda: any(drive.problems for drive in host.snapshot.drives))
@@ -243,7 +247,7 @@ async def test_drive_without_payload_is_told_and_let_go(host: Living, tmp_path: 
     assert [problem.code for problem in drive.problems] == ["DRIVE_NOT_PAYLOAD"]
 
 
-async def test_no_code_of_a_refused_wheel_has_run(host: Living, tmp_path: Path) -> None:
+async def test_no_code_of_a_refused_wheel_has_run(host: HostInProcess, tmp_path: Path) -> None:
     canary = tmp_path / "canary"
     source = f"open({str(canary)!r}, 'w')"
     part = replace(bare(source), files={"sitecustomize.py": source})

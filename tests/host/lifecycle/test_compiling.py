@@ -9,7 +9,7 @@ import signal
 from pathlib import Path
 
 import pytest
-from tests.kit.living import LAMP, PATIENCE_S, Living, left_over, living
+from tests.kit.host import LAMP, PATIENCE_S, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 
 from nondum.host import events
@@ -35,25 +35,25 @@ def lamp(drive: Path, *, id: str = "lamp", payload_id: str = LAMP_ID, **files: s
     make_payload(drive, Part(id, LAMP + TELLING, files=files), payload_id=payload_id)
 
 
-async def until_compiled(host: Living, payload_id: str = LAMP_ID) -> None:
+async def until_compiled(host: HostInProcess, payload_id: str = LAMP_ID) -> None:
     record = await host.until_step(payload_id, Step.ACTIVE)
     await host.until(lambda: events.WheelsCompiled(record.key) in host.heard)
 
 
-def said(host: Living) -> list[str]:
+def said(host: HostInProcess) -> list[str]:
     lines = (event.message for event in host.heard if isinstance(event, events.WorkerLogged))
     return [line for line in lines if line.startswith("from ")]
 
 
-def store(host: Living) -> Store:
+def store(host: HostInProcess) -> Store:
     return Store(host.folders.store)
 
 
-def entry(host: Living, filename: str = "test_lamp-1.0-py3-none-any.whl") -> StoredWheel:
+def entry(host: HostInProcess, filename: str = "test_lamp-1.0-py3-none-any.whl") -> StoredWheel:
     return next(wheel for wheel in store(host).listing() if wheel.filename == filename)
 
 
-def venv_file(host: Living, path: str) -> Path:
+def venv_file(host: HostInProcess, path: str) -> Path:
     component = host.snapshot.component("lamp")
     assert component is not None
     return component.site_packages / path
@@ -61,7 +61,7 @@ def venv_file(host: Living, path: str) -> Path:
 
 async def test_wheels_are_compiled_after_the_payload_is_active(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
         await until_compiled(host)
         wheels = store(host).listing()
@@ -74,7 +74,7 @@ async def test_wheels_are_compiled_after_the_payload_is_active(tmp_path: Path) -
 
 async def test_the_next_worker_starts_from_what_was_compiled(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
         await until_compiled(host)
         assert said(host) == ["from source"]
@@ -85,7 +85,7 @@ async def test_the_next_worker_starts_from_what_was_compiled(tmp_path: Path) -> 
 
 async def test_the_next_insertion_starts_from_what_was_compiled(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
         await until_compiled(host)
         before = (entry(host).root / CACHED).stat().st_ino
@@ -100,7 +100,7 @@ async def test_the_next_insertion_starts_from_what_was_compiled(tmp_path: Path) 
 
 async def test_modules_that_do_not_compile_are_left_without(tmp_path: Path) -> None:
     lamp(tmp_path / "drive", **{"templates/lamp.py": "class {% name %}: pass"})
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
         await until_compiled(host)
         assert [file.path for file in entry(host).compiled_here or ()] == [CACHED]
@@ -112,7 +112,7 @@ async def test_modules_that_do_not_compile_are_left_without(tmp_path: Path) -> N
 async def test_a_failure_hurts_nobody(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
     lamp(tmp_path / "other", id="torch", payload_id="org.example.torch")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive", "a")
         await host.until_step(LAMP_ID, Step.ACTIVE)
         shutil.rmtree(entry(host).folder)  # so that it cannot be compiled
@@ -129,7 +129,7 @@ async def test_a_withdrawn_payload_is_not_compiled(tmp_path: Path) -> None:
     """It is pulled as its compilation begins, half done at any point."""
     sources = {f"lamp_{n}.py": f"X = [{','.join(map(str, range(20_000)))}]" for n in range(20)}
     lamp(tmp_path / "drive", **sources)
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
         unfinished = entry(host).folder / UNFINISHED
@@ -148,7 +148,7 @@ async def test_a_withdrawn_payload_is_not_compiled(tmp_path: Path) -> None:
 async def test_what_pip_installed_is_left_as_it_is(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
     options = InstallOptions(allow_unsigned=True, method="pip")
-    async with living(tmp_path, options=options) as host:
+    async with host_in_process(tmp_path, options=options) as host:
         host.plug(tmp_path / "drive")
         await until_compiled(host)
         assert not venv_file(host, CACHED).exists()

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from tests.kit.living import HOST, LAMP, Living, left_over, living
+from tests.kit.host import HOST, LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 
 from nondum.host.catalogue.catalogue import Catalogue
@@ -32,7 +32,7 @@ def lamp(drive: Path, id: str = "lamp", payload_id: str = LAMP_ID, manifest: str
 
 async def test_payload_comes_alive_and_leaves_nothing(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
         record = await host.until_step(LAMP_ID, Step.ACTIVE)
         assert list(record.phases) == ["seen", "verified", "installed", "ready"]
@@ -52,7 +52,7 @@ async def test_payload_comes_alive_and_leaves_nothing(tmp_path: Path) -> None:
 
 async def test_pulled_payload_is_withdrawn_within_the_promised_time(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
         pulled = time.monotonic()
@@ -66,7 +66,7 @@ async def test_pulled_payload_is_withdrawn_within_the_promised_time(tmp_path: Pa
 
 async def test_known_payload_is_not_copied_again(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         for _ in range(2):
             host.plug(tmp_path / "drive")
             await host.until_step(LAMP_ID, Step.ACTIVE)
@@ -82,7 +82,7 @@ async def test_known_payload_is_not_copied_again(tmp_path: Path) -> None:
 async def test_two_payloads_on_one_drive_are_two(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
     lamp(tmp_path / "drive", "torch", "org.example.torch")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
         await host.until_step("org.example.torch", Step.ACTIVE)
@@ -94,7 +94,7 @@ async def test_two_payloads_on_one_drive_are_two(tmp_path: Path) -> None:
 
 async def test_one_payload_on_two_drives_leaves_with_the_last(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive", "a")
         host.plug(tmp_path / "drive", "b")
         await host.until_step(LAMP_ID, Step.ACTIVE)
@@ -108,7 +108,7 @@ async def test_one_payload_on_two_drives_leaves_with_the_last(tmp_path: Path) ->
 
 async def test_replug_in_a_hurry_ends_alive(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         for _ in range(5):
             host.plug(tmp_path / "drive")
             await host.until(lambda: host.payload(LAMP_ID) is not None)
@@ -120,10 +120,10 @@ async def test_replug_in_a_hurry_ends_alive(tmp_path: Path) -> None:
 
 async def test_restarted_daemon_brings_back_what_was_active(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         await host.until(lambda: host.snapshot.component("lamp") is not None)
         await host.until_step(LAMP_ID, Step.ACTIVE)
         assert not host.catalogue.state.tries, "the one before was told to end"
@@ -132,20 +132,20 @@ async def test_restarted_daemon_brings_back_what_was_active(tmp_path: Path) -> N
 
 async def test_drive_pulled_while_the_daemon_is_down_is_withdrawn(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
     (host.slots / "a").unlink()
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         await host.until_gone(LAMP_ID)
         assert not left_over(host.folders)
 
 
 async def test_installed_payload_needs_no_drive(tmp_path: Path) -> None:
     folder = lamp(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         await install(folder, host.catalogue, host.bus)
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         await host.until(lambda: host.snapshot.component("lamp") is not None)
         assert host.snapshot.components[0].rank < 1_000_000
         await uninstall(LAMP_ID, host.catalogue, host.bus)
@@ -155,7 +155,7 @@ async def test_installed_payload_needs_no_drive(tmp_path: Path) -> None:
 
 async def test_refused_install_leaves_nothing(tmp_path: Path) -> None:
     folder = lamp(tmp_path / "drive", manifest="colour = 3")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         with pytest.raises(PayloadRefused) as refused:
             await install(folder, host.catalogue, host.bus)
         assert refused.value.code == "MANIFEST_KEY"
@@ -166,7 +166,7 @@ async def test_refused_install_leaves_nothing(tmp_path: Path) -> None:
 async def test_pip_installs_the_same_payload(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
     options = InstallOptions(allow_unsigned=True, method="pip")
-    async with living(tmp_path, options=options) as host:
+    async with host_in_process(tmp_path, options=options) as host:
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
         assert not await host.executor.installation.listing()
@@ -174,7 +174,7 @@ async def test_pip_installs_the_same_payload(tmp_path: Path) -> None:
 
 async def test_unsigned_payload_needs_leave(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
-    async with living(tmp_path, options=InstallOptions()) as host:
+    async with host_in_process(tmp_path, options=InstallOptions()) as host:
         host.plug(tmp_path / "drive")
         record = await host.until_step(LAMP_ID, Step.REFUSED)
         assert [problem.code for problem in record.problems] == ["SIG_MISSING"]
@@ -182,7 +182,7 @@ async def test_unsigned_payload_needs_leave(tmp_path: Path) -> None:
 
 async def test_worker_that_dies_is_started_again(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
 
@@ -193,7 +193,7 @@ async def test_worker_that_dies_is_started_again(tmp_path: Path) -> None:
 
 async def test_journal_tells_the_way_of_a_payload(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
         told = await host.catalogue.journal(subject=LAMP_ID)
@@ -205,7 +205,7 @@ async def test_journal_tells_the_way_of_a_payload(tmp_path: Path) -> None:
 async def test_mounts_come_with_the_payload_and_a_person_overrules_them(tmp_path: Path) -> None:
     unit = "spot__lamp__lamp"
     lamp(tmp_path / "drive", manifest='[[component.unit]]\nname = "lamp"\nxyz = [0, 0, 1]\n')
-    async with living(tmp_path) as host:
+    async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
         assert _height(host, unit) == 1.0
@@ -220,17 +220,17 @@ def is_running(pid: int) -> bool:
     return Path(f"/proc/{pid}").exists()
 
 
-def _drives(host: Living) -> tuple[str, ...]:
+def _drives(host: HostInProcess) -> tuple[str, ...]:
     record = host.payload(LAMP_ID)
     return record.drives if record else ()
 
 
-def _state(host: Living) -> ComponentState | None:
+def _state(host: HostInProcess) -> ComponentState | None:
     component = host.snapshot.component("lamp")
     return component.state if component else None
 
 
-def _height(host: Living, unit: str) -> float | None:
+def _height(host: HostInProcess, unit: str) -> float | None:
     pose = host.snapshot.mount(unit)
     return pose.xyz[2] if pose else None
 
@@ -239,7 +239,7 @@ async def test_daemon_that_lives_on_clears_what_was_counted(tmp_path: Path) -> N
     catalogue = await Catalogue.open(Folders(tmp_path / "state").catalogue, HOST)
     await catalogue.commit(HostState(HOST, tries={"what never came again": 4}), ())
     await catalogue.close()
-    async with living(tmp_path, steady_s=0.01) as host:
+    async with host_in_process(tmp_path, steady_s=0.01) as host:
         await host.until(lambda: not host.catalogue.state.tries)
         assert "HostSteady" in [entry.event for entry in await host.journal()]
 
@@ -248,7 +248,9 @@ async def test_nothing_is_cleared_before_it_is_known_what_is_plugged_in(tmp_path
     catalogue = await Catalogue.open(Folders(tmp_path / "state").catalogue, HOST)
     await catalogue.commit(HostState(HOST, tries={"block:a": 4, "what was on it": 4}), ())
     await catalogue.close()
-    async with living(tmp_path, steady_s=0.01, sources=lambda folders: (SlowSource(),)) as host:
+    async with host_in_process(
+        tmp_path, steady_s=0.01, sources=lambda folders: (SlowSource(),)
+    ) as host:
         await host.until(lambda: not host.catalogue.state.tries)
         order = [type(event) for event in host.heard]
         assert order[: order.index(HostSteady)].count(DrivesScanned) == len(("slot", "block"))

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.kit.living import LAMP, Living, living
+from tests.kit.host import LAMP, HostInProcess, host_in_process
 from tests.kit.payloads import Part, make_payload
 
 from nondum.host import events
@@ -49,7 +49,7 @@ def more_than_half() -> int:
 @pytest.mark.anyio
 async def test_second_payload_that_counts_on_the_same_memory_is_refused(tmp_path: Path) -> None:
     asked_mb = more_than_half()
-    async with living(tmp_path, timing=QUICK) as host:
+    async with host_in_process(tmp_path, timing=QUICK) as host:
         host.plug(greedy(tmp_path, FIRST, asked_mb), "a")
         await host.until_step(FIRST, Step.ACTIVE)
         host.plug(greedy(tmp_path, SECOND, asked_mb), "b")
@@ -71,7 +71,7 @@ async def test_second_payload_that_counts_on_the_same_memory_is_refused(tmp_path
 async def test_of_two_that_come_together_one_is_let_in(tmp_path: Path) -> None:
     """Both may have been copied by the time that one of them is promised anything."""
     drives = [greedy(tmp_path, payload_id, more_than_half()) for payload_id in (FIRST, SECOND)]
-    async with living(tmp_path, timing=QUICK) as host:
+    async with host_in_process(tmp_path, timing=QUICK) as host:
         for drive, slot in zip(drives, "ab", strict=True):
             host.plug(drive, slot)
 
@@ -88,7 +88,7 @@ async def test_of_two_that_come_together_one_is_let_in(tmp_path: Path) -> None:
 async def test_upgrade_has_the_memory_of_the_release_before(tmp_path: Path) -> None:
     """And the next payload finds what is promised promised once."""
     asked_mb = more_than_half()
-    async with living(tmp_path, timing=QUICK) as host:
+    async with host_in_process(tmp_path, timing=QUICK) as host:
         host.plug(greedy(tmp_path, FIRST, asked_mb), "a")
         await host.until_step(FIRST, Step.ACTIVE)
         host.plug(greedy(tmp_path, FIRST, asked_mb, release=2), "b")
@@ -104,10 +104,10 @@ async def test_upgrade_has_the_memory_of_the_release_before(tmp_path: Path) -> N
 @pytest.mark.anyio
 async def test_what_was_promised_is_promised_again_by_the_next_daemon(tmp_path: Path) -> None:
     first, second = (greedy(tmp_path, id, more_than_half()) for id in (FIRST, SECOND))
-    async with living(tmp_path, timing=QUICK) as host:
+    async with host_in_process(tmp_path, timing=QUICK) as host:
         host.plug(first, "a")
         await host.until_step(FIRST, Step.ACTIVE)
-    async with living(tmp_path, timing=QUICK) as host:
+    async with host_in_process(tmp_path, timing=QUICK) as host:
         host.plug(second, "b")
         await host.until_step(FIRST, Step.ACTIVE)
         await host.until(lambda: is_at(host, SECOND, Step.REFUSED))
@@ -135,7 +135,7 @@ def test_what_was_promised_while_it_was_copied_counts(tmp_path: Path) -> None:
     assert told["needs"]["memory_mb"] == 1, "what was let in before is not asked again"
 
 
-def is_at(host: Living, payload_id: str, step: Step) -> bool:
+def is_at(host: HostInProcess, payload_id: str, step: Step) -> bool:
     record = host.payload(payload_id)
     return record is not None and record.step is step
 

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 import pytest
-from tests.kit.living import LAMP, Living, left_over, living
+from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 
 from nondum.host import events
@@ -60,12 +60,12 @@ def lamp(root: Path, release: int) -> Path:
     return drive
 
 
-def release(host: Living, number: int) -> PayloadRecord | None:
+def release(host: HostInProcess, number: int) -> PayloadRecord | None:
     every = (p for p in host.snapshot.payloads if p.payload_id == LAMP_ID)
     return next((p for p in every if p.release == number), None)
 
 
-async def until(host: Living, **wanted: Step | None) -> None:
+async def until(host: HostInProcess, **wanted: Step | None) -> None:
     """Wait until releases (`r1=…`) are at steps; None: gone."""
 
     def holds() -> bool:
@@ -75,7 +75,7 @@ async def until(host: Living, **wanted: Step | None) -> None:
     await host.until(holds)
 
 
-def version(host: Living) -> str:
+def version(host: HostInProcess) -> str:
     """The version of the lamp that is in force."""
     component = host.snapshot.component("lamp")
     return component.version if component is not None else ""
@@ -87,7 +87,7 @@ def is_running(pid: int) -> bool:
 
 async def test_newer_release_takes_over_and_the_old_one_comes_back(tmp_path: Path) -> None:
     drives = {number: lamp(tmp_path, number) for number in (1, 2)}
-    async with living(tmp_path, timing=QUICK) as host:
+    async with host_in_process(tmp_path, timing=QUICK) as host:
         host.plug(drives[1], "a")
         await until(host, r1=Step.ACTIVE)
         old = host.workers.pids()["lamp"]
@@ -121,7 +121,7 @@ async def test_components_come_and_go_with_a_release(tmp_path: Path) -> None:
         version = f"{number}.0"
         drive = tmp_path / f"drive-{number}"
         make_payload(drive, *parts, payload_id=LAMP_ID, version=version, release=number)
-    async with living(tmp_path, timing=WATCHED) as host:
+    async with host_in_process(tmp_path, timing=WATCHED) as host:
         host.plug(tmp_path / "drive-1", "a")
         await until(host, r1=Step.ACTIVE)
         host.plug(tmp_path / "drive-2", "b")
@@ -150,7 +150,7 @@ async def test_broken_release_leaves_the_old_one_alone(tmp_path: Path, how: str)
     first = lamp(tmp_path, 1)
     part = Part("lamp", source, described, version="2.0")
     make_payload(tmp_path / "drive-2", part, payload_id=LAMP_ID, version="2.0", release=2)
-    async with living(tmp_path, timing=WATCHED) as host:
+    async with host_in_process(tmp_path, timing=WATCHED) as host:
         host.plug(first, "a")
         await until(host, r1=Step.ACTIVE)
         old, revision = host.workers.pids(), host.snapshot.revision
@@ -175,7 +175,7 @@ async def test_release_that_runs_alone_takes_the_place_first(tmp_path: Path, sou
     folder = tmp_path / "drive-2"
     alone = "alone = true"
     make_payload(folder, part, payload_id=LAMP_ID, version="2.0", release=2, requires=alone)
-    async with living(tmp_path, timing=QUICK) as host:
+    async with host_in_process(tmp_path, timing=QUICK) as host:
         host.plug(first, "a")
         await until(host, r1=Step.ACTIVE)
         old = host.workers.pids()["lamp"]
@@ -191,7 +191,7 @@ async def test_release_that_runs_alone_takes_the_place_first(tmp_path: Path, sou
 
 async def test_new_drive_pulled_during_the_bring_up(tmp_path: Path) -> None:
     drives = lamp(tmp_path, 1), lamp(tmp_path, 2)
-    async with living(tmp_path, timing=WATCHED) as host:
+    async with host_in_process(tmp_path, timing=WATCHED) as host:
         host.plug(drives[0], "a")
         await until(host, r1=Step.ACTIVE)
         old = host.workers.pids()
@@ -215,7 +215,7 @@ def _processes_of(folder: Path) -> set[int]:
 
 async def test_old_drive_pulled_during_the_bring_up(tmp_path: Path) -> None:
     drives = lamp(tmp_path, 1), lamp(tmp_path, 2)
-    async with living(tmp_path, timing=WATCHED) as host:
+    async with host_in_process(tmp_path, timing=WATCHED) as host:
         host.plug(drives[0], "a")
         await until(host, r1=Step.ACTIVE)
         host.plug(drives[1], "b")
@@ -230,7 +230,7 @@ async def test_old_drive_pulled_during_the_bring_up(tmp_path: Path) -> None:
 
 async def test_a_person_goes_back_and_forward(tmp_path: Path) -> None:
     drives = lamp(tmp_path, 1), lamp(tmp_path, 2)
-    async with living(tmp_path, timing=QUICK) as host:
+    async with host_in_process(tmp_path, timing=QUICK) as host:
         host.plug(drives[0], "a")
         host.plug(drives[1], "b")
         await until(host, r1=Step.SUPERSEDED, r2=Step.ACTIVE)
@@ -239,7 +239,7 @@ async def test_a_person_goes_back_and_forward(tmp_path: Path) -> None:
         host.bus.emit(events.RollbackAsked(first.key, 1, 2))
         await until(host, r1=Step.ACTIVE, r2=Step.SUPERSEDED)
         assert version(host) == "1.0"
-    async with living(tmp_path, timing=QUICK) as host:
+    async with host_in_process(tmp_path, timing=QUICK) as host:
         await until(host, r1=Step.ACTIVE, r2=Step.SUPERSEDED)
         assert version(host) == "1.0"
         second = release(host, 2)
@@ -250,7 +250,7 @@ async def test_a_person_goes_back_and_forward(tmp_path: Path) -> None:
 
 async def test_installed_payload_is_upgraded_and_the_one_before_is_kept(tmp_path: Path) -> None:
     folders = {n: lamp(tmp_path, n) / "nondum" / LAMP_ID for n in (1, 2, 3)}
-    async with living(tmp_path, timing=QUICK) as host:
+    async with host_in_process(tmp_path, timing=QUICK) as host:
         for number, folder in folders.items():
             installed = await install(folder, host.catalogue, host.bus)
             assert (installed.release, installed.step) == (number, Step.ACTIVE)
@@ -271,7 +271,7 @@ async def test_install_that_fails_leaves_the_one_before(tmp_path: Path) -> None:
     first = lamp(tmp_path, 1) / "nondum" / LAMP_ID
     part = Part("lamp", "import no_such_module", PluginDescription("test-lamp", "2.0"))
     broken = make_payload(tmp_path / "drive-2", part, payload_id=LAMP_ID, release=2)
-    async with living(tmp_path, timing=QUICK) as host:
+    async with host_in_process(tmp_path, timing=QUICK) as host:
         await install(first, host.catalogue, host.bus)
         with pytest.raises(PayloadRefused):
             await install(broken, host.catalogue, host.bus)
@@ -283,7 +283,7 @@ async def test_install_that_fails_leaves_the_one_before(tmp_path: Path) -> None:
 
 async def test_older_drive_is_let_pass_once(tmp_path: Path) -> None:
     older, newer = lamp(tmp_path, 1), lamp(tmp_path, 2)
-    async with living(tmp_path, timing=QUICK) as host:
+    async with host_in_process(tmp_path, timing=QUICK) as host:
         host.plug(newer, "b")
         await until(host, r2=Step.ACTIVE)
         host.plug(older, "a")

@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-from tests.kit.living import LAMP, Living, living
+from tests.kit.host import LAMP, HostInProcess, host_in_process
 from tests.kit.payloads import Part, make_payload, seal
 from tests.kit.signing import Key, sign_payload, signed, trust_of
 
@@ -66,17 +66,17 @@ def enrol(root: Path, trust: Trust = FIRST) -> Path:
 @contextlib.asynccontextmanager
 async def trusting(
     root: Path, trust: Trust | None = FIRST, *, stop: bool = True
-) -> AsyncIterator[Living]:
+) -> AsyncIterator[HostInProcess]:
     """A host that goes by a trust file, from the first time it runs under `root`."""
     anchor = root / "etc/trust.toml"
     if trust is not None and not anchor.exists():
         enrol(root, trust)
     options = InstallOptions(trust=TrustOptions(anchor, stop=stop))
-    async with living(root, options=options) as host:
+    async with host_in_process(root, options=options) as host:
         yield host
 
 
-async def refusal(host: Living) -> list[str]:
+async def refusal(host: HostInProcess) -> list[str]:
     """Codes of what a lamp is refused for, once it is."""
 
     def is_refused() -> bool:
@@ -90,7 +90,7 @@ async def refusal(host: Living) -> list[str]:
     return [problem.code for problem in record.problems]
 
 
-async def until_read(host: Living, drive: str = "a") -> None:
+async def until_read(host: HostInProcess, drive: str = "a") -> None:
     """Wait until a drive was looked through."""
     await host.until(
         lambda: any(isinstance(e, DriveRead) and e.drive.endswith(drive) for e in host.heard)

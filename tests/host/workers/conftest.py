@@ -1,4 +1,4 @@
-"""A house of workers for every test; nothing of it may be left."""
+"""Workers for every test; none of them may be left."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
-from tests.kit.house import House, is_alive
+from tests.kit.workers import WorkersUnderTest, is_alive
 
 
 @pytest.fixture
-async def house(tmp_path: Path) -> AsyncIterator[House]:
+async def tested(tmp_path: Path) -> AsyncIterator[WorkersUnderTest]:
     """Workers with short patience, ended after the test."""
-    made = House(tmp_path)
+    made = WorkersUnderTest(tmp_path)
     yield made
     pids = made.workers.pids().values()
     await made.workers.close(grace_s=1.0)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.kit.house import House, is_alive
+from tests.kit.workers import WorkersUnderTest, is_alive
 
 from nondum.host.events import WorkerLogged, WorkerReady
 from nondum.host.workers import WorkerSpec
@@ -19,11 +19,11 @@ pytestmark = pytest.mark.anyio
 HOOKED = "from nondum.sdk import hookimpl\n@hookimpl\n{}"
 
 
-async def failure(house: House, source: str) -> WorkerFailed:
+async def failure(tested: WorkersUnderTest, source: str) -> WorkerFailed:
     with pytest.raises(WorkerFailed) as caught:
-        await house.start("guest", source)
-    assert not house.workers.pids()
-    assert not house.told(WorkerReady)
+        await tested.start("guest", source)
+    assert not tested.workers.pids()
+    assert not tested.told(WorkerReady)
     return caught.value
 
 
@@ -61,23 +61,27 @@ async def failure(house: House, source: str) -> WorkerFailed:
         ),
     ],
 )
-async def test_start_fails_with_its_code(house: House, source: str, code: str, words: str) -> None:
-    error = await failure(house, source)
+async def test_start_fails_with_its_code(
+    tested: WorkersUnderTest, source: str, code: str, words: str
+) -> None:
+    error = await failure(tested, source)
     assert error.code == code
     assert words in str(error)
     assert "guest" in error.problems[0].where
 
 
-async def test_nothing_importable_tells_what_is_missing(house: House, tmp_path: Path) -> None:
-    spec = replace(house.spec("guest", ""), site_packages=(tmp_path,))
+async def test_nothing_importable_tells_what_is_missing(
+    tested: WorkersUnderTest, tmp_path: Path
+) -> None:
+    spec = replace(tested.spec("guest", ""), site_packages=(tmp_path,))
     with pytest.raises(WorkerFailed, match=r"WORKER_START_FAILED .*No module named 'nondum'"):
-        await house.workers.start(spec)
+        await tested.workers.start(spec)
 
 
-async def test_missing_interpreter_is_told(house: House, tmp_path: Path) -> None:
-    spec = replace(house.spec("guest", ""), python=tmp_path / "python")
+async def test_missing_interpreter_is_told(tested: WorkersUnderTest, tmp_path: Path) -> None:
+    spec = replace(tested.spec("guest", ""), python=tmp_path / "python")
     with pytest.raises(WorkerFailed, match=r"LAUNCH_FAILED|No such file or directory"):
-        await house.workers.start(spec)
+        await tested.workers.start(spec)
 
 
 @pytest.mark.parametrize(
@@ -91,95 +95,97 @@ async def test_missing_interpreter_is_told(house: House, tmp_path: Path) -> None
         ),
     ],
 )
-async def test_hang_in_start_is_ended(house: House, hang: str) -> None:
-    house.workers.timing = replace(house.timing, startup_s=1.5)
+async def test_hang_in_start_is_ended(tested: WorkersUnderTest, hang: str) -> None:
+    tested.workers.timing = replace(tested.timing, startup_s=1.5)
     error = await failure(
-        house,
+        tested,
         "import asyncio, signal, time\n" + HOOKED.format(f"async def start(ctx):\n    {hang}"),
     )
     assert error.code == "WORKER_HUNG"
 
 
-async def test_hang_while_imported_is_ended(house: House) -> None:
-    house.workers.timing = replace(house.timing, startup_s=1.5)
-    error = await failure(house, "import time\ntime.sleep(3600)")
+async def test_hang_while_imported_is_ended(tested: WorkersUnderTest) -> None:
+    tested.workers.timing = replace(tested.timing, startup_s=1.5)
+    error = await failure(tested, "import time\ntime.sleep(3600)")
     assert error.code == "WORKER_HUNG"
 
 
-async def test_lie_in_the_index_is_told_by_place(house: House) -> None:
-    honest = house.spec("guest", "'''Honest.'''")
+async def test_lie_in_the_index_is_told_by_place(tested: WorkersUnderTest) -> None:
+    honest = tested.spec("guest", "'''Honest.'''")
     index = PluginDescription("guest", "0", summary="Bold.", labels=(Label("a", "an a"),))
     with pytest.raises(WorkerFailed) as caught:
-        await house.workers.start(replace(honest, index=index))
+        await tested.workers.start(replace(honest, index=index))
     assert {p.code for p in caught.value.problems} == {"INDEX_MISMATCH"}
     told = str(caught.value)
     assert "index.summary" in told and "'Bold.'" in told and "'Honest.'" in told
     assert "index.labels[0]" in told
 
 
-async def test_failed_start_can_be_tried_again(house: House) -> None:
-    spec = house.spec("guest", "import nowhere_at_all")
+async def test_failed_start_can_be_tried_again(tested: WorkersUnderTest) -> None:
+    spec = tested.spec("guest", "import nowhere_at_all")
     for _ in range(2):
         with pytest.raises(WorkerFailed):
-            await house.workers.start(spec)
+            await tested.workers.start(spec)
     (spec.site_packages[0] / "guest_plugin.py").write_text("")
-    await house.workers.start(spec)
-    assert list(house.workers.pids()) == ["guest"]
+    await tested.workers.start(spec)
+    assert list(tested.workers.pids()) == ["guest"]
 
 
-async def endless_start(house: House) -> tuple[asyncio.Task[WorkerSpec], int]:
+async def endless_start(tested: WorkersUnderTest) -> tuple[asyncio.Task[WorkerSpec], int]:
     """A start that does not end by itself, and the worker's process."""
     source = "import asyncio\n" + HOOKED.format(
         "async def start(ctx):\n    print('here', __import__('os').getpid())\n"
         "    await asyncio.Event().wait()"
     )
-    starting = asyncio.create_task(house.start("guest", source))
-    said = await house.until(WorkerLogged, lambda line: line.message.startswith("here"))
-    return starting, house.pid("guest", said.message.split()[1])
+    starting = asyncio.create_task(tested.start("guest", source))
+    said = await tested.until(WorkerLogged, lambda line: line.message.startswith("here"))
+    return starting, tested.pid("guest", said.message.split()[1])
 
 
-async def test_component_removed_while_it_starts(house: House) -> None:
-    starting, pid = await endless_start(house)
-    await house.workers.stop("guest")
+async def test_component_removed_while_it_starts(tested: WorkersUnderTest) -> None:
+    starting, pid = await endless_start(tested)
+    await tested.workers.stop("guest")
     with pytest.raises(WorkerFailed, match="COMPONENT_REMOVED"):
         await starting
     assert not is_alive(pid)
 
 
-async def test_cancelled_start_leaves_no_process(house: House) -> None:
-    starting, pid = await endless_start(house)
+async def test_cancelled_start_leaves_no_process(tested: WorkersUnderTest) -> None:
+    starting, pid = await endless_start(tested)
     starting.cancel()
     with pytest.raises(asyncio.CancelledError):
         await starting
     assert not is_alive(pid)
 
 
-async def test_cancelled_start_that_is_stopped_too_leaves_no_process(house: House) -> None:
+async def test_cancelled_start_that_is_stopped_too_leaves_no_process(
+    tested: WorkersUnderTest,
+) -> None:
     """As when a daemon ends while a payload is brought up."""
-    starting, pid = await endless_start(house)
+    starting, pid = await endless_start(tested)
     starting.cancel()
     await asyncio.sleep(0)
-    await house.workers.close()
+    await tested.workers.close()
     assert not is_alive(pid)
     with pytest.raises((asyncio.CancelledError, WorkerFailed)):
         await starting
 
 
-async def test_start_waits_for_the_one_that_is_being_stopped(house: House) -> None:
+async def test_start_waits_for_the_one_that_is_being_stopped(tested: WorkersUnderTest) -> None:
     source = HOOKED.format("async def stop(ctx):\n    await __import__('asyncio').sleep(0.3)")
-    spec = await house.start("guest", source)
-    old = house.workers.pids()["guest"]
-    stopping = asyncio.create_task(house.workers.stop("guest"))
+    spec = await tested.start("guest", source)
+    old = tested.workers.pids()["guest"]
+    stopping = asyncio.create_task(tested.workers.stop("guest"))
     await asyncio.sleep(0)
-    assert not house.workers.pids()
-    await house.workers.start(spec)
+    assert not tested.workers.pids()
+    await tested.workers.start(spec)
     assert not is_alive(old)
-    assert is_alive(house.workers.pids()["guest"])
+    assert is_alive(tested.workers.pids()["guest"])
     await stopping
-    assert is_alive(house.workers.pids()["guest"])
+    assert is_alive(tested.workers.pids()["guest"])
 
 
-async def test_second_worker_of_a_component_is_a_mistake(house: House) -> None:
-    spec = await house.start("guest", "")
+async def test_second_worker_of_a_component_is_a_mistake(tested: WorkersUnderTest) -> None:
+    spec = await tested.start("guest", "")
     with pytest.raises(ValueError, match="has a worker already"):
-        await house.workers.start(spec)
+        await tested.workers.start(spec)

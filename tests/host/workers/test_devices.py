@@ -6,7 +6,7 @@ import os
 import signal
 
 import pytest
-from tests.kit.house import HOST, House
+from tests.kit.workers import HOST, WorkersUnderTest
 
 from nondum.host.confinement import Level
 from nondum.host.events import FactKnown, WorkerReady
@@ -40,8 +40,8 @@ CONVERT = Behaviour("convert", "(convert ?u - sensor ?h - host)")
 UNIT = f"{HOST}__guest__port"
 
 
-async def guest(house: House) -> None:
-    await house.start(
+async def guest(tested: WorkersUnderTest) -> None:
+    await tested.start(
         "guest",
         PLUGIN,
         behaviours=(CONVERT, LOOK),
@@ -50,75 +50,77 @@ async def guest(house: House) -> None:
     )
 
 
-async def node(house: House) -> str:
+async def node(tested: WorkersUnderTest) -> str:
     """What the plugin has been granted now."""
-    seen = len(house.told(FactKnown))
-    assert await house.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
-    return house.told(FactKnown)[seen].arguments[0]
+    seen = len(tested.told(FactKnown))
+    assert await tested.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
+    return tested.told(FactKnown)[seen].arguments[0]
 
 
-def seen(house: House) -> str:
+def seen(tested: WorkersUnderTest) -> str:
     """Where a worker finds the device for its need `line`."""
-    return "/dev/nondum/line" if house.workers.launcher.level == Level.BOX else "/dev/zero"
+    return "/dev/nondum/line" if tested.workers.launcher.level == Level.BOX else "/dev/zero"
 
 
-async def test_device_is_granted_and_withdrawn(house: House) -> None:
-    await guest(house)
-    assert await node(house) == "none"
-    await house.workers.attach("guest", "line", "/dev/zero", {"ID_BUS": "usb"})
-    assert await node(house) == seen(house)
-    await house.workers.detach("guest", "line")
-    assert await node(house) == "none"
+async def test_device_is_granted_and_withdrawn(tested: WorkersUnderTest) -> None:
+    await guest(tested)
+    assert await node(tested) == "none"
+    await tested.workers.attach("guest", "line", "/dev/zero", {"ID_BUS": "usb"})
+    assert await node(tested) == seen(tested)
+    await tested.workers.detach("guest", "line")
+    assert await node(tested) == "none"
 
 
-async def test_device_that_is_being_pulled_is_not_told_as_another(house: House) -> None:
-    await guest(house)
-    await house.workers.attach("guest", "line", "/dev/zero", {})
-    await house.workers.attach("guest", "line", "/dev/pulled", {})
-    assert await node(house) == seen(house)
-    await house.workers.detach("guest", "line")
-    assert await node(house) == "none"
+async def test_device_that_is_being_pulled_is_not_told_as_another(tested: WorkersUnderTest) -> None:
+    await guest(tested)
+    await tested.workers.attach("guest", "line", "/dev/zero", {})
+    await tested.workers.attach("guest", "line", "/dev/pulled", {})
+    assert await node(tested) == seen(tested)
+    await tested.workers.detach("guest", "line")
+    assert await node(tested) == "none"
 
 
-async def test_device_granted_before_the_start_is_there(house: House) -> None:
-    await house.workers.attach("guest", "line", "/dev/zero", {})
-    await guest(house)
-    assert await node(house) == seen(house)
+async def test_device_granted_before_the_start_is_there(tested: WorkersUnderTest) -> None:
+    await tested.workers.attach("guest", "line", "/dev/zero", {})
+    await guest(tested)
+    assert await node(tested) == seen(tested)
 
 
-async def test_device_outlives_a_crash(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_device_outlives_a_crash(
+    tested: WorkersUnderTest, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(supervision, "BACKOFF_S", 0.02)
-    await guest(house)
-    await house.workers.attach("guest", "line", "/dev/zero", {})
-    os.kill(house.workers.pids()["guest"], signal.SIGKILL)
-    await house.until(WorkerReady, lambda _: len(house.told(WorkerReady)) == 2)
-    assert await node(house) == seen(house)
+    await guest(tested)
+    await tested.workers.attach("guest", "line", "/dev/zero", {})
+    os.kill(tested.workers.pids()["guest"], signal.SIGKILL)
+    await tested.until(WorkerReady, lambda _: len(tested.told(WorkerReady)) == 2)
+    assert await node(tested) == seen(tested)
 
 
-async def test_values_mounts_and_settings_reach_behaviours(house: House) -> None:
-    await guest(house)
+async def test_values_mounts_and_settings_reach_behaviours(tested: WorkersUnderTest) -> None:
+    await guest(tested)
     half = 0.5**0.5  # a quarter turn to the left
-    house.workers.remount({UNIT: [HOST, [0.0, 0.0, 0.3], [0.0, 0.0, half, half]]})
+    tested.workers.remount({UNIT: [HOST, [0.0, 0.0, 0.3], [0.0, 0.0, half, half]]})
     ahead = value_to_wire(Bearing(Header(frame_id=UNIT), (1.0, 0.0, 0.0), 0.1))
-    call = house.workers.behave(
+    call = tested.workers.behave(
         "guest", "convert", {"u": UNIT, "h": HOST}, [("bearing-known", (HOST,), ahead)]
     )
     assert await call.ended() is RunState.SUCCEEDED, call.reason
-    assert house.told(FactKnown)[0].arguments == ("1.00", "ada")
+    assert tested.told(FactKnown)[0].arguments == ("1.00", "ada")
 
 
-async def test_value_can_be_withdrawn(house: House) -> None:
-    await guest(house)
-    house.workers.tell_values("guest", [("bearing-known", (HOST,), None)])
-    call = house.behave("guest", "convert", u=UNIT, h=HOST)
+async def test_value_can_be_withdrawn(tested: WorkersUnderTest) -> None:
+    await guest(tested)
+    tested.workers.tell_values("guest", [("bearing-known", (HOST,), None)])
+    call = tested.behave("guest", "convert", u=UNIT, h=HOST)
     assert await call.ended() is RunState.FAILED
     assert "VALUE_UNKNOWN" in call.reason
 
 
-async def test_strangers_are_told_nothing(house: House) -> None:
-    house.workers.tell_values("nobody", [("p", (), None)])
-    await house.workers.detach("nobody", "line")
-    await house.workers.stop("nobody")
+async def test_strangers_are_told_nothing(tested: WorkersUnderTest) -> None:
+    tested.workers.tell_values("nobody", [("p", (), None)])
+    await tested.workers.detach("nobody", "line")
+    await tested.workers.stop("nobody")
 
 
 GROUP = """
@@ -138,21 +140,21 @@ async def look(ctx, u):
 """
 
 
-async def test_device_of_several_nodes_is_granted_as_a_group(house: House) -> None:
+async def test_device_of_several_nodes_is_granted_as_a_group(tested: WorkersUnderTest) -> None:
     others = (("/dev/full", {"SUBSYSTEM": "b"}),)
-    await house.workers.attach("guest", "line", "/dev/zero", {"SUBSYSTEM": "a"}, others)
-    await house.start("guest", GROUP, behaviours=(LOOK,), units=(Unit("port", "sensor"),))
-    in_box = house.workers.launcher.level == Level.BOX
+    await tested.workers.attach("guest", "line", "/dev/zero", {"SUBSYSTEM": "a"}, others)
+    await tested.start("guest", GROUP, behaviours=(LOOK,), units=(Unit("port", "sensor"),))
+    in_box = tested.workers.launcher.level == Level.BOX
     zero = "/dev/nondum/line" if in_box else "/dev/zero"
     null = "/dev/nondum/line.null" if in_box else "/dev/null"
-    call = house.behave("guest", "look", u=UNIT)
+    call = tested.behave("guest", "look", u=UNIT)
     assert await call.ended() is RunState.FAILED  # a full disk tells that it was the one written to
     assert "No space left" in call.reason
-    assert [fact.arguments for fact in house.told(FactKnown)] == [(zero, "a")]
+    assert [fact.arguments for fact in tested.told(FactKnown)] == [(zero, "a")]
     others = (("/dev/null", {"SUBSYSTEM": "c"}),)
-    await house.workers.attach("guest", "line", "/dev/zero", {"SUBSYSTEM": "a"}, others)
-    assert await house.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
-    told = [fact.arguments for fact in house.told(FactKnown)]
+    await tested.workers.attach("guest", "line", "/dev/zero", {"SUBSYSTEM": "a"}, others)
+    assert await tested.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
+    told = [fact.arguments for fact in tested.told(FactKnown)]
     assert told[1:] == [(zero, "a"), (null, "c")]
 
 
@@ -170,13 +172,13 @@ async def look(ctx, u):
 """
 
 
-async def test_node_is_found_by_its_own_name_in_a_room(house: House) -> None:
-    if house.workers.launcher.level != Level.BOX:
+async def test_node_is_found_by_its_own_name_in_a_room(tested: WorkersUnderTest) -> None:
+    if tested.workers.launcher.level != Level.BOX:
         pytest.skip("only a room has a /dev of its own")
-    await house.start("guest", NAMED, behaviours=(LOOK,), units=(Unit("port", "sensor"),))
-    await house.workers.attach("guest", "line", "/dev/kmsg", {})
-    assert await house.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
-    await house.workers.detach("guest", "line")
-    assert await house.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
-    told = [fact.arguments[0] for fact in house.told(FactKnown)]
+    await tested.start("guest", NAMED, behaviours=(LOOK,), units=(Unit("port", "sensor"),))
+    await tested.workers.attach("guest", "line", "/dev/kmsg", {})
+    assert await tested.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
+    await tested.workers.detach("guest", "line")
+    assert await tested.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
+    told = [fact.arguments[0] for fact in tested.told(FactKnown)]
     assert told == ["/dev/nondum/line", "none"]

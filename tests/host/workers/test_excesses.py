@@ -9,7 +9,7 @@ from pathlib import Path
 
 import anyio
 import pytest
-from tests.kit.house import HOST, QUICK, House, is_alive
+from tests.kit.workers import HOST, QUICK, WorkersUnderTest, is_alive
 
 from nondum.host.cgroups import Cages
 from nondum.host.events import WorkerExited, WorkerLogged, WorkerReady, WorkerStrained
@@ -36,31 +36,31 @@ SMALL = Limits(memory_mb=128, tasks=24, descriptors=64, scratch_mb=8)
 
 
 @pytest.fixture
-async def caged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[House]:
-    """A house with cages, whose other worker is there before and after."""
+async def caged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[WorkersUnderTest]:
+    """Workers in control groups; another one is there before and after."""
     monkeypatch.setattr(supervision, "BACKOFF_S", 0.02)
     cages = Cages.open(tmp_path)
     assert cages.holds == {"memory", "pids", "cpu"}, "tests run as root, with cgroups"
-    house = House(tmp_path, replace(QUICK, look_s=0.1))
-    house.workers.launcher = WorkerLauncher(cages=cages)
-    await begin(house, "other", "pass")
-    pid = house.workers.pids()["other"]
-    yield house
-    assert await done(house, "other") is RunState.SUCCEEDED
-    assert house.workers.pids()["other"] == pid
+    tested = WorkersUnderTest(tmp_path, replace(QUICK, look_s=0.1))
+    tested.workers.launcher = WorkerLauncher(cages=cages)
+    await begin(tested, "other", "pass")
+    pid = tested.workers.pids()["other"]
+    yield tested
+    assert await done(tested, "other") is RunState.SUCCEEDED
+    assert tested.workers.pids()["other"] == pid
     assert is_alive(pid)
-    await house.workers.close(grace_s=1.0)
+    await tested.workers.close(grace_s=1.0)
     assert cages.sweep() == 0, "cages are left"
     cages.close()
 
 
-async def begin(house: House, name: str, body: str) -> None:
+async def begin(tested: WorkersUnderTest, name: str, body: str) -> None:
     source = PLUGIN.replace("{body}", body.replace("\n", "\n    "))
-    await house.start(name, source, behaviours=(DO,), units=(Unit("it", "sensor"),), limits=SMALL)
+    await tested.start(name, source, behaviours=(DO,), units=(Unit("it", "sensor"),), limits=SMALL)
 
 
-async def done(house: House, name: str) -> RunState:
-    return await house.behave(name, "do", u=f"{HOST}__{name}__it").ended()
+async def done(tested: WorkersUnderTest, name: str) -> RunState:
+    return await tested.behave(name, "do", u=f"{HOST}__{name}__it").ended()
 
 
 FORK = "while True:\n    try:\n        os.fork()\n    except OSError:\n        pass"
@@ -110,7 +110,9 @@ CHILD = "b = []\nwhile True: b.append(bytearray(1 << 20))"
         pytest.param(DEEP, "SCRATCH_FULL", id="deep folders"),
     ],
 )
-async def test_too_much_ends_that_worker_alone(caged: House, body: str, code: str) -> None:
+async def test_too_much_ends_that_worker_alone(
+    caged: WorkersUnderTest, body: str, code: str
+) -> None:
     await begin(caged, "guest", body)
     call = caged.behave("guest", "do", u=f"{HOST}__guest__it")
     exited = await caged.until(WorkerExited)
@@ -123,7 +125,7 @@ async def test_too_much_ends_that_worker_alone(caged: House, body: str, code: st
         assert os.listdir(caged.folder / "guest/scratch") == []  # noqa: PTH208
 
 
-async def test_what_cannot_be_deleted_is_told_and_holds_nothing_up(caged: House) -> None:
+async def test_what_cannot_be_deleted_is_told_and_holds_nothing_up(caged: WorkersUnderTest) -> None:
     held = caged.folder / "guest/scratch/held"
     body = (
         "os.mkdir('held'); subprocess.run(['mount', '-t', 'tmpfs', 'tmpfs', 'held'], check=True)\n"
@@ -144,7 +146,7 @@ async def test_what_cannot_be_deleted_is_told_and_holds_nothing_up(caged: House)
 
 
 async def test_worker_that_nobody_asks_and_spins_is_told_once(
-    caged: House, monkeypatch: pytest.MonkeyPatch
+    caged: WorkersUnderTest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(excess, "SPIN_S", 0.5)
     spin = "def spin():\n    while True:\n        pass\n"
@@ -156,7 +158,9 @@ async def test_worker_that_nobody_asks_and_spins_is_told_once(
     assert not caged.told(WorkerExited)
 
 
-async def test_what_left_the_group_and_cleared_its_marks_ends_with_the_cage(caged: House) -> None:
+async def test_what_left_the_group_and_cleared_its_marks_ends_with_the_cage(
+    caged: WorkersUnderTest,
+) -> None:
     child = "import os,time; print('child', os.getpid(), flush=True); time.sleep(3600)"
     body = (
         "if os.fork() == 0:\n"

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from tests.kit.house import House, is_alive, until_gone
+from tests.kit.workers import WorkersUnderTest, is_alive, until_gone
 
 from nondum.host.workers import end_leftovers
 from nondum.host.workers.launcher import owner_mark
@@ -20,12 +20,12 @@ ROOT = Path(__file__).parents[3]
 DAEMON = """
 import asyncio, sys
 from pathlib import Path
-from tests.kit.house import House
+from tests.kit.workers import WorkersUnderTest
 
 async def main():
-    house = House(Path(sys.argv[1]))
-    await house.start("guest", Path(sys.argv[2]).read_text())
-    print(house.workers.pids()["guest"], flush=True)
+    tested = WorkersUnderTest(Path(sys.argv[1]))
+    await tested.start("guest", Path(sys.argv[2]).read_text())
+    print(tested.workers.pids()["guest"], flush=True)
     await asyncio.Event().wait()
 
 asyncio.run(main())
@@ -87,29 +87,29 @@ async def test_stuck_interpreter_ends_too(tmp_path: Path) -> None:
     await until_gone(worker, timeout_s=30.0)
 
 
-async def test_next_daemon_ends_what_was_to_become_a_worker(house: House) -> None:
+async def test_next_daemon_ends_what_was_to_become_a_worker(tested: WorkersUnderTest) -> None:
     commands = (
-        {"NONDUM_SPARE_OF": f"{house.folder}:1"},
-        {"NONDUM_SPARE_OF": owner_mark(house.folder)},
+        {"NONDUM_SPARE_OF": f"{tested.folder}:1"},
+        {"NONDUM_SPARE_OF": owner_mark(tested.folder)},
     )
     orphan, own = [
         await asyncio.create_subprocess_exec("sleep", "3600", env=marked) for marked in commands
     ]
-    assert await asyncio.to_thread(end_leftovers, house.folder) == 1
+    assert await asyncio.to_thread(end_leftovers, tested.folder) == 1
     assert await orphan.wait() == -signal.SIGKILL
     assert own.returncode is None
     own.kill()
     await own.wait()
 
 
-async def test_next_daemon_ends_what_was_left(house: House) -> None:
+async def test_next_daemon_ends_what_was_left(tested: WorkersUnderTest) -> None:
     orphan = await asyncio.create_subprocess_exec(
-        *("sleep", "3600"), env={"NONDUM_WORKER": str(house.folder / "guest/scratch")}
+        *("sleep", "3600"), env={"NONDUM_WORKER": str(tested.folder / "guest/scratch")}
     )
     stranger = await asyncio.create_subprocess_exec(
-        *("sleep", "3600"), env={"NONDUM_WORKER": f"{house.folder}-other/guest/scratch"}
+        *("sleep", "3600"), env={"NONDUM_WORKER": f"{tested.folder}-other/guest/scratch"}
     )
-    assert await asyncio.to_thread(end_leftovers, house.folder) == 1
+    assert await asyncio.to_thread(end_leftovers, tested.folder) == 1
     assert await orphan.wait() == -signal.SIGKILL
     assert stranger.returncode is None
     stranger.kill()

@@ -13,7 +13,7 @@ from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
 
 import pytest
-from tests.kit.house import HOST, House
+from tests.kit.workers import HOST, WorkersUnderTest
 
 from nondum.host.events import WorkerReady
 from nondum.host.workers import Timing, Workers, WorkerSpec
@@ -135,45 +135,45 @@ HOSTILE: Mapping[str, tuple[str, str]] = {
 
 
 @pytest.fixture
-async def other(tmp_path: Path) -> AsyncIterator[House]:
-    """A house with a good worker, which answers before and after."""
-    house = House(tmp_path)
+async def other(tmp_path: Path) -> AsyncIterator[WorkersUnderTest]:
+    """A good worker, which answers before and after."""
+    tested = WorkersUnderTest(tmp_path)
     source = (
         "from nondum.sdk import Unit, behaviour, hookimpl\n"
         "@hookimpl\ndef units():\n    return (Unit('it', 'sensor'),)\n"
         "@behaviour('do', action='(do ?u - sensor)')\nasync def do(ctx, u):\n    pass\n"
     )
-    await house.start(
+    await tested.start(
         "good",
         source,
         behaviours=(Behaviour("do", "(do ?u - sensor)"),),
         units=(Unit("it", "sensor"),),
     )
-    yield house
-    assert await house.behave("good", "do", u=f"{HOST}__good__it").ended() is RunState.SUCCEEDED
-    assert len(house.told(WorkerReady)) == 1
-    await house.workers.close(grace_s=1.0)
+    yield tested
+    assert await tested.behave("good", "do", u=f"{HOST}__good__it").ended() is RunState.SUCCEEDED
+    assert len(tested.told(WorkerReady)) == 1
+    await tested.workers.close(grace_s=1.0)
 
 
-async def meet(house: House, name: str, script: str) -> str:
+async def meet(tested: WorkersUnderTest, name: str, script: str) -> str:
     """Start a hostile worker, which fails; give the code."""
     launcher = RawLauncher(f"{script}\ntime.sleep(60)")
     workers = Workers(HOST, lambda event: None, launcher=launcher, timing=QUICK)
     try:
         with pytest.raises(WorkerFailed) as failed:
-            await workers.start(house.spec(name, ""))
+            await workers.start(tested.spec(name, ""))
     finally:
         await workers.close(grace_s=0.5)
     return failed.value.code
 
 
 @pytest.mark.parametrize("name", list(HOSTILE))
-async def test_it_ends_itself_only(other: House, name: str) -> None:
+async def test_it_ends_itself_only(other: WorkersUnderTest, name: str) -> None:
     script, code = HOSTILE[name]
     assert await meet(other, "bad", script) == code
 
 
-async def test_the_host_keeps_nothing_of_them(other: House) -> None:
+async def test_the_host_keeps_nothing_of_them(other: WorkersUnderTest) -> None:
     """Descriptors and memory after many rounds are what they were after one."""
     quick = [script for script, code in HOSTILE.values() if code == "PROTO_VIOLATION"]
     await asyncio.gather(*(meet(other, f"warm-{n}", script) for n, script in enumerate(quick)))

@@ -8,7 +8,7 @@ import signal
 import time
 
 import pytest
-from tests.kit.house import HOST, House, is_alive, until_gone
+from tests.kit.workers import HOST, WorkersUnderTest, is_alive, until_gone
 
 from nondum.host.events import (
     BehaviourEstablished,
@@ -56,76 +56,78 @@ def short_backoff(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(supervision, "BACKOFF_S", 0.02)
 
 
-async def guest(house: House, body: str, more: str = "", limits: Limits | None = None) -> None:
+async def guest(
+    tested: WorkersUnderTest, body: str, more: str = "", limits: Limits | None = None
+) -> None:
     source = PLUGIN.replace("{more}", more).replace("{body}", body.replace("\n", "\n    "))
-    await house.start(
+    await tested.start(
         "guest", source, behaviours=(DO,), units=(Unit("it", "sensor"),), limits=limits
     )
 
 
-async def exits_with(house: House, body: str, code: str) -> None:
+async def exits_with(tested: WorkersUnderTest, body: str, code: str) -> None:
     """The worker ends for this reason, its call fails, and another worker takes its place."""
-    await guest(house, body)
-    call = house.behave("guest", "do", u=UNIT)
-    exited = await house.until(WorkerExited)
+    await guest(tested, body)
+    call = tested.behave("guest", "do", u=UNIT)
+    exited = await tested.until(WorkerExited)
     assert exited.reason.startswith(code), exited.reason
     assert await call.ended() is RunState.FAILED
     assert code in call.reason
-    await house.until(WorkerReady, lambda _: len(house.told(WorkerReady)) == 2)
+    await tested.until(WorkerReady, lambda _: len(tested.told(WorkerReady)) == 2)
 
 
-async def test_exit_fails_the_call_and_is_repaired(house: House) -> None:
-    await exits_with(house, "os._exit(7)", "WORKER_EXITED")
+async def test_exit_fails_the_call_and_is_repaired(tested: WorkersUnderTest) -> None:
+    await exits_with(tested, "os._exit(7)", "WORKER_EXITED")
 
 
-async def test_killed_worker_is_replaced(house: House) -> None:
-    await guest(house, "await asyncio.Event().wait()")
-    os.kill(house.workers.pids()["guest"], signal.SIGKILL)
-    exited = await house.until(WorkerExited)
+async def test_killed_worker_is_replaced(tested: WorkersUnderTest) -> None:
+    await guest(tested, "await asyncio.Event().wait()")
+    os.kill(tested.workers.pids()["guest"], signal.SIGKILL)
+    exited = await tested.until(WorkerExited)
     assert "was ended by SIGKILL" in exited.reason
 
 
-async def test_blocked_loop_is_a_hang(house: House) -> None:
-    await exits_with(house, "time.sleep(3600)", "WORKER_HUNG")
+async def test_blocked_loop_is_a_hang(tested: WorkersUnderTest) -> None:
+    await exits_with(tested, "time.sleep(3600)", "WORKER_HUNG")
 
 
-async def test_stopped_process_is_a_hang(house: House) -> None:
-    await guest(house, "pass")
-    pid = house.workers.pids()["guest"]
+async def test_stopped_process_is_a_hang(tested: WorkersUnderTest) -> None:
+    await guest(tested, "pass")
+    pid = tested.workers.pids()["guest"]
     os.kill(pid, signal.SIGSTOP)
-    exited = await house.until(WorkerExited)
+    exited = await tested.until(WorkerExited)
     assert exited.reason.startswith("WORKER_HUNG")
     assert not is_alive(pid)
 
 
-async def test_closed_link_ends_the_worker(house: House) -> None:
+async def test_closed_link_ends_the_worker(tested: WorkersUnderTest) -> None:
     body = "link().shutdown(socket.SHUT_RDWR)\nawait asyncio.to_thread(time.sleep, 3600)"
-    await guest(house, body)
-    house.behave("guest", "do", u=UNIT)
-    await house.until(WorkerExited)
+    await guest(tested, body)
+    tested.behave("guest", "do", u=UNIT)
+    await tested.until(WorkerExited)
 
 
-async def test_crash_loop_ends_in_quarantine(house: House) -> None:
-    await guest(house, "pass", "import threading; threading.Timer(0.1, os._exit, [9]).start()")
-    failed = await house.until(WorkerFailed)
+async def test_crash_loop_ends_in_quarantine(tested: WorkersUnderTest) -> None:
+    await guest(tested, "pass", "import threading; threading.Timer(0.1, os._exit, [9]).start()")
+    failed = await tested.until(WorkerFailed)
     assert [p.code for p in failed.problems] == ["WORKER_CRASH_LOOP", "WORKER_EXITED"]
-    assert len(house.told(WorkerReady)) == 1 + supervision.RESTARTS
-    assert not house.workers.pids()
+    assert len(tested.told(WorkerReady)) == 1 + supervision.RESTARTS
+    assert not tested.workers.pids()
 
 
-async def test_quarantined_component_may_try_again(house: House) -> None:
+async def test_quarantined_component_may_try_again(tested: WorkersUnderTest) -> None:
     crash = "import pathlib\nif pathlib.Path('bad').exists(): os._exit(9)"
-    await guest(house, "open('bad', 'w').close(); os._exit(9)", crash)
-    house.behave("guest", "do", u=UNIT)
-    await house.until(WorkerFailed)
-    await house.workers.restart("guest")
-    assert len(house.told(WorkerFailed)) == 2
-    (house.folder / "guest/scratch/bad").unlink()
-    await house.workers.restart("guest")
-    assert list(house.workers.pids()) == ["guest"]
+    await guest(tested, "open('bad', 'w').close(); os._exit(9)", crash)
+    tested.behave("guest", "do", u=UNIT)
+    await tested.until(WorkerFailed)
+    await tested.workers.restart("guest")
+    assert len(tested.told(WorkerFailed)) == 2
+    (tested.folder / "guest/scratch/bad").unlink()
+    await tested.workers.restart("guest")
+    assert list(tested.workers.pids()) == ["guest"]
 
 
-async def test_behaviour_that_does_not_halt_costs_its_worker(house: House) -> None:
+async def test_behaviour_that_does_not_halt_costs_its_worker(tested: WorkersUnderTest) -> None:
     body = (
         "await ctx.established()\n"
         "while True:\n"
@@ -134,20 +136,20 @@ async def test_behaviour_that_does_not_halt_costs_its_worker(house: House) -> No
         "    except asyncio.CancelledError:\n"
         "        pass"
     )
-    await guest(house, body)
-    pid = house.workers.pids()["guest"]
-    call = house.behave("guest", "do", u=UNIT)
-    await house.until(BehaviourEstablished)
+    await guest(tested, body)
+    pid = tested.workers.pids()["guest"]
+    call = tested.behave("guest", "do", u=UNIT)
+    await tested.until(BehaviourEstablished)
     asked_s = time.monotonic()
     call.halt()
     assert await call.ended() is RunState.HALTED
     assert time.monotonic() - asked_s < 3.0
     assert not is_alive(pid)
-    assert (await house.until(WorkerExited)).reason.startswith("HALT_OVERDUE")
-    await house.until(WorkerReady, lambda _: len(house.told(WorkerReady)) == 2)
+    assert (await tested.until(WorkerExited)).reason.startswith("HALT_OVERDUE")
+    await tested.until(WorkerReady, lambda _: len(tested.told(WorkerReady)) == 2)
 
 
-async def test_stop_ends_what_ignores_everything(house: House) -> None:
+async def test_stop_ends_what_ignores_everything(tested: WorkersUnderTest) -> None:
     stubborn = (
         "@hookimpl\n"
         "async def start(ctx):\n"
@@ -156,16 +158,16 @@ async def test_stop_ends_what_ignores_everything(house: House) -> None:
         "async def stop(ctx):\n"
         "    time.sleep(3600)"
     )
-    await guest(house, "pass", stubborn)
-    pid = house.workers.pids()["guest"]
+    await guest(tested, "pass", stubborn)
+    pid = tested.workers.pids()["guest"]
     asked_s = time.monotonic()
-    await house.workers.stop("guest", grace_s=1.0)
+    await tested.workers.stop("guest", grace_s=1.0)
     assert not is_alive(pid)
     assert time.monotonic() - asked_s < 2.0
-    assert not house.told(WorkerExited), "an expected end is no crash"
+    assert not tested.told(WorkerExited), "an expected end is no crash"
 
 
-async def test_worker_has_ended_once_it_is_said_to_have_stopped(house: House) -> None:
+async def test_worker_has_ended_once_it_is_said_to_have_stopped(tested: WorkersUnderTest) -> None:
     """The kernel takes a while over much memory; who asks next may want the same device."""
     heavy = (
         "@hookimpl\n"
@@ -176,16 +178,16 @@ async def test_worker_has_ended_once_it_is_said_to_have_stopped(house: House) ->
         "async def stop(ctx):\n"
         "    time.sleep(3600)"
     )
-    await guest(house, "pass", heavy)
-    pid = house.workers.pids()["guest"]
-    await house.workers.stop("guest", grace_s=0.1)
+    await guest(tested, "pass", heavy)
+    pid = tested.workers.pids()["guest"]
+    await tested.workers.stop("guest", grace_s=0.1)
     assert not is_alive(pid)
 
 
-async def test_stop_hook_leaves_things_safe(house: House) -> None:
-    await guest(house, "pass", "@hookimpl\nasync def stop(ctx):\n    open('safe', 'w').close()")
-    await house.workers.stop("guest")
-    assert (house.folder / "guest/scratch/safe").exists()
+async def test_stop_hook_leaves_things_safe(tested: WorkersUnderTest) -> None:
+    await guest(tested, "pass", "@hookimpl\nasync def stop(ctx):\n    open('safe', 'w').close()")
+    await tested.workers.stop("guest")
+    assert (tested.folder / "guest/scratch/safe").exists()
 
 
 CHILD = "import os, time; print('child', os.getpid(), flush=True); time.sleep(3600)"
@@ -210,39 +212,39 @@ await asyncio.Event().wait()
         pytest.param(DOUBLE_FORK, id="double fork"),
     ],
 )
-async def test_children_go_with_their_worker(house: House, body: str, end: str) -> None:
-    await guest(house, body)
-    pid = house.workers.pids()["guest"]
-    house.behave("guest", "do", u=UNIT)
-    said = await house.until(WorkerLogged, lambda line: line.message.startswith("child"))
-    child = house.pid("guest", said.message.split()[1])
+async def test_children_go_with_their_worker(tested: WorkersUnderTest, body: str, end: str) -> None:
+    await guest(tested, body)
+    pid = tested.workers.pids()["guest"]
+    tested.behave("guest", "do", u=UNIT)
+    said = await tested.until(WorkerLogged, lambda line: line.message.startswith("child"))
+    child = tested.pid("guest", said.message.split()[1])
     assert is_alive(child)
     if end == "stop":
-        await house.workers.stop("guest")
+        await tested.workers.stop("guest")
     else:
         os.kill(pid, signal.SIGKILL)
-        await house.until(WorkerExited)
+        await tested.until(WorkerExited)
     await until_gone(child)
 
 
-async def test_flood_of_output_is_bounded(house: House) -> None:
+async def test_flood_of_output_is_bounded(tested: WorkersUnderTest) -> None:
     body = (
         "for _ in range(40):\n    os.write(1, b'x' * 60_000 + b'\\n')\n    await asyncio.sleep(0)"
     )
-    await guest(house, body)
-    call = house.behave("guest", "do", u=UNIT)
+    await guest(tested, body)
+    call = tested.behave("guest", "do", u=UNIT)
     assert await call.ended() is RunState.SUCCEEDED
-    await house.workers.stop("guest")
-    assert any(line.startswith("LOG_DROPPED") for line in house.lines("guest"))
-    assert sum(map(len, house.lines("guest"))) < 1_000_000
-    assert not house.told(WorkerExited)
+    await tested.workers.stop("guest")
+    assert any(line.startswith("LOG_DROPPED") for line in tested.lines("guest"))
+    assert sum(map(len, tested.lines("guest"))) < 1_000_000
+    assert not tested.told(WorkerExited)
 
 
-async def test_control_characters_do_not_reach_terminals(house: House) -> None:
-    await guest(house, r"print('\x1b[2Jhello')")
-    await house.behave("guest", "do", u=UNIT).ended()
-    await house.until(WorkerLogged, lambda line: "hello" in line.message)
-    assert r"\x1b[2Jhello" in house.lines("guest")
+async def test_control_characters_do_not_reach_terminals(tested: WorkersUnderTest) -> None:
+    await guest(tested, r"print('\x1b[2Jhello')")
+    await tested.behave("guest", "do", u=UNIT).ended()
+    await tested.until(WorkerLogged, lambda line: "hello" in line.message)
+    assert r"\x1b[2Jhello" in tested.lines("guest")
 
 
 @pytest.mark.parametrize(
@@ -290,41 +292,45 @@ async def test_control_characters_do_not_reach_terminals(house: House) -> None:
         ),
     ],
 )
-async def test_protocol_is_enforced(house: House, body: str, code: str) -> None:
-    await exits_with(house, f"{body}\nawait asyncio.sleep(60)", code)
+async def test_protocol_is_enforced(tested: WorkersUnderTest, body: str, code: str) -> None:
+    await exits_with(tested, f"{body}\nawait asyncio.sleep(60)", code)
 
 
-async def test_others_never_notice(house: House) -> None:
-    await house.start(
+async def test_others_never_notice(tested: WorkersUnderTest) -> None:
+    await tested.start(
         "good",
         PLUGIN.replace("{more}", "").replace("{body}", "pass"),
         behaviours=(DO,),
         units=(Unit("it", "sensor"),),
     )
-    await guest(house, "while True: os.write(1, b'y' * 4096)")
-    house.behave("guest", "do", u=UNIT)
+    await guest(tested, "while True: os.write(1, b'y' * 4096)")
+    tested.behave("guest", "do", u=UNIT)
     for _ in range(20):
         async with asyncio.timeout(30):
-            call = house.behave("good", "do", u=f"{HOST}__good__it")
+            call = tested.behave("good", "do", u=f"{HOST}__good__it")
             assert await call.ended() is RunState.SUCCEEDED
-    assert "good" in house.workers.pids()
+    assert "good" in tested.workers.pids()
 
 
-async def test_memory_hog_hurts_itself_only(house: House) -> None:
-    await guest(house, "bytearray(1 << 30)", limits=Limits(memory_mb=256))
-    call = house.behave("guest", "do", u=UNIT)
+async def test_memory_hog_hurts_itself_only(tested: WorkersUnderTest) -> None:
+    await guest(tested, "bytearray(1 << 30)", limits=Limits(memory_mb=256))
+    call = tested.behave("guest", "do", u=UNIT)
     assert await call.ended() is RunState.FAILED
     assert "MemoryError" in call.reason
 
 
-async def test_descriptors_run_out_for_the_leaker_only(house: House) -> None:
-    await guest(house, "kept = [open('/dev/null') for _ in range(500)]", "", Limits(descriptors=64))
-    call = house.behave("guest", "do", u=UNIT)
+async def test_descriptors_run_out_for_the_leaker_only(tested: WorkersUnderTest) -> None:
+    await guest(
+        tested, "kept = [open('/dev/null') for _ in range(500)]", "", Limits(descriptors=64)
+    )
+    call = tested.behave("guest", "do", u=UNIT)
     assert await call.ended() is RunState.FAILED
     assert "Too many open files" in call.reason
 
 
-async def test_nothing_is_inherited(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_nothing_is_inherited(
+    tested: WorkersUnderTest, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("SECRET", "of the host")
     body = (
         "assert 'SECRET' not in os.environ, os.environ\n"
@@ -340,6 +346,6 @@ async def test_nothing_is_inherited(house: House, monkeypatch: pytest.MonkeyPatc
         "own = ['/dev/null', 'anon_inode', 'pipe', 'pipe', 'socket', 'socket', 'socket']\n"
         "assert kinds == own, kinds"
     )
-    await guest(house, body)
-    call = house.behave("guest", "do", u=UNIT)
+    await guest(tested, body)
+    call = tested.behave("guest", "do", u=UNIT)
     assert await call.ended() is RunState.SUCCEEDED, call.reason

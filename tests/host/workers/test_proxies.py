@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from tests.kit.house import House
+from tests.kit.workers import WorkersUnderTest
 
 from nondum.sdk.description import Unit
 
@@ -25,52 +25,52 @@ async def translate_goal(ctx, words):
 '''
 
 
-async def talker(house: House) -> None:
-    await house.start("talker", TALKER, units=(Unit("mouth", "speaker"),), summary="Talks.")
+async def talker(tested: WorkersUnderTest) -> None:
+    await tested.start("talker", TALKER, units=(Unit("mouth", "speaker"),), summary="Talks.")
 
 
-async def test_describing_hooks_answer_at_once(house: House) -> None:
-    await talker(house)
-    await house.start("quiet", "'''Says nothing.'''", summary="Says nothing.")
-    summaries = {answer["summary"] for answer in house.workers.hook.describe()}
+async def test_describing_hooks_answer_at_once(tested: WorkersUnderTest) -> None:
+    await talker(tested)
+    await tested.start("quiet", "'''Says nothing.'''", summary="Says nothing.")
+    summaries = {answer["summary"] for answer in tested.workers.hook.describe()}
     assert summaries == {"Talks.", "Says nothing."}
-    assert (Unit("mouth", "speaker"),) in house.workers.hook.units()
+    assert (Unit("mouth", "speaker"),) in tested.workers.hook.units()
     for name in ("behaviours", "conditions", "fragments", "devices", "phrases", "labels"):
-        assert getattr(house.workers.hook, name)() == [(), ()]
+        assert getattr(tested.workers.hook, name)() == [(), ()]
 
 
-async def test_acting_hooks_are_gathered(house: House) -> None:
-    await talker(house)
-    await house.start("quiet", "'''Says nothing.'''", summary="Says nothing.")
+async def test_acting_hooks_are_gathered(tested: WorkersUnderTest) -> None:
+    await talker(tested)
+    await tested.start("quiet", "'''Says nothing.'''", summary="Says nothing.")
     answers = await asyncio.gather(
-        *house.workers.hook.translate_goal(ctx=None, words="hello", vocabulary={})
+        *tested.workers.hook.translate_goal(ctx=None, words="hello", vocabulary={})
     )
     assert sorted(answers, key=str) == [{"pddl": "(said hello)"}, {}]
-    assert await asyncio.gather(*house.workers.hook.speak(ctx=None, text="hi")) == [{}, {}]
+    assert await asyncio.gather(*tested.workers.hook.speak(ctx=None, text="hi")) == [{}, {}]
 
 
-async def test_every_component_is_asked_to_translate(house: House) -> None:
-    await talker(house)
-    await house.start("quiet", "'''Says nothing.'''", summary="Says nothing.")
-    asked = house.workers.translations("hello", {"host": "rover"})
+async def test_every_component_is_asked_to_translate(tested: WorkersUnderTest) -> None:
+    await talker(tested)
+    await tested.start("quiet", "'''Says nothing.'''", summary="Says nothing.")
+    asked = tested.workers.translations("hello", {"host": "rover"})
     answers = dict(zip(asked, await asyncio.gather(*asked.values()), strict=True))
     assert answers == {"talker": {"pddl": "(said hello)"}, "quiet": {}}
 
 
-async def test_failing_hook_comes_to_nothing(house: House) -> None:
-    await talker(house)
-    (answer,) = house.workers.hook.translate_goal(ctx=None, words="boom", vocabulary={})
+async def test_failing_hook_comes_to_nothing(tested: WorkersUnderTest) -> None:
+    await talker(tested)
+    (answer,) = tested.workers.hook.translate_goal(ctx=None, words="boom", vocabulary={})
     assert await answer is None
 
 
-async def test_hook_of_a_worker_that_goes_comes_to_nothing(house: House) -> None:
-    await talker(house)
-    (answer,) = house.workers.hook.translate_goal(ctx=None, words="hello", vocabulary={})
-    await house.workers.stop("talker")
+async def test_hook_of_a_worker_that_goes_comes_to_nothing(tested: WorkersUnderTest) -> None:
+    await talker(tested)
+    (answer,) = tested.workers.hook.translate_goal(ctx=None, words="hello", vocabulary={})
+    await tested.workers.stop("talker")
     assert await answer is None
 
 
-async def test_proxy_goes_with_its_worker(house: House) -> None:
-    await talker(house)
-    await house.workers.stop("talker")
-    assert house.workers.hook.describe() == []
+async def test_proxy_goes_with_its_worker(tested: WorkersUnderTest) -> None:
+    await talker(tested)
+    await tested.workers.stop("talker")
+    assert tested.workers.hook.describe() == []

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from tests.host.workers.test_excesses import DO, FORK, PLUGIN
-from tests.kit.house import HOST, QUICK, House
+from tests.kit.workers import HOST, QUICK, WorkersUnderTest
 
 from nondum.host.cgroups import CageLimits
 from nondum.host.cgroups.cages import Cage, owner, tree
@@ -54,30 +54,32 @@ class Elsewhere(Unconfined):
 
 
 @pytest.fixture
-async def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[House]:
-    """A house whose workers are all elsewhere."""
+async def served(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> AsyncIterator[WorkersUnderTest]:
+    """Workers that are all services."""
     monkeypatch.setattr(supervision, "BACKOFF_S", 60.0)  # one life is enough
-    house, elsewhere = House(tmp_path, replace(QUICK, look_s=0.1)), Elsewhere(tmp_path)
-    house.workers.launcher = WorkerLauncher(elsewhere)
-    yield house
-    await house.workers.close(grace_s=1.0)
+    tested, elsewhere = WorkersUnderTest(tmp_path, replace(QUICK, look_s=0.1)), Elsewhere(tmp_path)
+    tested.workers.launcher = WorkerLauncher(elsewhere)
+    yield tested
+    await tested.workers.close(grace_s=1.0)
     elsewhere.end()
 
 
-async def begin(house: House, body: str) -> None:
+async def begin(tested: WorkersUnderTest, body: str) -> None:
     source = PLUGIN.replace("{body}", body.replace("\n", "\n    "))
     unit = Unit("it", "sensor")
-    await house.start("guest", source, behaviours=(DO,), units=(unit,), limits=SMALL)
-    house.behave("guest", "do", u=f"{HOST}__guest__it")
+    await tested.start("guest", source, behaviours=(DO,), units=(unit,), limits=SMALL)
+    tested.behave("guest", "do", u=f"{HOST}__guest__it")
 
 
-async def test_service_that_forks_without_end_is_ended(served: House) -> None:
+async def test_service_that_forks_without_end_is_ended(served: WorkersUnderTest) -> None:
     await begin(served, FORK)
     exited = await served.until(WorkerExited)
     assert exited.reason.startswith("WORKER_TASKS"), exited.reason
 
 
-async def test_service_that_ends_by_its_limit_of_tasks_says_so(served: House) -> None:
+async def test_service_that_ends_by_its_limit_of_tasks_says_so(served: WorkersUnderTest) -> None:
     """Its cgroup goes with it; what was seen last counts."""
     body = "import threading\nawait asyncio.sleep(0.5)\nheld = []\n"
     body += "try:\n    while True:\n"
@@ -91,7 +93,7 @@ async def test_service_that_ends_by_its_limit_of_tasks_says_so(served: House) ->
     assert exited.reason.startswith("WORKER_TASKS"), exited.reason
 
 
-async def test_descriptors_of_a_service_are_counted(served: House) -> None:
+async def test_descriptors_of_a_service_are_counted(served: WorkersUnderTest) -> None:
     body = "held = []\nwhile True:\n    try:\n        held.append(os.dup(1))\n"
     await begin(served, f"{body}    except OSError:\n        await asyncio.sleep(0.01)")
     exited = await served.until(WorkerExited)
@@ -99,7 +101,7 @@ async def test_descriptors_of_a_service_are_counted(served: House) -> None:
 
 
 async def test_service_that_spins_is_told_of(
-    served: House, monkeypatch: pytest.MonkeyPatch
+    served: WorkersUnderTest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(excess, "SPIN_S", 0.5)
     spin = "def spin():\n    while True:\n        pass\n"
@@ -108,7 +110,9 @@ async def test_service_that_spins_is_told_of(
     assert [problem.code for problem in strained.problems] == ["WORKER_CPU"]
 
 
-async def test_service_that_ends_by_its_full_scratch_folder_says_so(served: House) -> None:
+async def test_service_that_ends_by_its_full_scratch_folder_says_so(
+    served: WorkersUnderTest,
+) -> None:
     """Which is memory of a size of its own, into which the host cannot look."""
     body = "print(OSError(28, os.strerror(28)), file=sys.stderr, flush=True)\nos._exit(1)"
     await begin(served, body)

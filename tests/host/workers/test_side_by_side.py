@@ -6,7 +6,7 @@ import asyncio
 from dataclasses import replace
 
 import pytest
-from tests.kit.house import HOST, House, is_alive
+from tests.kit.workers import HOST, WorkersUnderTest, is_alive
 
 from nondum.host.events import FactKnown, TrialFailed, WorkerExited, WorkerReady
 from nondum.host.workers import WorkerSpec
@@ -56,9 +56,9 @@ threading.Timer(0.5, os._exit, (3,)).start()
 """Ends soon after it was imported."""
 
 
-def spec(house: House, release: str, source: str = PLUGIN) -> WorkerSpec:
+def spec(tested: WorkersUnderTest, release: str, source: str = PLUGIN) -> WorkerSpec:
     """A release of the component `guest`."""
-    made = house.spec(
+    made = tested.spec(
         release,
         source,
         behaviours=BEHAVIOURS,
@@ -69,92 +69,94 @@ def spec(house: House, release: str, source: str = PLUGIN) -> WorkerSpec:
     return replace(made, component="guest", payload=payload)
 
 
-async def side_by_side(house: House) -> tuple[int, int]:
+async def side_by_side(tested: WorkersUnderTest) -> tuple[int, int]:
     """Both run, the old one in force; their processes."""
-    await house.workers.start(spec(house, "old"))
-    await house.workers.start(spec(house, "new"))
-    (old,), (new,) = house.workers.pids_of(OLD), house.workers.pids_of(NEW)
-    assert house.workers.pids() == {"guest": old}
+    await tested.workers.start(spec(tested, "old"))
+    await tested.workers.start(spec(tested, "new"))
+    (old,), (new,) = tested.workers.pids_of(OLD), tested.workers.pids_of(NEW)
+    assert tested.workers.pids() == {"guest": old}
     return old, new
 
 
-def facts(house: House) -> list[tuple[str, ...]]:
-    return [event.arguments for event in house.told(FactKnown)]
+def facts(tested: WorkersUnderTest) -> list[tuple[str, ...]]:
+    return [event.arguments for event in tested.told(FactKnown)]
 
 
-async def test_worker_that_is_tried_is_not_heard_nor_asked(house: House) -> None:
-    await side_by_side(house)
-    assert await house.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
-    assert facts(house) == [("old",), ("old", "none")]
-    assert [event.payload for event in house.told(WorkerReady)] == [OLD]
+async def test_worker_that_is_tried_is_not_heard_nor_asked(tested: WorkersUnderTest) -> None:
+    await side_by_side(tested)
+    assert await tested.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
+    assert facts(tested) == [("old",), ("old", "none")]
+    assert [event.payload for event in tested.told(WorkerReady)] == [OLD]
 
 
-async def test_it_counts_once_it_has_taken_over(house: House) -> None:
-    old, new = await side_by_side(house)
-    house.workers.take_over({"guest": NEW})
-    assert house.workers.pids() == {"guest": new}
-    assert [c.arguments for c in house.workers.claims("guest") if isinstance(c, FactKnown)] == [
+async def test_it_counts_once_it_has_taken_over(tested: WorkersUnderTest) -> None:
+    old, new = await side_by_side(tested)
+    tested.workers.take_over({"guest": NEW})
+    assert tested.workers.pids() == {"guest": new}
+    assert [c.arguments for c in tested.workers.claims("guest") if isinstance(c, FactKnown)] == [
         ("new",)
     ]
-    call = house.behave("guest", "look", u=UNIT)
+    call = tested.behave("guest", "look", u=UNIT)
     await asyncio.sleep(0)
     assert is_alive(old)
-    assert ("new", "none") not in facts(house), "two releases never act at once"
-    await house.workers.stop("guest", 1.0, OLD)
+    assert ("new", "none") not in facts(tested), "two releases never act at once"
+    await tested.workers.stop("guest", 1.0, OLD)
     assert await call.ended() is RunState.SUCCEEDED
-    assert facts(house)[-1] == ("new", "none")
+    assert facts(tested)[-1] == ("new", "none")
     assert not is_alive(old)
-    assert house.workers.pids() == {"guest": new}
-    assert not house.told(WorkerExited)
+    assert tested.workers.pids() == {"guest": new}
+    assert not tested.told(WorkerExited)
 
 
-async def test_device_is_handed_over_once_the_old_one_has_ended(house: House) -> None:
-    await house.workers.attach("guest", "line", "/dev/zero", {})
-    old, _ = await side_by_side(house)
-    house.workers.take_over({"guest": NEW})
-    attaching = asyncio.create_task(house.workers.attach("guest", "line", "/dev/zero", {}))
-    stopping = asyncio.create_task(house.workers.stop("guest", 1.0, OLD))
+async def test_device_is_handed_over_once_the_old_one_has_ended(tested: WorkersUnderTest) -> None:
+    await tested.workers.attach("guest", "line", "/dev/zero", {})
+    old, _ = await side_by_side(tested)
+    tested.workers.take_over({"guest": NEW})
+    attaching = asyncio.create_task(tested.workers.attach("guest", "line", "/dev/zero", {}))
+    stopping = asyncio.create_task(tested.workers.stop("guest", 1.0, OLD))
     await attaching
     assert not is_alive(old)
     await stopping
-    assert await house.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
-    assert facts(house)[-1][0] == "new"
-    assert facts(house)[-1][1] != "none"
+    assert await tested.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
+    assert facts(tested)[-1][0] == "new"
+    assert facts(tested)[-1][1] != "none"
 
 
-async def test_device_of_another_component_is_not_waited_for(house: House) -> None:
-    await house.workers.attach("guest", "line", "/dev/zero", {})
-    await side_by_side(house)
-    house.workers.take_over({"guest": NEW})
-    await house.workers.attach("guest", "line", "/dev/null", {})
-    await house.workers.stop("guest", 1.0, OLD)
+async def test_device_of_another_component_is_not_waited_for(tested: WorkersUnderTest) -> None:
+    await tested.workers.attach("guest", "line", "/dev/zero", {})
+    await side_by_side(tested)
+    tested.workers.take_over({"guest": NEW})
+    await tested.workers.attach("guest", "line", "/dev/null", {})
+    await tested.workers.stop("guest", 1.0, OLD)
 
 
-async def test_worker_that_is_tried_is_given_up_when_it_ends(house: House) -> None:
-    await house.workers.start(spec(house, "old"))
-    await house.workers.start(spec(house, "new", FALLS))
+async def test_worker_that_is_tried_is_given_up_when_it_ends(tested: WorkersUnderTest) -> None:
+    await tested.workers.start(spec(tested, "old"))
+    await tested.workers.start(spec(tested, "new", FALLS))
     with pytest.raises(WorkerFailed, match="status 3"):
-        await house.workers.watched("guest", NEW)
-    failed = await house.until(TrialFailed)
+        await tested.workers.watched("guest", NEW)
+    failed = await tested.until(TrialFailed)
     assert (failed.payload, failed.component) == (NEW, "guest")
-    assert not house.told(WorkerExited)
-    await house.workers.stop("guest", 1.0, NEW)
-    assert len(house.workers.pids()) == 1
+    assert not tested.told(WorkerExited)
+    await tested.workers.stop("guest", 1.0, NEW)
+    assert len(tested.workers.pids()) == 1
 
 
-async def test_stopping_one_leaves_the_other(house: House) -> None:
-    old, new = await side_by_side(house)
-    await house.workers.stop("guest", 1.0, NEW)
+async def test_stopping_one_leaves_the_other(tested: WorkersUnderTest) -> None:
+    old, new = await side_by_side(tested)
+    await tested.workers.stop("guest", 1.0, NEW)
     assert is_alive(old)
     assert not is_alive(new)
-    await house.workers.ended(NEW)
-    assert await house.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
+    await tested.workers.ended(NEW)
+    assert await tested.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
 
 
-async def test_one_in_force_may_be_gone_by_the_time_it_is_replaced(house: House) -> None:
-    old, new = await side_by_side(house)
-    await house.workers.stop("guest", 1.0, OLD)
+async def test_one_in_force_may_be_gone_by_the_time_it_is_replaced(
+    tested: WorkersUnderTest,
+) -> None:
+    old, new = await side_by_side(tested)
+    await tested.workers.stop("guest", 1.0, OLD)
     assert not is_alive(old)
-    assert not house.workers.pids()
-    house.workers.take_over({"guest": NEW})
-    assert house.workers.pids() == {"guest": new}
+    assert not tested.workers.pids()
+    tested.workers.take_over({"guest": NEW})
+    assert tested.workers.pids() == {"guest": new}

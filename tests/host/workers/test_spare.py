@@ -14,7 +14,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from tests.kit.house import SDK, House, is_alive, until_gone
+from tests.kit.workers import SDK, WorkersUnderTest, is_alive, until_gone
 
 from nondum.host.inside.bootstrap import PRELOADED
 from nondum.host.workers import base_interpreter
@@ -35,8 +35,8 @@ FORKING = (
 )
 
 
-def spare_of(house: House) -> int:
-    launcher = house.workers.launcher
+def spare_of(tested: WorkersUnderTest) -> int:
+    launcher = tested.workers.launcher
     assert isinstance(launcher, WorkerLauncher)
     assert launcher._spare is not None
     return launcher._spare.popen.pid
@@ -61,52 +61,52 @@ def place(pid: int) -> Path:
     return Path(f"/proc/{pid}/cwd").readlink()
 
 
-async def test_the_spare_becomes_the_next_worker(house: House) -> None:
-    house.workers.keep_spare()
-    spare = spare_of(house)
-    await house.start("cam", QUIET)
-    assert spare in ancestors(house.workers.pids()["cam"])
-    await house.start("cam-2", QUIET)
-    assert spare not in ancestors(house.workers.pids()["cam-2"])
+async def test_the_spare_becomes_the_next_worker(tested: WorkersUnderTest) -> None:
+    tested.workers.keep_spare()
+    spare = spare_of(tested)
+    await tested.start("cam", QUIET)
+    assert spare in ancestors(tested.workers.pids()["cam"])
+    await tested.start("cam-2", QUIET)
+    assert spare not in ancestors(tested.workers.pids()["cam-2"])
 
 
-async def test_a_worker_that_was_a_spare_lives_where_others_do(house: House) -> None:
-    house.workers.keep_spare()
-    spec = await house.start("cam", "import os; print(os.getcwd(), dict(os.environ))\n")
-    pid = house.workers.pids()["cam"]
+async def test_a_worker_that_was_a_spare_lives_where_others_do(tested: WorkersUnderTest) -> None:
+    tested.workers.keep_spare()
+    spec = await tested.start("cam", "import os; print(os.getcwd(), dict(os.environ))\n")
+    pid = tested.workers.pids()["cam"]
     assert environment(pid)[MARK] == str(spec.scratch)
     assert place(pid) == spec.scratch
-    (line,) = house.lines("cam")
+    (line,) = tested.lines("cam")
     assert line.startswith(f"{spec.scratch} ")
     assert f"'HOME': '{spec.scratch}'" in line
     assert "'OMP_NUM_THREADS': '1'" in line
     assert "NONDUM_ROOM" not in line
 
 
-async def test_what_a_spare_forks_is_found(house: House) -> None:
-    house.workers.keep_spare()
-    spec = await house.start("cam", FORKING)
-    forked = house.pid("cam", (spec.scratch / "child").read_text())
+async def test_what_a_spare_forks_is_found(tested: WorkersUnderTest) -> None:
+    tested.workers.keep_spare()
+    spec = await tested.start("cam", FORKING)
+    forked = tested.pid("cam", (spec.scratch / "child").read_text())
     assert is_alive(forked)
     assert end_leftovers(spec.scratch) >= 1
     await until_gone(forked)
 
 
-async def test_a_spare_that_died_is_not_missed(house: House) -> None:
-    house.workers.keep_spare()
-    spare = spare_of(house)
+async def test_a_spare_that_died_is_not_missed(tested: WorkersUnderTest) -> None:
+    tested.workers.keep_spare()
+    spare = spare_of(tested)
     os.kill(spare, signal.SIGKILL)
     await asyncio.to_thread(os.waitid, os.P_PID, spare, os.WEXITED | os.WNOWAIT)
-    await house.start("cam", QUIET)
-    assert spare not in ancestors(house.workers.pids()["cam"])
+    await tested.start("cam", QUIET)
+    assert spare not in ancestors(tested.workers.pids()["cam"])
 
 
-async def test_a_worker_that_cannot_be_watched_is_ended(house: House) -> None:
+async def test_a_worker_that_cannot_be_watched_is_ended(tested: WorkersUnderTest) -> None:
     """The last descriptor that there is would have told of its end (pidfd_open(2))."""
-    house.workers.keep_spare()
-    spare = spare_of(house)
-    spec = house.spec("cam", QUIET)
-    launcher = house.workers.launcher
+    tested.workers.keep_spare()
+    spare = spare_of(tested)
+    spec = tested.spec("cam", QUIET)
+    launcher = tested.workers.launcher
     ours, theirs = socket.socketpair()
     with ours, theirs, no_descriptors_left(), pytest.raises(WorkerFailed) as failed:
         launcher.launch(spec, theirs)
@@ -131,10 +131,10 @@ def no_descriptors_left() -> Iterator[None]:
             resource.setrlimit(resource.RLIMIT_NOFILE, before)
 
 
-async def test_an_unused_spare_ends_with_the_workers(house: House) -> None:
-    house.workers.keep_spare()
-    spare = spare_of(house)
-    await house.workers.close()
+async def test_an_unused_spare_ends_with_the_workers(tested: WorkersUnderTest) -> None:
+    tested.workers.keep_spare()
+    spare = spare_of(tested)
+    await tested.workers.close()
     assert not is_alive(spare)
 
 

@@ -8,7 +8,7 @@ import signal
 from collections.abc import Callable
 
 import pytest
-from tests.kit.house import HOST, House
+from tests.kit.workers import HOST, WorkersUnderTest
 
 from nondum.host.events import BehaviourEstablished, FactKnown, StreamFlowing, WorkerReady
 from nondum.host.workers import Call
@@ -95,139 +95,143 @@ def frames(camera: str) -> str:
     return f"{HOST}__{camera}__frames"
 
 
-async def camera(house: House, name: str = "cam") -> None:
+async def camera(tested: WorkersUnderTest, name: str = "cam") -> None:
     unit = Unit("camera", "camera", outputs=(Output("frames", "image"),))
-    await house.start(name, CAMERA, behaviours=(STREAM,), units=(unit,))
-    house.behave(name, "stream", u=f"{HOST}__{name}__camera", o=frames(name))
+    await tested.start(name, CAMERA, behaviours=(STREAM,), units=(unit,))
+    tested.behave(name, "stream", u=f"{HOST}__{name}__camera", o=frames(name))
 
 
-async def watcher(house: House, name: str, source: str) -> Call:
-    await house.start(name, WATCHER, behaviours=(WATCH,), units=(Unit("eye", "detector"),))
-    return house.behave(name, "watch", u=f"{HOST}__{name}__eye", i=frames(source))
+async def watcher(tested: WorkersUnderTest, name: str, source: str) -> Call:
+    await tested.start(name, WATCHER, behaviours=(WATCH,), units=(Unit("eye", "detector"),))
+    return tested.behave(name, "watch", u=f"{HOST}__{name}__eye", i=frames(source))
 
 
-async def sees(house: House, name: str, count: int = 30) -> FactKnown:
+async def sees(tested: WorkersUnderTest, name: str, count: int = 30) -> FactKnown:
     """Wait until a watcher has seen so many frames more."""
-    seen = sum(1 for e in house.told(FactKnown) if e.predicate == "seen" and e.component == name)
+    seen = sum(1 for e in tested.told(FactKnown) if e.predicate == "seen" and e.component == name)
     wanted = str((seen + 1) * 10 + count)
-    return await house.until(FactKnown, lambda e: e.arguments[:2] == (name, wanted))
+    return await tested.until(FactKnown, lambda e: e.arguments[:2] == (name, wanted))
 
 
-async def test_frames_flow_to_two_consumers(house: House) -> None:
-    await camera(house)
-    await watcher(house, "one", "cam")
-    await watcher(house, "two", "cam")
-    await sees(house, "one")
-    await sees(house, "two")
-    (status,) = house.workers.streams.listing()
+async def test_frames_flow_to_two_consumers(tested: WorkersUnderTest) -> None:
+    await camera(tested)
+    await watcher(tested, "one", "cam")
+    await watcher(tested, "two", "cam")
+    await sees(tested, "one")
+    await sees(tested, "two")
+    (status,) = tested.workers.streams.listing()
     assert status.is_flowing
     assert status.readers == ("one", "two")
 
 
-async def test_swapping_the_argument_swaps_the_feed(house: House) -> None:
-    await camera(house, "left")
-    await camera(house, "right")
-    await watcher(house, "one", "left")
-    assert (await sees(house, "one", 0)).arguments[2] == f"{HOST}__left__camera"
-    await house.workers.stop("one")
-    await watcher(house, "two", "right")
-    assert (await sees(house, "two", 0)).arguments[2] == f"{HOST}__right__camera"
+async def test_swapping_the_argument_swaps_the_feed(tested: WorkersUnderTest) -> None:
+    await camera(tested, "left")
+    await camera(tested, "right")
+    await watcher(tested, "one", "left")
+    assert (await sees(tested, "one", 0)).arguments[2] == f"{HOST}__left__camera"
+    await tested.workers.stop("one")
+    await watcher(tested, "two", "right")
+    assert (await sees(tested, "two", 0)).arguments[2] == f"{HOST}__right__camera"
 
 
 @pytest.mark.parametrize("number", [signal.SIGSTOP, signal.SIGKILL], ids=lambda n: n.name)
-async def test_dead_consumer_costs_nobody_anything(house: House, number: signal.Signals) -> None:
-    await camera(house)
-    await watcher(house, "one", "cam")
-    await watcher(house, "two", "cam")
-    await sees(house, "two", 0)
-    os.kill(house.workers.pids()["two"], number)
-    await sees(house, "one", 100)
-    assert "cam" in house.workers.pids()
+async def test_dead_consumer_costs_nobody_anything(
+    tested: WorkersUnderTest, number: signal.Signals
+) -> None:
+    await camera(tested)
+    await watcher(tested, "one", "cam")
+    await watcher(tested, "two", "cam")
+    await sees(tested, "two", 0)
+    os.kill(tested.workers.pids()["two"], number)
+    await sees(tested, "one", 100)
+    assert "cam" in tested.workers.pids()
 
 
-async def test_stream_is_unwired_when_the_call_ends(house: House) -> None:
-    await camera(house)
-    watching = await watcher(house, "one", "cam")
-    await sees(house, "one", 0)
-    house.workers.halt_all()
-    await house.until(StreamFlowing, lambda e: not e.flowing)
+async def test_stream_is_unwired_when_the_call_ends(tested: WorkersUnderTest) -> None:
+    await camera(tested)
+    watching = await watcher(tested, "one", "cam")
+    await sees(tested, "one", 0)
+    tested.workers.halt_all()
+    await tested.until(StreamFlowing, lambda e: not e.flowing)
     assert await watching.ended() is RunState.HALTED
-    (status,) = house.workers.streams.listing()
+    (status,) = tested.workers.streams.listing()
     assert not status.is_flowing
     assert status.readers == ()
 
 
-async def test_stream_of_nobody_fails_the_call(house: House) -> None:
-    await house.start("one", WATCHER, behaviours=(WATCH,), units=(Unit("eye", "detector"),))
-    call = house.behave("one", "watch", u=f"{HOST}__one__eye", i=frames("gone"))
+async def test_stream_of_nobody_fails_the_call(tested: WorkersUnderTest) -> None:
+    await tested.start("one", WATCHER, behaviours=(WATCH,), units=(Unit("eye", "detector"),))
+    call = tested.behave("one", "watch", u=f"{HOST}__one__eye", i=frames("gone"))
     assert await call.ended() is RunState.FAILED
     assert "STREAM_UNKNOWN" in call.reason
 
 
-async def odometer(house: House, name: str) -> None:
+async def odometer(tested: WorkersUnderTest, name: str) -> None:
     unit = Unit("wheels", "base", outputs=(Output("odometry", "pose", always=True),))
-    await house.start(name, ODOMETER, units=(unit,))
+    await tested.start(name, ODOMETER, units=(unit,))
 
 
-async def panner(house: House) -> None:
+async def panner(tested: WorkersUnderTest) -> None:
     unit = Unit("reader", "sensor", inputs=(Input("odometry", "pose"),))
-    await house.start("panner", PANNER, behaviours=(READ,), units=(unit,))
+    await tested.start("panner", PANNER, behaviours=(READ,), units=(unit,))
 
 
 @pytest.mark.parametrize("is_first", [True, False], ids=["before", "after"])
-async def test_optional_input_is_wired_to_what_flows(house: House, is_first: bool) -> None:
+async def test_optional_input_is_wired_to_what_flows(
+    tested: WorkersUnderTest, is_first: bool
+) -> None:
     if is_first:
-        await odometer(house, "base")
-    await panner(house)
-    call = house.behave("panner", "read", u=f"{HOST}__panner__reader")
+        await odometer(tested, "base")
+    await panner(tested)
+    call = tested.behave("panner", "read", u=f"{HOST}__panner__reader")
     if not is_first:
-        await odometer(house, "base")
+        await odometer(tested, "base")
     assert await call.ended() is RunState.SUCCEEDED
-    (status,) = house.workers.streams.listing()
+    (status,) = tested.workers.streams.listing()
     assert status.readers == ("panner.reader.odometry",)
 
 
-async def test_optional_input_moves_on_when_its_stream_goes(house: House) -> None:
-    await odometer(house, "a-base")
-    await odometer(house, "b-base")
-    await panner(house)
-    await house.until(StreamFlowing, _from("a-base"))
-    await house.until(StreamFlowing, _from("b-base"))
-    assert _readers(house) == {f"{HOST}__a-base__odometry"}
-    await house.workers.stop("a-base")
-    assert _readers(house) == {f"{HOST}__b-base__odometry"}
-    call = house.behave("panner", "read", u=f"{HOST}__panner__reader")
+async def test_optional_input_moves_on_when_its_stream_goes(tested: WorkersUnderTest) -> None:
+    await odometer(tested, "a-base")
+    await odometer(tested, "b-base")
+    await panner(tested)
+    await tested.until(StreamFlowing, _from("a-base"))
+    await tested.until(StreamFlowing, _from("b-base"))
+    assert _readers(tested) == {f"{HOST}__a-base__odometry"}
+    await tested.workers.stop("a-base")
+    assert _readers(tested) == {f"{HOST}__b-base__odometry"}
+    call = tested.behave("panner", "read", u=f"{HOST}__panner__reader")
     assert await call.ended() is RunState.SUCCEEDED
 
 
-async def test_restarted_reader_is_wired_again(house: House) -> None:
-    await odometer(house, "base")
-    await panner(house)
-    os.kill(house.workers.pids()["panner"], signal.SIGKILL)
-    await house.until(WorkerReady, lambda _: len(house.told(WorkerReady)) == 3)
-    call = house.behave("panner", "read", u=f"{HOST}__panner__reader")
+async def test_restarted_reader_is_wired_again(tested: WorkersUnderTest) -> None:
+    await odometer(tested, "base")
+    await panner(tested)
+    os.kill(tested.workers.pids()["panner"], signal.SIGKILL)
+    await tested.until(WorkerReady, lambda _: len(tested.told(WorkerReady)) == 3)
+    call = tested.behave("panner", "read", u=f"{HOST}__panner__reader")
     assert await call.ended() is RunState.SUCCEEDED
 
 
-async def test_claims_hold_what_was_said_before_anybody_listened(house: House) -> None:
-    await odometer(house, "base")
-    await house.until(StreamFlowing)
+async def test_claims_hold_what_was_said_before_anybody_listened(tested: WorkersUnderTest) -> None:
+    await odometer(tested, "base")
+    await tested.until(StreamFlowing)
     stream = f"{HOST}__base__odometry"
-    assert house.workers.claims("base") == (StreamFlowing("base", stream, True),)
-    assert house.workers.claims("nobody") == ()
+    assert tested.workers.claims("base") == (StreamFlowing("base", stream, True),)
+    assert tested.workers.claims("nobody") == ()
 
 
-async def test_calls_are_established_only_by_themselves(house: House) -> None:
-    await camera(house)
-    established = await house.until(BehaviourEstablished)
+async def test_calls_are_established_only_by_themselves(tested: WorkersUnderTest) -> None:
+    await camera(tested)
+    established = await tested.until(BehaviourEstablished)
     assert established.component == "cam"
     await asyncio.sleep(0)
-    assert len(house.told(BehaviourEstablished)) == 1
+    assert len(tested.told(BehaviourEstablished)) == 1
 
 
 def _from(component: str) -> Callable[[StreamFlowing], bool]:
     return lambda event: event.component == component
 
 
-def _readers(house: House) -> set[str]:
-    return {s.stream for s in house.workers.streams.listing() if s.readers}
+def _readers(tested: WorkersUnderTest) -> set[str]:
+    return {s.stream for s in tested.workers.streams.listing() if s.readers}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from tests.kit.house import HOST, House, is_alive
+from tests.kit.workers import HOST, WorkersUnderTest, is_alive
 
 from nondum.host.events import (
     BehaviourEnded,
@@ -70,8 +70,8 @@ BEHAVIOURS = (
 )
 
 
-async def greeter(house: House) -> None:
-    await house.start(
+async def greeter(tested: WorkersUnderTest) -> None:
+    await tested.start(
         "greeter",
         GREETER,
         behaviours=BEHAVIOURS,
@@ -80,81 +80,81 @@ async def greeter(house: House) -> None:
     )
 
 
-async def test_worker_describes_itself_and_starts(house: House) -> None:
-    await greeter(house)
-    ready = await house.until(WorkerReady)
+async def test_worker_describes_itself_and_starts(tested: WorkersUnderTest) -> None:
+    await greeter(tested)
+    ready = await tested.until(WorkerReady)
     assert ready.description.summary == "Greets."
-    await house.until(WorkerLogged, lambda line: line.message == f"ready in {HOST}")
+    await tested.until(WorkerLogged, lambda line: line.message == f"ready in {HOST}")
 
 
-async def test_finishing_behaviour_succeeds(house: House) -> None:
-    await greeter(house)
-    call = house.behave("greeter", "greet", u=f"{HOST}__greeter__mouth", t="ada")
+async def test_finishing_behaviour_succeeds(tested: WorkersUnderTest) -> None:
+    await greeter(tested)
+    call = tested.behave("greeter", "greet", u=f"{HOST}__greeter__mouth", t="ada")
     assert await call.ended() is RunState.SUCCEEDED
-    known = await house.until(FactKnown)
+    known = await tested.until(FactKnown)
     assert (known.component, known.predicate, known.arguments) == ("greeter", "greeted", ("ada",))
-    progress = await house.until(BehaviourProgressed)
+    progress = await tested.until(BehaviourProgressed)
     assert (progress.call_id, progress.fraction, progress.text) == (call.id, 0.5, "half way")
     said = f"greeting ada by {HOST}__greeter__mouth"
-    logged = await house.until(WorkerLogged, lambda line: line.message == said)
+    logged = await tested.until(WorkerLogged, lambda line: line.message == said)
     assert logged.level == "info"
-    assert said in house.lines("greeter")
+    assert said in tested.lines("greeter")
 
 
-async def test_failing_behaviour_says_why(house: House) -> None:
-    await greeter(house)
-    call = house.behave("greeter", "refuse", u=f"{HOST}__greeter__mouth")
+async def test_failing_behaviour_says_why(tested: WorkersUnderTest) -> None:
+    await greeter(tested)
+    call = tested.behave("greeter", "refuse", u=f"{HOST}__greeter__mouth")
     assert await call.ended() is RunState.FAILED
     assert "too shy" in call.reason
 
 
-async def test_lasting_behaviour_is_established_until_halted(house: House) -> None:
-    await greeter(house)
-    call = house.behave("greeter", "hum", u=f"{HOST}__greeter__mouth")
-    await house.until(BehaviourEstablished)
+async def test_lasting_behaviour_is_established_until_halted(tested: WorkersUnderTest) -> None:
+    await greeter(tested)
+    call = tested.behave("greeter", "hum", u=f"{HOST}__greeter__mouth")
+    await tested.until(BehaviourEstablished)
     assert call.state is RunState.ESTABLISHED
     call.halt()
     assert await call.ended() is RunState.HALTED
-    await house.until(FactForgotten)
-    assert house.ends() == [("hum", "HALTED")]
+    await tested.until(FactForgotten)
+    assert tested.ends() == [("hum", "HALTED")]
 
 
-async def test_stopping_that_is_cancelled_leaves_no_process(house: House) -> None:
+async def test_stopping_that_is_cancelled_leaves_no_process(tested: WorkersUnderTest) -> None:
     """As when a daemon ends while a payload is withdrawn."""
-    await house.start("guest", LINGERING)
-    pid = house.workers.pids()["guest"]
-    stopping = asyncio.create_task(house.workers.stop("guest"))
-    await house.until(WorkerLogged, lambda line: line.message == "leaving")
+    await tested.start("guest", LINGERING)
+    pid = tested.workers.pids()["guest"]
+    stopping = asyncio.create_task(tested.workers.stop("guest"))
+    await tested.until(WorkerLogged, lambda line: line.message == "leaving")
     stopping.cancel()
-    await house.workers.close()
+    await tested.workers.close()
     assert not is_alive(pid)
     with pytest.raises(asyncio.CancelledError):
         await stopping
 
 
-async def test_stopping_halts_and_ends_the_process(house: House) -> None:
-    await greeter(house)
-    (pid,) = house.workers.pids().values()
-    call = house.behave("greeter", "hum", u=f"{HOST}__greeter__mouth")
-    await house.until(BehaviourEstablished)
-    await house.workers.stop("greeter")
+async def test_stopping_halts_and_ends_the_process(tested: WorkersUnderTest) -> None:
+    await greeter(tested)
+    (pid,) = tested.workers.pids().values()
+    call = tested.behave("greeter", "hum", u=f"{HOST}__greeter__mouth")
+    await tested.until(BehaviourEstablished)
+    await tested.workers.stop("greeter")
     assert await call.ended() is RunState.HALTED
     assert not is_alive(pid)
     with pytest.raises(WorkerFailed, match="NOT_RUNNING"):
-        house.behave("greeter", "hum", u="")
+        tested.behave("greeter", "hum", u="")
 
 
-async def test_call_halted_at_once_never_begins(house: House) -> None:
-    await greeter(house)
-    call = house.behave("greeter", "greet", u=f"{HOST}__greeter__mouth", t="ada")
+async def test_call_halted_at_once_never_begins(tested: WorkersUnderTest) -> None:
+    await greeter(tested)
+    call = tested.behave("greeter", "greet", u=f"{HOST}__greeter__mouth", t="ada")
     call.halt()
     assert await call.ended() is RunState.HALTED
-    assert not house.told(FactKnown)
+    assert not tested.told(FactKnown)
 
 
-async def test_ends_are_told_once_and_after_the_start(house: House) -> None:
-    await greeter(house)
-    call = house.behave("greeter", "refuse", u=f"{HOST}__greeter__mouth")
+async def test_ends_are_told_once_and_after_the_start(tested: WorkersUnderTest) -> None:
+    await greeter(tested)
+    call = tested.behave("greeter", "refuse", u=f"{HOST}__greeter__mouth")
     await call.ended()
-    await house.workers.stop("greeter")
-    assert len(house.told(BehaviourEnded)) == 1
+    await tested.workers.stop("greeter")
+    assert len(tested.told(BehaviourEnded)) == 1

@@ -13,7 +13,7 @@ from tests.lab.lab import Lab
 CHECKOUT = Path(__file__).parents[3]
 PARTS = (
     *("tests/confinement/baits.py", "tests/confinement/escape.py", "tests/confinement/table.py"),
-    *("tests/kit/house.py", "plugins/sdk/nondum"),
+    *("tests/kit/workers.py", "plugins/sdk/nondum"),
 )
 PLACE = "/var/lib/checkout"
 PROGRAM = """

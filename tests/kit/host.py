@@ -1,4 +1,4 @@
-"""A whole host's lifecycle in a test: catalogue, workers, executor and a folder of slots."""
+"""A host in the test process: catalogue, workers, executor, drives that are folders; no mind."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ async def shine(ctx, u):
 
 
 @dataclass
-class Living:
+class HostInProcess:
     """A running host, without its mind."""
 
     catalogue: Catalogue
@@ -102,14 +102,14 @@ class Living:
 
 
 @contextlib.asynccontextmanager
-async def living(
+async def host_in_process(
     root: Path,
     *,
     options: InstallOptions | None = None,
     timing: Timing | None = None,
     sources: Callable[[Folders], Sequence[DriveSource]] = lambda folders: (),
     steady_s: float = STEADY_S,
-) -> AsyncIterator[Living]:
+) -> AsyncIterator[HostInProcess]:
     """Run a host's lifecycle under `root`; its state stays there for the next one."""
     folders, slots = Folders(root / "state"), root / "slots"
     bus = Bus()
@@ -120,7 +120,9 @@ async def living(
     manager = ComponentManager(catalogue, executor, bus, steady_s=steady_s)
     for source in (SlotSource([slots]), *sources(folders)):
         manager.add_source(source)
-    host = Living(catalogue, manager, executor, workers, bus, folders, slots, root / "drives")
+    host = HostInProcess(
+        catalogue, manager, executor, workers, bus, folders, slots, root / "drives"
+    )
     slots.mkdir(parents=True, exist_ok=True)
     bus.subscribe(host.heard.append)
     running = asyncio.create_task(manager.run())

@@ -1,4 +1,4 @@
-"""A small world for tests of workers: plugins written as files, real processes, news gathered."""
+"""Workers under test: plugins written as files, real processes, events collected."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ def level() -> Level:
 
 
 @dataclass
-class House:
-    """Workers of one host, and all that they emitted."""
+class WorkersUnderTest:
+    """Workers of one host, and all events that they emitted."""
 
     folder: Path
     timing: Timing = QUICK
@@ -182,7 +182,7 @@ def pose_reader(name: str = "reader") -> Unit:
 __all__ = [
     "HOST",
     "QUICK",
-    "House",
+    "WorkersUnderTest",
     "camera",
     "is_alive",
     "pose_reader",
