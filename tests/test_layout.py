@@ -39,6 +39,17 @@ def imported_names(path: Path) -> Iterator[str]:
             yield node.module
 
 
+def imported_test_modules(text: str) -> set[str]:
+    """Names of modules and their members, where a part of the name is that of a test module."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            names |= {f"{node.module or ''}.{alias.name}" for alias in node.names}
+    return {name for name in names if any(x.startswith("test_") for x in name.split("."))}
+
+
 @pytest.mark.parametrize("portion", PORTIONS)
 def test_imports_point_inwards(portion: str) -> None:
     allowed = MAY_IMPORT[portion] | {portion}
@@ -73,3 +84,59 @@ def test_host_names_no_plugin() -> None:
             text = path.read_text(encoding="utf-8")
             found = [n for n in names if n in text or f"nondum_{n.replace('-', '_')}" in text]
             assert not found, f"{portion}: {path} names {found}"
+
+
+HELPERS_IN_TEST_MODULES = {
+    "tests/benchmarks/test_planning.py",
+    "tests/confinement/test_walls.py",
+    "tests/daemon/test_bad_payloads.py",
+    "tests/daemon/test_block_devices.py",
+    "tests/daemon/test_hostile_plugin.py",
+    "tests/daemon/test_placement.py",
+    "tests/faults/yanks.py",
+    "tests/host/drives/test_blocks.py",
+    "tests/host/drives/test_left_alone.py",
+    "tests/host/drives/test_reader.py",
+    "tests/host/drives/test_reading.py",
+    "tests/host/helper/test_server.py",
+    "tests/host/helper/test_service.py",
+    "tests/host/lifecycle/test_claims.py",
+    "tests/host/lifecycle/test_former.py",
+    "tests/host/lifecycle/test_installing.py",
+    "tests/host/lifecycle/test_rebuilding.py",
+    "tests/host/lifecycle/test_releases.py",
+    "tests/host/lifecycle/test_safe_mode.py",
+    "tests/host/lifecycle/test_tries.py",
+    "tests/host/service/test_telling.py",
+    "tests/host/trust/test_chain.py",
+    "tests/host/workers/test_served.py",
+}
+"""Modules that still import from test modules; none may join them."""
+
+
+def test_helpers_do_not_live_in_test_modules() -> None:
+    found = {
+        path.relative_to(ROOT).as_posix()
+        for folder in (ROOT / "tests", *ROOT.glob("plugins/*/tests"))
+        for path in folder.rglob("*.py")
+        if "data" not in path.parts and imported_test_modules(path.read_text(encoding="utf-8"))
+    }
+    assert found <= HELPERS_IN_TEST_MODULES, found - HELPERS_IN_TEST_MODULES
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "from tests.host.test_it import helper",
+        "from tests.host import test_it",
+        "from .test_it import helper",
+        "import tests.host.test_it",
+        "def late():\n    from test_it import helper",
+    ],
+)
+def test_helper_from_a_test_module_is_found(text: str) -> None:
+    assert imported_test_modules(text)
+
+
+def test_helper_from_a_helper_module_is_fine() -> None:
+    assert not imported_test_modules("from tests.kit.until import until\nimport latest_news")

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from tests.kit.payloads import installed_wheel, make_wheel, sdk_wheel
 from tests.wheelhouse.hostile_wheels import WheelBuilder
+from tests.wheelhouse.locks import host
 from tests.wheelhouse.sources import PLUGIN, make_source
-from tests.wheelhouse.test_lock import host
 
 from nondum.sdk.errors import ConfigRefused, InstallFailed, NondumError, PayloadRefused
 from nondum.wheelhouse import build, contents, drive, index, lock, preflight

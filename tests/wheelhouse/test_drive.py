@@ -6,12 +6,10 @@ import hashlib
 import os
 import stat
 import subprocess
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from tests.wheelhouse.file_systems import file_system, needs_mount
 
 from nondum.sdk.errors import DriveGone, InstallFailed, PayloadRefused
 from nondum.wheelhouse import contents, drive
@@ -282,26 +280,6 @@ def test_linked_contents_are_refused(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(PayloadRefused) as found:
         drive.read_contents(folder)
     assert found.value.code == "PATH_UNSAFE"
-
-
-@contextmanager
-def file_system(folder: Path, size_mb: int, options: str = "loop") -> Iterator[Path]:
-    """A real ext4 on a file, mounted; the file is `<folder>.img`."""
-    image = folder.with_suffix(".img")
-    with image.open("wb") as file:
-        file.truncate(size_mb * 1024**2)
-    subprocess.run(["mkfs.ext4", "-q", "-O", "^has_journal", image], check=True)
-    folder.mkdir()
-    subprocess.run(["mount", "-o", options, image, folder], check=True)
-    try:
-        yield folder
-    finally:
-        subprocess.run(["umount", "-l", folder], check=True)
-
-
-needs_mount = pytest.mark.skipif(
-    os.geteuid() != 0 or sys.platform != "linux", reason="mounting needs root"
-)
 
 
 @needs_mount

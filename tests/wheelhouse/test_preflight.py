@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.wheelhouse.test_lock import HEAD, host, package, wheel
+from tests.wheelhouse.locks import HEAD, host, package, wheel
 
 from nondum.sdk.errors import PayloadRefused
 from nondum.wheelhouse import lock, manifest

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 from tests.kit.payloads import make_wheel, sha256
+from tests.wheelhouse.file_systems import file_system, needs_mount
 from tests.wheelhouse.hostile_wheels import INFO, METADATA, WHEEL, Lie, WheelBuilder, record_of
-from tests.wheelhouse.test_drive import file_system, needs_mount
 
 from nondum.sdk.errors import InstallFailed, PayloadRefused
 from nondum.wheelhouse.store import Store

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from tests.kit.payloads import installed_wheel, make_wheel, sha256
-from tests.wheelhouse.test_drive import file_system, needs_mount
+from tests.wheelhouse.file_systems import file_system, needs_mount
 
 from nondum.sdk.errors import InstallFailed
 from nondum.wheelhouse import bytecode, venvs

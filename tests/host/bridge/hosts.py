@@ -6,9 +6,11 @@ import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Callable
 
+import numpy as np
+
 from nondum.host.bridge.bridge import Bridge, Grant
 from nondum.sdk.errors import Problem, ProtocolViolation
-from nondum.sdk.messages import Message
+from nondum.sdk.messages import Header, Image, Message
 from nondum.sdk.packets import SocketPackets
 from nondum.sdk.streams import Consumer, Producer
 from nondum.sdk.wire import MAX_PACKET
@@ -16,6 +18,8 @@ from nondum.transport import link_sockets
 
 PATIENCE_S = 60.0
 HERE = ("tcp://127.0.0.1:0",)
+SHAPE = (240, 320, 3)
+NOISE = np.random.default_rng(7).integers(0, 256, SHAPE, np.uint8)
 
 
 class Reader:
@@ -125,8 +129,29 @@ async def pair(*, idle_s: float = 10.0) -> AsyncIterator[Pair]:
         await reader.close()
 
 
-async def sending(producer: Producer, make: Callable[[int], Message], rate_hz: float) -> None:
-    """Send messages at a rate until it is cancelled."""
+def header(seq: int) -> Header:
+    """Of a message of a camera on the rover."""
+    return Header(stamp_s=12.5 + seq / 3, frame_id="rover__cam__camera", seq=seq)
+
+
+def noise(seq: int) -> Image:
+    """An image that does not get smaller by coding it."""
+    return Image.from_array(header(seq), NOISE, "bgr8")
+
+
+@contextlib.asynccontextmanager
+async def sent(
+    producer: Producer, make: Callable[[int], Message] = noise, rate_hz: float = 100.0
+) -> AsyncIterator[None]:
+    """Messages, for as long as the block lasts."""
+    task = asyncio.create_task(_send(producer, make, rate_hz))
+    try:
+        yield
+    finally:
+        task.cancel()
+
+
+async def _send(producer: Producer, make: Callable[[int], Message], rate_hz: float) -> None:
     loop = asyncio.get_running_loop()
     begun_s, seq = loop.time(), 0
     while True:

@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import os
 import signal
 import socket
-from collections.abc import AsyncIterator, Callable
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from benchmarks.slow_link import slow_link
-from tests.host.bridge.hosts import HERE, Over, Pair, Reader, pair, sending
+from tests.host.bridge.hosts import (
+    HERE,
+    NOISE,
+    SHAPE,
+    Over,
+    Pair,
+    Reader,
+    header,
+    noise,
+    pair,
+    sent,
+)
 from tests.kit.workers import until_gone
 
 from nondum.host.bridge.bridge import Bridge
@@ -24,7 +34,6 @@ from nondum.sdk.messages import (
     Depth,
     Detection,
     Detections,
-    Header,
     Image,
     Message,
     Points,
@@ -39,20 +48,10 @@ pytestmark = pytest.mark.anyio
 Pixels = np.ndarray[Any, np.dtype[Any]]
 Raster = Callable[[int], Image | Depth]
 
-SHAPE = (240, 320, 3)
-NOISE = np.random.default_rng(7).integers(0, 256, SHAPE, np.uint8)
 ROWS, COLUMNS = np.mgrid[: SHAPE[0], : SHAPE[1]]
 SCENE = np.stack(
     [120 + 100 * np.sin(ROWS / 17), 120 + 100 * np.cos(COLUMNS / 23), (ROWS + COLUMNS) % 256], 2
 ).astype(np.uint8)
-
-
-def header(seq: int) -> Header:
-    return Header(stamp_s=12.5 + seq / 3, frame_id="rover__cam__camera", seq=seq)
-
-
-def noise(seq: int) -> Image:
-    return Image.from_array(header(seq), NOISE, "bgr8")
 
 
 def padded(seq: int) -> Image:
@@ -101,18 +100,6 @@ def after(seq: int) -> Callable[[Message], bool]:
 def pixels(message: Message) -> Pixels:
     assert isinstance(message, Image | Depth)
     return message.array()
-
-
-@contextlib.asynccontextmanager
-async def sent(
-    producer: Producer, make: Callable[[int], Message] = noise, rate_hz: float = 100.0
-) -> AsyncIterator[None]:
-    """Messages, for as long as the block lasts."""
-    task = asyncio.create_task(sending(producer, make, rate_hz))
-    try:
-        yield
-    finally:
-        task.cancel()
 
 
 async def read(hosts: Pair, kind: str = "image") -> tuple[Producer, Reader, Over, Over]:

@@ -7,8 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
-from tests.host.bridge.hosts import HERE, Over, pair
-from tests.host.bridge.test_bridge import sent
+from tests.host.bridge.hosts import HERE, Over, pair, sent
 
 from nondum.sdk.messages import Header, Text
 

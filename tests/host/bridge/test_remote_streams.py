@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from tests.host.bridge.hosts import HERE, PATIENCE_S
-from tests.host.workers.test_streams import CAMERA, STREAM, WATCH, WATCHER, sees
+from tests.host.workers.streaming import CAMERA, STREAM, WATCH, WATCHER, sees
 from tests.kit.workers import WorkersUnderTest, is_alive, until_gone
 
 from nondum.host.bridge.bridge import Bridge

@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 from tests.host.cli.daemon import Ran, command, nondum, quiet_environment
-from tests.host.peers.test_pairing_desk import Network
+from tests.host.peers.hints import Network
 
 from nondum.host.control.arguments import Arguments
 from nondum.host.control.server import ControlServer

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable, Iterable
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.host.peers.hints import Hinted, Network
 
 from nondum.host.peers.pairing_desk import PairingDesk
 from nondum.host.peers.trust_keeper import TRUST_NAME, TrustKeeper
@@ -19,33 +20,6 @@ pytestmark = pytest.mark.anyio
 
 PATIENCE_S = 60.0
 Row = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Hinted:
-    """What the network tells of a host."""
-
-    key: PeerKey
-    name: str
-    addresses: tuple[str, ...]
-    pairing_port: int | None
-
-
-@dataclass
-class Network:
-    """Who has told what."""
-
-    hints: dict[PeerKey, Hinted] = field(default_factory=dict)
-
-    def all(self) -> Iterable[Hinted]:
-        return list(self.hints.values())
-
-    def tells(self, keeper: TrustKeeper) -> Callable[[int | None], None]:
-        def announce(port: int | None) -> None:
-            at = ("tcp://127.0.0.1:7410", "tcp://[::1]:7410")
-            self.hints[keeper.key] = Hinted(keeper.key, keeper.host.name, at, port)
-
-        return announce
 
 
 @dataclass

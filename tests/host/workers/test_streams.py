@@ -8,54 +8,16 @@ import signal
 from collections.abc import Callable
 
 import pytest
+from tests.host.workers.streaming import CAMERA, STREAM, WATCH, WATCHER, sees
 from tests.kit.workers import HOST, WorkersUnderTest
 
-from nondum.host.events import BehaviourEstablished, FactKnown, StreamFlowing, WorkerReady
+from nondum.host.events import BehaviourEstablished, StreamFlowing, WorkerReady
 from nondum.host.workers import Call
 from nondum.planning.running import RunState
 from nondum.sdk.description import Behaviour, Input, Output, Unit
 
 pytestmark = pytest.mark.anyio
 
-CAMERA = """
-import asyncio
-from nondum.sdk import Header, Image, Output, Unit, behaviour, hookimpl
-
-@hookimpl
-def units():
-    return (Unit("camera", "camera", outputs=(Output("frames", "image"),)),)
-
-@behaviour("stream", action="(stream ?u - camera ?o - image)", lasting=True)
-async def stream(ctx, u, o):
-    output = ctx.output(o)
-    number = 0
-    await ctx.established()
-    while True:
-        number += 1
-        header = Header(frame_id=u, seq=number)
-        output.send(Image(header, 480, 640, "bgr8", 1920, bytes([number % 256]) * 921_600, None))
-        if number % 20 == 0:
-            ctx.know("sent", ctx.component, str(number))
-        await asyncio.sleep(0.01)
-"""
-WATCHER = """
-from nondum.sdk import Unit, behaviour, hookimpl
-
-@hookimpl
-def units():
-    return (Unit("eye", "detector"),)
-
-@behaviour("watch", action="(watch ?u - detector ?i - image)", lasting=True)
-async def watch(ctx, u, i):
-    count = 0
-    async for image in ctx.input(i):
-        assert len(image.data) == 921_600 and image.data[0] == image.header.seq % 256
-        count += 1
-        if count == 1:
-            await ctx.established()
-        if count % 10 == 0:
-            ctx.know("seen", ctx.component, str(count), image.header.frame_id)
-"""
 ODOMETER = """
 import asyncio
 from nondum.sdk import Header, Output, Pose, Unit, hookimpl
@@ -86,8 +48,6 @@ async def read(ctx, u):
     pose = await ctx.optional_input("odometry").next(10.0)
     ctx.know("at", str(pose.position[1]))
 """
-STREAM = Behaviour("stream", "(stream ?u - camera ?o - image)", lasting=True)
-WATCH = Behaviour("watch", "(watch ?u - detector ?i - image)", lasting=True)
 READ = Behaviour("read", "(read ?u - sensor)")
 
 
@@ -104,13 +64,6 @@ async def camera(tested: WorkersUnderTest, name: str = "cam") -> None:
 async def watcher(tested: WorkersUnderTest, name: str, source: str) -> Call:
     await tested.start(name, WATCHER, behaviours=(WATCH,), units=(Unit("eye", "detector"),))
     return tested.behave(name, "watch", u=f"{HOST}__{name}__eye", i=frames(source))
-
-
-async def sees(tested: WorkersUnderTest, name: str, count: int = 30) -> FactKnown:
-    """Wait until a watcher has seen so many frames more."""
-    seen = sum(1 for e in tested.told(FactKnown) if e.predicate == "seen" and e.component == name)
-    wanted = str((seen + 1) * 10 + count)
-    return await tested.until(FactKnown, lambda e: e.arguments[:2] == (name, wanted))
 
 
 async def test_frames_flow_to_two_consumers(tested: WorkersUnderTest) -> None:

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from tests.planning.differential.generated import texts
 from tests.planning.differential.sas import Sas, translated
 from tests.planning.differential.semantics import Problem
-from tests.planning.differential.test_meaning import all_that_can_be_done, small
+from tests.planning.differential.states import all_that_can_be_done, small
 from tests.planning.differential.texts import TEXTS, Text
 
 from nondum.planning.pddl_text import pddl_text

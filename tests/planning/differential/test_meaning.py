@@ -3,36 +3,29 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import replace
 
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from tests.planning.differential.generated import texts
 from tests.planning.differential.semantics import (
     Problem,
     State,
-    TooManyStates,
     distance,
     reachable,
 )
+from tests.planning.differential.states import Graph, all_that_can_be_done, small
 from tests.planning.differential.texts import TEXTS, Text, text
 
-from nondum.planning.draft import drafted
-from nondum.planning.exploration import explore
 from nondum.planning.facts import is_twin, twin
 from nondum.planning.ground import ground
 from nondum.planning.pddl_text import pddl_text
-from nondum.planning.polarity import positive_task
 from nondum.planning.progression import progress, start
 from nondum.planning.rehearsal import rehearsed
 from nondum.planning.search import solve
-from nondum.planning.standalone import Standalone, load
+from nondum.planning.standalone import load
 from nondum.planning.validate import validate
 from nondum.sdk.planner import AlreadyTrue, GroundTask, Plan, Unsolvable
-
-Graph = Mapping[State, frozenset[tuple[str, State]]]
-MOST_STATES = 150
 
 
 def graph_of(problem: Problem, task: GroundTask) -> Graph:
@@ -80,12 +73,6 @@ def check_derived(problem: Problem, task: GroundTask, state: frozenset[int], bas
             assert (index in state) == (atom in whole), fact
 
 
-def all_that_can_be_done(loaded: Standalone) -> GroundTask:
-    """The task with what does not help, too."""
-    found = explore(loaded.merged, loaded.facts)
-    return positive_task(drafted(loaded.merged, found, loaded.goal), found.table)
-
-
 def shortest(task: GroundTask) -> int | None:
     seen, frontier, length = {start(task)}, [start(task)], 0
     while frontier:
@@ -100,15 +87,6 @@ def shortest(task: GroundTask) -> int | None:
         frontier, length = list(after - seen), length + 1
         seen |= after
     return None
-
-
-def small(problem: Problem) -> Graph:
-    """The graph of a problem, unless it is too large to look at."""
-    try:
-        return reachable(problem, most=MOST_STATES)
-    except TooManyStates:
-        assume(False)
-        raise
 
 
 def check(text: Text, graph: Graph) -> None:

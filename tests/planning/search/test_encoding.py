@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from hypothesis import given, settings
-from tests.planning.search.walks import walks
+from tests.planning.search.walks import Walk, walks
 from tests.planning.tasks import Written, follow_task, ground
 
-from nondum.planning.progression import State
-from nondum.planning.search import encoding
-from nondum.planning.search.encoding import Encoded, encode
+from nondum.planning.search.encoding import encode
 from nondum.planning.search.successors import Successors
 from nondum.sdk.planner import GroundAction, GroundTask
-
-Walk = tuple[GroundTask, Encoded, list[tuple[State, encoding.State]]]
 
 
 @settings(max_examples=100, deadline=None)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.planning.search.test_encoding import Walk
-from tests.planning.search.walks import walks
+from tests.planning.search.walks import Walk, walks
 from tests.planning.tasks import gripper_task, plan_of
 
 from nondum.planning.search.changes import Changes

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 from hypothesis import given, settings
 from tests.planning.search.random_tasks import shortest
-from tests.planning.search.test_encoding import Walk
-from tests.planning.search.walks import walks
+from tests.planning.search.walks import Walk, walks
 from tests.planning.tasks import delivery_task
 
 from nondum.planning.progression import derived_facts

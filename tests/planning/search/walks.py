@@ -12,9 +12,12 @@ from nondum.planning.search import encoding
 from nondum.planning.search.encoding import Encoded, encode
 from nondum.sdk.planner import GroundTask
 
+Walk = tuple[GroundTask, Encoded, list[tuple[State, encoding.State]]]
+"""A task, the same encoded, and states of a way through both."""
+
 
 @st.composite
-def walks(draw: st.DrawFn) -> tuple[GroundTask, Encoded, list[tuple[State, encoding.State]]]:
+def walks(draw: st.DrawFn) -> Walk:
     """A task, the same encoded, and the states of a way through both, side by side."""
     task = draw(tasks())
     assume(task.goal <= reachable(task))

@@ -1,0 +1,39 @@
+"""The states of small problems, and all that can be done in them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from hypothesis import assume
+from tests.planning.differential.semantics import (
+    Problem,
+    State,
+    TooManyStates,
+    reachable,
+)
+
+from nondum.planning.draft import drafted
+from nondum.planning.exploration import explore
+from nondum.planning.polarity import positive_task
+from nondum.planning.standalone import Standalone
+from nondum.sdk.planner import GroundTask
+
+Graph = Mapping[State, frozenset[tuple[str, State]]]
+
+
+MOST_STATES = 150
+
+
+def all_that_can_be_done(loaded: Standalone) -> GroundTask:
+    """The task with what does not help, too."""
+    found = explore(loaded.merged, loaded.facts)
+    return positive_task(drafted(loaded.merged, found, loaded.goal), found.table)
+
+
+def small(problem: Problem) -> Graph:
+    """The graph of a problem, unless it is too large to look at."""
+    try:
+        return reachable(problem, most=MOST_STATES)
+    except TooManyStates:
+        assume(False)
+        raise
