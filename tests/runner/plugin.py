@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import pytest
+from tests.runner import budget
 from tests.runner.result import Result
 
 
@@ -49,6 +50,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             return campaign in long | short
         return not long and not (short and short <= current)
 
+    slow = budget.read().slow_files
+    items.sort(key=lambda item: -slow.get(item.nodeid.split("::", 1)[0], 0.0))
     left_out = [item for item in items if not runs(item)]
     if left_out:
         config.hook.pytest_deselected(items=left_out)

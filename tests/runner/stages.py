@@ -1,0 +1,90 @@
+"""What a full run consists of: which jobs, in which order, and which of them beside each other.
+
+Tests run beside each other, one more than there are processors, since most wait now and then. The
+demonstrations (marker `alone`) are judged in real time, as a person would: no other whole daemon
+runs beside them, and what only computes does so at the lowest priority.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from tests.runner.job import Job
+
+ROOT = Path(__file__).parents[2]
+PROCESSORS = os.cpu_count() or 1
+INSTALLED = ("-o", "pythonpath=.")
+"""`.` on the path gives tests/ and demo/ only: nondum itself is what is installed."""
+COMPUTE = (
+    "tests/benchmarks",
+    "tests/demo/shuffle",
+    "tests/docs",
+    "tests/mutation",
+    "tests/planning",
+    "tests/plugins",
+    "tests/wheelhouse",
+)
+"""Tests that only compute: they run with what the demonstrations leave of the processors."""
+LOWEST = 19
+
+
+def pytest_job(
+    name: str,
+    run: Path,
+    options: Iterable[str],
+    *,
+    folder: Path = ROOT,
+    prefix: str = "",
+    niceness: int = 0,
+) -> Job:
+    """A pytest session whose folders, log and results lie in the folder of the run."""
+    results = run / f"{name}.jsonl"
+    command = (
+        *(sys.executable, "-m", "pytest", "-q", "--basetemp", str(run / name)),
+        *("-p", "tests.runner.plugin", "--results", str(results), *options),
+    )
+    log = run / f"{name}.log"
+    more = {"PYTHONPATH": str(ROOT)} if folder != ROOT else {}
+    return Job(name, command, folder, log, results, prefix, niceness, more)
+
+
+def at_once(number: int) -> tuple[str, ...]:
+    """So many processes of pytest-xdist, each with whole files: what a file shares is made once."""
+    return ("-n", str(number), "--dist", "loadfile", "--no-loadscope-reorder")
+
+
+def of_checkout(run: Path, tox: Sequence[str]) -> tuple[list[Job], ...]:
+    """Lanes of what needs no tests environment: an emulated machine, lint, types, doctests."""
+
+    def env(name: str) -> Job:
+        command = (*tox, "run", "-q", "-e", name, "--skip-pkg-install")
+        return Job(name, command, ROOT, run / f"{name}.log")
+
+    lab = Job("lab", ("./run", "lab", "--short"), ROOT, run / "lab.log")
+    return [env("lint"), env("type"), env("docs")], [lab]
+
+
+def of_hosts(run: Path, options: Sequence[str]) -> Job:
+    """All that is neither alone nor of what only computes."""
+    ignored = (f"--ignore={place}" for place in COMPUTE)
+    chosen = (*INSTALLED, *at_once(PROCESSORS + 1), "-m", "not alone", *ignored, *options)
+    return pytest_job("hosts", run, chosen)
+
+
+def of_demonstrations(run: Path, options: Sequence[str]) -> tuple[list[Job], ...]:
+    """Lanes: what is judged in real time, and what computes meanwhile."""
+    alone = pytest_job("alone", run, (*INSTALLED, "-m", "alone", "tests/demo", *options))
+    chosen = (*INSTALLED, *at_once(PROCESSORS), *COMPUTE, *options)
+    compute = pytest_job("compute", run, chosen, niceness=LOWEST)
+    return [alone], [compute, *of_plugins(run)]
+
+
+def of_plugins(run: Path) -> Iterable[Job]:
+    """Each plugin's own tests, as its author runs them."""
+    for tests in sorted(ROOT.glob("plugins/*/tests")):
+        folder = tests.parent
+        prefix = f"{folder.relative_to(ROOT)}/"
+        yield pytest_job(folder.name, run, (), folder=folder, prefix=prefix, niceness=LOWEST)
