@@ -8,8 +8,7 @@ The orders are one JSON object: `root`, and optionally
   worker `lost`, … as soon as that step was committed, one after the other,
 - `kill_while` (a drive's state): SIGKILL itself once a drive was committed to be in it,
 - `script`: things to do one after the other, each when all that came before has settled: `plug`
-  and `pull` slots, `tried` (something is on trial), `steady` (wait until nothing is), `end`; or
-  `end now`.
+  and `pull` slots, `retry`, `send` or `distrust` the payload, `end`; or `end now`.
 
 Each commit is told in the file `told` under the root once it is acknowledged. The catalogue handed
 in at the composition root does all this; nothing that is shipped knows of it.
@@ -23,7 +22,7 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +66,10 @@ class DeadlyCatalogue(Catalogue):
     told: int
     """Descriptor of the file `told`: it was opened before anything could fail."""
     entries = 0
+    committed: asyncio.Event
+    """Set at each commit."""
+    is_scanned = False
+    """Whether this daemon knows which drives are plugged in."""
 
     async def commit(self, after: HostState, entries: Sequence[JournalEntry]) -> None:
         passed, parts = list(self._passed(entries)), list(self._components_passed(entries))
@@ -77,6 +80,8 @@ class DeadlyCatalogue(Catalogue):
             os.kill(os.getpid(), signal.SIGKILL)
         await super().commit(after, entries)
         self.entries += len(entries)
+        self.is_scanned |= any(entry.event == "DrivesScanned" for entry in entries)
+        self.committed.set()
         self.tell(f"committed {self.boot} {self.entries} {after.revision}")
         states = {drive.state.name for drive in after.drives.values()}
         if is_deadly or self.orders.get("kill_while") in states:
@@ -115,19 +120,20 @@ class DeadlyCatalogue(Catalogue):
 
     def _nudge(self, at: str, payload: str) -> None:
         nudges = self.orders.get("nudge", [])
-        what = nudges[0][1] if nudges and nudges[0][0] == at else None
-        if what is None:
-            return
-        nudges.pop(0)
+        if nudges and nudges[0][0] == at:
+            self.make_happen(nudges.pop(0)[1], payload)
+
+    def make_happen(self, what: str, payload: str = "") -> None:
+        """Do one of the things that orders name; to the first payload unless another is given."""
+        root = Path(self.orders["root"])
         problem = Problem("TEST", "made up by a test")
         lost = (Problem("WORKER_CRASH_LOOP", "made up by a test"),)
         key = payload or next(iter(self.state.payloads), "")
         match what:
             case "plug":
-                root = Path(self.orders["root"])
                 (root / "slots" / OTHER).symlink_to(root / "drives" / OTHER)
             case "pull":
-                (Path(self.orders["root"]) / "slots" / SLOT).unlink()
+                (root / "slots" / SLOT).unlink()
                 self.bus.emit(events.DriveRemoved(SLOT))
             case "send":
                 self.bus.emit(events.PayloadSentAway(key, "mule", (problem,)))
@@ -144,21 +150,21 @@ class DeadlyCatalogue(Catalogue):
             case "ready":
                 described = self.state.components[COMPONENT].description
                 self.bus.emit(events.WorkerReady(COMPONENT, described))
+            case _:
+                raise ValueError(what)
 
 
 class Script:
     """Does one thing after the other."""
 
-    def __init__(self, catalogue: DeadlyCatalogue, slots: Path, bus: Bus) -> None:
+    def __init__(self, catalogue: DeadlyCatalogue, slots: Path) -> None:
         self._catalogue, self._slots = catalogue, slots
-        self._changed = asyncio.Event()
-        bus.subscribe(lambda event: self._changed.set())
 
     async def run(self, script: Sequence[str]) -> None:
         for line in script:
             if line == "end now":
                 return
-            await self._until(self._is_settled)
+            await self._until_settled()
             self._catalogue.tell(f"at {line}")
             what, *slots = line.split()
             match what:
@@ -168,24 +174,28 @@ class Script:
                 case "pull":
                     for slot in slots:
                         (self._slots / slot).unlink(missing_ok=True)
-                case "tried":
-                    assert self._catalogue.state.tries
-                case "steady":
-                    await self._until(lambda: not self._catalogue.state.tries)
                 case "end":
                     return
-        await asyncio.Event().wait()  # for whoever kills it
+                case _:
+                    before = self._catalogue.state.payloads
+                    self._catalogue.make_happen(what)
+                    while self._catalogue.state.payloads == before:
+                        await self._until_committed()
+        await asyncio.Event().wait()  # it is killed, from inside or outside
 
-    async def _until(self, holds: Callable[[], bool]) -> None:
-        while not holds():
-            self._changed.clear()
-            with contextlib.suppress(TimeoutError):  # not all that changes is told
-                await asyncio.wait_for(self._changed.wait(), 0.1)
+    async def _until_settled(self) -> None:
+        while not self._is_settled():
+            await self._until_committed()
+
+    async def _until_committed(self) -> None:
+        """Wait for the next commit: nothing else changes the state."""
+        self._catalogue.committed.clear()
+        await self._catalogue.committed.wait()
 
     def _is_settled(self) -> bool:
         state = self._catalogue.state
         return (
-            bool(self._catalogue.entries)
+            self._catalogue.is_scanned
             and {path.name for path in self._slots.iterdir()} == set(state.drives)
             and all(drive.state is DriveState.IDLE for drive in state.drives.values())
             and all(payload.step in _AT_REST for payload in state.payloads.values())
@@ -203,6 +213,7 @@ async def main(orders: dict[str, Any]) -> None:
     catalogue = await DeadlyCatalogue.open(folders.catalogue, HOST)
     assert isinstance(catalogue, DeadlyCatalogue)
     catalogue.orders, catalogue.bus, catalogue.told = orders, bus, told
+    catalogue.committed = asyncio.Event()
     workers = Workers(HOST, bus.emit, timing=QUICK)
     executor = Executor(HOST, folders, workers, bus.emit, OPTIONS)
     manager = ComponentManager(catalogue, executor, bus)
@@ -212,7 +223,7 @@ async def main(orders: dict[str, Any]) -> None:
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
     waited: list[asyncio.Task[Any]] = [running, asyncio.create_task(ended.wait())]
     if "script" in orders:
-        script = Script(catalogue, root / "slots", bus)
+        script = Script(catalogue, root / "slots")
         waited.append(asyncio.create_task(script.run(orders["script"])))
     done, _ = await asyncio.wait(waited, return_when=asyncio.FIRST_COMPLETED)
     for task in done:

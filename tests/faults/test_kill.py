@@ -1,84 +1,29 @@
-"""The daemon is killed at every commit of every transition, and comes back consistent by itself."""
+"""The daemon is killed at any moment, or by what is plugged in: it comes back consistent."""
 
 from __future__ import annotations
 
-import itertools
 import random
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from tests.faults.model import Ended, check
-from tests.faults.ways import COMPONENT_WAYS, LAMP_ID, Way, sound, way
+from tests.faults.ways import LAMP_ID, Way, sound
 from tests.kit.fork_server import Nursery
 from tests.kit.host import host_in_process
 
 from nondum.host import events
-from nondum.host.catalogue.records import ComponentState, Step
-from nondum.host.events import Event
+from nondum.host.catalogue.records import Step
 from nondum.host.lifecycle.tries import ATTEMPTS
-from nondum.host.transitions import COMPONENT_TRANSITIONS, TRANSITIONS
 
 pytestmark = pytest.mark.slow
 
 KILLED = -9
 
 
-def named(value: object) -> str:
-    return getattr(value, "__name__", str(value))
-
-
 def judge(ended: Ended, came: Way) -> None:
     """Nothing is wrong, and each payload that is plugged in is where it belongs."""
     assert not ended.wrong
     assert not came.out_of_place(ended.steps)
-
-
-ENDINGS = (events.PayloadSentAway, events.PayloadDistrusted, events.PayloadWithdrawn)
-"""What may come at any step."""
-
-
-def boundaries() -> Iterator[tuple[Step, type[Event], str]]:
-    """After the commit of each row, but of one ending only for each step: they are one mechanism.
-    Before it where a payload goes forward; otherwise there is what led there. The long form goes
-    through all of them."""
-    endings = itertools.cycle(ENDINGS)
-    ending = {step: next(endings) for step in Step}
-    ending[Step.REFUSED] = events.PayloadWithdrawn
-    for (step, event), row in TRANSITIONS.items():
-        if event not in ENDINGS or ending[step] is event:
-            yield step, event, "AFTER"
-        if row.effect is not None and event not in ENDINGS and row.to in FORWARD:
-            yield step, event, "BEFORE"
-
-
-FORWARD = (Step.COPIED, Step.VERIFIED, Step.STAGED, Step.STORED, Step.PROBED, Step.ACTIVE)
-BOUNDARIES = list(boundaries())
-
-
-def test_every_ending_is_tried() -> None:
-    assert {event for _, event, _ in BOUNDARIES} == {event for _, event in TRANSITIONS}
-    assert {step for step, _, _ in BOUNDARIES} == {step for step, _ in TRANSITIONS}
-
-
-@pytest.mark.parametrize(("step", "event", "when"), BOUNDARIES, ids=named)
-def test_kill_at_a_transition(
-    nursery: Nursery, tmp_path: Path, step: Step, event: type[Event], when: str
-) -> None:
-    came = way(step, event)
-    orders = came.orders(tmp_path, kill=(when, step.name, event.__name__))
-    nursery.run(orders, expect=KILLED)
-    judge(check(tmp_path), came)
-
-
-@pytest.mark.parametrize(("state", "event"), COMPONENT_TRANSITIONS, ids=named)
-def test_kill_at_a_transition_of_a_component(
-    nursery: Nursery, tmp_path: Path, state: ComponentState, event: type[Event]
-) -> None:
-    came = COMPONENT_WAYS[state, event]
-    orders = came.orders(tmp_path, kill=("AFTER", state.name, event.__name__))
-    nursery.run(orders, expect=KILLED)
-    judge(check(tmp_path), came)
 
 
 def test_kill_at_any_moment(nursery: Nursery, tmp_path: Path) -> None:

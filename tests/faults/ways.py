@@ -21,9 +21,10 @@ NOTHING = PluginDescription(name="test-lamp", version="1.0")
 SLOW = """
 @hookimpl
 def start(ctx):
-    import time
-    time.sleep(3.0)
+    import threading
+    threading.Event().wait()
 """
+"""It never becomes ready."""
 
 Write = Callable[[Path], None]
 
@@ -39,7 +40,7 @@ def newer(drive: Path) -> None:
 
 
 def slow(drive: Path) -> None:
-    """One that takes its time to start: others come to STORED meanwhile."""
+    """One that never ends to start: others come to STORED meanwhile."""
     lamp = Part("lamp", LAMP + SLOW)
     make_payload(drive, lamp, payload_id=LAMP_ID)
 
