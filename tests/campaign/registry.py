@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
 
 HOST = "host/nondum/host"
@@ -15,7 +16,7 @@ PORTIONS = (
     "plugins/sdk/nondum",
 )
 """The source of nondum itself."""
-SUITES = ("python", "-m", "tests.campaign.suites")
+SUITES = "tests.campaign.suites"
 """Runs the tests of pytest that are marked `long(NAME)`, file by file."""
 
 
@@ -28,26 +29,26 @@ class Campaign:
     """What it does."""
     covers: tuple[str, ...]
     """Pathspecs of git: a change there makes its last result old."""
-    command: tuple[str, ...]
-    """Its long form. `{minutes}`, `{folder}` (keeps what was done) and `{seed}` are filled in."""
-    extras: tuple[str, ...] = ()
-    """Dependency groups of pyproject.toml that it needs beside those of the tests."""
-    needs_lab: bool = False
-    """Whether it needs the system packages of `./run lab`."""
+    module: str
+    """Its long form: `python -m MODULE --minutes N --folder F`. F keeps what was done."""
+    options: tuple[str, ...] = ()
+    """Further ones, in which `{seed}` and `{keep}` (a folder that stays) are filled in."""
+    needs: tuple[str, ...] = ()
+    """Groups of `set_up` in `./run` that it needs beside those of the tests."""
 
     @property
     def is_pytest(self) -> bool:
         """Whether it consists of tests that are marked `long(NAME)`."""
-        return self.command[: len(SUITES)] == SUITES
+        return self.module == SUITES
+
+    def arguments(self, minutes: float | None, *, seed: int, folder: Path, keep: Path) -> list[str]:
+        """Of Python, to go on for so many minutes; None: until it is done."""
+        time = [] if minutes is None else ["--minutes", f"{minutes:g}"]
+        more = [word.format(seed=seed, keep=keep) for word in self.options]
+        return ["-m", self.module, *more, *time, "--folder", str(folder)]
 
 
-def _module(name: str, *options: str) -> tuple[str, ...]:
-    return ("python", "-m", name, "--minutes", "{minutes}", "--folder", "{folder}", *options)
-
-
-def _suites(name: str) -> tuple[str, ...]:
-    return (*SUITES, name, "--minutes", "{minutes}", "--folder", "{folder}", "--seed", "{seed}")
-
+_SEED = ("--seed", "{seed}")
 
 _ALL = (
     Campaign(
@@ -58,20 +59,23 @@ _ALL = (
             "wheelhouse/nondum",
             "tests/faults",
         ),
-        _module("tests.faults"),
+        "tests.faults",
+        ("--points", "100", *_SEED),
     ),
     Campaign(
         "fuzz",
         "Every reader of foreign bytes, by a coverage-guided fuzzer",
         (*PORTIONS, "tests/fuzz"),
-        _module("tests.fuzz"),
-        extras=("fuzz",),
+        "tests.fuzz",
+        ("--work", "{keep}"),
+        needs=("fuzz",),
     ),
     Campaign(
         "mutation",
         "Each step of verification removed in turn: a test must fail",
         (*PORTIONS, "tests/mutation"),
-        _module("tests.mutation"),
+        "tests.mutation",
+        ("--keep", "{keep}"),
     ),
     Campaign(
         "drives",
@@ -81,7 +85,8 @@ _ALL = (
             "wheelhouse/nondum",
             "tests/faults",
         ),
-        _module("tests.faults.drive_figures"),
+        "tests.faults.drive_figures",
+        ("--due",),
     ),
     Campaign(
         "machines",
@@ -92,32 +97,36 @@ _ALL = (
             *(f"{HOST}/{room}" for room in ("devices", "cgroups", "feedback", "peers")),
             "tests/lab",
         ),
-        _module("tests.lab"),
-        needs_lab=True,
+        "tests.lab",
+        needs=("lab",),
     ),
     Campaign(
         "packages",
         "Debian packages of both architectures, lintian, installation by pipx and uv",
         ("packaging", "pyproject.toml", "plugins/*/pyproject.toml", "tests/packages"),
-        _suites("packages"),
+        SUITES,
+        ("packages", *_SEED),
     ),
     Campaign(
         "conformance",
         "Real wheels from PyPI, installed as pip installs them",
         ("wheelhouse/nondum", "tests/wheelhouse"),
-        _suites("conformance"),
+        SUITES,
+        ("conformance", *_SEED),
     ),
     Campaign(
         "demonstrations",
         "Both demonstrations in all their forms: shuffled drives, loopback, several seeds",
         (*PORTIONS, "plugins", "demo", "tests/demo"),
-        _suites("demonstrations"),
+        SUITES,
+        ("demonstrations", *_SEED),
     ),
     Campaign(
         "properties",
         "Tests of properties with many random examples",
         (*PORTIONS, "demo"),
-        ("python", "-m", "tests.campaign.properties", *_module("")[3:], "--seed", "{seed}"),
+        "tests.campaign.properties",
+        _SEED,
     ),
     Campaign(
         "peers",
@@ -128,7 +137,8 @@ _ALL = (
             f"{HOST}/bridge",
             "tests/daemon/peer_faults",
         ),
-        _suites("peers"),
+        SUITES,
+        ("peers", *_SEED),
     ),
 )
 

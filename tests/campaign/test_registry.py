@@ -21,4 +21,3 @@ def test_every_covered_path_exists(campaign: Campaign) -> None:
 @each
 def test_it_says_what_it_does(campaign: Campaign) -> None:
     assert campaign.sentence and "|" not in campaign.sentence
-    assert "{minutes}" in campaign.command

@@ -1,27 +1,31 @@
 """The long form of the tests of faults: `python -m tests.faults --minutes N`.
 
 Works off what was not done yet of each kind in turn, and adds to the results in a folder, so that
-it can be stopped and goes on where it was. `--table` writes docs/reliability/faults.md from them.
+it can be stopped and goes on where it was. `--points` takes so many of each kind, other ones for
+each `--seed`. `--table` writes docs/reliability/faults.md from the results; without `--minutes` it
+does nothing else.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import functools
 import itertools
 import json
 import platform
+import random
 import shutil
 import sys
 import tempfile
-import time
 import traceback
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
+from tests.campaign.rounds import Limit, Tally
 from tests.faults import points, power, table
 from tests.faults.points import Point, Result, clean
 from tests.kit.fork_server import Nursery
@@ -42,8 +46,9 @@ def main() -> int:
     """Run what there is time for; 1 if anything was wrong."""
     options = _options()
     options.folder.mkdir(parents=True, exist_ok=True)
-    if options.minutes:
-        _run(options)
+    if options.minutes is not None or options.table is None:
+        with contextlib.suppress(KeyboardInterrupt):
+            _run(options)
     found = read(options.folder / "results.jsonl")
     if options.table:
         options.table.parent.mkdir(parents=True, exist_ok=True)
@@ -68,28 +73,63 @@ def read(file: Path) -> list[Result]:
 
 
 def _run(options: argparse.Namespace) -> None:
-    end = time.monotonic() + options.minutes * 60
+    limit = Limit(options.minutes)
     results = options.folder / "results.jsonl"
-    done = {(r.kind, r.name) for r in read(results) if not (r.wrong and options.again)}
-    counts = _prepared(options.folder)
-    todo = {kind: _todo(kind, counts, done) for kind in options.kinds}
-    number = len(done)
+    found = {(r.kind, r.name): r for r in read(results) if not (r.wrong and options.again)}
+    planned = _planned(options, _prepared(options.folder))
+    total = sum(map(len, planned.values()))
+    left = {
+        kind: iter([point for point in points if (kind, point.name) not in found])
+        for kind, points in planned.items()
+    }
+
+    def kept() -> Tally:
+        names = [f"{kind} {name}" for kind, name in found]
+        wrong = [f"{r.kind} {r.name}" for r in found.values() if r.wrong]
+        tally = Tally(total, tuple(names), tuple(wrong))
+        tally.write(options.folder)
+        return tally
+
+    kept()
     with ProcessPoolExecutor(options.jobs) as pool, results.open("a") as out:
-        while todo and time.monotonic() < end:
-            for kind, left in list(todo.items()):
-                batch = list(itertools.islice(left, BATCH))
+        while left and not limit.is_over:
+            for kind, points_left in list(left.items()):
+                if limit.is_over:
+                    break
+                batch = list(itertools.islice(points_left, BATCH))
                 if not batch:
-                    del todo[kind]
+                    del left[kind]
                 tried = [pool.submit(_try, point, options.folder) for point in batch]
-                for ended in as_completed(tried):
-                    result = ended.result()
-                    number += 1
+                for result in _results(pool, tried, limit):
+                    found[result.kind, result.name] = result
                     out.write(json.dumps(asdict(result)) + "\n")
                     out.flush()
                     mark = "WRONG" if result.wrong else "ok"
-                    _say(f"{number} {kind} {result.name}: {result.outcome} {mark}")
-                if time.monotonic() >= end:
-                    return
+                    _say(f"{limit} {kept()}  {kind} {result.name}: {result.outcome} {mark}")
+
+
+def _results(
+    pool: ProcessPoolExecutor, tried: Sequence[Future[Result]], limit: Limit
+) -> Iterator[Result]:
+    """As they come. When the time is over, only of what has begun."""
+    try:
+        for ended in as_completed(tried):
+            if not ended.cancelled():
+                yield ended.result()
+            if limit.is_over:
+                for one in tried:
+                    one.cancel()
+    except KeyboardInterrupt:
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise
+
+
+def _planned(options: argparse.Namespace, counts: dict[str, int]) -> dict[str, list[Point]]:
+    """The points of each kind: all of them in their order, or so many that the seed has drawn."""
+    return {
+        kind: list(itertools.islice(_drawn(kind, counts, options.seed), options.points))
+        for kind in options.kinds
+    }
 
 
 def _prepared(folder: Path) -> dict[str, int]:
@@ -108,20 +148,30 @@ def _prepared(folder: Path) -> dict[str, int]:
     return found
 
 
-def _todo(kind: str, counts: dict[str, int], done: set[tuple[str, str]]) -> Iterator[Point]:
+def _drawn(kind: str, counts: dict[str, int], seed: int | None) -> Iterator[Point]:
+    more = {} if seed is None else {"seed": seed}
     every: dict[str, Callable[[], Iterator[Point]]] = {
-        "boundary": partial(points.boundaries, FULL["boundary"]),
-        "moment": partial(points.moments, FULL["moment"]),
-        "kill": partial(points.calls, "kill", counts, FULL["kill"]),
-        "error": partial(points.calls, "error", counts, FULL["error"]),
-        "power": _failures,
+        "boundary": partial(_boundaries, seed),
+        "moment": partial(points.moments, FULL["moment"], **more),
+        "kill": partial(points.calls, "kill", counts, FULL["kill"], **more),
+        "error": partial(points.calls, "error", counts, FULL["error"], **more),
+        "power": partial(_failures, more),
     }
-    return (point for point in every[kind]() if (point.kind, point.name) not in done)
+    return every[kind]()
 
 
-def _failures() -> Iterator[Point]:
+def _boundaries(seed: int | None) -> Iterator[Point]:
+    """Each row once before any row comes again."""
+    every = points.boundaries(FULL["boundary"])
+    rows = list(itertools.islice(every, len(list(points.boundaries(1)))))
+    if seed is not None:
+        random.Random(seed).shuffle(rows)
+    return itertools.chain(rows, every)
+
+
+def _failures(more: dict[str, int]) -> Iterator[Point]:
     for nth in range(FULL["power"]):
-        yield Point("power", str(nth), {"nth": nth})
+        yield Point("power", str(nth), {"nth": nth, **more})
 
 
 def _try(point: Point, home: Path) -> Result:
@@ -147,7 +197,8 @@ def _try(point: Point, home: Path) -> Result:
 def _power(point: Point, home: Path, folder: Path) -> Result:
     life = _life(home / "life")
     nth = point.arguments["nth"]
-    after, seed = next(itertools.islice(power.cuts(life, nth + 1), nth, None))
+    drawn = power.cuts(life, nth + 1, point.arguments.get("seed", 5))
+    after, seed = next(itertools.islice(drawn, nth, None))
     ended = power.fail(life, after, seed, folder)
     outcome = f"{'all' if seed is None else 'part'} of what was not flushed"
     wrong = (*ended.wrong, *points.out_of_place(ended))
@@ -175,7 +226,9 @@ def _machine() -> str:
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tests.faults", description=__doc__)
-    parser.add_argument("--minutes", type=float, default=0.0, help="how long to go on")
+    parser.add_argument("--minutes", type=float, help="how long to go on [until all is done]")
+    parser.add_argument("--points", type=int, help="of each kind [all]")
+    parser.add_argument("--seed", type=int, help="by which points are drawn [a fixed order]")
     parser.add_argument("--jobs", type=int, default=2, help="points at the same time")
     parser.add_argument("--kinds", nargs="+", choices=list(FULL), default=list(FULL))
     parser.add_argument("--folder", type=Path, default=FOLDER, help="what was done so far")

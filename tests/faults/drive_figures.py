@@ -3,7 +3,9 @@
 `hostile`: the whole corpus ten times through one daemon. `yanks`: 500 drives yanked at any moment.
 `crowd`: a hundred drives in ten seconds. `soak`: good and hostile drives by turns, for long.
 Each is written to a folder when it is done, and docs/reliability/drives.md from all that are there.
-Exits with 1 if anything was wrong.
+With `--due`, those that are not in the folder yet are done until the `--minutes` are over (one that
+has begun goes on to its end), and the page is written once all four are there. Exits with 1 if
+anything was wrong.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from tests.campaign.rounds import Limit, Round
 from tests.faults import crowds
 from tests.faults.footprint import slope
 from tests.faults.hostile import FAMILIES, Bench, HostileDrive
@@ -119,15 +122,16 @@ WHAT: Mapping[str, Callable[[Path, argparse.Namespace], Figures]] = {
 def main() -> int:
     """Measure what is asked for, and write the page."""
     options = _options()
-    options.folder.mkdir(parents=True, exist_ok=True)
-    for name in options.what:
+    work = Round(options.folder, list(WHAT), Limit(options.minutes))
+    for name in work.due() if options.due else options.what:
         with tempfile.TemporaryDirectory(prefix=f"nondum-{name}-") as root:
             figures = WHAT[name](Path(root), options)
         figures["machine"] = _machine()
         (options.folder / f"{name}.json").write_text(json.dumps(figures))
-        say(f"{name}: {'WRONG' if figures['is_wrong'] else 'as it should be'}")
+        work.add(name, passed=not figures["is_wrong"])
     found = {name: _read(options.folder / f"{name}.json") for name in WHAT}
-    PAGE.write_text("\n".join(_page(found)) + "\n", encoding="utf-8")
+    if not options.due or work.tally.is_whole:
+        PAGE.write_text("\n".join(_page(found)) + "\n", encoding="utf-8")
     return any(figures and figures["is_wrong"] for figures in found.values())
 
 
@@ -324,6 +328,8 @@ def _options() -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("what", nargs="*", choices=[*WHAT, []], help="nothing: only the page")
+    parser.add_argument("--due", action="store_true", help="what is not in the folder yet")
+    parser.add_argument("--minutes", type=float, help="begin nothing more after so long")
     parser.add_argument("--rounds", type=int, default=10, help="of hostile drives")
     parser.add_argument("--points", type=int, default=500, help="yanks")
     parser.add_argument("--cycles", type=int, default=500, help="of the soak")

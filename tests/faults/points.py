@@ -113,17 +113,17 @@ def boundaries(times: int) -> Iterator[Point]:
                 yield Point("boundary", f"{' '.join(at)} {nth}", {"at": at, "of": "component"})
 
 
-def moments(count: int) -> Iterator[Point]:
+def moments(count: int, seed: int = 20) -> Iterator[Point]:
     """Random moments of an installation, an upgrade and two removals."""
-    chance = random.Random(20)
+    chance = random.Random(seed)
     for nth in range(count):
         late = round(chance.uniform(0.0, 6.0), 3)
         yield Point("moment", f"{nth} at {late} s", {"late_s": late})
 
 
-def calls(kind: str, counts: dict[str, int], count: int) -> Iterator[Point]:
+def calls(kind: str, counts: dict[str, int], count: int, seed: int = 3) -> Iterator[Point]:
     """So many of the points that system calls make: the nth of each kind in whatever thread."""
-    chance = random.Random(f"{kind} 3")
+    chance = random.Random(f"{kind} {seed}")
     every: list[Point] = []
     for call, most in counts.items():
         for nth in range(1, most + 1):

@@ -1,22 +1,28 @@
-"""Fuzz every reader, guided by coverage: `python -m tests.fuzz [TARGET…] [--cases N]`.
+"""Fuzz every reader, guided by coverage: `python -m tests.fuzz [TARGET…] [--minutes N]`.
 
 Needs atheris (`pip install --group fuzz`). Each target runs in a process of its own, as many at a
-time as there are cores; what it finds is written to a file beside the report.
+time as there are cores; what it finds is written to a file beside the report. With a folder for
+what was done (`--folder`) it can be stopped and goes on where it was.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
+import tempfile
+import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
+from tests.campaign.rounds import Limit, Round
 from tests.fuzz.target import Target
 from tests.fuzz.targets import TARGETS
 
@@ -43,21 +49,83 @@ def main() -> int:
     """Fuzz, report, and exit with 1 when something was found."""
     options = _options()
     chosen = [t for t in TARGETS if not options.targets or t.name in options.targets]
+    with contextlib.ExitStack() as stack:
+        if options.folder is None:
+            fresh = tempfile.TemporaryDirectory(prefix="nondum-fuzz-")
+            options.folder = Path(stack.enter_context(fresh))
+        return _fuzz(chosen, options)
+
+
+def _fuzz(chosen: Sequence[Target], options: argparse.Namespace) -> int:
+    work = Round(options.folder, [target.name for target in chosen], Limit(options.minutes))
+    due = [target for target in chosen if target.name in set(work.due())]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        running = {
-            pool.submit(_fuzzed, t, options.cases or t.cases, options.work): t for t in chosen
-        }
-        done: dict[str, dict[str, Any]] = {}
-        for future in as_completed(running):
-            target = running[future]
-            done[target.name] = future.result()
-            told = ", ".join(f"{key} {value}" for key, value in done[target.name].items())
-            sys.stdout.write(f"{target.name}: {told}\n")
-    rows = [done[target.name] for target in chosen]
-    if not options.targets:
+        turns = [pool.submit(_turn, target, options, work) for target in due]
+        try:
+            for turn in as_completed(turns):
+                turn.result()
+        except KeyboardInterrupt:
+            pool.shutdown(wait=False, cancel_futures=True)
+            _end()
+    if work.tally.is_whole and not options.targets:
+        rows = [_read(options.folder, target) for target in chosen]
         PAGE.parent.mkdir(exist_ok=True)
         PAGE.write_text(HEAD + "\n".join(_rows(chosen, rows)) + "\n", encoding="utf-8")
-    return 1 if any(row["findings"] for row in rows) else 0
+    return work.end()
+
+
+def _turn(target: Target, options: argparse.Namespace, work: Round) -> None:
+    """Fuzz one target for what is left of the time, and add that to what was done before."""
+    before, cases = _read(options.folder, target), options.cases or target.cases
+    if work.limit.is_over:
+        return
+    seconds = 0 if work.limit.left_s is None else max(1, round(work.limit.left_s))
+    row = _together(before, _fuzzed(target, cases - before["inputs"], options.work, seconds))
+    _file(options.folder, target).write_text(json.dumps(row))
+    if row["findings"] or row["inputs"] >= cases:
+        told = ", ".join(f"{key} {value}" for key, value in row.items())
+        work.add(target.name, passed=not row["findings"], note=told)
+    else:
+        sys.stdout.write(f"{work.limit} {target.name}: {row['inputs']:,} of {cases:,} inputs\n")
+        sys.stdout.flush()
+
+
+_running: set[subprocess.Popen[bytes]] = set()
+_is_ending = threading.Event()
+
+
+def _end() -> None:
+    """Have the targets that run end: that is not their fault."""
+    _is_ending.set()
+    for process in tuple(_running):
+        process.send_signal(signal.SIGINT)
+
+
+NOTHING: dict[str, Any] = dict.fromkeys(
+    ("inputs", "findings", "codes", "edges", "longest_ms", "grown_mb", "seconds"), 0
+)
+ADDED = ("inputs", "seconds")
+"""What further turns add to; of the rest the most counts."""
+
+
+def _together(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
+    return {
+        key: one[key] + other[key] if key in ADDED else max(one[key], other[key]) for key in NOTHING
+    }
+
+
+def _file(folder: Path, target: Target) -> Path:
+    return folder / f"{_folded(target.name)}.json"
+
+
+def _read(folder: Path, target: Target) -> dict[str, Any]:
+    """What was done of a target so far."""
+    file = _file(folder, target)
+    return json.loads(file.read_text()) if file.exists() else dict(NOTHING)
+
+
+def _folded(name: str) -> str:
+    return name.replace(" ", "-").replace(",", "")
 
 
 def _rows(targets: Sequence[Target], rows: Sequence[dict[str, Any]]) -> Iterator[str]:
@@ -69,19 +137,26 @@ def _rows(targets: Sequence[Target], rows: Sequence[dict[str, Any]]) -> Iterator
         )
 
 
-def _fuzzed(target: Target, cases: int, work: Path) -> dict[str, Any]:
-    """Run a target until it has had its cases or breaks; what its process tells."""
-    folder = work / target.name.replace(" ", "-").replace(",", "")
+def _fuzzed(target: Target, cases: int, work: Path, seconds: int) -> dict[str, Any]:
+    """Run a target until it has had its cases or its time, or breaks; what its process tells."""
+    folder = work / _folded(target.name)
     folder.mkdir(parents=True, exist_ok=True)
     report = folder / "report.json"
     report.unlink(missing_ok=True)
-    command = [sys.executable, "-m", "tests.fuzz.guided", target.name, str(cases), str(folder)]
-    with (folder / "log").open("wb") as log:
-        status = subprocess.run(command, stdout=log, stderr=log, check=False).returncode
+    words = [target.name, str(cases), str(folder), str(seconds)]
+    command = [sys.executable, "-m", "tests.fuzz.guided", *words]
+    with (
+        (folder / "log").open("wb") as log,
+        subprocess.Popen(command, stdout=log, stderr=log) as process,
+    ):
+        _running.add(process)
+        status = process.wait()
+        _running.discard(process)
     row: dict[str, Any] = json.loads(report.read_text()) if report.exists() else {}
+    is_short = row.get("inputs", 0) < (1 if seconds else cases)
     return {
         "inputs": row.get("inputs", 0),
-        "findings": int(status != 0 or row.get("inputs", 0) < cases),
+        "findings": int((status != 0 or is_short) and not _is_ending.is_set()),
         "codes": row.get("codes", 0),
         "edges": int((_COVERED.findall((folder / "log").read_text("utf-8", "replace")) or [0])[-1]),
         "longest_ms": row.get("longest_ms", 0.0),
@@ -95,6 +170,8 @@ def _options() -> argparse.Namespace:
     names = [target.name for target in TARGETS]
     parser.add_argument("targets", nargs="*", metavar="TARGET", help=f"of {', '.join(names)}")
     parser.add_argument("--cases", type=int, help="inputs for each [default: as its target says]")
+    parser.add_argument("--minutes", type=float, help="how long to go on [until all is done]")
+    parser.add_argument("--folder", type=Path, help="what was done so far [begin again]")
     parser.add_argument(
         "--work", type=Path, default=Path("/tmp/nondum-fuzz"), help="corpora, logs and findings"
     )

@@ -1,4 +1,7 @@
-"""One target in a process of its own under atheris: `python -m tests.fuzz.guided TARGET CASES DIR`.
+"""One target in a process of its own under atheris.
+
+`python -m tests.fuzz.guided TARGET CASES DIR SECONDS`: it ends after so many cases or seconds
+(0: no limit of time).
 
 DIR/corpus keeps what reached new code, DIR/report.json says how it went, DIR/crash-… holds an input
 that broke a rule.
@@ -59,7 +62,7 @@ def _peak_bytes() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def main(name: str, cases: int, folder: Path) -> None:
+def main(name: str, cases: int, folder: Path, seconds: int) -> None:
     """Fuzz; does not return."""
     corpus = folder / "corpus"
     corpus.mkdir(exist_ok=True)
@@ -74,10 +77,11 @@ def main(name: str, cases: int, folder: Path) -> None:
     arguments = [
         *(sys.argv[0], str(corpus), f"-runs={cases}", f"-max_len={fuzzing.target.longest}"),
         *(f"-dict={words}", f"-artifact_prefix={folder}/", "-rss_limit_mb=2048", "-timeout=30"),
+        f"-max_total_time={seconds}",
     ]
     atheris.Setup(arguments, fuzzing.one)
     atheris.Fuzz()
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]), Path(sys.argv[3]))
+    main(sys.argv[1], int(sys.argv[2]), Path(sys.argv[3]), int(sys.argv[4]))

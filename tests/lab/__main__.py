@@ -11,6 +11,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from tests.campaign.rounds import Limit, Round
 from tests.lab.building import built
 from tests.lab.lab import Lab
 from tests.lab.recipe import RECIPES, X86_64
@@ -38,18 +39,21 @@ def main(words: Sequence[str]) -> int:
     try:
         if asked.shell:
             return talk(lab)
-        names = asked.scenario or (SHORT if asked.short else known)
-        return _run(lab, [known[name] for name in names], asked)
+        names = asked.scenario or (SHORT if asked.short else list(known))
+        folder = asked.folder or work
+        due = Round(folder, names, Limit(asked.minutes), say=lambda _: None)
+        return _run(lab, known, due, asked)
     finally:
         lab.close()
         shutil.rmtree(work)
 
 
-def _run(lab: Lab, wanted: Sequence[Scenario], asked: argparse.Namespace) -> int:
+def _run(lab: Lab, known: dict[str, Scenario], due: Round, asked: argparse.Namespace) -> int:
     results = []
-    for result in run_all(wanted, lab):
+    for result in run_all((known[name] for name in due.due()), lab):
         results.append(result)
-        _show(result)
+        due.add(result.scenario.name, passed=not result.failure)
+        _show(result, f"{due.limit} {due.tally}  " if asked.folder else "")
         if asked.keep and result.kept is None:
             print(f"    kept: {keep(result.scenario.name, lab)}")
     failed = sum(1 for r in results if r.failure)
@@ -58,13 +62,13 @@ def _run(lab: Lab, wanted: Sequence[Scenario], asked: argparse.Namespace) -> int
             print(f"\n{result.scenario.name}\n{result.failure}\nkept: {result.kept}")
     boots = ", ".join(f"{seconds:.0f}" for seconds in lab.boots_s)
     print(f"\nboots: {boots} s\n{len(results) - failed} passed, {failed} failed")
-    return 1 if failed else 0
+    return 1 if due.tally.failed else 0
 
 
-def _show(result: Result) -> None:
+def _show(result: Result, head: str) -> None:
     mark = "FAILED" if result.failure else "passed"
     times = f"{result.seconds:5.0f} s  {result.cpu_s:5.0f} s cpu"
-    print(f"{mark}  {times}  {result.scenario.name:14}  {result.note}", flush=True)
+    print(f"{head}{mark}  {times}  {result.scenario.name:14}  {result.note}", flush=True)
 
 
 def _told(what: str, began: float) -> None:
@@ -82,6 +86,8 @@ def _arguments(known: dict[str, Scenario], words: Sequence[str]) -> argparse.Nam
     parser.add_argument("--payload", type=Path, metavar="DIR", help="what `payload` plugs in")
     parser.add_argument("--list", action="store_true", help="tell which scenarios there are")
     parser.add_argument("--short", action="store_true", help=f"only {', '.join(SHORT)}")
+    parser.add_argument("--minutes", type=float, help="begin no further scenario after so long")
+    parser.add_argument("--folder", type=Path, help="what was done so far: that is not done again")
     parser.add_argument("--keep", action="store_true", help="keep consoles and journals of all")
     parser.add_argument("--commit", help="nondum as of a commit, not as the checkout is now")
     parser.add_argument("--shell", action="store_true", help="boot one and run what you type")

@@ -1,27 +1,33 @@
 """Remove each step of verification in turn, and see a test fail: `python -m tests.mutation`.
 
 What the page has already is not tried again, unless `--all` is given; then the guard that it names
-is tried first. Exits with 1 when a step has no guard.
+is tried first. With `--folder`, all are tried of which neither the module nor a file of its guards
+is as it was when that was noted in the folder: so it can be stopped and goes on where it was, and
+only what has changed is tried again. Exits with 1 when a step has no guard.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import queue
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 
+from tests.campaign.rounds import Limit
 from tests.mutation import page
 from tests.mutation.guards import GUARDS
 from tests.mutation.page import Key
 from tests.mutation.steps import Step, steps_in
 from tests.mutation.trial import Copy, copies
+from tests.mutation.tried import Tried
 
 ROOT = Path(__file__).parents[2]
 
@@ -37,25 +43,43 @@ def main() -> int:
         folder.chmod(0o755)  # some tests are other users
         made = [stack.enter_context(copy) for copy in copies(ROOT, folder, os.cpu_count() or 1)]
         steps = page.keyed(steps_in(made[0].folder, tuple(GUARDS)))
+        tried = (
+            Tried(options.folder, options.keep or options.folder, made[0].folder, steps)
+            if options.folder
+            else None
+        )
+        limit = Limit(options.minutes)
         due = [
             key
             for key in steps
-            if (options.all or key not in known) and (options.only or "") in key.module
+            if (tried.is_due(key) if tried else options.all or key not in known)
+            and (options.only or "") in key.module
         ]
         due.sort(key=lambda key: key in known)
         guards = {key: known[key] for key in steps if key in known}
-        for number, (key, guard) in enumerate(_tried(made, steps, due, known), start=1):
-            guards[key] = guard or page.MISSING
-            sys.stdout.write(f"{number}/{len(due)} {steps[key].name}: {guards[key]}\n")
-            sys.stdout.flush()
-            _write(steps, guards, page.took(before))
+        broken = 0
+        with contextlib.suppress(KeyboardInterrupt):
+            for number, (key, guard) in enumerate(_tried(made, steps, due, known, limit), start=1):
+                if guard is None:
+                    broken += 1
+                else:
+                    guards[key] = guard or page.MISSING
+                if tried:
+                    tried.add(key, guard or "")
+                told = "not tried" if guard is None else guards[key]
+                sys.stdout.write(f"{limit} {number}/{len(due)} {steps[key].name}: {told}\n")
+                sys.stdout.flush()
+                _write(steps, guards, page.took(before))
         if options.all and not options.only:
             minutes = round((time.monotonic() - began_s) / 60)
             told = f"All of them took {minutes} minutes on {len(made)} processors."
             _write(steps, guards, told)
+    if tried:
+        sys.stdout.write(f"{tried.tally} tried, {len(tried.tally.failed)} without a guard\n")
+        return 1 if tried.tally.failed else 0
     missing = [key for key in due if guards.get(key, page.MISSING) == page.MISSING]
     sys.stdout.write(f"{len(steps)} steps, {len(due)} tried, {len(missing)} without a guard\n")
-    return 1 if missing else 0
+    return 1 if missing or broken else 0
 
 
 def _write(steps: Iterable[Key], guards: Mapping[Key, str], took: str) -> None:
@@ -64,39 +88,51 @@ def _write(steps: Iterable[Key], guards: Mapping[Key, str], took: str) -> None:
 
 
 def _tried(
-    made: Sequence[Copy], steps: dict[Key, Step], due: list[Key], known: Mapping[Key, str]
-) -> Iterator[tuple[Key, str]]:
-    """Each step that is due, with its guard, as they come."""
+    made: Sequence[Copy],
+    steps: dict[Key, Step],
+    due: list[Key],
+    known: Mapping[Key, str],
+    limit: Limit,
+) -> Iterator[tuple[Key, str | None]]:
+    """Each step that is due, with its guard, as they come; None where the guards fail although
+    every step is in place."""
     idle: queue.Queue[Copy] = queue.Queue()
     for copy in made:
         idle.put(copy)
+    failed: dict[tuple[str, ...], str] = {}
+    looking = {GUARDS[key.module]: threading.Lock() for key in due}
 
-    def failure(guards: tuple[str, ...]) -> str:
-        copy = idle.get()
-        try:
-            return copy.first_failure(guards)
-        finally:
-            idle.put(copy)
+    def failure(copy: Copy, guards: tuple[str, ...]) -> str:
+        with looking[guards]:
+            if guards not in failed:
+                failed[guards] = copy.first_failure(guards)
+                if failed[guards]:
+                    told = f"error: fails with every step in place: {failed[guards]}\n"
+                    sys.stdout.write(told)
+            return failed[guards]
 
-    def tried(key: Key) -> tuple[Key, str]:
-        copy = idle.get()
+    def tried(key: Key) -> tuple[Key, str | None] | None:
+        if limit.is_over:
+            return None
+        copy, guards = idle.get(), GUARDS[key.module]
         try:
-            return key, copy.guard_of(steps[key], GUARDS[key.module], known.get(key, ""))
+            if failure(copy, guards):
+                return key, None
+            return key, copy.guard_of(steps[key], guards, known.get(key, ""))
         finally:
             idle.put(copy)
 
     with ThreadPoolExecutor(len(made)) as pool:
-        every = tuple(dict.fromkeys(GUARDS[key.module] for key in due))
-        failed = dict(zip(every, pool.map(failure, every), strict=True))
-        for test in filter(None, failed.values()):
-            sys.stdout.write(f"error: fails with every step in place: {test}\n")
-        yield from pool.map(tried, [key for key in due if not failed[GUARDS[key.module]]])
+        yield from (told for told in pool.map(tried, due) if told is not None)
 
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser("python -m tests.mutation", description=__doc__)
     parser.add_argument("--all", action="store_true", help="try again what the page has")
     parser.add_argument("--only", metavar="TEXT", help="modules with this in their path")
+    parser.add_argument("--minutes", type=float, help="how long to go on [until all is done]")
+    parser.add_argument("--folder", type=Path, help="try all that was not noted there")
+    parser.add_argument("--keep", type=Path, help="where that is noted [FOLDER]")
     return parser.parse_args()
 
 

@@ -1,0 +1,140 @@
+"""What was done of a campaign: its pieces, those that failed, and the time that is left.
+
+A round is one time through all pieces. It is kept in a folder, so that a run goes on where the one
+before it stopped.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+FILE = "round.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Tally:
+    """How far a round is."""
+
+    of: int
+    """Pieces that it has."""
+    done: tuple[str, ...] = ()
+    """Failed ones, too."""
+    failed: tuple[str, ...] = ()
+
+    @property
+    def is_whole(self) -> bool:
+        return len(self.done) >= self.of
+
+    def __str__(self) -> str:
+        return f"{len(self.done)} of {self.of}"
+
+    def write(self, folder: Path) -> None:
+        """Keep it: the former one stays until this one is there."""
+        folder.mkdir(parents=True, exist_ok=True)
+        new = folder / f"{FILE}.new"
+        new.write_text(json.dumps(asdict(self)), encoding="utf-8")
+        new.replace(folder / FILE)
+
+    @classmethod
+    def read(cls, folder: Path) -> Tally | None:
+        """That of a folder; None if nothing was begun there."""
+        file = folder / FILE
+        if not file.exists():
+            return None
+        told = json.loads(file.read_text(encoding="utf-8"))
+        return cls(told["of"], tuple(told["done"]), tuple(told["failed"]))
+
+
+class Limit:
+    """The time that a run has."""
+
+    def __init__(self, minutes: float | None, clock: Callable[[], float] = time.monotonic) -> None:
+        """None: as long as it takes."""
+        self._clock, self._begun_s = clock, clock()
+        self._seconds = None if minutes is None else minutes * 60
+
+    @property
+    def elapsed_s(self) -> float:
+        return self._clock() - self._begun_s
+
+    @property
+    def left_s(self) -> float | None:
+        """None: there is no limit."""
+        return None if self._seconds is None else max(0.0, self._seconds - self.elapsed_s)
+
+    @property
+    def is_over(self) -> bool:
+        return self.left_s == 0.0
+
+    def __str__(self) -> str:
+        left = "" if self.left_s is None else f", {minutes_of(self.left_s)} left"
+        return f"[{minutes_of(self.elapsed_s)}{left}]"
+
+
+def minutes_of(seconds: float) -> str:
+    """Minutes and seconds.
+
+    >>> minutes_of(3723.4)
+    '62:03'
+    """
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02}"
+
+
+class Round:
+    """The pieces of one round, worked off one after the other, or some at the same time."""
+
+    def __init__(
+        self,
+        folder: Path,
+        pieces: Sequence[str],
+        limit: Limit,
+        say: Callable[[str], None] | None = None,
+    ) -> None:
+        self.folder, self.limit = folder, limit
+        self._pieces, self._say = pieces, say or _print
+        self._lock = threading.Lock()
+        before = Tally.read(folder) or Tally(0)
+        self.tally = Tally(len(pieces), _among(before.done, pieces), _among(before.failed, pieces))
+        self.tally.write(folder)
+
+    def due(self) -> Iterator[str]:
+        """The pieces that were not done yet, until the time is over."""
+        for piece in self._pieces:
+            if self.limit.is_over:
+                return
+            if piece not in self.tally.done:
+                yield piece
+
+    def add(self, piece: str, *, passed: bool, note: str = "") -> None:
+        """A piece is done: keep that, and say so."""
+        with self._lock:
+            others = [one for one in self.tally.done if one != piece]
+            failed = [one for one in self.tally.failed if one != piece]
+            if not passed:
+                failed.append(piece)
+            self.tally = Tally(len(self._pieces), (*others, piece), tuple(failed))
+            self.tally.write(self.folder)
+            mark = "passed" if passed else "FAILED"
+            more = f"  {note}" if note else ""
+            self._say(f"{self.limit} {self.tally}  {mark}  {piece}{more}")
+
+    def end(self) -> int:
+        """Say how far it is; the exit status: 1 if anything has failed."""
+        for piece in self.tally.failed:
+            self._say(f"FAILED {piece}")
+        self._say(f"{self.tally} done, {len(self.tally.failed)} failed")
+        return 1 if self.tally.failed else 0
+
+
+def _among(names: Iterable[str], pieces: Sequence[str]) -> tuple[str, ...]:
+    known = set(pieces)
+    return tuple(name for name in names if name in known)
+
+
+def _print(line: str) -> None:
+    print(line, flush=True)

@@ -1,0 +1,78 @@
+"""A round goes on where it stopped, and stops when its time is over."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tests.campaign.rounds import Limit, Round, Tally
+
+PIECES = ("one", "two", "three")
+
+
+class Clock:
+    """Seconds that a test counts."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+def quiet(_line: str) -> None:
+    """Nobody reads it."""
+
+
+def test_it_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    first = Round(tmp_path, PIECES, Limit(None), quiet)
+    first.add("one", passed=True)
+    second = Round(tmp_path, PIECES, Limit(None), quiet)
+    assert list(second.due()) == ["two", "three"]
+    assert str(second.tally) == "1 of 3"
+
+
+def test_pieces_that_are_there_no_more_do_not_count(tmp_path: Path) -> None:
+    first = Round(tmp_path, PIECES, Limit(None), quiet)
+    first.add("one", passed=False)
+    first.add("two", passed=True)
+    second = Round(tmp_path, ("two", "four"), Limit(None), quiet)
+    assert second.tally == Tally(2, ("two",), ())
+    assert list(second.due()) == ["four"]
+
+
+def test_nothing_begins_once_the_time_is_over(tmp_path: Path) -> None:
+    clock = Clock()
+    work = Round(tmp_path, PIECES, Limit(1, clock), quiet)
+    due = work.due()
+    assert next(due) == "one"
+    clock.now_s += 59.0
+    assert next(due) == "two"
+    clock.now_s += 1.0
+    assert list(due) == []
+
+
+def test_what_failed_is_told_at_the_end(tmp_path: Path) -> None:
+    said: list[str] = []
+    work = Round(tmp_path, PIECES, Limit(None), said.append)
+    work.add("one", passed=False, note="see there")
+    work.add("two", passed=True)
+    assert work.end() == 1
+    assert said[0].endswith("1 of 3  FAILED  one  see there")
+    assert said[-2:] == ["FAILED one", "2 of 3 done, 1 failed"]
+    assert Tally.read(tmp_path) == Tally(3, ("one", "two"), ("one",))
+
+
+def test_a_piece_that_is_done_again_counts_once(tmp_path: Path) -> None:
+    work = Round(tmp_path, PIECES, Limit(None), quiet)
+    work.add("one", passed=False)
+    work.add("one", passed=True)
+    assert work.tally == Tally(3, ("one",), ())
+    assert work.end() == 0
+
+
+def test_elapsed_and_left_time_are_told() -> None:
+    clock = Clock()
+    limit = Limit(10, clock)
+    clock.now_s += 192.0
+    assert str(limit) == "[3:12, 6:48 left]"
+    assert str(Limit(None, clock)) == "[0:00]"
