@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import combinations
 
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from tests.planning.fragments import HOST, brings
 from tests.planning.strangers import (
@@ -354,7 +354,6 @@ def by_trying_all(
     shelves(),
     st.sampled_from(["(b self)", "(and (a self) (b self))", "(and (b self) (not (a self)))"]),
 )
-@settings(max_examples=150, deadline=None)
 def test_smallest_sets_are_those_that_trying_all_finds(
     world: tuple[Here, list[Candidate]], goal: str
 ) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from tests.planning.search.random_tasks import BASIC, tasks
 
@@ -50,7 +50,6 @@ def test_step_that_deletes_a_fact_makes_room_for_what_needs_it_false() -> None:
     assert [written.facts[fact] for fact in last.precondition] == ["!a"]
 
 
-@settings(max_examples=150, deadline=None)
 @given(tasks())
 def test_plain_plan_is_valid_and_has_the_same_steps(task: GroundTask) -> None:
     plan = plan_of(task)
@@ -62,7 +61,6 @@ def test_plain_plan_is_valid_and_has_the_same_steps(task: GroundTask) -> None:
     ]
 
 
-@settings(max_examples=150, deadline=None)
 @given(tasks(), st.frozensets(st.integers(0, BASIC - 1)))
 def test_rest_that_a_state_supports_reaches_the_goal_from_it(
     task: GroundTask, basic: frozenset[int]
@@ -88,7 +86,6 @@ def reaches(task: GroundTask, steps: tuple[int, ...], basic: frozenset[int]) -> 
     return task.goal <= state
 
 
-@settings(max_examples=80, deadline=None)
 @given(tasks())
 def test_plain_steps_change_what_the_plan_changes(task: GroundTask) -> None:
     """What the robot assumes of a step that succeeded is what the action did."""

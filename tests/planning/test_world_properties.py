@@ -123,7 +123,7 @@ class Life(RuleBasedStateMachine):
         assert all(self.world.evidence(fact).pros for fact in self.world.facts)
 
 
-Life.TestCase.settings = settings(max_examples=100, stateful_step_count=25, deadline=None)
+Life.TestCase.settings = settings(stateful_step_count=25)
 TestLife = Life.TestCase
 
 

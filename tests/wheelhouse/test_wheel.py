@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from tests.kit.payloads import installed_wheel, make_wheel, sdk_wheel
 from tests.wheelhouse.hostile import WHEELS, HostileWheel
@@ -124,7 +124,6 @@ ENDS = st.builds(
 )
 
 
-@settings(max_examples=150, deadline=None)
 @given(st.one_of(st.just(Lie()), LIES), st.one_of(st.just(End()), ENDS))
 def test_other_readers_see_the_same_in_all_that_is_accepted(
     tmp_path_factory: pytest.TempPathFactory, lie: Lie, end: End
@@ -349,7 +348,6 @@ def test_requirements_are_read_from_metadata(tmp_path: Path) -> None:
     assert found == ("a>=1", "b; extra=='c'")
 
 
-@settings(max_examples=300, deadline=None)
 @given(st.data())
 def test_damaged_bytes_never_break_the_reader(data: st.DataObject) -> None:
     whole = bytearray(WheelBuilder().bytes())

@@ -8,7 +8,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
+from tests.kit.examples import a_share
 from tests.planning.differential.generated import texts
 from tests.planning.differential.sas import Sas, translated
 from tests.planning.differential.semantics import Problem
@@ -80,7 +81,7 @@ def test_each_takes_the_plan_of_the_other(text: Text) -> None:
 @needs_engine
 @pytest.mark.slow
 @given(text=texts())
-@settings(max_examples=30, deadline=None)
+@a_share(3)
 def test_no_problem_is_solvable_for_one_of_them_only(text: Text) -> None:
     small(Problem.of(text))
     check_plans(text)
@@ -89,7 +90,7 @@ def test_no_problem_is_solvable_for_one_of_them_only(text: Text) -> None:
 @needs_engine
 @pytest.mark.slow
 @given(text=texts())
-@settings(max_examples=30, deadline=None)
+@a_share(3)
 def test_whatever_can_be_done_is_found_by_both(text: Text) -> None:
     graph = small(Problem.of(text))
     loaded = text.load()

@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from tests.planning.differential.generated import texts
 from tests.planning.differential.semantics import (
     Problem,
@@ -123,13 +123,11 @@ def test_features_mean_what_they_say(text: Text) -> None:
 
 
 @given(text=texts())
-@settings(max_examples=300, deadline=None)
 def test_whatever_is_written_means_what_it_says(text: Text) -> None:
     check(text, small(Problem.of(text)))
 
 
 @given(text=texts())
-@settings(max_examples=150, deadline=None)
 def test_whatever_is_written_is_written_again(text: Text) -> None:
     loaded = text.load()
     task = pddl_text(loaded.merged, loaded.facts, loaded.goal)

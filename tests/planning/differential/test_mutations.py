@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn
+from tests.kit.examples import a_share
 from tests.planning.differential.generated import texts
 from tests.planning.differential.texts import TEXTS, Text
 
@@ -66,26 +67,24 @@ def read(domain: str, problem: str) -> None:
 
 @pytest.mark.parametrize("text", TEXTS, ids=str)
 @given(data=st.data())
-@settings(max_examples=40, deadline=None)
+@a_share(3)
 def test_a_mutated_domain(text: Text, data: st.DataObject) -> None:
     read(data.draw(mutated(text.domain)), text.problem)
 
 
 @pytest.mark.parametrize("text", TEXTS, ids=str)
 @given(data=st.data())
-@settings(max_examples=25, deadline=None)
+@a_share(3)
 def test_a_mutated_problem(text: Text, data: st.DataObject) -> None:
     read(text.domain, data.draw(mutated(text.problem)))
 
 
 @given(text=texts(), data=st.data())
-@settings(max_examples=150, deadline=None)
 def test_mutations_of_whatever_is_written(text: Text, data: st.DataObject) -> None:
     read(data.draw(mutated(text.domain)), data.draw(mutated(text.problem)))
 
 
 @given(text=st.text(max_size=60) | st.text(alphabet="()?:- ;abe=\n", max_size=60))
-@settings(max_examples=300, deadline=None)
 def test_any_text_at_all(text: str) -> None:
     for parse in (load_domain, parse_formula, parse_signature):
         try:

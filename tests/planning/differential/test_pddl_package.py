@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from pddl.parser.domain import DomainParser
+from tests.kit.examples import a_share
 from tests.planning.differential.generated import texts
 from tests.planning.differential.texts import TEXTS, Text
 
@@ -87,7 +88,7 @@ def test_what_nondum_writes_is_read_the_same(text: Text) -> None:
 
 
 @given(text=texts(plain=True))
-@settings(max_examples=100, deadline=None)
+@a_share(4)
 def test_what_both_accept_is_the_same(text: Text) -> None:
     for domain in (without_root(as_written(text)), text.domain):
         other = by_the_other(domain)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hypothesis import given, settings
+from hypothesis import given
 from tests.planning.search.walks import Walk, walks
 from tests.planning.tasks import Written, follow_task, ground
 
@@ -11,7 +11,6 @@ from nondum.planning.search.successors import Successors
 from nondum.sdk.planner import GroundAction, GroundTask
 
 
-@settings(max_examples=100, deadline=None)
 @given(walks())
 def test_moves_follow_the_actions(walk: Walk) -> None:
     task, encoded, way = walk
@@ -22,7 +21,6 @@ def test_moves_follow_the_actions(walk: Walk) -> None:
             assert can_move == (task.actions[move.action].precondition <= state)
 
 
-@settings(max_examples=100, deadline=None)
 @given(walks())
 def test_tree_finds_the_moves_that_can_be_made(walk: Walk) -> None:
     _, encoded, way = walk

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from tests.planning.search.walks import Walk, walks
 from tests.planning.tasks import gripper_task, plan_of
@@ -25,7 +25,6 @@ def reaches(encoded: Encoded, plan: Moves) -> bool:
     return encoded.is_goal(state)
 
 
-@settings(max_examples=200, deadline=None)
 @given(walks(), st.lists(st.integers(0, 5), max_size=8))
 def test_what_is_left_of_a_plan_is_one(walk: Walk, choices: list[int]) -> None:
     """Plans are made by walking at random until the goal holds."""

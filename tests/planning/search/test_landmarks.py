@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hypothesis import given, settings
+from hypothesis import given
 from tests.planning.search.random_tasks import tasks
 from tests.planning.tasks import FOLLOW_PLAN, follow_task
 
@@ -28,7 +28,6 @@ def left_along(task: GroundTask, plan: Plan) -> list[int]:
     return left
 
 
-@settings(max_examples=150, deadline=None)
 @given(tasks())
 def test_plan_meets_all_landmarks(task: GroundTask) -> None:
     answer = solve(task, lambda: False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hypothesis import given, settings
+from hypothesis import given
 from tests.planning.search.random_tasks import shortest
 from tests.planning.search.walks import Walk, walks
 from tests.planning.tasks import delivery_task
@@ -16,7 +16,6 @@ from nondum.planning.search.relaxation import Relaxation
 from nondum.planning.search.successors import Successors
 
 
-@settings(max_examples=150, deadline=None)
 @given(walks())
 def test_dead_end_is_one(walk: Walk) -> None:
     task, encoded, way = walk
@@ -26,7 +25,6 @@ def test_dead_end_is_one(walk: Walk) -> None:
             assert shortest(replace(task, init=state - derived_facts(task))) is None
 
 
-@settings(max_examples=100, deadline=None)
 @given(walks())
 def test_estimate_knows_what_can_be_done(walk: Walk) -> None:
     _, encoded, way = walk

@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from tests.planning.search.random_tasks import holds_after, shortest, tasks
 from tests.planning.tasks import (
     FOLLOW_PLAN,
@@ -64,7 +64,6 @@ def counter(bits: int) -> GroundTask:
     return GroundTask(facts, off, on, tuple(actions))
 
 
-@settings(max_examples=300, deadline=None)
 @given(tasks())
 def test_answer_agrees_with_looking_at_every_state(random_task: GroundTask) -> None:
     length = shortest(random_task)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import itertools
 import json
 import queue
 import socket
@@ -87,15 +86,6 @@ async def seeking(announcement: Announcement, **options: Any) -> AsyncIterator[S
         yield seeker
     finally:
         await seeker.discovery.close()
-
-
-async def until(condition: Callable[[], bool]) -> None:
-    """Wait for something that is told by a status only."""
-    async with asyncio.timeout(PATIENCE_S):
-        for _ in itertools.count():
-            if condition():
-                return
-            await asyncio.sleep(0.01)
 
 
 class Host:

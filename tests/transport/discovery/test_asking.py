@@ -9,7 +9,8 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from tests.transport.discovery.hosts import PATIENCE_S, Seeker, free_port, here, seeking, until
+from tests.kit.until import until_async
+from tests.transport.discovery.hosts import PATIENCE_S, Seeker, free_port, here, seeking
 
 from nondum.sdk.errors import ConfigRefused
 from nondum.transport.discovery import Announcement, Discovery, Source, StaticRow, packets
@@ -25,7 +26,7 @@ async def row(seeker: Seeker, *, code: str) -> StaticRow:
         (row,) = seeker.discovery.status().static
         return row if row.problem is not None and row.problem.code == code else None
 
-    await until(lambda: found() is not None)
+    await until_async("a host that is found", found)
     row = found()
     assert row is not None
     return row
@@ -121,7 +122,7 @@ async def test_a_name_that_nobody_has_is_told() -> None:
 async def test_a_host_that_was_given_itself_finds_nobody() -> None:
     rover = here("rover")
     async with seeking(rover, multicast=False, static=[at(rover)]) as seeker:
-        await until(lambda: seeker.discovery.status().static[0].name == "rover")
+        await until_async("the name", lambda: seeker.discovery.status().static[0].name == "rover")
         assert seeker.discovery.hints == {}
         assert seeker.discovery.status().problems == ()
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import Bundle, RuleBasedStateMachine, invariant, rule
+from tests.kit.examples import a_share
 
 from nondum.transport.discovery import Hint, Source
 from nondum.transport.discovery.book import MAX_PEERS, Change, HintBook
@@ -160,4 +161,4 @@ class Telling(RuleBasedStateMachine):
 
 
 TestTelling = Telling.TestCase
-TestTelling.settings = settings(max_examples=25, stateful_step_count=20, deadline=None)
+TestTelling.settings = settings(a_share(4), stateful_step_count=20)

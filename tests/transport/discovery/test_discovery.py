@@ -7,8 +7,9 @@ import os
 from dataclasses import replace
 
 import pytest
+from tests.kit.until import until_async
 from tests.transport.discovery import spoofing
-from tests.transport.discovery.hosts import Seeker, here, seeking, until
+from tests.transport.discovery.hosts import Seeker, here, seeking
 
 from nondum.transport.discovery import Announcement
 from nondum.transport.discovery.book import MAX_PEERS
@@ -23,12 +24,12 @@ LIARS = {LIAR.key, OTHER.key}
 
 
 async def until_refused(seeker: Seeker, code: str) -> None:
-    await until(lambda: seeker.discovery.status().refused.get(code, 0) > 0)
+    await until_async(code, lambda: seeker.discovery.status().refused.get(code))
 
 
 async def until_duplicate(seeker: Seeker) -> str:
     """Wait until it is told of another host with its key; where that is."""
-    await until(lambda: len(seeker.discovery.status().problems) > 0)
+    await until_async("a problem", lambda: seeker.discovery.status().problems)
     (problem,) = seeker.discovery.status().problems
     assert problem.code == "IDENTITY_DUPLICATE"
     return problem.message

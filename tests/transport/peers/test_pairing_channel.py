@@ -12,8 +12,10 @@ from typing import TypeVar
 
 import pytest
 import zmq
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from tests.kit.examples import a_share
+from tests.kit.until import until_async
 from tests.transport.peers.hosts import PATIENCE_S, identity
 
 from nondum.sdk.errors import NondumError
@@ -137,12 +139,12 @@ async def end(
 
 async def refuses_connections(port: int) -> None:
     """Wait until ZeroMQ's own thread has closed a port."""
-    async with asyncio.timeout(PATIENCE_S):
-        while True:
-            with socket.socket() as late:
-                if late.connect_ex(("127.0.0.1", port)) == errno.ECONNREFUSED:
-                    return
-            await asyncio.sleep(0.01)
+
+    def is_refused() -> bool:
+        with socket.socket() as late:
+            return late.connect_ex(("127.0.0.1", port)) == errno.ECONNREFUSED
+
+    await until_async(f"port {port} is closed", is_refused)
 
 
 async def compared(rover: End, base: End) -> tuple[Comparing, Comparing]:
@@ -519,7 +521,7 @@ THINGS_SAID = st.one_of(
 )
 
 
-@settings(max_examples=20, deadline=None)
+@a_share(5)
 @given(st.lists(st.lists(THINGS_SAID, max_size=6), max_size=3), st.booleans())
 async def test_whatever_strangers_say_nobody_is_paired_with_them(
     talks: list[list[bytes | Said]], is_own_key: bool

@@ -4,7 +4,7 @@ connection.
 
 from __future__ import annotations
 
-import time
+import asyncio
 from collections.abc import Callable, Sequence
 
 from nondum.sdk.errors import Problem, ProtocolViolation
@@ -26,15 +26,16 @@ class MeteredPackets:
     def __init__(self, packets: Packets, rate_hz: float = RATE_HZ, burst: float = BURST) -> None:
         self._packets = packets
         self._rate_hz = rate_hz
-        self._bucket = TokenBucket(rate_hz, burst, time.monotonic())
-        self._bytes = TokenBucket(BYTES_S, BURST_BYTES, time.monotonic())
+        self._now_s = asyncio.get_running_loop().time
+        self._bucket = TokenBucket(rate_hz, burst, self._now_s())
+        self._bytes = TokenBucket(BYTES_S, BURST_BYTES, self._now_s())
         self.shares_memory = packets.shares_memory
 
     def open(self, on_packet: OnPacket, on_closed: OnClosed) -> None:
         """Begin to read (see `Packets`)."""
 
         def count(data: bytes, handles: tuple[Handle, ...]) -> None:
-            now_s = time.monotonic()
+            now_s = self._now_s()
             if not self._bucket.take(1, now_s):
                 flood = f"{self._rate_hz:.0f} packets"
             elif not self._bytes.take(len(data), now_s):

@@ -68,7 +68,7 @@ async def test_file_is_whole_afterwards(tmp_path: Path, size: int) -> None:
 pieces = st.sampled_from(["cut", "longer", "changed", "text", "failed"])
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(at=st.integers(0, 300_000), wrong=pieces)
 async def test_wrong_piece_is_refused_wherever_it_is(tmp_path: Path, at: int, wrong: str) -> None:
     data = bytes(300_001)

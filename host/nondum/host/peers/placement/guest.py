@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import re
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -84,11 +83,15 @@ class Guest:
     def tell(self, step: str) -> None:
         """Report how far it is."""
         self.step = step
-        self._told_s = time.monotonic()
+        self._told_s = _now_s()
         self.errand.progress({"step": step, "done": self.done, "total": self.total})
 
     def add(self, count: int) -> None:
         """More bytes are here."""
         self.done += count
-        if self.done >= self.total or time.monotonic() - self._told_s >= PROGRESS_S:
+        if self.done >= self.total or _now_s() - self._told_s >= PROGRESS_S:
             self.tell("fetching")
+
+
+def _now_s() -> float:
+    return asyncio.get_running_loop().time()
