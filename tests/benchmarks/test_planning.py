@@ -12,7 +12,7 @@ from benchmarks.planning import race, report
 from benchmarks.planning.contenders import GAVE_UP, NO_PLAN, PLAN, REFUSED, installed
 from benchmarks.planning.problems import Problem, problems_in
 from benchmarks.planning.results import Attempt, Results
-from tests.host.cli.test_pddl import ENDLESS, endless
+from tests.kit.endless_problem import ENDLESS, endless
 from tests.planning.differential.texts import TEXTS
 
 BY_NAME = {text.name: text for text in TEXTS}

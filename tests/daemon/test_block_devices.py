@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from tests.daemon.plugins import scribe, talker
-from tests.host.drives.test_blocks import cut_off, image
+from tests.kit.disk_images import cut_off, image
 from tests.kit.loop_devices import attached, detach
 from tests.kit.payloads import make_wheel
 from tests.kit.running_host import RunningHost, running

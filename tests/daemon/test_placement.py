@@ -18,7 +18,7 @@ from demo.ports import free_port
 from demo.robot import nondum
 from tests.daemon.neighbours import UNCONFINED, beacon, until_peer, until_shared, written
 from tests.daemon.plugins import talker
-from tests.host.drives.test_blocks import image
+from tests.kit.disk_images import image
 from tests.kit.loop_devices import attached, detach
 from tests.kit.payloads import Part
 from tests.kit.running_host import DAEMON, READY_S, RunningHost

@@ -15,7 +15,7 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tests.host.drives.test_blocks import make_ext4, on
+from tests.kit.disk_images import make_ext4, on
 from tests.kit.host import LAMP, HostInProcess, host_in_process
 from tests.kit.loop_devices import attach, cut_off, detach
 from tests.kit.payloads import Part, make_payload, make_wheel

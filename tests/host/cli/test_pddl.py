@@ -6,11 +6,12 @@ import json
 import os
 import signal
 import subprocess
-import time
 from pathlib import Path
 
 import pytest
 from tests.host.cli.daemon import PATIENCE_S, Ran, at_terminal, command, nondum, quiet_environment
+from tests.kit.endless_problem import ENDLESS, endless
+from tests.kit.until import until
 from tests.planning.differential.texts import TEXTS
 
 ROADS = """(define (domain roads)
@@ -30,14 +31,6 @@ EYE = """(define (domain eye)
 """
 CLASSES = """(define (problem eye) (:domain eye)
   (:objects person dog - class) (:init (seen person self) (looks left)))
-"""
-ENDLESS = """(define (domain holes)
-  (:types pigeon hole)
-  (:predicates (out ?p - pigeon) (free ?h - hole) (in ?p - pigeon ?h - hole) (home ?p - pigeon))
-  (:action enter :parameters (?p - pigeon ?h - hole) :precondition (and (out ?p) (free ?h))
-    :effect (and (in ?p ?h) (home ?p) (not (out ?p)) (not (free ?h))))
-  (:action leave :parameters (?p - pigeon ?h - hole) :precondition (in ?p ?h)
-    :effect (and (out ?p) (free ?h) (not (in ?p ?h)) (not (home ?p)))))
 """
 
 
@@ -60,18 +53,6 @@ def files(tmp_path: Path) -> Path:
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text, encoding="utf-8")
     return tmp_path
-
-
-def endless() -> str:
-    """Fourteen pigeons for thirteen holes, which nobody proves by looking at all states."""
-    pigeons, holes = [f"p{n}" for n in range(14)], [f"h{n}" for n in range(13)]
-    outside = [f"(out {pigeon})" for pigeon in pigeons] + [f"(free {hole})" for hole in holes]
-    return (
-        "(define (problem endless) (:domain holes)"
-        f"(:objects {' '.join(pigeons)} - pigeon {' '.join(holes)} - hole)"
-        f"(:init {' '.join(outside)})"
-        f"(:goal (and {' '.join(f'(home {p})' for p in pigeons)})))"
-    )
 
 
 def pddl(files: Path, *arguments: str) -> Ran:
@@ -203,13 +184,13 @@ def test_ctrl_c_ends_a_search_in_silence_and_leaves_nobody_behind(files: Path) -
 
 def children_of(pid: int) -> list[int]:
     """Its children, once there are some that have come to themselves."""
-    until_s = time.monotonic() + PATIENCE_S
-    while time.monotonic() < until_s:
+
+    def look() -> list[int]:
         listed = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-        if listed and all("planner_child" in cmdline(int(child)) for child in listed):
-            return [int(child) for child in listed]
-        time.sleep(0.01)
-    raise AssertionError("it has no children")
+        are_started = all("planner_child" in cmdline(int(child)) for child in listed)
+        return [int(child) for child in listed] if are_started else []
+
+    return until("children that have started", look)
 
 
 def cmdline(pid: int) -> str:

@@ -9,74 +9,30 @@ import fcntl
 import hashlib
 import os
 import struct
-import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-import pyudev
-from tests.host.drives.test_usb import stick
-from tests.kit import loop_devices
+from tests.host.drives.usb_devices import stick
+from tests.kit.disk_images import LAMP_ID, attribute, cut_off, image, make_ext4, on, run
 from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.loop_devices import attached, can_be_made, detach
-from tests.kit.payloads import Part, make_payload, make_wheel
+from tests.kit.payloads import Part, make_wheel
 from tests.kit.traces import until_unmounted
 
 from nondum.host import events
 from nondum.host.catalogue.records import DriveState, Step
 from nondum.host.drives import filesystems, mounting, nodes
-from nondum.host.drives.blocks import Accepts, BlockSource
+from nondum.host.drives.blocks import BlockSource
 from nondum.host.drives.mounts import mounted_below
 from nondum.host.drives.source import DriveSource
 from nondum.host.lifecycle.folders import Folders
 from nondum.sdk.errors import DriveGone, PayloadRefused
 
-LAMP_ID = "org.example.lamp"
-
 pytestmark = [
     pytest.mark.anyio,
     pytest.mark.skipif(not can_be_made(), reason="loop devices need root"),
 ]
-
-
-def image(
-    tmp_path: Path,
-    *parts: Part,
-    size_mb: int = 24,
-    payload_id: str = LAMP_ID,
-    spoilt: bool = False,
-) -> Path:
-    """An ext4 image of a drive with one payload; `spoilt`: a file changed since it was listed."""
-    folder = make_payload(tmp_path / "content", *parts, payload_id=payload_id)
-    if spoilt:
-        with (folder / "index.json").open("ab") as index:
-            index.write(b" ")
-    file = tmp_path / "drive.img"
-    make_ext4(tmp_path / "content", file, size_mb)
-    return file
-
-
-def make_ext4(content: Path, file: Path, size_mb: int = 24) -> None:
-    """A file system of a folder's files."""
-    with file.open("wb") as out:
-        out.truncate(size_mb * 1024**2)
-    _run("mkfs.ext4", "-q", "-d", str(content), str(file))
-
-
-def cut_off(file: Path) -> None:
-    """Most of an image is gone."""
-    loop_devices.cut_off(file, 6 * 1024**2)
-
-
-def on(tmp_path: Path) -> Accepts:
-    """Loop devices on this test's images, and no other block device of the machine."""
-
-    def accepts(device: pyudev.Device) -> bool:
-        disk = Path(device.sys_path)
-        backing = (disk.parent if device.device_type == "partition" else disk) / "loop/backing_file"
-        return backing.exists() and backing.read_text().startswith(f"{tmp_path}/")
-
-    return accepts
 
 
 def sources(tmp_path: Path) -> Sequence[DriveSource]:
@@ -142,7 +98,7 @@ def test_drive_has_no_say_in_how_it_is_mounted(tmp_path: Path, panics: bool) -> 
     """The superblock of an ext4 can say that the kernel is to panic once it finds an error."""
     file, target = image(tmp_path, Part("lamp", LAMP)), tmp_path / "mount"
     if panics:
-        _run("tune2fs", "-e", "panic", "-o", "debug,user_xattr,acl", str(file))
+        run("tune2fs", "-e", "panic", "-o", "debug,user_xattr,acl", str(file))
     with attached(file) as node:
         mounting.mount(node, target, "ext4")
         try:
@@ -156,7 +112,7 @@ def test_drive_has_no_say_in_how_it_is_mounted(tmp_path: Path, panics: bool) -> 
 async def test_file_system_that_tears_under_a_reader_is_told_as_that(tmp_path: Path) -> None:
     """Its list lies, by its own word, where the device has no bytes."""
     file = image(tmp_path, Part("lamp", LAMP))
-    _run("debugfs", "-w", "-R", f"sif /nondum/{LAMP_ID}/CONTENTS block[5] 999999999", str(file))
+    run("debugfs", "-w", "-R", f"sif /nondum/{LAMP_ID}/CONTENTS block[5] 999999999", str(file))
     async with host_in_process(tmp_path, sources=lambda folders: sources(tmp_path)) as host:
         with attached(file):
             await host.until(lambda: bool(host.snapshot.payloads))
@@ -235,11 +191,6 @@ def test_drive_that_goes_while_it_is_mounted_is_told(
     assert gone.value.code == "DRIVE_GONE"
 
 
-def attribute(node: Path, name: str) -> int:
-    """What sysfs says of a block device."""
-    return int(Path(f"/sys/block/{node.name}/{name}").read_text())
-
-
 def digest(file: Path) -> str:
     return hashlib.sha256(file.read_bytes()).hexdigest()
 
@@ -248,16 +199,16 @@ def dirty(tmp_path: Path) -> Path:
     """An image as a stick has it that was pulled while it was written to: its journal is full."""
     clean, folder, file = image(tmp_path, Part("lamp", LAMP)), tmp_path / "rw", tmp_path / "dirty"
     folder.mkdir()
-    _run("mount", "-o", "loop", str(clean), str(folder))
+    run("mount", "-o", "loop", str(clean), str(folder))
     try:
         (folder / "letter").write_text("dear robot")
-        _run("sync", "-f", str(folder))
+        run("sync", "-f", str(folder))
         (folder / "letter").write_text("never finished")
-        _run("sync", "-f", str(folder))
+        run("sync", "-f", str(folder))
         file.write_bytes(clean.read_bytes())
     finally:
-        _run("umount", str(folder))
-    assert "needs_recovery" in _run("dumpe2fs", "-h", str(file))
+        run("umount", str(folder))
+    assert "needs_recovery" in run("dumpe2fs", "-h", str(file))
     return file
 
 
@@ -268,7 +219,7 @@ async def test_nothing_is_written_to_a_drive(tmp_path: Path) -> None:
         with attached(file) as node:
             await host.until_step(LAMP_ID, Step.ACTIVE)
             await until_drive_is(host, DriveState.IDLE)
-            _run("sync")
+            run("sync")
             assert digest(file) == before
             assert attribute(node, "ro") == 1
             with pytest.raises(OSError), node.open("r+b", buffering=0) as device:
@@ -297,7 +248,7 @@ async def test_next_stick_in_the_same_node_is_another_drive(tmp_path: Path) -> N
             await host.until_step(LAMP_ID, Step.ACTIVE)
             (before,) = (drive.id for drive in host.snapshot.drives)
             detach(node)
-            await asyncio.to_thread(_run, "losetup", str(node), str(other))
+            await asyncio.to_thread(run, "losetup", str(node), str(other))
             await host.until_step("org.example.other", Step.ACTIVE)
             await host.until_gone(LAMP_ID)
             (after,) = (drive.id for drive in host.snapshot.drives)
@@ -383,7 +334,3 @@ async def test_composite_stick_is_refused_unread(tmp_path: Path) -> None:
 
         async with host_in_process(tmp_path, sources=allowed) as host:
             await host.until_step(LAMP_ID, Step.ACTIVE)
-
-
-def _run(*command: str) -> str:
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout

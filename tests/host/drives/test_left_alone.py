@@ -9,8 +9,8 @@ from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 
 import pytest
-from tests.host.drives.test_blocks import attribute, image, on
-from tests.host.drives.test_usb import stick
+from tests.host.drives.usb_devices import stick
+from tests.kit.disk_images import attribute, image, on
 from tests.kit.host import LAMP
 from tests.kit.loop_devices import attached, can_be_made
 from tests.kit.payloads import Part

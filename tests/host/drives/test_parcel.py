@@ -9,28 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.kit.payloads import Part, make_payload, seal
+from tests.kit.lamp_drive import PAYLOAD, code, lamp, told
+from tests.kit.payloads import seal
 
 from nondum.host.drives import parcel
-from nondum.sdk.errors import NondumError
 from nondum.wheelhouse import payload
 from nondum.wheelhouse.memory import Promised
-
-LAMP = """
-from nondum.sdk import Unit, hookimpl
-
-@hookimpl
-def units():
-    return [Unit("lamp", "light")]
-"""
-PAYLOAD = "org.example.lamp"
-
-
-def lamp(drive: Path, *, requires: str = "") -> Path:
-    return make_payload(drive, Part("lamp", LAMP), payload_id=PAYLOAD, requires=requires)
-
-
-def told(*_: object) -> None: ...
 
 
 def hand_over(folder: Path, target: Path, **more: Any) -> dict[str, Any]:
@@ -52,12 +36,6 @@ def judge(folder: Path, state: Path, **more: Any) -> dict[str, Any]:
     room = {"promised": asdict(Promised()), "freed_mb": 0, "freed_gpu_mb": 0}
     given = {"folder": str(folder), "store": str(state / "store"), "room": room, **rules}
     return parcel.judge(given | more, told)
-
-
-def code(work: Any, *arguments: Any, **more: Any) -> str:
-    with pytest.raises(NondumError) as refused:
-        work(*arguments, **more)
-    return refused.value.code
 
 
 def files(folder: Path) -> set[str]:
@@ -176,10 +154,10 @@ def test_what_is_fetched_needs_room_beside_what_is_made_of_it(
     listed = (folder / "CONTENTS").read_text()
     (folder / "CONTENTS").write_text(listed.replace(f"  {size}  ", "  9000000  "))
     real = shutil.disk_usage(tmp_path)
-    for free_mb, told in ((99, "DISK_FULL"), (107, "DISK_FULL"), (115, "")):
+    for free_mb, refusal in ((99, "DISK_FULL"), (107, "DISK_FULL"), (115, "")):
         disk = real._replace(free=free_mb * 2**20)
         monkeypatch.setattr(shutil, "disk_usage", lambda _, disk=disk: disk)
-        if told:
-            assert code(judge, folder, tmp_path) == told
+        if refusal:
+            assert code(judge, folder, tmp_path) == refusal
         else:
             assert judge(folder, tmp_path)["needed"]

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tests.host.drives.test_parcel import PAYLOAD, code, lamp, told
+from tests.kit.lamp_drive import PAYLOAD, code, lamp, told
 from tests.kit.payloads import seal
 from tests.kit.signing import Key, sign_payload, trust_of
 from tests.wheelhouse.hostile_wheels import WheelBuilder

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from tests.host.drives.test_blocks import image, on
+from tests.kit.disk_images import image, on
 from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.loop_devices import attached, can_be_made
 from tests.kit.payloads import Part, make_payload

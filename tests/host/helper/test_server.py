@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
-from tests.host.drives.test_blocks import make_ext4
+from tests.kit.disk_images import make_ext4
 from tests.kit.loop_devices import attached
 
 from nondum.host.cgroups import CageLimits, Cages

@@ -7,7 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from tests.host.helper.test_disks import Machine, machine
+from tests.host.helper.machines import Machine, machine
 
 from nondum.host.cgroups.cages import NoTree
 from nondum.host.feedback.lamps import Lamps

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.host.drives.test_parcel import lamp, told
+from tests.kit.lamp_drive import lamp, told
 
 from nondum.host.lifecycle.installing import install
 from nondum.sdk.errors import InstallFailed

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.host.drives.test_parcel import PAYLOAD, lamp, told
+from tests.kit.lamp_drive import PAYLOAD, lamp, told
 
 from nondum.host.drives.reader import KEY_DIGITS
 from nondum.host.lifecycle import rebuilding

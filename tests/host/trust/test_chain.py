@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.host.drives.test_parcel import lamp, told
+from tests.kit.lamp_drive import lamp, told
 from tests.kit.signing import Key, sign_payload, signed, trust_of
 
 from nondum.host.trust import chain
