@@ -13,7 +13,7 @@ import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -124,7 +124,7 @@ async def attempted(
     tested = WorkersUnderTest(folder, confinement=confinement)
     cages = Cages.open(folder)
     tested.workers.launcher = WorkerLauncher(confinement, cages)
-    tested.workers.timing = tested.timing.__class__(startup_s=120.0)
+    tested.workers.timing = replace(tested.timing, startup_s=120.0)
     source = ESCAPE.read_text(encoding="utf-8")
     summary = source.removeprefix('"""').partition("\n")[0]
     settings = {"bait": json.dumps({**bait, "attempts": list(attempts)})}

@@ -13,13 +13,22 @@ Input and output are real: sockets, pipes and ends of processes arrive as they d
 from __future__ import annotations
 
 import asyncio
-from typing import Any
+import time
+from collections.abc import Awaitable
+from typing import Any, TypeVar
+
+_T = TypeVar("_T")
+
+
+_PAUSE_S = 0.005
+"""Between two steps, for input from other processes."""
 
 
 class VirtualClock(asyncio.SelectorEventLoop):
     """An event loop whose time stands still until it is advanced."""
 
     _now_s = 1_000.0
+    _is_settling = False
     _scheduled: list[asyncio.TimerHandle]
     """asyncio's own heap of timers, soonest first."""
     _ready: Any
@@ -40,11 +49,28 @@ class VirtualClock(asyncio.SelectorEventLoop):
         self._now_s = end_s
         await self.settle()
 
+    async def advance_until(self, awaited: Awaitable[_T], step_s: float = 0.1) -> _T:
+        """Let time pass in steps until something has happened that takes input, too: the end of a
+        process that is given a grace, say. Between the steps there is time for that."""
+        task = asyncio.ensure_future(awaited)
+        try:
+            while not task.done():
+                await self.advance(step_s)
+                await asyncio.to_thread(time.sleep, _PAUSE_S)
+            return await task
+        finally:
+            task.cancel()
+
     async def settle(self) -> None:
         """Run all tasks until each waits for input, a thread or a timer."""
-        await asyncio.sleep(0)
-        while self._ready:  # noqa: ASYNC110  # no event tells that nothing is left to run
+        assert not self._is_settling, "only one task at a time may let time pass"
+        self._is_settling = True
+        try:
             await asyncio.sleep(0)
+            while self._ready:  # noqa: ASYNC110  # no event tells that nothing is left to run
+                await asyncio.sleep(0)
+        finally:
+            self._is_settling = False
 
     def _next_timer_s(self) -> float | None:
         return min((t.when() for t in self._scheduled if not t.cancelled()), default=None)

@@ -7,8 +7,9 @@ outside the process, which nothing announces: processes, files, mounts.
 from __future__ import annotations
 
 import asyncio
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import TypeVar
 
 from demo.robot import TooLate
@@ -55,3 +56,35 @@ async def until_async(
             raise TooLate(f"{what}: not within {patience_s:.0f} s\n{evidence()}")
         await asyncio.to_thread(time.sleep, LOOK_S)
     return found
+
+
+async def arrived(
+    what: str,
+    awaited: Awaitable[_T],
+    *,
+    evidence: Callable[[], object] = str,
+    patience_s: float = PATIENCE_S,
+) -> _T:
+    """Await an event with the same patience: in real time, also where the loop's time is virtual.
+
+    Raises `TooLate` as `until` does.
+    """
+    loop, task = asyncio.get_running_loop(), asyncio.ensure_future(awaited)
+    is_late = False
+
+    def give_up() -> None:
+        nonlocal is_late
+        is_late = task.cancel()
+
+    alarm = threading.Timer(patience_s, loop.call_soon_threadsafe, [give_up])
+    alarm.daemon = True
+    alarm.start()
+    try:
+        return await task
+    except asyncio.CancelledError:
+        if not is_late:
+            raise
+        raise TooLate(f"{what}: not within {patience_s:.0f} s\n{evidence()}") from None
+    finally:
+        alarm.cancel()
+        task.cancel()

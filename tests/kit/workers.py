@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import pluggy
+from tests.kit.until import PATIENCE_S, arrived
 
 from nondum.host.confinement import Level, choice
-from nondum.host.events import BehaviourEnded, Event
+from nondum.host.events import BehaviourEnded, Event, WorkerExited, WorkerReady
 from nondum.host.workers import (
     Call,
     Limits,
@@ -32,8 +33,8 @@ from nondum.sdk.description import Behaviour, Input, Output, PluginDescription, 
 SDK = Path(__file__).parents[2] / "plugins/sdk"
 LIBRARIES = Path(pluggy.__file__).parents[1]
 HOST = "rover"
-QUICK = Timing(startup_s=20.0, heartbeat_s=0.8, missed=4, halt_s=0.4, term_s=0.3)
-"""Impatient once they run, so that tests of hanging workers are short; the SDK beats every 2 s."""
+TIMING = Timing(backoff_s=0.0)
+"""As the product has it, but that workers are restarted at once."""
 
 LEVEL = os.environ.get("NONDUM_TEST_LEVEL", choice.AUTO)
 """Level of confinement at which workers are tested; `auto`: the best of this machine."""
@@ -52,7 +53,7 @@ class WorkersUnderTest:
     """Workers of one host, and all events that they emitted."""
 
     folder: Path
-    timing: Timing = QUICK
+    timing: Timing = TIMING
     confinement: Confinement | None = None
     """What holds the workers; the machine's best, if not given."""
     events: list[Event] = field(default_factory=list)
@@ -105,16 +106,22 @@ class WorkersUnderTest:
         return self.workers.behave(component, behaviour, arguments)
 
     async def until(
-        self, kind: type[_E], test: Callable[[_E], bool] = lambda _: True, timeout_s: float = 60.0
+        self,
+        kind: type[_E],
+        test: Callable[[_E], bool] = lambda _: True,
+        timeout_s: float = PATIENCE_S,
     ) -> _E:
         """Wait for an event that has come, or comes."""
-        async with asyncio.timeout(timeout_s):
-            while True:
-                for event in self.events:
-                    if isinstance(event, kind) and test(event):
-                        return event
-                self._arrived.clear()
-                await self._arrived.wait()
+        return await arrived(
+            kind.__name__,
+            self._next(kind, test),
+            evidence=lambda: "\n".join(map(str, self.events[-20:])),
+            patience_s=timeout_s,
+        )
+
+    async def until_ready(self, times: int) -> None:
+        """Wait until so many starts of workers have succeeded."""
+        await self.until(WorkerReady, lambda _: len(self.told(WorkerReady)) >= times)
 
     def told(self, kind: type[_E]) -> list[_E]:
         """All events of a kind, so far."""
@@ -140,6 +147,18 @@ class WorkersUnderTest:
                         return int(entry.name)
         raise LookupError(f"{component} has no process {told}")
 
+    async def until_exited(self, times: int) -> None:
+        """Wait until so many workers have ended that were not to end."""
+        await self.until(WorkerExited, lambda _: len(self.told(WorkerExited)) >= times)
+
+    async def _next(self, kind: type[_E], test: Callable[[_E], bool]) -> _E:
+        while True:
+            for event in self.events:
+                if isinstance(event, kind) and test(event):
+                    return event
+            self._arrived.clear()
+            await self._arrived.wait()
+
     def _on_event(self, event: Event) -> None:
         self.events.append(event)
         self._arrived.set()
@@ -154,7 +173,7 @@ def is_alive(pid: int) -> bool:
     return status.rpartition(")")[2].split()[0] not in {"Z", "X"}
 
 
-async def until_gone(pid: int, timeout_s: float = 30.0) -> None:
+async def until_gone(pid: int, timeout_s: float = PATIENCE_S) -> None:
     """Wait for a process to end, whosever child it is."""
     try:
         descriptor = os.pidfd_open(pid)
@@ -163,7 +182,7 @@ async def until_gone(pid: int, timeout_s: float = 30.0) -> None:
     ended = asyncio.Event()
     asyncio.get_running_loop().add_reader(descriptor, ended.set)
     try:
-        await asyncio.wait_for(ended.wait(), timeout_s)
+        await arrived(f"end of process {pid}", ended.wait(), patience_s=timeout_s)
     finally:
         asyncio.get_running_loop().remove_reader(descriptor)
         os.close(descriptor)
@@ -181,7 +200,7 @@ def pose_reader(name: str = "reader") -> Unit:
 
 __all__ = [
     "HOST",
-    "QUICK",
+    "TIMING",
     "WorkersUnderTest",
     "camera",
     "is_alive",

@@ -6,14 +6,15 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
+from tests.kit.clock import VirtualClock
 from tests.kit.workers import WorkersUnderTest, is_alive
 
 
 @pytest.fixture
-async def tested(tmp_path: Path) -> AsyncIterator[WorkersUnderTest]:
-    """Workers with short patience, ended after the test."""
+async def tested(tmp_path: Path, clock: VirtualClock) -> AsyncIterator[WorkersUnderTest]:
+    """Workers that are judged in virtual time, ended after the test."""
     made = WorkersUnderTest(tmp_path)
     yield made
     pids = made.workers.pids().values()
-    await made.workers.close(grace_s=1.0)
+    await clock.advance_until(made.workers.close())
     assert not [pid for pid in pids if is_alive(pid)], "workers are left"

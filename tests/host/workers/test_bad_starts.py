@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tests.kit.clock import VirtualClock
 from tests.kit.workers import WorkersUnderTest, is_alive
 
 from nondum.host.events import WorkerLogged, WorkerReady
@@ -16,6 +17,7 @@ from nondum.sdk.errors import WorkerFailed
 
 pytestmark = pytest.mark.anyio
 
+HERE = "print('here', flush=True)"
 HOOKED = "from nondum.sdk import hookimpl\n@hookimpl\n{}"
 
 
@@ -87,27 +89,33 @@ async def test_missing_interpreter_is_told(tested: WorkersUnderTest, tmp_path: P
 @pytest.mark.parametrize(
     "hang",
     [
-        pytest.param("await asyncio.Event().wait()", id="waits for ever"),
-        pytest.param("time.sleep(3600)", id="blocks its loop"),
+        pytest.param("{here}; await asyncio.Event().wait()", id="waits for ever"),
+        pytest.param("{here}; time.sleep(3600)", id="blocks its loop"),
         pytest.param(
-            "signal.signal(signal.SIGTERM, signal.SIG_IGN)\n    time.sleep(3600)",
+            "signal.signal(signal.SIGTERM, signal.SIG_IGN); {here}; time.sleep(3600)",
             id="ignores SIGTERM",
         ),
     ],
 )
-async def test_hang_in_start_is_ended(tested: WorkersUnderTest, hang: str) -> None:
-    tested.workers.timing = replace(tested.timing, startup_s=1.5)
-    error = await failure(
-        tested,
-        "import asyncio, signal, time\n" + HOOKED.format(f"async def start(ctx):\n    {hang}"),
-    )
-    assert error.code == "WORKER_HUNG"
+async def test_hang_in_start_is_ended(
+    tested: WorkersUnderTest, clock: VirtualClock, hang: str
+) -> None:
+    start = HOOKED.format(f"async def start(ctx):\n    {hang.format(here=HERE)}")
+    await hangs(tested, clock, f"import asyncio, signal, time\n{start}")
 
 
-async def test_hang_while_imported_is_ended(tested: WorkersUnderTest) -> None:
-    tested.workers.timing = replace(tested.timing, startup_s=1.5)
-    error = await failure(tested, "import time\ntime.sleep(3600)")
-    assert error.code == "WORKER_HUNG"
+async def test_hang_while_imported_is_ended(tested: WorkersUnderTest, clock: VirtualClock) -> None:
+    await hangs(tested, clock, f"import time\n{HERE}; time.sleep(3600)")
+
+
+async def hangs(tested: WorkersUnderTest, clock: VirtualClock, source: str) -> None:
+    """A worker that has come to `HERE` has its time for the start, and no more."""
+    failing = asyncio.create_task(failure(tested, source))
+    await tested.until(WorkerLogged, lambda line: line.message == "here")
+    await clock.advance(tested.timing.startup_s * 0.9)
+    assert not failing.done()
+    await clock.advance(tested.timing.startup_s * 0.1)
+    assert (await failing).code == "WORKER_HUNG"
 
 
 async def test_lie_in_the_index_is_told_by_place(tested: WorkersUnderTest) -> None:

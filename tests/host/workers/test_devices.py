@@ -9,8 +9,7 @@ import pytest
 from tests.kit.workers import HOST, WorkersUnderTest
 
 from nondum.host.confinement import Level
-from nondum.host.events import FactKnown, WorkerReady
-from nondum.host.workers import supervision
+from nondum.host.events import FactKnown
 from nondum.planning.running import RunState
 from nondum.sdk.description import Behaviour, Unit
 from nondum.sdk.messages import Bearing, Header, value_to_wire
@@ -86,14 +85,11 @@ async def test_device_granted_before_the_start_is_there(tested: WorkersUnderTest
     assert await node(tested) == seen(tested)
 
 
-async def test_device_outlives_a_crash(
-    tested: WorkersUnderTest, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(supervision, "BACKOFF_S", 0.02)
+async def test_device_outlives_a_crash(tested: WorkersUnderTest) -> None:
     await guest(tested)
     await tested.workers.attach("guest", "line", "/dev/zero", {})
     os.kill(tested.workers.pids()["guest"], signal.SIGKILL)
-    await tested.until(WorkerReady, lambda _: len(tested.told(WorkerReady)) == 2)
+    await tested.until_ready(2)
     assert await node(tested) == seen(tested)
 
 

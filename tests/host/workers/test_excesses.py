@@ -4,44 +4,31 @@ from __future__ import annotations
 
 import os
 from collections.abc import AsyncIterator
-from dataclasses import replace
 from pathlib import Path
 
 import anyio
 import pytest
-from tests.kit.workers import HOST, QUICK, WorkersUnderTest, is_alive
+from tests.host.workers.excesses import DO, FORK, PLUGIN, WATCHED, strained_by_spinning
+from tests.kit.clock import VirtualClock
+from tests.kit.workers import HOST, WorkersUnderTest, is_alive
 
 from nondum.host.cgroups import Cages
-from nondum.host.events import WorkerExited, WorkerLogged, WorkerReady, WorkerStrained
-from nondum.host.workers import Limits, WorkerLauncher, excess, supervision
+from nondum.host.events import WorkerExited, WorkerLogged
+from nondum.host.workers import Limits, WorkerLauncher
 from nondum.planning.running import RunState
-from nondum.sdk.description import Behaviour, Unit
+from nondum.sdk.description import Unit
 
 pytestmark = pytest.mark.anyio
 
-DO = Behaviour("do", "(do ?u - sensor)")
-PLUGIN = """
-import asyncio, os, subprocess, sys, threading, time
-from nondum.sdk import Unit, behaviour, hookimpl
-
-@hookimpl
-def units():
-    return (Unit("it", "sensor"),)
-
-@behaviour("do", action="(do ?u - sensor)")
-async def do(ctx, u):
-    {body}
-"""
 SMALL = Limits(memory_mb=128, tasks=24, descriptors=64, scratch_mb=8)
 
 
 @pytest.fixture
-async def caged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[WorkersUnderTest]:
+async def caged(tmp_path: Path, clock: VirtualClock) -> AsyncIterator[WorkersUnderTest]:
     """Workers in control groups; another one is there before and after."""
-    monkeypatch.setattr(supervision, "BACKOFF_S", 0.02)
     cages = Cages.open(tmp_path)
     assert cages.holds == {"memory", "pids", "cpu"}, "tests run as root, with cgroups"
-    tested = WorkersUnderTest(tmp_path, replace(QUICK, look_s=0.1))
+    tested = WorkersUnderTest(tmp_path, WATCHED)
     tested.workers.launcher = WorkerLauncher(cages=cages)
     await begin(tested, "other", "pass")
     pid = tested.workers.pids()["other"]
@@ -49,7 +36,7 @@ async def caged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterato
     assert await done(tested, "other") is RunState.SUCCEEDED
     assert tested.workers.pids()["other"] == pid
     assert is_alive(pid)
-    await tested.workers.close(grace_s=1.0)
+    await clock.advance_until(tested.workers.close())
     assert cages.sweep() == 0, "cages are left"
     cages.close()
 
@@ -63,7 +50,6 @@ async def done(tested: WorkersUnderTest, name: str) -> RunState:
     return await tested.behave(name, "do", u=f"{HOST}__{name}__it").ended()
 
 
-FORK = "while True:\n    try:\n        os.fork()\n    except OSError:\n        pass"
 HELD = (
     "held = [open(f'f{n}', 'wb') for n in range(4)]\n"
     "for file in held:\n    os.unlink(file.name)\n"
@@ -111,21 +97,23 @@ CHILD = "b = []\nwhile True: b.append(bytearray(1 << 20))"
     ],
 )
 async def test_too_much_ends_that_worker_alone(
-    caged: WorkersUnderTest, body: str, code: str
+    caged: WorkersUnderTest, clock: VirtualClock, body: str, code: str
 ) -> None:
     await begin(caged, "guest", body)
     call = caged.behave("guest", "do", u=f"{HOST}__guest__it")
-    exited = await caged.until(WorkerExited)
+    exited = await clock.advance_until(caged.until(WorkerExited))
     assert exited.component == "guest"
     assert exited.reason.startswith(code), exited.reason
     assert "→" in exited.reason, "it is told what to do"
     assert await call.ended() is RunState.FAILED
-    await caged.until(WorkerReady, lambda _: len(caged.told(WorkerReady)) == 3)
+    await caged.until_ready(3)
     if code == "SCRATCH_FULL":
         assert os.listdir(caged.folder / "guest/scratch") == []  # noqa: PTH208
 
 
-async def test_what_cannot_be_deleted_is_told_and_holds_nothing_up(caged: WorkersUnderTest) -> None:
+async def test_what_cannot_be_deleted_is_told_and_holds_nothing_up(
+    caged: WorkersUnderTest, clock: VirtualClock
+) -> None:
     held = caged.folder / "guest/scratch/held"
     body = (
         "os.mkdir('held'); subprocess.run(['mount', '-t', 'tmpfs', 'tmpfs', 'held'], check=True)\n"
@@ -135,24 +123,23 @@ async def test_what_cannot_be_deleted_is_told_and_holds_nothing_up(caged: Worker
     await begin(caged, "guest", body)
     caged.behave("guest", "do", u=f"{HOST}__guest__it")
     try:
-        exited = await caged.until(WorkerExited)
+        exited = await clock.advance_until(caged.until(WorkerExited))
         assert exited.reason.startswith("SCRATCH_FULL"), exited.reason
         told = [line.message for line in caged.told(WorkerLogged) if line.level == "error"]
         assert [line for line in told if "not all that it left could be cleared away" in line]
-        await caged.until(WorkerReady, lambda _: len(caged.told(WorkerReady)) == 3)
+        await caged.until_ready(3)
         assert [each.name for each in held.parent.iterdir()] == ["held"], "all else is deleted"
     finally:
         await anyio.run_process(["umount", str(held)])
 
 
 async def test_worker_that_nobody_asks_and_spins_is_told_once(
-    caged: WorkersUnderTest, monkeypatch: pytest.MonkeyPatch
+    caged: WorkersUnderTest, clock: VirtualClock
 ) -> None:
-    monkeypatch.setattr(excess, "SPIN_S", 0.5)
     spin = "def spin():\n    while True:\n        pass\n"
     await begin(caged, "guest", f"{spin}threading.Thread(target=spin, daemon=True).start()")
     assert await done(caged, "guest") is RunState.SUCCEEDED
-    strained = await caged.until(WorkerStrained)
+    strained = await strained_by_spinning(caged, clock)
     assert strained.component == "guest"
     assert [problem.code for problem in strained.problems] == ["WORKER_CPU"]
     assert not caged.told(WorkerExited)

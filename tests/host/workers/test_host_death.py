@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.kit.until import arrived, until_async
 from tests.kit.workers import WorkersUnderTest, is_alive, until_gone
 
 from nondum.host.workers import end_leftovers
@@ -62,8 +63,7 @@ async def daemon_with(folder: Path, plugin: str) -> tuple[asyncio.subprocess.Pro
         env={**os.environ, "PYTHONPATH": ":".join(map(str, [*paths, ROOT / "plugins/sdk"]))},
     )
     assert daemon.stdout is not None
-    async with asyncio.timeout(60):
-        return daemon, int(await daemon.stdout.readline())
+    return daemon, int(await arrived("the worker's process", daemon.stdout.readline()))
 
 
 async def kill(daemon: asyncio.subprocess.Process) -> None:
@@ -80,11 +80,10 @@ async def test_worker_leaves_things_safe_and_ends(tmp_path: Path) -> None:
 
 async def test_stuck_interpreter_ends_too(tmp_path: Path) -> None:
     daemon, worker = await daemon_with(tmp_path, STUCK)
-    while not (tmp_path / "guest/scratch/held").exists():  # noqa: ASYNC110  # another process makes it
-        await asyncio.sleep(0.01)
+    await until_async("held", (tmp_path / "guest/scratch/held").exists)
     await kill(daemon)
     assert is_alive(worker)
-    await until_gone(worker, timeout_s=30.0)
+    await until_gone(worker)
 
 
 async def test_next_daemon_ends_what_was_to_become_a_worker(tested: WorkersUnderTest) -> None:

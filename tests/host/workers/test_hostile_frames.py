@@ -10,13 +10,16 @@ import socket
 import subprocess
 import sys
 from collections.abc import AsyncIterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.kit.workers import HOST, WorkersUnderTest
+from tests.kit.clock import VirtualClock
+from tests.kit.until import arrived
+from tests.kit.workers import HOST, TIMING, WorkersUnderTest
 
-from nondum.host.events import WorkerReady
-from nondum.host.workers import Timing, Workers, WorkerSpec
+from nondum.host.events import Event, WorkerLogged, WorkerReady
+from nondum.host.workers import Workers, WorkerSpec
 from nondum.host.workers.process import WorkerProcess
 from nondum.planning.running import RunState
 from nondum.sdk.description import Behaviour, Unit
@@ -26,7 +29,6 @@ from nondum.sdk.wire import PROTOCOL_VERSIONS
 pytestmark = pytest.mark.anyio
 
 SDK = Path(__file__).parents[3] / "plugins/sdk"
-QUICK = Timing(startup_s=5.0, heartbeat_s=0.8, missed=4, halt_s=0.4, term_s=0.1)
 PROLOGUE = f"""
 import os, socket, sys, time
 sys.path[:0] = {[str(SDK), *(p for p in sys.path if p.endswith("site-packages"))]!r}
@@ -135,9 +137,10 @@ HOSTILE: Mapping[str, tuple[str, str]] = {
 
 
 @pytest.fixture
-async def other(tmp_path: Path) -> AsyncIterator[WorkersUnderTest]:
+async def other(tmp_path: Path, clock: VirtualClock) -> AsyncIterator[WorkersUnderTest]:
     """A good worker, which answers before and after."""
-    tested = WorkersUnderTest(tmp_path)
+    # Its signs of life are real, and whole start-up times pass here.
+    tested = WorkersUnderTest(tmp_path, replace(TIMING, missed=1_000_000))
     source = (
         "from nondum.sdk import Unit, behaviour, hookimpl\n"
         "@hookimpl\ndef units():\n    return (Unit('it', 'sensor'),)\n"
@@ -152,25 +155,37 @@ async def other(tmp_path: Path) -> AsyncIterator[WorkersUnderTest]:
     yield tested
     assert await tested.behave("good", "do", u=f"{HOST}__good__it").ended() is RunState.SUCCEEDED
     assert len(tested.told(WorkerReady)) == 1
-    await tested.workers.close(grace_s=1.0)
+    await clock.advance_until(tested.workers.close())
 
 
-async def meet(tested: WorkersUnderTest, name: str, script: str) -> str:
-    """Start a hostile worker, which fails; give the code."""
-    launcher = RawLauncher(f"{script}\ntime.sleep(60)")
-    workers = Workers(HOST, lambda event: None, launcher=launcher, timing=QUICK)
+async def meet(tested: WorkersUnderTest, name: str, script: str, *, hangs: bool = False) -> str:
+    """Start a hostile worker, which fails; give the code. One that `hangs` does so when it has
+    said all that it has to say, and the time for a start is over."""
+    has_said, clock = asyncio.Event(), asyncio.get_running_loop()
+    assert isinstance(clock, VirtualClock)
+
+    def on_event(event: Event) -> None:
+        if isinstance(event, WorkerLogged) and event.message == "said all":
+            has_said.set()
+
+    launcher = RawLauncher(f"{script}\nprint('said all', flush=True)\ntime.sleep(60)")
+    workers = Workers(HOST, on_event, launcher=launcher, timing=TIMING)
+    starting = asyncio.create_task(workers.start(tested.spec(name, "")))
     try:
+        if hangs:
+            await arrived(f"all that {name} says", has_said.wait())
+            await clock.advance(TIMING.startup_s)
         with pytest.raises(WorkerFailed) as failed:
-            await workers.start(tested.spec(name, ""))
+            await arrived(f"failure of {name}", starting)
     finally:
-        await workers.close(grace_s=0.5)
+        await workers.close()
     return failed.value.code
 
 
 @pytest.mark.parametrize("name", list(HOSTILE))
 async def test_it_ends_itself_only(other: WorkersUnderTest, name: str) -> None:
     script, code = HOSTILE[name]
-    assert await meet(other, "bad", script) == code
+    assert await meet(other, "bad", script, hangs=code == "WORKER_HUNG") == code
 
 
 async def test_the_host_keeps_nothing_of_them(other: WorkersUnderTest) -> None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
-import time
+from dataclasses import replace
 
 import pytest
+from tests.kit.clock import VirtualClock
+from tests.kit.until import arrived
 from tests.kit.workers import HOST, WorkersUnderTest, is_alive, until_gone
 
 from nondum.host.events import (
@@ -17,7 +19,8 @@ from nondum.host.events import (
     WorkerLogged,
     WorkerReady,
 )
-from nondum.host.workers import Limits, supervision
+from nondum.host.workers import Call, Limits
+from nondum.host.workers.supervision import RESTARTS
 from nondum.planning.running import RunState
 from nondum.sdk.description import Behaviour, Unit
 
@@ -51,11 +54,6 @@ async def do(ctx, u):
 '''
 
 
-@pytest.fixture(autouse=True)
-def short_backoff(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(supervision, "BACKOFF_S", 0.02)
-
-
 async def guest(
     tested: WorkersUnderTest, body: str, more: str = "", limits: Limits | None = None
 ) -> None:
@@ -66,14 +64,19 @@ async def guest(
 
 
 async def exits_with(tested: WorkersUnderTest, body: str, code: str) -> None:
-    """The worker ends for this reason, its call fails, and another worker takes its place."""
+    """What a behaviour does ends its worker for this reason."""
     await guest(tested, body)
     call = tested.behave("guest", "do", u=UNIT)
+    await is_replaced(tested, call, code)
+
+
+async def is_replaced(tested: WorkersUnderTest, call: Call, code: str) -> None:
+    """The worker ends for this reason, its call fails, and another worker takes its place."""
     exited = await tested.until(WorkerExited)
     assert exited.reason.startswith(code), exited.reason
     assert await call.ended() is RunState.FAILED
     assert code in call.reason
-    await tested.until(WorkerReady, lambda _: len(tested.told(WorkerReady)) == 2)
+    await tested.until_ready(2)
 
 
 async def test_exit_fails_the_call_and_is_repaired(tested: WorkersUnderTest) -> None:
@@ -87,14 +90,32 @@ async def test_killed_worker_is_replaced(tested: WorkersUnderTest) -> None:
     assert "was ended by SIGKILL" in exited.reason
 
 
-async def test_blocked_loop_is_a_hang(tested: WorkersUnderTest) -> None:
-    await exits_with(tested, "time.sleep(3600)", "WORKER_HUNG")
+async def test_blocked_loop_is_a_hang(tested: WorkersUnderTest, clock: VirtualClock) -> None:
+    await guest(tested, "print('blocks', flush=True)\ntime.sleep(3600)")
+    call = tested.behave("guest", "do", u=UNIT)
+    await tested.until(WorkerLogged, lambda line: line.message == "blocks")
+    await clock.advance(tested.timing.silence_s)
+    await is_replaced(tested, call, "WORKER_HUNG")
 
 
-async def test_stopped_process_is_a_hang(tested: WorkersUnderTest) -> None:
+async def test_worker_that_shows_signs_of_life_does_not_hang(
+    tested: WorkersUnderTest, clock: VirtualClock
+) -> None:
+    """However long it lives; the signs are what it says."""
+    tested.workers.timing = replace(tested.timing, settle_beats=1)
+    await guest(tested, "pass")
+    for _ in range(2):
+        await arrived("a sign of life", tested.workers.watched("guest", "0" * 16))
+        await clock.advance(tested.timing.silence_s * 0.9)
+    assert "guest" in tested.workers.pids()
+    assert not tested.told(WorkerExited)
+
+
+async def test_stopped_process_is_a_hang(tested: WorkersUnderTest, clock: VirtualClock) -> None:
     await guest(tested, "pass")
     pid = tested.workers.pids()["guest"]
     os.kill(pid, signal.SIGSTOP)
+    await clock.advance(tested.timing.silence_s)
     exited = await tested.until(WorkerExited)
     assert exited.reason.startswith("WORKER_HUNG")
     assert not is_alive(pid)
@@ -107,11 +128,28 @@ async def test_closed_link_ends_the_worker(tested: WorkersUnderTest) -> None:
     await tested.until(WorkerExited)
 
 
+async def test_worker_that_crashed_is_restarted_after_a_growing_delay(
+    tested: WorkersUnderTest, clock: VirtualClock
+) -> None:
+    tested.workers.timing = replace(tested.timing, backoff_s=1.0)
+    await guest(tested, "pass")
+    for crash, delay_s in enumerate((1.0, 2.0, 4.0), start=1):
+        os.kill(tested.workers.pids()["guest"], signal.SIGKILL)
+        await tested.until_exited(crash)
+        await clock.advance(delay_s * 0.9)
+        assert not tested.workers.pids()
+        await clock.advance(delay_s * 0.1)
+        await tested.until_ready(1 + crash)
+
+
 async def test_crash_loop_ends_in_quarantine(tested: WorkersUnderTest) -> None:
-    await guest(tested, "pass", "import threading; threading.Timer(0.1, os._exit, [9]).start()")
+    await guest(tested, "pass")
+    for starts in range(1, 2 + RESTARTS):
+        await tested.until_ready(starts)
+        os.kill(tested.workers.pids()["guest"], signal.SIGKILL)
     failed = await tested.until(WorkerFailed)
     assert [p.code for p in failed.problems] == ["WORKER_CRASH_LOOP", "WORKER_EXITED"]
-    assert len(tested.told(WorkerReady)) == 1 + supervision.RESTARTS
+    assert len(tested.told(WorkerReady)) == 1 + RESTARTS
     assert not tested.workers.pids()
 
 
@@ -127,7 +165,9 @@ async def test_quarantined_component_may_try_again(tested: WorkersUnderTest) -> 
     assert list(tested.workers.pids()) == ["guest"]
 
 
-async def test_behaviour_that_does_not_halt_costs_its_worker(tested: WorkersUnderTest) -> None:
+async def test_behaviour_that_does_not_halt_costs_its_worker(
+    tested: WorkersUnderTest, clock: VirtualClock
+) -> None:
     body = (
         "await ctx.established()\n"
         "while True:\n"
@@ -140,34 +180,44 @@ async def test_behaviour_that_does_not_halt_costs_its_worker(tested: WorkersUnde
     pid = tested.workers.pids()["guest"]
     call = tested.behave("guest", "do", u=UNIT)
     await tested.until(BehaviourEstablished)
-    asked_s = time.monotonic()
     call.halt()
+    await clock.advance(tested.timing.halt_s * 0.9)
+    assert is_alive(pid)
+    await clock.advance(tested.timing.halt_s * 0.1 + tested.timing.term_s)
     assert await call.ended() is RunState.HALTED
-    assert time.monotonic() - asked_s < 3.0
     assert not is_alive(pid)
     assert (await tested.until(WorkerExited)).reason.startswith("HALT_OVERDUE")
-    await tested.until(WorkerReady, lambda _: len(tested.told(WorkerReady)) == 2)
+    await tested.until_ready(2)
 
 
-async def test_stop_ends_what_ignores_everything(tested: WorkersUnderTest) -> None:
+async def test_stop_ends_what_ignores_everything(
+    tested: WorkersUnderTest, clock: VirtualClock
+) -> None:
+    """Within its grace, of which it has most for its own `stop`."""
     stubborn = (
         "@hookimpl\n"
         "async def start(ctx):\n"
         "    signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
         "@hookimpl\n"
         "async def stop(ctx):\n"
+        "    print('stops', flush=True)\n"
         "    time.sleep(3600)"
     )
     await guest(tested, "pass", stubborn)
     pid = tested.workers.pids()["guest"]
-    asked_s = time.monotonic()
-    await tested.workers.stop("guest", grace_s=1.0)
+    stopping = asyncio.create_task(tested.workers.stop("guest", grace_s=1.0))
+    await tested.until(WorkerLogged, lambda line: line.message == "stops")
+    await clock.advance(0.6)
+    assert is_alive(pid)
+    await clock.advance(0.4)
+    await stopping
     assert not is_alive(pid)
-    assert time.monotonic() - asked_s < 2.0
     assert not tested.told(WorkerExited), "an expected end is no crash"
 
 
-async def test_worker_has_ended_once_it_is_said_to_have_stopped(tested: WorkersUnderTest) -> None:
+async def test_worker_has_ended_once_it_is_said_to_have_stopped(
+    tested: WorkersUnderTest, clock: VirtualClock
+) -> None:
     """The kernel takes a while over much memory; who asks next may want the same device."""
     heavy = (
         "@hookimpl\n"
@@ -180,7 +230,9 @@ async def test_worker_has_ended_once_it_is_said_to_have_stopped(tested: WorkersU
     )
     await guest(tested, "pass", heavy)
     pid = tested.workers.pids()["guest"]
-    await tested.workers.stop("guest", grace_s=0.1)
+    stopping = asyncio.create_task(tested.workers.stop("guest", grace_s=1.0))
+    await clock.advance(1.0)
+    await stopping
     assert not is_alive(pid)
 
 
@@ -227,13 +279,13 @@ async def test_children_go_with_their_worker(tested: WorkersUnderTest, body: str
     await until_gone(child)
 
 
-async def test_flood_of_output_is_bounded(tested: WorkersUnderTest) -> None:
+async def test_flood_of_output_is_bounded(tested: WorkersUnderTest, clock: VirtualClock) -> None:
     body = (
         "for _ in range(40):\n    os.write(1, b'x' * 60_000 + b'\\n')\n    await asyncio.sleep(0)"
     )
     await guest(tested, body)
     call = tested.behave("guest", "do", u=UNIT)
-    assert await call.ended() is RunState.SUCCEEDED
+    assert await clock.advance_until(call.ended()) is RunState.SUCCEEDED
     await tested.workers.stop("guest")
     assert any(line.startswith("LOG_DROPPED") for line in tested.lines("guest"))
     assert sum(map(len, tested.lines("guest"))) < 1_000_000
@@ -296,7 +348,7 @@ async def test_protocol_is_enforced(tested: WorkersUnderTest, body: str, code: s
     await exits_with(tested, f"{body}\nawait asyncio.sleep(60)", code)
 
 
-async def test_others_never_notice(tested: WorkersUnderTest) -> None:
+async def test_others_never_notice(tested: WorkersUnderTest, clock: VirtualClock) -> None:
     await tested.start(
         "good",
         PLUGIN.replace("{more}", "").replace("{body}", "pass"),
@@ -306,9 +358,9 @@ async def test_others_never_notice(tested: WorkersUnderTest) -> None:
     await guest(tested, "while True: os.write(1, b'y' * 4096)")
     tested.behave("guest", "do", u=UNIT)
     for _ in range(20):
-        async with asyncio.timeout(30):
-            call = tested.behave("good", "do", u=f"{HOST}__good__it")
-            assert await call.ended() is RunState.SUCCEEDED
+        await clock.advance(0.1)  # a little more of the flood is read
+        call = tested.behave("good", "do", u=f"{HOST}__good__it")
+        assert await call.ended() is RunState.SUCCEEDED
     assert "good" in tested.workers.pids()
 
 

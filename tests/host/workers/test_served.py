@@ -9,8 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.host.workers.test_excesses import DO, FORK, PLUGIN
-from tests.kit.workers import HOST, QUICK, WorkersUnderTest
+from tests.host.workers.excesses import DO, FORK, PLUGIN, WATCHED, strained_by_spinning
+from tests.kit.clock import VirtualClock
+from tests.kit.workers import HOST, WorkersUnderTest
 
 from nondum.host.cgroups import CageLimits
 from nondum.host.cgroups.cages import Cage, owner, tree
@@ -18,7 +19,7 @@ from nondum.host.cgroups.mounts import here
 from nondum.host.cgroups.services import ServiceGroup
 from nondum.host.confinement.bubblewrap import Ground
 from nondum.host.events import WorkerExited, WorkerStrained
-from nondum.host.workers import Limits, WorkerLauncher, WorkerSpec, excess, supervision
+from nondum.host.workers import Limits, WorkerLauncher, WorkerSpec
 from nondum.host.workers.confinements import Entry, Unconfined
 from nondum.sdk.description import Unit
 
@@ -54,15 +55,13 @@ class Elsewhere(Unconfined):
 
 
 @pytest.fixture
-async def served(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> AsyncIterator[WorkersUnderTest]:
+async def served(tmp_path: Path, clock: VirtualClock) -> AsyncIterator[WorkersUnderTest]:
     """Workers that are all services."""
-    monkeypatch.setattr(supervision, "BACKOFF_S", 60.0)  # one life is enough
-    tested, elsewhere = WorkersUnderTest(tmp_path, replace(QUICK, look_s=0.1)), Elsewhere(tmp_path)
+    timing = replace(WATCHED, backoff_s=1e9)  # one life is enough
+    tested, elsewhere = WorkersUnderTest(tmp_path, timing), Elsewhere(tmp_path)
     tested.workers.launcher = WorkerLauncher(elsewhere)
     yield tested
-    await tested.workers.close(grace_s=1.0)
+    await clock.advance_until(tested.workers.close())
     elsewhere.end()
 
 
@@ -73,40 +72,49 @@ async def begin(tested: WorkersUnderTest, body: str) -> None:
     tested.behave("guest", "do", u=f"{HOST}__guest__it")
 
 
-async def test_service_that_forks_without_end_is_ended(served: WorkersUnderTest) -> None:
+async def test_service_that_forks_without_end_is_ended(
+    served: WorkersUnderTest, clock: VirtualClock
+) -> None:
     await begin(served, FORK)
-    exited = await served.until(WorkerExited)
+    exited = await clock.advance_until(served.until(WorkerExited))
     assert exited.reason.startswith("WORKER_TASKS"), exited.reason
 
 
-async def test_service_that_ends_by_its_limit_of_tasks_says_so(served: WorkersUnderTest) -> None:
+async def test_service_that_ends_by_its_limit_of_tasks_says_so(
+    served: WorkersUnderTest, clock: VirtualClock
+) -> None:
     """Its cgroup goes with it; what was seen last counts."""
-    body = "import threading\nawait asyncio.sleep(0.5)\nheld = []\n"
-    body += "try:\n    while True:\n"
-    body += "        held.append(threading.Thread(target=time.sleep, args=(60,), daemon=True))\n"
-    body += "        held[-1].start()\n"
-    body += "except RuntimeError as error:\n"
-    body += "    await asyncio.sleep(1.0)\n"
-    body += "    print(f'RuntimeError: {error}', file=sys.stderr, flush=True)\n    os._exit(1)"
+    body = (
+        "while not os.path.exists('seen'):\n"
+        "    try:\n"
+        "        threading.Thread(target=time.sleep, args=(60,), daemon=True).start()\n"
+        "    except RuntimeError as refused:\n"
+        "        error = refused\n"
+        "        await asyncio.sleep(0.01)\n"
+        "print(f'RuntimeError: {error}', file=sys.stderr, flush=True)\n"
+        "os._exit(1)"
+    )
     await begin(served, body)
+    strained = await clock.advance_until(served.until(WorkerStrained))
+    assert [problem.code for problem in strained.problems] == ["WORKER_TASKS"]
+    (served.folder / "guest/scratch/seen").touch()
     exited = await served.until(WorkerExited)
     assert exited.reason.startswith("WORKER_TASKS"), exited.reason
 
 
-async def test_descriptors_of_a_service_are_counted(served: WorkersUnderTest) -> None:
+async def test_descriptors_of_a_service_are_counted(
+    served: WorkersUnderTest, clock: VirtualClock
+) -> None:
     body = "held = []\nwhile True:\n    try:\n        held.append(os.dup(1))\n"
     await begin(served, f"{body}    except OSError:\n        await asyncio.sleep(0.01)")
-    exited = await served.until(WorkerExited)
+    exited = await clock.advance_until(served.until(WorkerExited))
     assert exited.reason.startswith("WORKER_FDS"), exited.reason
 
 
-async def test_service_that_spins_is_told_of(
-    served: WorkersUnderTest, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(excess, "SPIN_S", 0.5)
+async def test_service_that_spins_is_told_of(served: WorkersUnderTest, clock: VirtualClock) -> None:
     spin = "def spin():\n    while True:\n        pass\n"
     await begin(served, f"{spin}threading.Thread(target=spin, daemon=True).start()")
-    strained = await served.until(WorkerStrained)
+    strained = await strained_by_spinning(served, clock)
     assert [problem.code for problem in strained.problems] == ["WORKER_CPU"]
 
 

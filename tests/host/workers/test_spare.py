@@ -38,8 +38,8 @@ FORKING = (
 def spare_of(tested: WorkersUnderTest) -> int:
     launcher = tested.workers.launcher
     assert isinstance(launcher, WorkerLauncher)
-    assert launcher._spare is not None
-    return launcher._spare.popen.pid
+    assert launcher.spare_pid is not None
+    return launcher.spare_pid
 
 
 def environment(pid: int) -> dict[str, str]:

@@ -11,7 +11,7 @@ import pytest
 from tests.host.workers.streaming import CAMERA, STREAM, WATCH, WATCHER, sees
 from tests.kit.workers import HOST, WorkersUnderTest
 
-from nondum.host.events import BehaviourEstablished, StreamFlowing, WorkerReady
+from nondum.host.events import BehaviourEstablished, StreamFlowing
 from nondum.host.workers import Call
 from nondum.planning.running import RunState
 from nondum.sdk.description import Behaviour, Input, Output, Unit
@@ -161,7 +161,7 @@ async def test_restarted_reader_is_wired_again(tested: WorkersUnderTest) -> None
     await odometer(tested, "base")
     await panner(tested)
     os.kill(tested.workers.pids()["panner"], signal.SIGKILL)
-    await tested.until(WorkerReady, lambda _: len(tested.told(WorkerReady)) == 3)
+    await tested.until_ready(3)
     call = tested.behave("panner", "read", u=f"{HOST}__panner__reader")
     assert await call.ended() is RunState.SUCCEEDED
 

@@ -12,17 +12,15 @@ from dataclasses import dataclass, field
 
 from nondum.host.cgroups import Usage
 from nondum.host.workers import problems
-from nondum.host.workers.spec import Limits
+from nondum.host.workers.spec import Limits, Timing
 from nondum.sdk.errors import Problem
 
 REFUSALS = 1000
 """Processes and threads refused without a reading at which none was: it forks for its life."""
 NEARLY = 0.9
 """Part of a limit at which people are told."""
-SPIN_S = 10.0
-"""How long a worker that nobody asks anything may keep a processor busy."""
 SPIN_PART = 0.8
-"""Of that time, one of its threads runs or waits for a processor: on a busy machine, it waits."""
+"""Of `spin_s`, one of its threads runs or waits for a processor: on a busy machine, it waits."""
 SPARED = 3
 """Descriptors below the limit at which there are none left to work with."""
 
@@ -58,6 +56,8 @@ class Watch:
 
     component: str
     limits: Limits
+    spin_s: float = Timing().spin_s
+    """How long it may keep a processor busy with nothing to do."""
     _last: Reading | None = None
     _busy_since_s: float | None = None
     _refused_before: int = 0
@@ -98,7 +98,7 @@ class Watch:
         if now.scratch_bytes >= self.limits.scratch_mb * problems.MEGABYTE * NEARLY:
             yield problems.scratch_full(self.component, self.limits.scratch_mb)
         if self._is_spinning(last, now):
-            yield problems.spinning(self.component, SPIN_S)
+            yield problems.spinning(self.component, self.spin_s)
 
     def _is_spinning(self, last: Reading, now: Reading) -> bool:
         most = min(1.0, self.limits.processors or 1.0) * SPIN_PART
@@ -110,4 +110,4 @@ class Watch:
             self._busy_since_s = None
         elif self._busy_since_s is None:
             self._busy_since_s = last.at_s
-        return self._busy_since_s is not None and now.at_s - self._busy_since_s >= SPIN_S
+        return self._busy_since_s is not None and now.at_s - self._busy_since_s >= self.spin_s

@@ -70,6 +70,11 @@ class WorkerLauncher:
         self.level = int(self._confinement.level)
         self.name = NAMES[self._confinement.level]
 
+    @property
+    def spare_pid(self) -> int | None:
+        """The process of the spare interpreter, if there is one."""
+        return None if self._spare is None else self._spare.popen.pid
+
     def launch(self, spec: WorkerSpec, sock: socket.socket) -> WorkerProcess:
         """Start a worker (see `Launcher`), from the spare interpreter if there is one."""
         said = ""

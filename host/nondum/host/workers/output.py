@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import time
 from collections.abc import Callable
 from typing import IO, TypeAlias
 
@@ -29,14 +28,15 @@ OnLine: TypeAlias = Callable[[str, str], None]
 class Valve:
     """Lets 64 KiB a second through, and counts what it does not."""
 
-    def __init__(self) -> None:
-        self._bucket = TokenBucket(RATE_BYTES_S, BURST_BYTES, time.monotonic())
+    def __init__(self, now_s: Callable[[], float]) -> None:
+        self._now_s = now_s
+        self._bucket = TokenBucket(RATE_BYTES_S, BURST_BYTES, now_s())
         self.dropped = 0
         """Bytes that did not pass, since they were last told."""
 
     def passes(self, size: int) -> bool:
         """Whether so much may pass now; it is counted otherwise."""
-        if self._bucket.take(size, time.monotonic()):
+        if self._bucket.take(size, self._now_s()):
             return True
         self.dropped += size
         return False
@@ -52,10 +52,10 @@ class Output:
 
     def __init__(self, source: str, pipe: IO[bytes], on_line: OnLine) -> None:
         self._source, self._pipe, self._on_line = source, pipe, on_line
-        self._valve = Valve()
+        self._loop = asyncio.get_running_loop()
+        self._valve = Valve(self._loop.time)
         self._unfinished = b""
         self._resume: asyncio.TimerHandle | None = None
-        self._loop = asyncio.get_running_loop()
         os.set_blocking(pipe.fileno(), False)
         self._loop.add_reader(pipe.fileno(), self._on_readable)
 

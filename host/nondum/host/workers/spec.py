@@ -56,8 +56,14 @@ class Timing:
     """From asking a behaviour to halt until its worker is ended for not obeying."""
     term_s: float = 0.5
     """From SIGTERM to SIGKILL."""
+    backoff_s: float = 1.0
+    """From a crash to the first restart; doubled for each further one."""
     look_s: float = 2.0
     """Between two looks at what a worker uses."""
+    spin_s: float = 10.0
+    """How long a worker that runs no behaviour and feeds no stream may keep a processor busy."""
+    spare_s: float = 2.0
+    """From a launch until the next one is prepared."""
 
     @property
     def silence_s(self) -> float:

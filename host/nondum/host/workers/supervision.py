@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 RESTARTS = 3
 """Within `WINDOW_S`; the next crash is one too many."""
 WINDOW_S = 60.0
-BACKOFF_S = 1.0
-"""Before the first restart; doubled for each further one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,6 +15,8 @@ class Supervision:
 
     crashes: tuple[float, ...] = ()
     """When they were, in seconds, oldest first."""
+    backoff_s: float = 1.0
+    """Before the first restart; doubled for each further one."""
 
     def crashed(self, now_s: float) -> Supervision:
         """With one more crash, and without those that are long ago.
@@ -39,4 +39,4 @@ class Supervision:
         >>> [Supervision((0.0,) * crashes).delay_s for crashes in range(4)]
         [0.0, 1.0, 2.0, 4.0]
         """
-        return BACKOFF_S * 2.0 ** (len(self.crashes) - 1) if self.crashes else 0.0
+        return self.backoff_s * 2.0 ** (len(self.crashes) - 1) if self.crashes else 0.0

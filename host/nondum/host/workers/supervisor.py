@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import time
 from collections.abc import Mapping
 from typing import Any, Protocol
 
@@ -56,7 +55,7 @@ class Supervisor:
         """How much it counts; what happens to it is told accordingly."""
         self._worker: Worker | None = None
         self._household = household
-        self._supervision = Supervision()
+        self._supervision = Supervision(backoff_s=household.timing.backoff_s)
         self._task: asyncio.Task[None] | None = None
         """Starts the first worker, then keeps one alive."""
         self.is_stopping = False
@@ -77,7 +76,8 @@ class Supervisor:
 
         Raises `WorkerFailed`; then there is none, and none will be. Cancelled, it leaves none.
         """
-        self.is_stopping, self._supervision = False, Supervision()
+        self.is_stopping = False
+        self._supervision = Supervision(backoff_s=self._household.timing.backoff_s)
         self._task = asyncio.create_task(self._start_worker())
         try:
             await self._task
@@ -143,7 +143,8 @@ class Supervisor:
     async def _restart(self, problem: Problem) -> bool:
         """Start another worker, trying as often as supervision allows; say whether one runs."""
         while True:
-            self._supervision = self._supervision.crashed(time.monotonic())
+            now_s = asyncio.get_running_loop().time()
+            self._supervision = self._supervision.crashed(now_s)
             if self._supervision.is_exhausted:
                 self._give_up(problem)
                 return False

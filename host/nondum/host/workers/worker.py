@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -61,8 +60,8 @@ class Worker:
         self._watchdog: asyncio.TimerHandle | None = None
         self.gone: asyncio.Future[Problem] = self._loop.create_future()
         """Why the worker ended, once nothing of it is left."""
-        self._log_valve = Valve()
-        self._watch = Watch(spec.component, spec.limits)
+        self._log_valve = Valve(self._loop.time)
+        self._watch = Watch(spec.component, spec.limits, timing.spin_s)
         ours, theirs = link_sockets()
         try:
             with theirs:
@@ -261,7 +260,7 @@ class Worker:
 
         def read() -> Reading:
             return Reading(
-                at_s=time.monotonic(),
+                at_s=self._loop.time(),
                 usage=self._gauge.usage(),
                 descriptors=self._gauge.descriptors(),
                 wanted_s=self._gauge.wanted_s(),

@@ -35,9 +35,6 @@ FactValue: TypeAlias = tuple[str, Sequence[str], Any]
 GRACE_S = 2.0
 """What a worker has to end when its component is removed."""
 
-SPARE_AFTER_S = 2.0
-"""From a launch until the next one is prepared."""
-
 log = logging.getLogger(__name__)
 
 
@@ -298,7 +295,7 @@ class Workers:
         """Keep what a worker logs, wire what begins to flow, and hand all of it on."""
         match event:
             case WorkerLogged(component, level, message):
-                now = Moment(time.monotonic(), time.time())
+                now = Moment(asyncio.get_running_loop().time(), time.time())
                 for line in message.splitlines():
                     self.logs.add(component, LogLine(now, level, line))
             case StreamFlowing(_, stream, flowing):
@@ -340,7 +337,7 @@ class Workers:
             self._warming.cancel()
         if self._keeps_spare:
             loop = asyncio.get_running_loop()
-            self._warming = loop.call_later(SPARE_AFTER_S, self.launcher.warm)
+            self._warming = loop.call_later(self.timing.spare_s, self.launcher.warm)
 
     def _worker(self, component: str) -> Worker:
         supervisor = self._supervisors.get(component)

@@ -1,0 +1,46 @@
+"""Plugins that use too much, and how they are watched in virtual time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from tests.kit.clock import VirtualClock
+from tests.kit.until import until_async
+from tests.kit.workers import TIMING, WorkersUnderTest
+
+from nondum.host.events import WorkerStrained
+from nondum.host.workers.gauge import Gauge
+from nondum.sdk.description import Behaviour
+
+DO = Behaviour("do", "(do ?u - sensor)")
+PLUGIN = """
+import asyncio, os, subprocess, sys, threading, time
+from nondum.sdk import Unit, behaviour, hookimpl
+
+@hookimpl
+def units():
+    return (Unit("it", "sensor"),)
+
+@behaviour("do", action="(do ?u - sensor)")
+async def do(ctx, u):
+    {body}
+"""
+FORK = "while True:\n    try:\n        os.fork()\n    except OSError:\n        pass"
+WATCHED = replace(TIMING, look_s=0.1, spin_s=0.5, missed=1_000_000)
+"""Looked at often; time passes faster than workers show signs of life, and none of them hangs."""
+
+
+async def strained_by_spinning(tested: WorkersUnderTest, clock: VirtualClock) -> WorkerStrained:
+    """Let time pass as fast as the worker `guest` computes, until it is told that it spins."""
+    gauge = Gauge(lambda: tested.workers.pids()["guest"], None)
+
+    enough_s = 0.0
+
+    def is_enough() -> bool:
+        return max(gauge.wanted_s().values()) >= enough_s
+
+    while not tested.told(WorkerStrained):
+        enough_s = max(gauge.wanted_s().values()) + 2 * WATCHED.look_s
+        await until_async("a spinning thread", is_enough)
+        await clock.advance(WATCHED.look_s)
+    return tested.told(WorkerStrained)[0]
