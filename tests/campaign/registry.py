@@ -63,6 +63,17 @@ _ALL = (
         ("--points", "100", *_SEED),
     ),
     Campaign(
+        "restarts",
+        "Daemons killed at random moments and started again at once, under load",
+        (
+            *(f"{HOST}/{room}" for room in ("lifecycle", "catalogue", "workers")),
+            "tests/faults",
+            "tests/kit",
+        ),
+        "tests.faults.restarts",
+        _SEED,
+    ),
+    Campaign(
         "fuzz",
         "Every reader of foreign bytes, by a coverage-guided fuzzer",
         (*PORTIONS, "tests/fuzz"),

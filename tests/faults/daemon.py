@@ -31,11 +31,12 @@ from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import DriveState, JournalEntry, Step
 from nondum.host.catalogue.state import HostState
 from nondum.host.drives.slots import SlotSource
+from nondum.host.lifecycle import state_lock
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.lifecycle.children import watch_without_threads
 from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
-from nondum.host.lifecycle.folders import Folders, claim
+from nondum.host.lifecycle.folders import Folders
 from nondum.host.lifecycle.installation import InstallOptions
 from nondum.host.transitions import COMPONENT_TRANSITIONS, TRANSITIONS
 from nondum.host.workers import Timing, Workers
@@ -208,7 +209,7 @@ async def main(orders: dict[str, Any]) -> None:
     told = os.open(root / "told", os.O_CREAT | os.O_APPEND | os.O_WRONLY | os.O_CLOEXEC)
     watch_without_threads()
     folders = Folders(root / "state")
-    claim(folders)
+    held = await state_lock.lock(folders.root)
     bus = Bus()
     catalogue = await DeadlyCatalogue.open(folders.catalogue, HOST)
     assert isinstance(catalogue, DeadlyCatalogue)
@@ -232,6 +233,7 @@ async def main(orders: dict[str, Any]) -> None:
     await asyncio.gather(running, return_exceptions=True)
     await workers.close()
     await catalogue.close()
+    held.release()
 
 
 if __name__ == "__main__":

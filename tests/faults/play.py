@@ -76,7 +76,7 @@ class Player:
         """Wait for something. Raises `ProcessLookupError` once the daemon is dead, and `Stuck`."""
         patience = time.monotonic() + PATIENCE_S
         while not holds():
-            if _is_dead(pid):
+            if is_dead(pid):
                 raise ProcessLookupError
             if self.late_s is not None and begun and time.monotonic() - begun > self.late_s:
                 os.kill(pid, signal.SIGKILL)
@@ -108,7 +108,8 @@ class Player:
                 return []
 
 
-def _is_dead(pid: int) -> bool:
+def is_dead(pid: int) -> bool:
+    """Whether a process has ended."""
     try:
         return "\nState:\tZ" in Path(f"/proc/{pid}/status").read_text()
     except FileNotFoundError:

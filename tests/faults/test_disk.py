@@ -16,7 +16,7 @@ from tests.kit.payloads import Part, make_payload, make_wheel
 from nondum.host import events
 from nondum.host.catalogue.records import Step
 from nondum.host.catalogue.reserve import RESERVE_BYTES
-from nondum.host.lifecycle.folders import Folders, claim
+from nondum.host.lifecycle import state_lock
 from nondum.host.lifecycle.installation import InstallOptions
 from nondum.host.lifecycle.installed import install, uninstall
 from nondum.sdk.errors import ConfigRefused
@@ -160,7 +160,7 @@ async def test_host_does_not_start_on_a_disk_that_is_read_only(
             pass
     assert refused.value.code == "STATE_UNWRITABLE"
     with pytest.raises(ConfigRefused) as refused:
-        claim(Folders(root / "state"))
+        await state_lock.lock(root / "state")
     assert refused.value.code == "STATE_UNWRITABLE"
 
 

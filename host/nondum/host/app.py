@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import os
 import signal
 from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -36,12 +35,12 @@ from nondum.host.feedback import parts as feedback_parts
 from nondum.host.feedback.feedback import Feedback
 from nondum.host.goal_files import GoalFiles, of_people
 from nondum.host.helper import privileged
-from nondum.host.lifecycle import safe_mode
+from nondum.host.lifecycle import safe_mode, state_lock
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.lifecycle.children import watch_without_threads
 from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
-from nondum.host.lifecycle.folders import Folders, claim
+from nondum.host.lifecycle.folders import Folders
 from nondum.host.lifecycle.installation import InstallOptions
 from nondum.host.lifecycle.lanes import in_thread
 from nondum.host.lifecycle.tally import Tally
@@ -81,7 +80,7 @@ async def run_host(
     """Run a host until SIGTERM or SIGINT. `more_drives` are sources beside the configuration's;
     `safety` is asked for by a person; `notifier` tells a service manager how it is.
 
-    Raises `ConfigRefused` (ALREADY_RUNNING, SYSTEM_TREE, …) before anything has begun.
+    Raises `ConfigRefused` (ALREADY_RUNNING, STATE_BUSY, SYSTEM_TREE, …) before anything has begun.
     """
     stop = _told_to_stop()
     async with Service(notifier or Notifier()) as service:
@@ -99,7 +98,8 @@ async def _run_as(
     heap.give_back_what_is_big()
     _make_slots(config)
     folders = Folders(config.host.state)
-    held = claim(folders)
+    held = await state_lock.lock(folders.root, service.waits)
+    ending = asyncio.create_task(_when(stop, held.will_end))
     try:
         tally = Tally(folders.root)
         safety = await in_thread(tally.begin, asked)
@@ -111,7 +111,8 @@ async def _run_as(
         finally:
             await catalogue.close()
     finally:
-        os.close(held)
+        ending.cancel()
+        held.release()
 
 
 async def _run(
@@ -403,6 +404,12 @@ def _told_to_stop() -> asyncio.Event:
     for number in (signal.SIGTERM, signal.SIGINT):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
     return stop
+
+
+async def _when(event: asyncio.Event, function: Callable[[], None]) -> None:
+    """Call a function once an event is set."""
+    await event.wait()
+    function()
 
 
 async def _until(stop: asyncio.Event, *parts: Coroutine[Any, Any, None]) -> None:

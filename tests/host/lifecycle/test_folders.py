@@ -1,16 +1,14 @@
-"""The state folder belongs to one daemon, and keeps nothing that its catalogue does not know."""
+"""The state folder keeps nothing that its catalogue does not know."""
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
 
 from nondum.host.catalogue.records import PayloadRecord, Step
 from nondum.host.catalogue.state import HostState
-from nondum.host.lifecycle.folders import Folders, claim, remove, sweep
-from nondum.sdk.errors import ConfigRefused
+from nondum.host.lifecycle.folders import Folders, remove, sweep
 
 NOTE = "installed/known.json"
 
@@ -37,15 +35,6 @@ def fill(folders: Folders) -> None:
             folder.mkdir(parents=True)
             (folder / "file").touch()
         folders.scratch(key, "eye").mkdir(parents=True, exist_ok=True)
-
-
-def test_second_daemon_is_turned_away(tmp_path: Path) -> None:
-    held = claim(Folders(tmp_path / "state"))
-    with pytest.raises(ConfigRefused) as refused:
-        claim(Folders(tmp_path / "state"))
-    assert refused.value.code == "ALREADY_RUNNING"
-    os.close(held)
-    os.close(claim(Folders(tmp_path / "state")))
 
 
 @pytest.mark.parametrize(

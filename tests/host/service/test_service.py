@@ -6,17 +6,21 @@ import asyncio
 import os
 import signal
 import socket
+import sqlite3
 import subprocess
 from collections.abc import AsyncIterator, Coroutine, Iterator
-from contextlib import asynccontextmanager, contextmanager, suppress
+from contextlib import asynccontextmanager, closing, contextmanager, suppress
 from pathlib import Path
 
 import pytest
-from tests.host.cli.daemon import Daemon, command, quiet_environment, write_config
+from tests.host.cli.daemon import Daemon, command, quiet_environment, running, write_config
 from tests.kit.clock import VirtualClock
+from tests.kit.until import until
 
 from nondum.host.events import HostStarted
+from nondum.host.lifecycle import state_lock
 from nondum.host.lifecycle.bus import Bus
+from nondum.host.lifecycle.state_lock import Holder
 from nondum.host.service.notify import Notifier
 from nondum.host.service.service import BETWEEN_WORDS_S, LONGEST_START_S, STARTING_S, Part, Service
 
@@ -71,6 +75,36 @@ def test_daemon_is_ready_once_it_answers_and_says_what_it_does(
         heard(manager, "STATUS=0 components at work")
         daemon.process.terminate()
         heard(manager, "STOPPING=1")
+
+
+def test_daemon_that_is_started_while_the_one_before_it_ends_comes_up_after_it(
+    tmp_path: Path, manager: socket.socket
+) -> None:
+    """The first one is stopped while it ends, until the other one waits for it."""
+    with running(tmp_path) as before:
+        with locked_catalogue(tmp_path):  # for its last words
+            before.process.terminate()
+            until("it shows that it is ending", lambda: holder(tmp_path / "state").is_ending)
+            before.process.send_signal(signal.SIGSTOP)
+        with served(tmp_path, manager):
+            heard(manager, f"STATUS=waiting for process {before.process.pid} ")
+            before.process.send_signal(signal.SIGCONT)
+            assert before.process.wait(PATIENCE_S) == 0
+            heard(manager, "READY=1")
+
+
+def holder(state: Path) -> Holder:
+    found = state_lock.attempt(state)
+    assert isinstance(found, Holder), "nothing has the lock"
+    return found
+
+
+@contextmanager
+def locked_catalogue(root: Path) -> Iterator[None]:
+    """Nothing can be written to it."""
+    with closing(sqlite3.connect(root / "state/catalogue.sqlite")) as connection:
+        connection.execute("BEGIN IMMEDIATE")
+        yield
 
 
 def test_daemon_gives_signs_of_life_whenever_it_runs(

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import fcntl
 import logging
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,8 +11,6 @@ from nondum.host.catalogue.records import Step
 from nondum.host.catalogue.state import HostState
 from nondum.host.helper import privileged
 from nondum.host.workers import scratch
-from nondum.sdk.errors import ConfigRefused, Problem
-from nondum.wheelhouse import disk
 
 _KEEPS_VENVS = frozenset({Step.STORED, Step.PROBED, Step.ACTIVE, Step.SUPERSEDED})
 KEEPS_FOLDER = _KEEPS_VENVS | {Step.STAGED, Step.QUARANTINED}
@@ -124,30 +120,6 @@ class Folders:
         return self.staging(payload), *kept, self.venvs(payload), scratches
 
 
-def claim(folders: Folders) -> int:
-    """Make the state folder this daemon's alone. Returns the descriptor that holds the claim.
-
-    Raises `ConfigRefused` (ALREADY_RUNNING, STATE_UNWRITABLE).
-    """
-    try:
-        disk.make_folder(folders.root)
-        held = os.open(folders.root / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-    except OSError as error:
-        raise ConfigRefused(_unwritable(folders.root, error)) from error
-    try:
-        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        os.close(held)
-        problem = Problem(
-            "ALREADY_RUNNING",
-            "another daemon uses this state folder",
-            where=str(folders.root),
-            fix="stop that one, or give this host another `state` folder",
-        )
-        raise ConfigRefused(problem) from error
-    return held
-
-
 def sweep(folders: Folders, state: HostState) -> tuple[Path, ...]:
     """Delete every folder and undo every mount that a recovered state does not account for."""
     try:
@@ -198,12 +170,3 @@ def _orphans(folders: Folders, state: HostState) -> Iterator[Path]:
     for name, names in kept.items():
         if (folders.root / name).is_dir():
             yield from (p for p in (folders.root / name).iterdir() if p.name not in names)
-
-
-def _unwritable(root: Path, error: OSError) -> Problem:
-    return Problem(
-        "STATE_UNWRITABLE",
-        f"the state folder cannot be used ({error.strerror})",
-        where=str(root),
-        fix="see to it that the disk works and is not read-only, or give another `state` folder",
-    )

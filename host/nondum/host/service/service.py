@@ -59,6 +59,10 @@ class Service:
         self._notifier.stopping()
         self._notifier.close()
 
+    def waits(self, words: str) -> None:
+        """Tell what the start waits for."""
+        self._notifier.status(words)
+
     def on_event(self, event: Event) -> None:
         """The daemon serves once it has recovered: its socket is open before that."""
         if isinstance(event, HostStarted):

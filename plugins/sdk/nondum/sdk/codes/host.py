@@ -135,6 +135,12 @@ CODES = (
         "`nondum status` says how it is",
     ),
     Code(
+        "STATE_BUSY",
+        "The daemon before this one is ending, and does not let go of the state folder.",
+        "end the process that is named (`kill -9`), and start again; if it does not end, a drive "
+        "or disk does not answer: unplug it, or restart the computer",
+    ),
+    Code(
         "STATE_UNWRITABLE",
         "The state folder cannot be used.",
         "see to it that the disk works, has room, and that this user may write there",
