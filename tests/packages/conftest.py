@@ -1,7 +1,8 @@
-"""The Debian packages of this checkout, built once for all that look at them."""
+"""The Debian packages of this checkout, each built once for all that look at it."""
 
 from __future__ import annotations
 
+import functools
 import os
 import subprocess
 import sys
@@ -15,6 +16,7 @@ BUILDER = ROOT / "packaging/debian"
 EPOCH = "1767225600"
 """One time for all, whatever is committed meanwhile."""
 Build = Callable[..., Path]
+Package = Callable[[str], Path]
 
 
 @pytest.fixture(scope="session")
@@ -34,7 +36,12 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
 
 
 @pytest.fixture(scope="session")
-def packages(build: Build) -> dict[str, Path]:
-    """The packages of both architectures, by Debian's name of it."""
-    folder = build("--arch", "amd64", "--arch", "arm64", "--version", "0.1.0+test1")
-    return {deb.stem.rpartition("_")[2]: deb for deb in folder.iterdir()}
+def package(build: Build) -> Package:
+    """The package of an architecture, by Debian's name of it."""
+
+    @functools.cache
+    def of(architecture: str) -> Path:
+        (deb,) = build("--arch", architecture, "--version", "0.1.0+test1").iterdir()
+        return deb
+
+    return of

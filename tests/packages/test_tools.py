@@ -19,7 +19,7 @@ from tests.daemon.plugins import talker
 from tests.kit.payloads import make_payload
 from tests.packages.conftest import ROOT
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900), pytest.mark.long("packages")]
 DISTRIBUTIONS = ("plugins/sdk", "plugins/planner-pyperplan", ".")
 PAYLOAD = "org.example.talker"
 
