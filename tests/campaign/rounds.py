@@ -96,7 +96,7 @@ class Round:
         say: Callable[[str], None] | None = None,
     ) -> None:
         self.folder, self.limit = folder, limit
-        self._pieces, self._say = pieces, say or _print
+        self.pieces, self._say = pieces, say or _print
         self._lock = threading.Lock()
         before = Tally.read(folder) or Tally(0)
         self.tally = Tally(len(pieces), _among(before.done, pieces), _among(before.failed, pieces))
@@ -104,7 +104,7 @@ class Round:
 
     def due(self) -> Iterator[str]:
         """The pieces that were not done yet, until the time is over."""
-        for piece in self._pieces:
+        for piece in self.pieces:
             if self.limit.is_over:
                 return
             if piece not in self.tally.done:
@@ -117,7 +117,7 @@ class Round:
             failed = [one for one in self.tally.failed if one != piece]
             if not passed:
                 failed.append(piece)
-            self.tally = Tally(len(self._pieces), (*others, piece), tuple(failed))
+            self.tally = Tally(len(self.pieces), (*others, piece), tuple(failed))
             self.tally.write(self.folder)
             mark = "passed" if passed else "FAILED"
             more = f"  {note}" if note else ""

@@ -50,7 +50,8 @@ def main(words: Sequence[str]) -> int:
 
 def _run(lab: Lab, known: dict[str, Scenario], due: Round, asked: argparse.Namespace) -> int:
     results = []
-    for result in run_all((known[name] for name in due.due()), lab):
+    names = due.due() if asked.folder else due.pieces
+    for result in run_all((known[name] for name in names), lab):
         results.append(result)
         due.add(result.scenario.name, passed=not result.failure)
         _show(result, f"{due.limit} {due.tally}  " if asked.folder else "")
@@ -61,14 +62,18 @@ def _run(lab: Lab, known: dict[str, Scenario], due: Round, asked: argparse.Names
         if result.failure:
             print(f"\n{result.scenario.name}\n{result.failure}\nkept: {result.kept}")
     boots = ", ".join(f"{seconds:.0f}" for seconds in lab.boots_s)
-    print(f"\nboots: {boots} s\n{len(results) - failed} passed, {failed} failed")
+    replugs = sum(result.replugs for result in results)
+    print(f"\nboots: {boots} s; drives plugged in again because they stalled: {replugs}")
+    print(f"{len(results) - failed} passed, {failed} failed")
     return 1 if due.tally.failed else 0
 
 
 def _show(result: Result, head: str) -> None:
     mark = "FAILED" if result.failure else "passed"
     times = f"{result.seconds:5.0f} s  {result.cpu_s:5.0f} s cpu"
-    print(f"{head}{mark}  {times}  {result.scenario.name:14}  {result.note}", flush=True)
+    told = [result.note, f"replugs: {result.replugs}" if result.replugs else ""]
+    note = "; ".join(filter(None, told))
+    print(f"{head}{mark}  {times}  {result.scenario.name:14}  {note}", flush=True)
 
 
 def _told(what: str, began: float) -> None:

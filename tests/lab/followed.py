@@ -81,6 +81,7 @@ class Followed(Installed):
                 return names
             for payload in late:
                 self.machine.pull(names[payload])
+                self.machine.replugs += 1
                 names[payload] = self._plug(sticks[payload])
         raise AssertionError(f"the drives of {sorted(late)} stalled {REPLUGS} times")
 

@@ -124,7 +124,8 @@ class Installed:
         Drives that do not answer for ten seconds count as broken. Where the emulated processors
         have to wait that long for real ones, this does as people are told: pulls, and plugs again.
         """
-        for _ in range(REPLUGS):
+        for attempt in range(REPLUGS):
+            self.machine.replugs += attempt > 0
             stick = self.machine.plug(image, port=port)
             if self.until(f"{payload} or a stalled drive", partial(active_or_stalled, payload)):
                 return stick

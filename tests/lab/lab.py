@@ -125,6 +125,10 @@ class Lab:
         """Processor time that all machines took so far."""
         return sum(machine.cpu_s for machine in self.all_machines)
 
+    def replugs(self) -> int:
+        """How often a drive was plugged in again so far, because it stalled."""
+        return sum(machine.replugs for machine in self.all_machines)
+
     def stick(self, name: str, *parts: Part, **options: Any) -> Path:
         """The image of a stick that carries one payload, `org.example.<name>`."""
         content = self.payload(name, *parts, **options)

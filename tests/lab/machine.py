@@ -49,6 +49,8 @@ class Machine:
         self._agent: Agent | None = None
         self._qmp: Qmp | None = None
         self._cpu_s = 0.0
+        self.replugs = 0
+        """How often a stick was plugged in again, because it had stalled."""
         work.mkdir(parents=True, exist_ok=True)
         self._disk = work / "disk.qcow2"
         overlay = ("-q", "-f", "qcow2", "-F", "raw", "-b", built.disk)

@@ -76,7 +76,8 @@ class MachineRobot(Robot):
         if not image.exists():
             fat_stick(image, drive)
         payload = self._payloads[drive.name]
-        for _ in range(REPLUGS):
+        for attempt in range(REPLUGS):
+            self.machine.replugs += attempt > 0
             stick = self.machine.plug(image)
             active = f"{payload} active, or its drive stalled"
             if self.until(active, partial(_has_worked, payload), timeout_s=INSTALL_S) == "yes":

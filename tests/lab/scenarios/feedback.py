@@ -93,7 +93,8 @@ def run(lab: Lab) -> str:
 def _bring(machine: Machine, image: Path, lamp: str) -> str:
     """Plug a stick in until the lamp says that it may be pulled; one that stalls is plugged in
     again, as `Installed.bring` does."""
-    for _ in range(REPLUGS):
+    for attempt in range(REPLUGS):
+        machine.replugs += attempt > 0
         stick = machine.plug(image)
         _until_shown(machine, lamp, State.WORKING)
         if _until_shown(machine, lamp, State.SAFE, State.REFUSED) is State.SAFE:

@@ -7,6 +7,7 @@ from pathlib import Path
 from tests.daemon.plugins import talker
 from tests.lab.installed import REPLUGS, Installed
 from tests.lab.lab import Lab
+from tests.lab.scenarios import starts
 
 PAYLOAD = "org.example.talker"
 BEGUN = "until ls -d /var/lib/nondum/staging/*; do sleep 0.02; done"
@@ -14,29 +15,36 @@ BEGUN_S = 120.0
 
 
 def run(lab: Lab) -> str:
-    """Plug, pull at the first byte copied, look, plug again."""
+    """Start, plug, pull at the first byte copied, look, plug again, pull, look."""
     host = lab.host()
+    said = starts.see(host)
     image = lab.stick("talker", talker())
     _yank(host, image)
     host.until_payload(PAYLOAD, "gone")
     host.until("no drive", lambda view: True if not view["drives"] else None)
-    host.machine.until("nothing is staged or mounted", lambda: None if _left(host) else True)
+    _until_nothing_is_left(host)
     stick = host.bring(image, PAYLOAD)
     host.machine.pull(stick)
     host.until_payload(PAYLOAD, "gone")
-    return f"the last that it had come to: {_reached(host)}"
+    _until_nothing_is_left(host)
+    return f"{said}; the last that it had come to: {_reached(host)}"
 
 
 def _yank(host: Installed, image: Path) -> None:
     """Pull it as soon as its files are copied; one that the processors had no time for is plugged
     in again (see `Installed.bring`)."""
-    for _ in range(REPLUGS):
+    for attempt in range(REPLUGS):
+        host.machine.replugs += attempt > 0
         stick = host.machine.plug(image)
         begun = host.machine.attempt(BEGUN, timeout_s=BEGUN_S)
         host.machine.pull(stick)
         if begun.status == 0:
             return
     raise AssertionError(f"nothing was copied from a drive that was plugged in {REPLUGS} times")
+
+
+def _until_nothing_is_left(host: Installed) -> None:
+    host.machine.until("nothing is staged or mounted", lambda: None if _left(host) else True)
 
 
 def _left(host: Installed) -> str:
