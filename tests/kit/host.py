@@ -8,6 +8,8 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tests.kit.until import arrived
+
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import JournalEntry, PayloadRecord, Snapshot, Step
 from nondum.host.drives.slots import SlotSource
@@ -22,7 +24,6 @@ from nondum.host.lifecycle.tries import STEADY_S
 from nondum.host.workers import Timing, Workers
 
 HOST = "spot"
-PATIENCE_S = 60.0
 
 LAMP = '''"""A lamp that does nothing, well."""
 from nondum.sdk import Output, Unit, behaviour, hookimpl
@@ -71,11 +72,14 @@ class HostInProcess:
         """Wait until something holds; looked at again after each event."""
         changed = asyncio.Event()
         end = self.bus.subscribe(lambda event: changed.set())
+
+        async def held() -> None:
+            while not holds():
+                changed.clear()
+                await changed.wait()
+
         try:
-            async with asyncio.timeout(PATIENCE_S):
-                while not holds():
-                    changed.clear()
-                    await changed.wait()
+            await arrived("what is waited for", held(), evidence=self._evidence)
         finally:
             end()
 
@@ -96,6 +100,9 @@ class HostInProcess:
     async def until_gone(self, payload_id: str) -> None:
         """Wait until nothing of a payload is left."""
         await self.until(lambda: self.payload(payload_id) is None)
+
+    def _evidence(self) -> str:
+        return "\n".join([str(self.snapshot), *map(str, self.heard[-20:])])
 
     async def journal(self) -> tuple[JournalEntry, ...]:
         return await self.catalogue.journal(limit=1000)

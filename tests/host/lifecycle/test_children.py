@@ -12,8 +12,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.kit.clock import VirtualClock
+from tests.kit.until import until_async
 
-from nondum.host.lifecycle.children import KEPT, Children, watch_without_threads
+from nondum.host.lifecycle.children import (
+    ASIDE_STALL_S,
+    KEPT,
+    QUIET_S,
+    STALL_S,
+    START_S,
+    Children,
+    watch_without_threads,
+)
 from nondum.sdk.errors import DriveGone, InstallFailed
 
 pytestmark = pytest.mark.anyio
@@ -29,8 +39,8 @@ NOTHING: dict[str, list[str]] = {
 
 
 @contextlib.asynccontextmanager
-async def children(quiet_s: float = 60.0) -> AsyncIterator[Children]:
-    pool = Children(quiet_s=quiet_s)
+async def children() -> AsyncIterator[Children]:
+    pool = Children()
     try:
         yield pool
     finally:
@@ -107,11 +117,15 @@ async def test_child_that_computes_for_ever_is_told(tmp_path: Path) -> None:
         assert failed.value.code == "CHILD_LIMIT"
 
 
-async def test_child_that_hangs_is_given_up(tmp_path: Path) -> None:
+async def test_child_that_hangs_is_given_up(tmp_path: Path, clock: VirtualClock) -> None:
     """A FIFO that nobody writes to stands for a disk that never answers."""
     async with children() as pool:
+        job = asyncio.create_task(pool.run("verify", staged_fifo(tmp_path)))
+        await until_async("a child", pool.pids)
+        await clock.advance(STALL_S * 0.9)
+        assert not job.done()
         with pytest.raises(InstallFailed) as failed:
-            await pool.run("verify", staged_fifo(tmp_path), stall_s=0.5)
+            await clock.advance_until(job, step_s=STALL_S * 0.1)
         assert failed.value.code == "CHILD_STALLED"
 
 
@@ -134,8 +148,7 @@ async def test_work_aside_is_idle_and_ends_with_its_child(tmp_path: Path) -> Non
     arguments = {**host_facts(tmp_path), "folder": str(tmp_path), "venvs": str(tmp_path)}
     async with children() as pool:
         job = asyncio.create_task(pool.run_aside("compile", arguments))
-        while not pool.pids():
-            await asyncio.wait([job], timeout=0.01)
+        await until_async("a child", pool.pids)
         (pid,) = pool.pids()
         assert os.sched_getscheduler(pid) == os.SCHED_IDLE
         with process_ended(pid) as ended:
@@ -151,8 +164,7 @@ async def test_work_aside_is_not_idle_when_it_is_to_end(tmp_path: Path) -> None:
     with reaped_on_the_loop():
         async with children() as pool:
             job = asyncio.create_task(pool.run_aside("verify", staged_fifo(tmp_path)))
-            while not pool.pids():
-                await asyncio.wait([job], timeout=0.01)
+            await until_async("a child", pool.pids)
             (pid,) = pool.pids()
             job.cancel()
             seen = []
@@ -165,35 +177,43 @@ async def test_work_aside_is_not_idle_when_it_is_to_end(tmp_path: Path) -> None:
 
 
 async def test_slow_start_is_not_the_drive_s(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, clock: VirtualClock
 ) -> None:
     """Whatever is wrong with a drive, it is not that this computer is small and has much to do."""
-    slow = tmp_path / "python"
-    first = "import os, sys, time; time.sleep(2)"
+    slow, gate = tmp_path / "python", tmp_path / "gate"
+    os.mkfifo(gate)
+    first = f"import os, sys; open({str(gate)!r}).close()"
     then = f"os.execv({sys.executable!r}, [{sys.executable!r}, *sys.argv[1:]])"
     slow.write_text(f"#!{sys.executable} -ISB\n{first}; {then}\n")
     slow.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(slow))
     async with children() as pool:
-        assert await pool.run("look", drive(tmp_path), stall_s=1.5) == NOTHING
+        job = asyncio.create_task(pool.run("look", drive(tmp_path), stall_s=1.5))
+        await until_async("a child", pool.pids)
+        await clock.advance(START_S * 0.9)
+        await asyncio.to_thread(gate.write_text, "")  # it opens the other end, and goes on
+        assert await job == NOTHING
 
 
-async def test_work_aside_gives_its_answer(tmp_path: Path) -> None:
+async def test_work_aside_gives_its_answer(tmp_path: Path, clock: VirtualClock) -> None:
     async with children() as pool:
         assert await pool.run_aside("look", drive(tmp_path)) == NOTHING
         assert not pool.pids()
         with pytest.raises(DriveGone):
             await pool.run_aside("look", drive(tmp_path / "nowhere"))
+        hanging = pool.run_aside("verify", staged_fifo(tmp_path))
         with pytest.raises(InstallFailed) as failed:
-            await pool.run_aside("verify", staged_fifo(tmp_path), stall_s=0.5)
+            await clock.advance_until(hanging, step_s=ASIDE_STALL_S * 0.1)
         assert failed.value.code == "CHILD_STALLED"
         assert not pool.pids()
 
 
-async def test_one_spare_stays_when_work_has_ended(tmp_path: Path) -> None:
-    async with children(quiet_s=0.1) as pool:
+async def test_one_spare_stays_when_work_has_ended(tmp_path: Path, clock: VirtualClock) -> None:
+    async with children() as pool:
         await pool.run("look", drive(tmp_path), owner="a")
+        await clock.advance(QUIET_S * 0.9)
         with process_ended(pool.kept()["a"]) as ended:
+            await clock.advance(QUIET_S * 0.1)
             await ended.wait()
         assert not pool.kept()
         assert len(pool.pids()) <= 1

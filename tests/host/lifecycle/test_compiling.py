@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import asyncio
 import os
 import shutil
 import signal
 from pathlib import Path
 
 import pytest
-from tests.kit.host import LAMP, PATIENCE_S, HostInProcess, host_in_process, left_over
+from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
+from tests.kit.until import arrived
 
 from nondum.host import events
 from nondum.host.catalogue.records import Step
@@ -134,10 +134,13 @@ async def test_a_withdrawn_payload_is_not_compiled(tmp_path: Path) -> None:
         await host.until_step(LAMP_ID, Step.ACTIVE)
         unfinished = entry(host).folder / UNFINISHED
         with folders_watched([unfinished.parent]) as changed:
-            async with asyncio.timeout(PATIENCE_S):
+
+            async def begun() -> None:
                 while not unfinished.exists():
                     await changed.wait()
                     changed.clear()
+
+            await arrived("a compilation that has begun", begun())
         host.pull()
         await host.until_gone(LAMP_ID)
         assert not left_over(host.folders)
