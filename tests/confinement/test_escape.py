@@ -8,16 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.confinement.baits import attempted, laid
+from tests.confinement.baits import LEFT_AT_1, attempted, laid
 from tests.confinement.escape import ATTEMPTS
 
 from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined
 
 pytestmark = pytest.mark.anyio
-
-LEFT_AT_1 = {"be root", "know the host name", "see a process of the host"}
-"""What level 1 does not hide: other processes' names are to be seen, though nothing of what they
-hold. It is root where the host is, and the interpreter is root's alone."""
 
 
 @pytest.fixture

@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tests.confinement.processes import children
 from tests.kit.workers import HOST, LIBRARIES, SDK, WorkersUnderTest, until_gone
 
 from nondum.host.confinement import bubblewrap
@@ -215,11 +216,6 @@ def open_folder() -> Iterator[Path]:
         folder = Path(name)
         folder.chmod(0o755)
         yield folder
-
-
-def children(pid: int) -> set[int]:
-    listed = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii")
-    return set(map(int, listed.split()))
 
 
 def parent(pid: int) -> int:

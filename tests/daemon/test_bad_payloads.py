@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from demo.robot import nondum
 from tests.daemon.plugins import scribe, talker
-from tests.host.lifecycle.test_bad_payloads import BAD, EXITS_LATER, WAYS, Bad, bare
+from tests.host.lifecycle.bad_payloads import BAD, EXITS_LATER, WAYS, Bad, bare
 from tests.kit.payloads import make_payload
 from tests.kit.running_host import READY_S, Row, RunningHost, running
 

@@ -6,9 +6,8 @@ import json
 from pathlib import Path
 
 import pytest
-from tests.confinement.baits import ESCAPE, laid
+from tests.confinement.baits import ESCAPE, LEFT_AT_1, laid
 from tests.confinement.escape import ATTEMPTS
-from tests.confinement.test_escape import LEFT_AT_1
 from tests.daemon.plugins import talker
 from tests.kit.payloads import Part
 from tests.kit.running_host import RunningHost
