@@ -53,7 +53,7 @@ async def nothing_is_left_behind(host: HostInProcess) -> AsyncIterator[None]:
     if (host.slots / "bad").is_symlink():
         host.pull("bad")
     await host.until(lambda: {drive.id for drive in host.snapshot.drives} == {"good"})
-    await host.until_gone(BAD)
+    await host.until(lambda: {payload.payload_id for payload in host.snapshot.payloads} == {GOOD})
     assert (host.workers.pids(), host.snapshot.components) == untouched[:2]
     assert set(left_over(host.folders)) == untouched[2]
 
@@ -67,7 +67,7 @@ async def test_bad_payload_is_told_with_its_code(
     host.plug(tmp_path / "bad", "bad")
     if bad.hangs:
         await host.until_step(BAD, Step.STORED)
-        await clock.advance_until(host.until_step(BAD, bad.step))
+        await clock.advance_until(host.until_step(BAD, bad.step), step_s=TIMING.startup_s)
     record = await host.until_step(BAD, bad.step)
     assert {problem.code for problem in record.problems} == {bad.code}, record.problems
     journal = await host.catalogue.journal(subject=BAD)
@@ -106,9 +106,10 @@ async def test_plugin_that_ends_again_and_again_is_quarantined(
 async def test_second_payload_with_the_same_component_is_refused(
     host: HostInProcess, tmp_path: Path
 ) -> None:
-    make_payload(tmp_path / "bad", Part("good", LAMP), payload_id=BAD)
+    other = "org.example.other"
+    make_payload(tmp_path / "bad", Part("good", LAMP), payload_id=other)
     host.plug(tmp_path / "bad", "bad")
-    record = await host.until_step(BAD, Step.REFUSED)
+    record = await host.until_step(other, Step.REFUSED)
     assert [problem.code for problem in record.problems] == ["COMPONENT_TAKEN"]
     assert host.snapshot.component("good") is not None
 
