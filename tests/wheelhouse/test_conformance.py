@@ -1,7 +1,7 @@
 """What a venv holds is what pip would have put there, file by file, for wheels that people use.
 
-Scripts, other data schemes, start-up hooks of known tools and installer metadata apart. The wheels
-come from the package index.
+Scripts, other data schemes, start-up hooks of known tools and installer metadata apart. Many wheels
+come from the package index, in a campaign; a few are those that are installed here.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterable
@@ -16,6 +17,7 @@ from importlib.util import cache_from_source
 from pathlib import Path
 
 import pytest
+from tests.kit.payloads import installed_wheel
 
 from nondum.wheelhouse import bytecode, lock, locking, preflight, venvs, wheel
 from nondum.wheelhouse.store import Store
@@ -28,7 +30,12 @@ POPULAR = (
     *("numpy<2.5", "packaging", "pillow", "pygments", "python-dateutil", "pyyaml", "requests"),
     *("rich", "six", "typing-extensions", "urllib3", "jaraco-context", "jaraco-functools"),
 )
+FEW = ("idna", "markupsafe", "jaraco-functools", "python-dateutil")
+"""Pure, of C, of a namespace, and with something that it needs."""
+AT_HAND = ("pluggy", "msgpack", "packaging")
 INSTALLER_METADATA = {"INSTALLER", "RECORD", "REQUESTED", "direct_url.json"}
+
+long = pytest.mark.long("conformance")
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
@@ -38,12 +45,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A payload-like folder with the wheels, what they depend on, and a lock."""
     made = tmp_path_factory.mktemp("conformance")
     pip("download", "--only-binary", ":all:", "--dest", str(made / "wheels"), *POPULAR)
-    text = locking.lock_text({Target.here(): sorted((made / "wheels").iterdir())})
-    (made / "pylock.popular.toml").write_text(text)
+    write_lock(made)
     return made
 
 
-@pytest.fixture(scope="module")
+def write_lock(folder: Path) -> None:
+    """Of all wheels that are there."""
+    text = locking.lock_text({Target.here(): sorted((folder / "wheels").iterdir())})
+    (folder / "pylock.popular.toml").write_text(text)
+
+
 def stored(folder: Path) -> list[StoredWheel]:
     """The wheels as chosen from the lock, in the store."""
     store = Store(folder / "store")
@@ -56,13 +67,22 @@ def stored(folder: Path) -> list[StoredWheel]:
 
 
 @pytest.fixture(scope="module")
-def ours(folder: Path, stored: list[StoredWheel]) -> Path:
-    venvs.make(folder / "ours", PYTHON, stored)
-    return folder / "ours"
+def ours(folder: Path) -> Path:
+    return made_by_us(folder)
 
 
 @pytest.fixture(scope="module")
 def pips(folder: Path) -> Path:
+    return made_by_pip(folder)
+
+
+def made_by_us(folder: Path) -> Path:
+    """A venv of the wheels of the lock."""
+    venvs.make(folder / "ours", PYTHON, stored(folder))
+    return folder / "ours"
+
+
+def made_by_pip(folder: Path) -> Path:
     """A venv of Python's own, filled by pip from the same lock."""
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder / "pips"], check=True)
     pip(
@@ -98,11 +118,32 @@ def tree(venv: Path, *, without: Iterable[str] = ()) -> dict[str, tuple[str, boo
     }
 
 
+def test_trees_of_wheels_at_hand_are_equal(tmp_path: Path) -> None:
+    """As they are installed here: with code of C, with scripts, and of packages within packages."""
+    (tmp_path / "wheels").mkdir()
+    for name in AT_HAND:
+        made = installed_wheel(name)
+        shutil.copy(made, tmp_path / "wheels" / made.name)
+    write_lock(tmp_path)
+    ours = made_by_us(tmp_path)
+    assert tree(ours) == tree(made_by_pip(tmp_path))
+    assert len(tree(ours)) > 20
+
+
+@pytest.mark.short("conformance")
+def test_trees_of_a_few_real_wheels_are_equal(tmp_path: Path) -> None:
+    pip("download", "--only-binary", ":all:", "--dest", str(tmp_path / "wheels"), *FEW)
+    write_lock(tmp_path)
+    assert tree(made_by_us(tmp_path)) == tree(made_by_pip(tmp_path))
+
+
+@long
 def test_trees_are_equal(ours: Path, pips: Path) -> None:
     assert tree(ours) == tree(pips)
     assert len(tree(ours)) > 1000
 
 
+@long
 def test_compiled_files_are_those_that_interpreters_look_for(ours: Path) -> None:
     site = venvs.site_packages(ours)
     modules = [path for path in site.rglob("*.py") if "templates" not in path.parts]
@@ -111,6 +152,7 @@ def test_compiled_files_are_those_that_interpreters_look_for(ours: Path) -> None
     assert len(compiled) >= len(modules) - 5
 
 
+@long
 def test_pip_sees_the_same_distributions(ours: Path, pips: Path) -> None:
     lists = [
         json.loads(pip("--python", str(venv / "bin/python"), "list", "--format", "json"))
@@ -120,10 +162,12 @@ def test_pip_sees_the_same_distributions(ours: Path, pips: Path) -> None:
     assert len(lists[0]) >= len(POPULAR)
 
 
+@long
 def test_pip_finds_nothing_broken(ours: Path) -> None:
     assert "No broken requirements" in pip("--python", str(ours / "bin/python"), "check")
 
 
+@long
 def test_the_distributions_work_together(ours: Path) -> None:
     code = (
         "import numpy, PIL.Image, yaml, requests, jaraco.context, jaraco.functools;"
@@ -135,6 +179,7 @@ def test_the_distributions_work_together(ours: Path) -> None:
     assert done.stdout == "(3, 4)\n"
 
 
+@long
 def test_the_other_method_gives_the_same_tree(folder: Path, pips: Path) -> None:
     parsed = lock.parse((folder / "pylock.popular.toml").read_text(), "lock")
     facts = preflight.probe(folder, reserve_mb=0, confinement=0)
@@ -145,11 +190,13 @@ def test_the_other_method_gives_the_same_tree(folder: Path, pips: Path) -> None:
     assert tree(folder / "by-pip", without=scripts) == tree(pips)
 
 
+@long
 def test_no_popular_wheel_is_refused(folder: Path) -> None:
     for path in (folder / "wheels").iterdir():
         assert wheel.check(path) == (), path.name
 
 
+@long
 def test_start_up_hooks_are_the_one_thing_left_out(tmp_path: Path) -> None:
     pip("download", "--no-deps", "--only-binary", ":all:", "--dest", str(tmp_path), "setuptools")
     (path,) = tmp_path.glob("*.whl")

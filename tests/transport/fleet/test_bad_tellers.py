@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Awaitable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import pytest
@@ -23,9 +23,14 @@ from nondum.transport.peers import (
     Lease,
     Loss,
     PeerKey,
+    PeerLost,
     PeerNode,
     PeerUnreachable,
+    Reason,
+    Refusal,
+    Trust,
 )
+from nondum.transport.peers.pulse import DIGEST_BYTES, State
 
 pytestmark = pytest.mark.anyio
 
@@ -58,11 +63,19 @@ class Teller:
         raise AssertionError
 
 
+class LyingLedger(Ledger):
+    """Says that it has told other entries than it tells."""
+
+    @property
+    def state(self) -> State:
+        return replace(super().state, digest=b"x" * DIGEST_BYTES)
+
+
 @contextlib.asynccontextmanager
 async def telling(me: Identity, other: Member, teller: Teller) -> AsyncIterator[PeerNode]:
     """A peer of a mesh that is none itself."""
     assert isinstance(other.fleet, Mesh)
-    trust = trusting(other.fleet._node.identity)
+    trust = Trust(paired={other.key: other.name})
     node = PeerNode(me, trust, teller, on_event=lambda _: None, epoch=teller.ledger.epoch)
     await node.start([])
     node.dial(other.key, other.fleet.addresses)
@@ -80,6 +93,16 @@ async def meshed(me: Identity, *others: Identity) -> AsyncIterator[Member]:
         yield member
     finally:
         await mesh.close()
+
+
+async def test_wrong_catalogue_has_its_host_cut() -> None:
+    """A host that was let in, and lies about the digest of what it tells."""
+    base, liar = identity("base"), identity("liar")
+    async with meshed(base, liar) as here, telling(liar, here, Teller(LyingLedger(7))):
+        assert (await here.told(PeerLost)).reason is Loss.VIOLATED
+        assert not [event for event in here.events if isinstance(event, PeerChanged)]
+        refused = [event for event in here.events if isinstance(event, Refusal)]
+        assert refused[0].reason is Reason.GARBAGE
 
 
 async def test_peers_that_never_answer_keep_nobody_waiting(

@@ -96,7 +96,7 @@ def test_removals_are_remembered_only_so_far() -> None:
     for number in range(1000):
         ledger.publish({f"fact/{number}": ON})
         ledger.publish({f"fact/{number}": None})
-    assert len(ledger._changed) == 10
+    assert ledger.remembered == 10
 
 
 @pytest.mark.parametrize("epoch", [6, 0, -1])

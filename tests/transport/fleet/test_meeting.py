@@ -17,6 +17,7 @@ from nondum.transport.peers import (
     Loss,
     PeerKey,
     PeerLost,
+    PeerNode,
     PeerRefused,
     PeerUp,
     Reason,
@@ -226,19 +227,6 @@ async def test_host_that_was_met_keeps_its_place_among_strangers() -> None:
     meeting.close()
 
 
-async def test_wrong_catalogue_has_its_host_cut() -> None:
-    """A host that was let in, and lies about the digest of what it tells."""
-    hosts = pairs("rover", "liar")
-    trust = trust_in(hosts)
-    async with started(hosts[0], trust) as (rover, told), started(hosts[1], trust) as (liar, _):
-        liar._catalogues._ledger._digest = 1
-        rover.meet(liar.key, liar.addresses)
-        await told.until(lambda: bool(refusals(told)))
-        assert refusals(told)[0].reason is Reason.GARBAGE
-        assert (await told.told(PeerLost)).reason is Loss.VIOLATED
-        assert not [event for event in told.events if isinstance(event, PeerChanged)]
-
-
 @pytest.mark.parametrize(
     ("method", "body"),
     [("fleet.changed", {}), ("fleet.changed", {"epoch": 1}), ("fleet.state", {"digest": 1})],
@@ -262,6 +250,6 @@ async def test_lost_news_is_found_by_the_next_ping(monkeypatch: pytest.MonkeyPat
     async with started(hosts[0], trust) as (rover, told), started(hosts[1], trust) as (base, _):
         rover.meet(base.key, base.addresses)
         await told.sees(base.key, {})
-        monkeypatch.setattr(base._node, "notify_all", lambda *_: None)
+        monkeypatch.setattr(PeerNode, "notify_all", lambda *_: None)
         base.publish({"fact/a": {"holds": True}})
         await told.sees(base.key, {"fact/a": {"holds": True}})

@@ -200,7 +200,7 @@ async def test_slow_strangers_are_cut_and_bounded(monkeypatch: pytest.MonkeyPatc
         assert await rover.node.call(base.key, "echo", {}, deadline_s=5) == {}
         await base.counted(Reason.CROWDED, 30)
         await base.counted(Reason.SILENT, 20)
-        assert base.node._arrivals.strangers == 0
+        assert base.node.strangers == 0
         for stranger in idle:
             stranger.close()
         assert await rover.node.call(base.key, "echo", {}, deadline_s=5) == {}

@@ -15,7 +15,6 @@ from nondum.transport.peers import (
     PeerNode,
     PeerUp,
     Reason,
-    accepted,
     allowance,
     roster,
 )
@@ -138,7 +137,6 @@ async def test_peer_that_greets_again_and_again_is_not_let_in(
 ) -> None:
     rover, base = narrow
     while await raises(lambda: rover.node.call(base.key, "echo", {}, deadline_s=5)) == []:
-        for session in base.node._roster.sessions.values():
-            (route,) = (link.route for link in session.links)
-            accepted.cut(route.descriptor, route.address)  # type: ignore[attr-defined]  # accepted
+        for route in base.node.accepted:
+            route.cut()
     await base.counted(Reason.FLOODING)

@@ -55,7 +55,7 @@ class Caller(RuleBasedStateMachine):
     @invariant()
     def memory_is_bounded(self) -> None:
         assert self.once.size <= BOUNDS.size
-        assert len(self.once._answers) <= BOUNDS.answers
+        assert self.once.kept <= BOUNDS.answers
 
 
 TestCaller = Caller.TestCase

@@ -42,6 +42,11 @@ class Ledger:
         """Revision 1 is the empty catalogue of the start."""
         return State(self._revision, self._digest.to_bytes(DIGEST_BYTES))
 
+    @property
+    def remembered(self) -> int:
+        """How many entries, and removals that can still be told, it holds."""
+        return len(self._changed)
+
     def publish(self, changes: Mapping[str, Body | None]) -> bool:
         """Take changes over as one revision; whether there were any.
 

@@ -25,7 +25,7 @@ from nondum.transport.peers.failures import PeerRefused, PeerUnreachable
 from nondum.transport.peers.gate import Gate, entry
 from nondum.transport.peers.identity import Identity, Security
 from nondum.transport.peers.keys import PeerKey
-from nondum.transport.peers.link import AcceptedRoute, Link
+from nondum.transport.peers.link import AcceptedRoute, Link, Route
 from nondum.transport.peers.listener import dialling, listening, prove_enforced
 from nondum.transport.peers.messages import Notice, Ping, encode
 from nondum.transport.peers.monitor import Watch
@@ -105,6 +105,17 @@ class PeerNode:
     def peers(self) -> Mapping[PeerKey, Admission]:
         """Who can be called now."""
         return {key: session.admission for key, session in self._roster.sessions.items()}
+
+    @property
+    def strangers(self) -> int:
+        """How many connections are not a peer's yet."""
+        return self._arrivals.strangers
+
+    @property
+    def accepted(self) -> tuple[Route, ...]:
+        """The connections that peers made to this host."""
+        links = (link for session in self._roster.sessions.values() for link in session.links)
+        return tuple(link.route for link in links if not link.dialled)
 
     def round_trip_s(self, peer: PeerKey) -> float | None:
         """The last ping's time there and back; None before one was answered."""

@@ -46,6 +46,11 @@ class Once:
         """Bytes of answers that are kept."""
         return self._size
 
+    @property
+    def kept(self) -> int:
+        """How many answers are kept."""
+        return len(self._answers)
+
     def take(self, number: int) -> Seen:
         """Look at a call that came; a new one is running from now on.
 
