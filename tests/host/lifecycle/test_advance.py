@@ -2,129 +2,37 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.host.devices.sightings import appeared
+from tests.host.lifecycle.states import (
+    AT,
+    PROBLEM,
+    active,
+    after,
+    at_step,
+    drive,
+    found,
+    way_to_active,
+    with_newer,
+)
 
 from nondum.host import effects, events
 from nondum.host.catalogue.records import (
-    ComponentRecord,
     ComponentState,
-    DeviceClaim,
     DriveState,
-    Moment,
-    MountPose,
     Step,
 )
 from nondum.host.catalogue.state import HostState
-from nondum.host.effects import Effect
 from nondum.host.events import Event
 from nondum.host.lifecycle.advance import advance
 from nondum.host.lifecycle.recovery import recover
 from nondum.host.lifecycle.tries import ATTEMPTS
 from nondum.host.transitions import COMPONENT_TRANSITIONS, RECOVERY, TRANSITIONS
 from nondum.sdk.description import PluginDescription
-from nondum.sdk.errors import Problem
-
-AT = Moment(1.0, 2.0)
-PROBLEM = Problem("TEST", "made up")
-OLDER = Problem("ROLLBACK", "made up")
-
-
-def drive(name: str = "a", kind: str = "slot") -> events.DriveInserted:
-    return events.DriveInserted(name, Path("/drives") / name, kind)
-
-
-def found(
-    key: str = "k1", drive: str = "a", *, payload_id: str = "org.x", release: int = 1
-) -> events.PayloadFound:
-    folder = Path("/drives") / drive / "nondum" / payload_id
-    return events.PayloadFound(key, drive, folder, f"digest-{key}", payload_id, "1.0", release)
-
-
-def component(id: str = "eye", payload: str = "k1", need: str = "") -> ComponentRecord:
-    claims = (DeviceClaim("port", {"ID_MODEL": need}, False),) if need else ()
-    return ComponentRecord(
-        id=id,
-        payload=payload,
-        payload_id="org.x",
-        distribution=id,
-        entry_point=id,
-        version="1.0",
-        state=ComponentState.READY,
-        description=PluginDescription(name=id, version="1.0"),
-        venv=Path("/v"),
-        site_packages=Path("/v/s"),
-        scratch=Path("/s"),
-        rank=0,
-        devices=claims,
-    )
-
-
-def way_to_active(
-    key: str = "k1", drive: str = "a", id: str = "eye", need: str = "", payload_id: str = "org.x"
-) -> list[Event]:
-    mounts = (MountPose(f"spot__{id}__camera", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "payload"),)
-    return [
-        found(key, drive, payload_id=payload_id),
-        events.PayloadCopied(key),
-        events.PayloadVerified(key, (id,)),
-        events.PayloadStaged(key),
-        events.WheelsStored(key, 1),
-        events.ComponentsProbed(key),
-        events.PayloadActivated(key, (component(id, key, need),), mounts),
-    ]
-
-
-def after(*happened: Event, state: HostState | None = None) -> tuple[HostState, list[Effect]]:
-    state = state or HostState("spot")
-    done: list[Effect] = []
-    for event in happened:
-        outcome = advance(state, event, AT)
-        state = outcome.state
-        done.extend(outcome.effects)
-    return state, done
-
-
-def active(id: str = "eye", need: str = "") -> HostState:
-    return after(drive(), *way_to_active(id=id, need=need), events.DriveRead("a", ("k1",)))[0]
-
-
-def at_step(step: Step) -> HostState:
-    """A payload `k1` on drive `a`, at a step."""
-    way = way_to_active()
-    order = list(Step)[: list(Step).index(Step.ACTIVE) + 1]
-    match step:
-        case Step.GONE:
-            return after(drive())[0]
-        case Step.REMOVING:
-            return after(drive(), *way, events.PayloadWithdrawn("k1", "test"))[0]
-        case Step.SUPERSEDED:
-            return after(drive("b"), *upgrade(), state=after(drive(), *way)[0])[0]
-        case Step.REFUSED:
-            return after(drive(), way[0], events.PayloadRefused("k1", (OLDER,)))[0]
-        case Step.QUARANTINED:
-            return after(drive(), *way[:5], events.PayloadFailed("k1", (PROBLEM,)))[0]
-        case _:
-            return after(drive(), *way[: order.index(step) + 1])[0]
-
-
-def upgrade(key: str = "k2", drive: str = "b", release: int = 2, id: str = "eye") -> list[Event]:
-    """What happens to a newer release of `k1` until it is active."""
-    newer = found(key, drive, release=release)
-    return [newer, *way_to_active(key, drive, id)[1:]]
-
-
-def with_newer(state: HostState) -> HostState:
-    """With a newer release of `k1` that is just being brought up."""
-    old = state.payloads["k1"]
-    newer = replace(old, key="k2", digest="newer", release=2, step=Step.STORED, components=())
-    return replace(state, payloads={**state.payloads, newer.key: newer})
-
 
 EVENTS: dict[type[Event], Event] = {
     type(event): event

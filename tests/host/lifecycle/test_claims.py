@@ -7,7 +7,7 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.host.devices.sightings import camera_with_microphone, serial_adapter
-from tests.host.lifecycle.test_advance import AT, component
+from tests.host.lifecycle.states import AT, component
 
 from nondum.host import effects
 from nondum.host.catalogue.records import ComponentRecord, DeviceClaim, DeviceRecord

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.host.lifecycle.test_advance import AT, active, after, at_step, found, way_to_active
+from tests.host.lifecycle.states import AT, active, after, at_step, found, way_to_active
 
 from nondum.host.catalogue.records import FormerPayload, PayloadRecord, Step
 from nondum.host.catalogue.state import HostState

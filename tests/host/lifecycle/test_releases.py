@@ -10,7 +10,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 from tests.host.devices.sightings import appeared
-from tests.host.lifecycle.test_advance import (
+from tests.host.lifecycle.states import (
     AT,
     PROBLEM,
     active,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.host.lifecycle.test_advance import (
+from tests.host.lifecycle.states import (
     AT,
     active,
     after,

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.host.lifecycle.test_advance import (
+from tests.host.lifecycle.states import (
     AT,
     active,
     after,

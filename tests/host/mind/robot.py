@@ -10,6 +10,8 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+from tests.kit.until import arrived
+
 from nondum.host.catalogue.records import (
     ComponentRecord,
     ComponentState,
@@ -191,12 +193,12 @@ class Robot:
 
     async def until(self, holds: Callable[[], bool]) -> None:
         """Wait, while the mind runs, until something is so."""
-        try:
-            async with asyncio.timeout(20.0):
-                while not holds():
-                    await self.mind.changed(self.mind.version)
-        except TimeoutError:
-            raise AssertionError(f"still not so; told: {self.told}") from None
+
+        async def held() -> None:
+            while not holds():
+                await self.mind.changed(self.mind.version)
+
+        await arrived("what is waited for", held(), evidence=lambda: self.told)
 
     async def until_goal(self, state: str, id: str = "1") -> None:
         await self.until(lambda: self.mind.queue[id].state.value == state)

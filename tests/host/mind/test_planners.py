@@ -8,6 +8,8 @@ from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
 import pytest
+from tests.kit.clock import VirtualClock
+from tests.kit.until import arrived, until_async
 from tests.planning.tasks import FOLLOW_PLAN, follow_task, gripper_task, plan_of
 
 from nondum.host.mind.planner_process import PlannerProcess
@@ -155,9 +157,14 @@ async def test_no_planner_is_no_proof(task: GroundTask) -> None:
     ],
 )
 async def test_misbehaving_planner_gave_up(
-    planner: Make, task: GroundTask, name: str, why: str
+    planner: Make, task: GroundTask, clock: VirtualClock, name: str, why: str
 ) -> None:
-    found = await Planners([planner(name)]).plan(task, 0.1)
+    process = planner(name)
+    planning = asyncio.create_task(Planners([process]).plan(task, 0.1))
+    if name == "hanger":  # only this one is judged by time: of a child that runs
+        await until_async("a child", lambda: process.pid)
+        await clock.advance_until(planning)
+    found = await arrived("an answer", planning)
     assert isinstance(found.answer, GaveUp)
     assert why in found.answer.why
 

@@ -6,7 +6,7 @@ import logging
 from pathlib import Path
 
 import pytest
-from tests.host.lifecycle.test_advance import active, component
+from tests.host.lifecycle.states import active, component
 
 from nondum.host import events
 from nondum.host.catalogue.state import HostState

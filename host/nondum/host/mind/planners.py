@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -91,9 +90,10 @@ class Planners:
         the same task's PDDL. It is called only for planners that ground by themselves, perhaps in
         another thread; without it, they give up.
         """
-        started_s = time.monotonic()
+        loop = asyncio.get_running_loop()
+        started_s = loop.time()
         if (known := quick_answer(task)) is not None:
-            return Found(known, "", time.monotonic() - started_s)
+            return Found(known, "", loop.time() - started_s)
         request = Request(task, text)
         searches = {
             asyncio.create_task(process.plan(request, deadline_s)): process.name
@@ -105,7 +105,7 @@ class Planners:
             for search in searches:
                 search.cancel()
             await asyncio.gather(*searches, return_exceptions=True)
-        return Found(answer, planner, time.monotonic() - started_s)
+        return Found(answer, planner, loop.time() - started_s)
 
     async def close(self) -> None:
         """End every child."""
@@ -134,7 +134,8 @@ async def _best(searches: Mapping[_Search, str], task: GroundTask) -> tuple[Answ
                 case _ if not plans:
                     return answer, name
         if plans and until_s is None:
-            until_s = time.monotonic() + (CHEAPER_S if len(task.actions) <= SMALL else 0.0)
+            more_s = CHEAPER_S if len(task.actions) <= SMALL else 0.0
+            until_s = asyncio.get_running_loop().time() + more_s
     if plans:
         _, name, plan = min(plans, key=lambda found: (found[0], len(found[2].steps), found[1]))
         return plan, name
@@ -143,7 +144,8 @@ async def _best(searches: Mapping[_Search, str], task: GroundTask) -> tuple[Answ
 
 async def _done(left: set[_Search], until_s: float | None) -> set[_Search]:
     """The searches that end next; none if nothing ends in time."""
-    timeout_s = None if until_s is None else max(0.0, until_s - time.monotonic())
+    now_s = asyncio.get_running_loop().time()
+    timeout_s = None if until_s is None else max(0.0, until_s - now_s)
     done, _ = await asyncio.wait(left, timeout=timeout_s, return_when=asyncio.FIRST_COMPLETED)
     return done
 
