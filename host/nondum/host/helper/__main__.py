@@ -7,7 +7,6 @@ import os
 import pwd
 import signal
 import socket
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -44,10 +43,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         lamps=partial(_lamps, told.config, told.run / "lamps.json"),
     )
     service.nodes.prepare()  # workers' rooms, which are made early, show what is below it
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    # No exception: Python drops those of signal handlers that run in its callbacks after a fork.
+    ending, end = os.pipe()
+    signal.signal(signal.SIGTERM, lambda *_: os.write(end, b"."))
     try:
         with _handed_over() as listening:
-            Server(listening, service, told.idle_s).run()
+            Server(listening, service, ending, told.idle_s).run()
     finally:
         service.tree.close()
 

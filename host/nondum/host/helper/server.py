@@ -32,18 +32,26 @@ _CREDENTIALS = struct.Struct("3i")
 
 
 class Server:
-    """Serves connections until nobody comes any more."""
+    """Serves connections until it is told to end, or nobody comes any more."""
 
-    def __init__(self, listening: socket.socket, service: Service, idle_s: float = IDLE_S) -> None:
+    def __init__(
+        self, listening: socket.socket, service: Service, ending: int, idle_s: float = IDLE_S
+    ) -> None:
+        """`ending` is a descriptor that can be read once the server is to end."""
         self._listening, self._service, self._idle_s = listening, service, idle_s
+        self._ending = ending
         self._children: set[int] = set()
 
     def run(self) -> None:
-        """Serve; returns after `idle_s` without a connection and with no child left."""
+        """Serve; returns when it is to end, or after `idle_s` without a connection and with no
+        child left."""
         self._listening.settimeout(0)
+        sources = [self._ending, self._listening.fileno()]
         while True:
-            ready, _, _ = select.select([self._listening], [], [], self._idle_s)
+            ready, _, _ = select.select(sources, [], [], self._idle_s)
             self._reap()
+            if self._ending in ready:
+                return
             if ready:
                 self._accept()
             elif not self._children:
@@ -95,6 +103,7 @@ def _child(work: Callable[[], None]) -> int:
     if pid:
         return pid
     try:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
         signal.alarm(int(DRIVE_S))
         work()
     except Exception as error:
