@@ -81,7 +81,13 @@ def test_the_page_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 
 @pytest.mark.daemon
-@pytest.mark.parametrize("where", [ground, lambda: nullcontext(LOOPBACK)], ids=["best", "loopback"])
+@pytest.mark.parametrize(
+    "where",
+    [
+        pytest.param(ground, id="best"),
+        pytest.param(lambda: nullcontext(LOOPBACK), id="loopback", marks=pytest.mark.long("peers")),
+    ],
+)
 def test_hosts_are_seen_to_come_and_go(where: Where) -> None:
     with where() as here:
         found = presence.measure(here, 1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -67,9 +66,7 @@ def test_who_does_not_read_a_problem_has_refused_it(folder: Path) -> None:
 
 
 def test_who_is_killed_at_the_limit_has_given_up(folder: Path) -> None:
-    began_s = time.monotonic()
     assert race.attempt(one(folder, "holes"), "pyperplan", 1.0).said == GAVE_UP
-    assert time.monotonic() - began_s < 60.0
 
 
 def test_a_plan_that_does_not_hold_counts_for_nothing() -> None:

@@ -15,6 +15,8 @@ from benchmarks.recompose import processes, report, spreads
 from benchmarks.recompose.insertion import PHASES, Insertion, Memory
 from benchmarks.recompose.results import FIRST, KNOWN, LOAD, START, Container, Findings, Results
 
+WORKED_S = 0.2
+
 
 def insertion(ready_s: float) -> Insertion:
     return Insertion(ready_s, ready_s + 0.01, {phase: ready_s for phase in PHASES})
@@ -68,7 +70,9 @@ def test_report_without_containers_says_why() -> None:
 
 @pytest.fixture
 def child() -> Iterator[subprocess.Popen[bytes]]:
-    program = "import sys; print(flush=True); sys.stdin.read()"
+    """A process that has computed for `WORKED_S`, and waits."""
+    works = f"while time.process_time() < {WORKED_S}: pass"
+    program = f"import sys, time\n{works}\nprint(flush=True); sys.stdin.read()"
     pipe = subprocess.PIPE
     with subprocess.Popen([sys.executable, "-c", program], stdin=pipe, stdout=pipe) as started:
         assert started.stdout is not None
@@ -85,5 +89,5 @@ def test_ticks_count_every_processor(tmp_path: Path) -> None:
 def test_memory_and_time_of_a_real_process(child: subprocess.Popen[bytes]) -> None:
     assert child.pid in set(processes.descendants(os.getpid()))
     assert 1 < processes.pss_mb(child.pid) < 100
-    assert processes.cpu_s(child.pid) >= 0
+    assert processes.cpu_s(child.pid) > WORKED_S / 2, "the kernel counts in ticks"
     processes.await_rest(child.pid, timeout_s=30)

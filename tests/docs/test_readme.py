@@ -7,15 +7,13 @@ import re
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from tests.kit.until import until
 
 ROOT = Path(__file__).parents[2]
-PATIENCE_S = 60.0
-"""For a host to get where the page says it is."""
 
 pytestmark = [pytest.mark.daemon, pytest.mark.timeout(300)]
 
@@ -93,8 +91,10 @@ def start(command: str, shown: str, folder: Path, env: dict[str, str]) -> subpro
 def follow(command: str, shown: str, folder: Path, env: dict[str, str]) -> None:
     """Run a command; where a host has yet to get there, ask again as a person would."""
     asks = command.startswith(("nondum goals", "nondum components", "nondum why"))
-    deadline = time.monotonic() + PATIENCE_S
-    while True:
+    printed = ""
+
+    def is_there() -> bool:
+        nonlocal printed
         done = subprocess.run(
             ["bash", "-c", command],
             cwd=folder,
@@ -103,6 +103,10 @@ def follow(command: str, shown: str, folder: Path, env: dict[str, str]) -> None:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
         )
-        if done.returncode == 0 and is_as_shown(shown, done.stdout):
-            return
-        assert asks and time.monotonic() < deadline, f"$ {command}\n{done.stdout}"
+        printed = done.stdout
+        return done.returncode == 0 and is_as_shown(shown, printed)
+
+    if asks:
+        until(f"$ {command}", is_there, evidence=lambda: printed)
+    else:
+        assert is_there(), f"$ {command}\n{printed}"

@@ -10,7 +10,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -145,13 +144,11 @@ def test_what_kstar_adds_to_a_plan_is_no_step() -> None:
 @pytest.mark.parametrize("part", ["translate", "search"])
 def test_who_overruns_is_killed(part: str, tmp_path: Path) -> None:
     pid = tmp_path / "pid"
-    tells = f"import os, time; open({str(pid)!r}, 'w').write(str(os.getpid()))"
-    hangs = f"{tells}; time.sleep({PATIENCE_S})"
+    tells = f"import os, signal; open({str(pid)!r}, 'w').write(str(os.getpid()))"
+    hangs = f"{tells}; signal.pause()"
     engine = ending(hangs) if part == "search" else ending("", translate=hangs)
-    started_s = time.monotonic()
     answer = FastDownwardPlanner(engine).plan(roads("(done)"), 5.0)
     assert answer == GaveUp("no plan within 5 s")
-    assert time.monotonic() - started_s < PATIENCE_S
     assert not Path(f"/proc/{pid.read_text()}").exists()
 
 

@@ -6,6 +6,7 @@ Facts stay integers, so results do not depend on PYTHONHASHSEED.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import ClassVar
 
 from pyperplan.heuristics.relaxation import hFFHeuristic
@@ -23,12 +24,12 @@ class _DeadlinePassed(Exception):
 class _Heuristic:
     """hFF that looks at the clock: pyperplan asks it about every node, and has no limit itself."""
 
-    def __init__(self, task: Task, until_s: float) -> None:
+    def __init__(self, task: Task, until_s: float, now_s: Callable[[], float]) -> None:
         self._estimate = hFFHeuristic(task)
-        self._until_s = until_s
+        self._until_s, self._now_s = until_s, now_s
 
     def __call__(self, node: SearchNode) -> float:
-        if time.monotonic() > self._until_s:
+        if self._now_s() > self._until_s:
             raise _DeadlinePassed
         estimate: float = self._estimate(node)
         return estimate
@@ -40,13 +41,17 @@ class PyperplanPlanner:
     speaks: ClassVar[str] = "ground"
     handles: ClassVar[frozenset[str]] = frozenset()
 
+    def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
+        """`now_s` is the clock that deadlines are judged by, in seconds."""
+        self._now_s = now_s
+
     def plan(self, task: GroundTask, deadline_s: float) -> Answer:
         """Search for at most about `deadline_s` seconds; never raises for lack of time."""
-        until_s = time.monotonic() + deadline_s
+        until_s = self._now_s() + deadline_s
         if task.goal <= task.init:
             return AlreadyTrue()
         translated = _translated(task)
-        heuristic = _Heuristic(translated, until_s)
+        heuristic = _Heuristic(translated, until_s, self._now_s)
         try:
             if heuristic(SearchNode(translated.initial_state, None, None, 0)) == float("inf"):
                 return Unsolvable("relaxed")
