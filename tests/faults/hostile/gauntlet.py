@@ -20,6 +20,7 @@ from tests.kit.payloads import Part
 from tests.kit.running_host import Row, RunningHost
 from tests.kit.signing import sign_payload
 from tests.kit.traces import Traces
+from tests.kit.until import until
 
 HEALTHY = ("talker", "scribe")
 GOAL = "(written spot)"
@@ -121,7 +122,7 @@ class Gauntlet:
     def make(self, cases: Sequence[HostileDrive]) -> list[Plugged]:
         """Write the drives, once. What is wrong with each is found although it is signed."""
         made = []
-        for number, case in enumerate(cases):
+        for number, case in enumerate(cases, start=len(self._made)):
             drive = self._work / f"h{number}"
             drive.mkdir()
             case.make(Bench(drive, number, self._canary, sign))
@@ -147,10 +148,12 @@ class Gauntlet:
             self.host.views.clear()  # each is big, and nobody asks for them
         self.outcome.touched = [d.case.name for d in drives if not self._is_as_made(d)]
         self.outcome.controls = len(CONTROLS.findall((self.host.work / "daemon.log").read_bytes()))
-        end = time.monotonic() + PRUNED_S
-        while (stayed := self._stayed()) and time.monotonic() < end:
-            time.sleep(0.1)
-        assert stayed == []
+        until(
+            "nothing left of the drives",
+            lambda: not self._stayed(),
+            evidence=self._stayed,
+            patience_s=PRUNED_S,
+        )
 
     def _bring(self, name: str, part: Part) -> None:
         """Have a benign payload at work, signed by whom the host trusts."""
