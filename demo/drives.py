@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
-import json
 import platform
 import shutil
 import sys
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -59,8 +60,8 @@ def build(
         digest = _digest([plugin, *libraries], maker, target)
         drive = cache / f"{plugin.name}-{digest[:12]}"
         if not drive.exists():
-            unfinished = drive.with_suffix(".part")
-            shutil.rmtree(unfinished, ignore_errors=True)
+            cache.mkdir(parents=True, exist_ok=True)
+            unfinished = Path(tempfile.mkdtemp(dir=cache, prefix=f".{plugin.name}-")) / "drive"
             command: list[str | Path] = [
                 "payload",
                 "build",
@@ -74,15 +75,17 @@ def build(
             if maker is not None:
                 command += ["--sign", maker.key]
             nondum(*command, "--quiet")
-            unfinished.rename(drive)
+            with contextlib.suppress(OSError):  # another run has just built the same
+                unfinished.rename(drive)
+            shutil.rmtree(unfinished.parent, ignore_errors=True)
         drives[plugin.name] = drive
     return drives
 
 
 def payload_id(drive: Path) -> str:
-    """The id of the one payload on a drive."""
-    (payload,) = json.loads(nondum("payload", "inspect", drive, "--json"))["payloads"]
-    return str(payload["id"])
+    """The id of the one payload on a drive: its folder is named for it."""
+    (payload,) = (drive / "nondum").iterdir()
+    return payload.name
 
 
 def _digest(folders: Sequence[Path], maker: Maker | None, target: Target) -> str:

@@ -6,11 +6,12 @@ import argparse
 import functools
 import math
 import random
-from collections.abc import Iterator, Sequence
+import shutil
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from demo import live, shuffle, stages
-from demo.follow_me import follow_me
+from demo.follow_me import FollowMe, follow_me
 from demo.following import Reference
 from demo.kit import CACHE, PLUGINS, Kit
 from demo.live import Says
@@ -28,8 +29,8 @@ OFFERED = ("pedestrian-detector",)
 SECOND = ("thermal-camera",)
 THIRD = ("compton-camera", "pan-tilt-unit")
 LIBRARIES = ("sdk", "panorama")
-LAST = "III"
-STAGES = ("I", "pulled", "put back", "offered", "killed", "II", LAST)
+BEGIN, LAST = "I", "III"
+STAGES = (BEGIN, "pulled", "put back", "offered", "killed", "II", LAST)
 
 PHASES = ("seen", "verified", "installed", "ready", "in plan", "goal")
 NOTE = (
@@ -46,7 +47,7 @@ def main(arguments: Sequence[str]) -> int:
     """Run the demonstration; 0 only if every goal was reached."""
     options = _options(arguments)
     play = functools.partial(_play, options)
-    wanted = (LAST,) if options.only == LAST else STAGES
+    wanted = tuple(name for name in STAGES if name in (options.only or STAGES))
     return perform(Programme(wanted, PHASES, NOTE), play, options, {"seed": options.seed})
 
 
@@ -67,11 +68,15 @@ def _played(
     if options.shuffle is not None:
         for names in (first, second, third):
             dice.shuffle(names)
-    if options.only != LAST:
+    if not options.only:
         yield from _followed(robot, kit, first, second, say)
-        robot.ask("halt", now=True)
-        leaving = {*first, *OFFERED, *second} - {CAMERA}
-        stages.withdraw(robot, *(kit.drives[name] for name in leaving))
+        _leave(robot, kit, {*first, *OFFERED, *second} - {CAMERA})
+    elif BEGIN in options.only:
+        with follow_me(robot, Reference.read(REFERENCE), words=FOLLOW) as following:
+            yield _begun(following, kit, first, say)
+        _leave(robot, kit, first)
+    if options.only and LAST not in options.only:
+        return
     say(f"{LAST}: no other is in; {', '.join(third)} go in; “{POINT}” (--seed {options.seed})")
     yield stages.point(
         robot,
@@ -89,8 +94,7 @@ def _followed(
 ) -> Iterator[StageResult]:
     camera = kit.drives[CAMERA]
     with follow_me(robot, Reference.read(REFERENCE), words=FOLLOW) as following:
-        say(f"I: {', '.join(first)} go in; “{FOLLOW}”")
-        yield following.begin(kit.of(first), name="I", published_s=93)
+        yield _begun(following, kit, first, say)
         say("pulled: the camera comes out while the robot turns")
         yield following.lose(camera, name="pulled")
         say("put back: the camera goes in again; the goal stands")
@@ -104,15 +108,43 @@ def _followed(
         yield following.begin(kit.of(second), name="II", published_s=136, is_given=True)
 
 
+def _begun(following: FollowMe, kit: Kit, first: Sequence[str], say: Says) -> StageResult:
+    say(f"{BEGIN}: {', '.join(first)} go in; “{FOLLOW}”")
+    return following.begin(kit.of(first), name=BEGIN, published_s=93)
+
+
+def _leave(robot: Robot, kit: Kit, names: Iterable[str]) -> None:
+    """Withdraw the goal, and then drives that are in."""
+    robot.ask("halt", now=True)
+    stages.withdraw(robot, *(kit.drives[name] for name in names))
+
+
 def _kit(options: argparse.Namespace, work: Path, say: Says) -> Kit:
-    names = (INITIAL, *FIRST, *OFFERED, *SECOND, *THIRD)
+    names, wanted = (INITIAL, *FIRST, *OFFERED, *SECOND, *THIRD), _wanted(options)
     folders, cache = dict[str, Path](), CACHE
     if options.shuffle is not None:
         plugins = {name: PLUGINS / name for name in (*names, *LIBRARIES)}
         folders = shuffle.sources(plugins, work / "sources", seed=options.shuffle)
-        cache = work / "drives"
+        cache = _shuffled_cache(options.shuffle)
     say("building the payload drives (cached after the first time)")
-    return Kit.built(names, libraries=LIBRARIES, folders=folders, cache=cache)
+    return Kit.built(wanted, libraries=LIBRARIES, folders=folders, cache=cache)
+
+
+def _shuffled_cache(seed: int) -> Path:
+    """For drives of this seed; those of others are removed, since each seed makes new ones."""
+    above = CACHE.with_name("shuffled")
+    for other in above.glob("*"):
+        if other.name != str(seed):
+            shutil.rmtree(other, ignore_errors=True)
+    return above / str(seed)
+
+
+def _wanted(options: argparse.Namespace) -> Sequence[str]:
+    """The plugins whose drives are needed."""
+    if not options.only:
+        return (INITIAL, *FIRST, *OFFERED, *SECOND, *THIRD)
+    parts = {BEGIN: FIRST, LAST: THIRD}
+    return (INITIAL, *(name for stage in parts if stage in options.only for name in parts[stage]))
 
 
 def _options(arguments: Sequence[str]) -> argparse.Namespace:
@@ -127,7 +159,12 @@ def _options(arguments: Sequence[str]) -> argparse.Namespace:
         default=random.SystemRandom().randrange(1_000_000),
         help="of source and mounts in stage III [default: another one each time]",
     )
-    made.add_argument("--only", choices=(LAST,), help="this stage alone")
+    made.add_argument(
+        "--only",
+        action="append",
+        choices=(BEGIN, LAST),
+        help="play this stage only; may be given twice",
+    )
     made.add_argument(
         "--shuffle",
         type=int,

@@ -64,7 +64,8 @@ def main(arguments: Sequence[str]) -> int:
     options = _options(arguments)
     facts: dict[str, str] = {}
     play = functools.partial(_play, options, facts)
-    return perform(Programme(STAGES, PHASES, NOTE), play, options, facts)
+    stages = (options.only,) if options.only else STAGES
+    return perform(Programme(stages, PHASES, NOTE), play, options, facts)
 
 
 def _play(
@@ -104,6 +105,8 @@ def _played(
     brought = [name for name in FOR_NODE if name not in options.without]
     search.equip(stage, {node: kit.of(brought), robot: kit.of([CAMERA])})
     yield search.run(stage)
+    if options.only:
+        return
 
     say(f"{SMALL}: it is switched on; the camera moves there; “{WORDS}”")
     begun_s = time.monotonic()
@@ -165,4 +168,5 @@ def _options(arguments: Sequence[str]) -> argparse.Namespace:
         metavar="PAYLOAD",
         help=f"leave this payload of the node out, which must fail: {', '.join(FOR_NODE)}",
     )
+    made.add_argument("--only", choices=(ROBOT,), help="play this stage only")
     return made.parse_args(arguments)

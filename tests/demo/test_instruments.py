@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from demo.emulators.pose import Mount
 from demo.instruments import EMULATORS, Instruments, switched_on
 from demo.pointing import HELD_S, Score
 from demo.scenario import random_scenario
+from tests.kit.until import until
 
 from nondum.sdk.bench import WorkerFactory
 
@@ -54,11 +54,13 @@ def run(
     return instruments.score(instruments.switched(on=True) + HELD_S + 0.2), call
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(
+    "number", [1, *(pytest.param(n, marks=pytest.mark.long("demonstrations")) for n in (2, 3))]
+)
 def test_the_laser_comes_to_rest_on_the_source(
-    worker: WorkerFactory, tmp_path: Path, seed: int
+    worker: WorkerFactory, tmp_path: Path, number: int
 ) -> None:
-    scenario = random_scenario(seed)
+    scenario = random_scenario(number)
     with switched_on(scenario, tmp_path) as instruments:
         found, call = run(worker, instruments, camera=scenario.camera, pointer=scenario.pointer)
         assert found.is_reached, str(found)
@@ -66,7 +68,10 @@ def test_the_laser_comes_to_rest_on_the_source(
         instruments.switched(on=False)
 
 
-@pytest.mark.parametrize("forgotten", ["camera", "pointer", "both"])
+@pytest.mark.parametrize(
+    "forgotten",
+    ["camera", "pointer", pytest.param("both", marks=pytest.mark.long("demonstrations"))],
+)
 def test_a_mount_left_out_fails(worker: WorkerFactory, tmp_path: Path, forgotten: str) -> None:
     scenario = replace(random_scenario(2), activity_bq=STRONG_BQ)
     mounts = {"camera": scenario.camera, "pointer": scenario.pointer}
@@ -114,10 +119,7 @@ def test_emulators_end_with_who_started_them(tmp_path: Path) -> None:
     )
     pid, terminal = ran.stdout.split()
     assert terminal.startswith("/dev/pts/")
-    deadline = time.monotonic() + 5
-    while is_running(pid) and time.monotonic() < deadline:
-        time.sleep(0.02)  # it is nobody's child here: there is nothing to wait on
-    assert not is_running(pid)
+    until("the emulator to end", lambda: not is_running(pid))
 
 
 def is_running(pid: str) -> bool:

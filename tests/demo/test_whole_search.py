@@ -6,7 +6,9 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -29,30 +31,55 @@ def search(*options: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.alone
-@pytest.mark.parametrize("options", [(), ("--loopback",)], ids=["as shipped", "loopback"])
-def test_two_robots_search_with_the_node_and_miss_it(options: tuple[str, ...]) -> None:
-    done = search(*options)
+def found_by(done: subprocess.CompletedProcess[str], stages: list[str]) -> Sequence[Any]:
+    """The stages of a demonstration that has reached these, in their order."""
     assert done.returncode == 0, done.stdout + done.stderr
     document = json.loads(done.stdout)
-    has_network = "namespaces" in document["where"]
-    assert has_network == (os.geteuid() == 0 and not options)
     assert document["reached"] is True
-    assert [stage["name"] for stage in document["stages"]] == STAGES
-    panther, scout, steered, lost = document["stages"]
-    for stage in (panther, scout):
-        phases = [stage["phases_s"][phase] for phase in IN_ORDER]
-        assert phases == sorted(phases)
-        steps = [step.partition(" ")[0] for step in stage["plan"]]
-        assert [step.partition(".")[2] for step in steps] == ["stream", "detect", "watch", "report"]
-        assert f"thermal-camera@{stage['name']}" in stage["measure"]
-        for component in ("people-detector", "visual-tracker", "speaker"):
-            assert f"{component}@node" in stage["measure"]
+    assert [stage["name"] for stage in document["stages"]] == stages
+    assert all("BUT" not in stage["measure"] for stage in document["stages"])
+    found: Sequence[Any] = document["stages"]
+    return found
+
+
+def assert_searched(stage: Any) -> None:
+    """A robot searched with the parts of the node."""
+    phases = [stage["phases_s"][phase] for phase in IN_ORDER]
+    assert phases == sorted(phases)
+    steps = [step.partition(" ")[0] for step in stage["plan"]]
+    assert [step.partition(".")[2] for step in steps] == ["stream", "detect", "watch", "report"]
+    assert f"thermal-camera@{stage['name']}" in stage["measure"]
+    for component in ("people-detector", "visual-tracker", "speaker"):
+        assert f"{component}@node" in stage["measure"]
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize(
+    "options",
+    [
+        pytest.param((), id="as shipped"),
+        pytest.param(("--loopback",), id="loopback", marks=pytest.mark.long("demonstrations")),
+    ],
+)
+def test_two_robots_search_with_the_node_and_miss_it(options: tuple[str, ...]) -> None:
+    done = search(*options)
+    panther, scout, steered, lost = found_by(done, STAGES)
+    has_network = "namespaces" in json.loads(done.stdout)["where"]
+    assert has_network == (os.geteuid() == 0 and not options)
+    assert_searched(panther)
+    assert_searched(scout)
     assert "mobile-base.drive" in steered["plan"][-1]
     assert "visual-tracker.track node__" in steered["plan"][-2]
     assert lost["phases_s"].keys() == {"halted", "told"}
     assert "bring the host node back" in lost["measure"]
-    assert all("BUT" not in stage["measure"] for stage in document["stages"])
+
+
+@pytest.mark.alone
+def test_robot_searches_with_the_node_on_loopback() -> None:
+    done = search("--loopback", "--only", "panther")
+    (panther,) = found_by(done, ["panther"])
+    assert "namespaces" not in json.loads(done.stdout)["where"]
+    assert_searched(panther)
 
 
 def test_without_the_speaker_nothing_is_reached() -> None:
