@@ -19,6 +19,8 @@ from demo.table import StageResult
 WORDS = "search for people"
 SAID_SO = re.compile("search for .+")
 """How a host offers it, whatever it calls people."""
+NOTHING_DOES = "nothing here makes"
+"""How a host begins to say that no component has a behaviour for something."""
 ALERT = "i can see a person"
 FIND_S = 20.0
 UNDERSTAND_S = 15.0
@@ -34,6 +36,8 @@ class Search:
 
     node: Robot
     person: Person
+    is_incomplete: bool = False
+    """A payload was left out: once a robot says that nothing does what is needed, it is over."""
 
     def begin(self, robot: Robot, *, published_s: float, begun_s: float) -> Stage:
         """Wait until a robot that was switched on and the node know each other."""
@@ -93,8 +97,12 @@ class Search:
         deadline_s = time.monotonic() + PLAN_S * robot.slowness
         while time.monotonic() < deadline_s:
             offers = robot.ask("goals")["can"]
-            if any(SAID_SO.fullmatch(row["words"]) and row["now"] == "can" for row in offers):
+            fitting = [row for row in offers if SAID_SO.fullmatch(row["words"])]
+            if any(row["now"] == "can" for row in fitting):
                 return
+            lacks = (lack for row in fitting for lack in row["lacks"])
+            if self.is_incomplete and any(lack.startswith(NOTHING_DOES) for lack in lacks):
+                break
             time.sleep(PAUSE_S)
         raise TooLate(f"{robot.name} does not say that it can “{WORDS}”, but:\n{offers}")
 

@@ -100,7 +100,7 @@ def _played(
     say(f"{ROBOT}: it and the {NODE} are switched on; “{WORDS}”")
     begun_s = time.monotonic()
     node, robot = switch_on(NODE), switch_on(ROBOT, BASE)
-    search = Search(node, person)
+    search = Search(node, person, is_incomplete=bool(options.without))
     stage = search.begin(robot, published_s=PUBLISHED_S[ROBOT], begun_s=begun_s)
     brought = [name for name in FOR_NODE if name not in options.without]
     search.equip(stage, {node: kit.of(brought), robot: kit.of([CAMERA])})
