@@ -19,8 +19,6 @@ from demo.table import StageResult
 WORDS = "search for people"
 SAID_SO = re.compile("search for .+")
 """How a host offers it, whatever it calls people."""
-NOTHING_DOES = "nothing here makes"
-"""How a host begins to say that no component has a behaviour for something."""
 ALERT = "i can see a person"
 FIND_S = 20.0
 UNDERSTAND_S = 15.0
@@ -37,7 +35,7 @@ class Search:
     node: Robot
     person: Person
     is_incomplete: bool = False
-    """A payload was left out: once a robot says that nothing does what is needed, it is over."""
+    """A payload was left out: a robot's first answer that counts the node's parts in is final."""
 
     def begin(self, robot: Robot, *, published_s: float, begun_s: float) -> Stage:
         """Wait until a robot that was switched on and the node know each other."""
@@ -100,8 +98,8 @@ class Search:
             fitting = [row for row in offers if SAID_SO.fullmatch(row["words"])]
             if any(row["now"] == "can" for row in fitting):
                 return
-            lacks = (lack for row in fitting for lack in row["lacks"])
-            if self.is_incomplete and any(lack.startswith(NOTHING_DOES) for lack in lacks):
+            givers = (giver for row in offers for giver in row["from"])
+            if self.is_incomplete and any(giver.endswith(f"@{self.node.name}") for giver in givers):
                 break
             time.sleep(PAUSE_S)
         raise TooLate(f"{robot.name} does not say that it can “{WORDS}”, but:\n{offers}")

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from tests.faults.daemon import HOST, OPTIONS, QUICK
 from tests.kit.host import HostInProcess, host_in_process, left_over
+from tests.kit.until import until
 
 from nondum.host import events
 from nondum.host.catalogue.catalogue import Catalogue, now
@@ -24,9 +25,6 @@ from nondum.host.drives.mounts import mounted_below
 from nondum.host.lifecycle.folders import Folders, missing, sweep
 from nondum.host.lifecycle.recovery import recover
 from nondum.wheelhouse.store import Store
-
-ENDED_S = 5.0
-"""So long processes may take to follow their daemon."""
 
 VOLATILE = frozenset({"journal", "tries", "host", "sqlite_sequence"})
 """Tables that another start changes: it is written down, and counted."""
@@ -55,10 +53,8 @@ class Told:
 
 
 def look(root: Path, told: list[Told]) -> Iterator[str]:
-    """What is wrong with what lies there: processes, mounts, and the catalogue."""
-    left = until_none_of(root)
-    if left:
-        yield f"left running: {left}"
+    """What is wrong with what lies there: mounts and the catalogue. Processes are waited for."""
+    until_none_of(root)
     state = root / "state"
     if mounted := mounted_below(state):
         yield f"left mounted: {mounted}"
@@ -88,12 +84,10 @@ def _look_at_catalogue(file: Path, told: list[Told]) -> Iterator[str]:
             yield f"acknowledged revision {newest}, have {revision}"
 
 
-def until_none_of(root: Path) -> list[str]:
-    """Command lines of what still belongs to a daemon of that root after it had time to end."""
-    patience = time.monotonic() + ENDED_S
-    while (left := processes_of(root)) and time.monotonic() < patience:
-        time.sleep(0.01)
-    return left
+def until_none_of(root: Path) -> None:
+    """Wait until no process belongs to a daemon of that root. Raises `TooLate`."""
+    what = f"no process of {root}"
+    until(what, lambda: not processes_of(root), evidence=lambda: processes_of(root))
 
 
 def processes_of(folder: Path) -> list[str]:

@@ -16,8 +16,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from demo.robot import TooLate
+from tests.kit.until import until
+
 PATIENCE_S = 30.0
-POLL_S = 0.02
 
 _AT_REST = ("active", "superseded", "refused", "quarantined")
 
@@ -74,16 +76,21 @@ class Player:
         self, pid: int, what: str, holds: Callable[[], bool], begun: float | None = None
     ) -> None:
         """Wait for something. Raises `ProcessLookupError` once the daemon is dead, and `Stuck`."""
-        patience = time.monotonic() + PATIENCE_S
-        while not holds():
-            if is_dead(pid):
-                raise ProcessLookupError
+
+        def is_over() -> bool:
+            if holds():
+                return True
             if self.late_s is not None and begun and time.monotonic() - begun > self.late_s:
                 os.kill(pid, signal.SIGKILL)
                 raise ProcessLookupError
-            if time.monotonic() > patience:
-                raise Stuck(what)
-            time.sleep(POLL_S)
+            if is_dead(pid):
+                raise ProcessLookupError
+            return False
+
+        try:
+            until(what, is_over, patience_s=PATIENCE_S)
+        except TooLate as late:
+            raise Stuck(what) from late
 
     def _is_up(self) -> bool:
         return bool(self._ask("SELECT 1 FROM journal WHERE event = 'DrivesScanned'"))
@@ -120,8 +127,7 @@ def trace(pid: int, *options: str) -> subprocess.Popen[bytes]:
     """Have strace(1) at a daemon and all that it starts; it goes when they do. Wait for it."""
     command = ["strace", "-f", "-qq", "-p", str(pid), *options]
     strace = subprocess.Popen(command, stderr=subprocess.DEVNULL)
-    while strace.poll() is None and not _is_traced(pid):
-        time.sleep(0.002)
+    until("strace attached", lambda: strace.poll() is not None or _is_traced(pid))
     return strace
 
 

@@ -17,7 +17,7 @@ from nondum.host.lifecycle.installation import AT_ONCE
 
 pytestmark = pytest.mark.daemon
 
-DRIVES = 16
+DRIVES = 8
 
 
 def test_drives_in_a_crowd_wait_and_are_all_judged(tmp_path: Path) -> None:

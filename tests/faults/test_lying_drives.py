@@ -201,8 +201,10 @@ async def test_list_that_grows_while_it_is_read_is_given_up(
     assert max(told) <= 256 * 1024
 
 
-@pytest.mark.parametrize("path", ["list", "wheel"])
-@pytest.mark.parametrize("number", [errno.EIO, errno.ENODEV, errno.ESTALE])
+@pytest.mark.parametrize(
+    ("path", "number"),
+    [("list", errno.EIO), ("wheel", errno.EIO), ("list", errno.ENODEV), ("wheel", errno.ESTALE)],
+)
 async def test_device_that_fails_is_gone(tmp_path: Path, path: str, number: int) -> None:
     def answer(opening: int, offset: int, size: int) -> bytes:
         raise OSError(number, "the device fails")

@@ -19,7 +19,7 @@ from tests.kit.fork_server import Nursery
 
 pytestmark = pytest.mark.slow
 
-CUTS = 5
+CUTS = 3
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,7 @@ from tests.kit.disk_images import make_ext4, on
 from tests.kit.host import LAMP, HostInProcess, host_in_process
 from tests.kit.loop_devices import attach, cut_off, detach
 from tests.kit.payloads import Part, make_payload, make_wheel
+from tests.kit.until import until_async
 
 from nondum.host.catalogue.records import Step
 from nondum.host.drives.blocks import BlockSource
@@ -74,6 +75,16 @@ class Bench:
             await asyncio.to_thread(_cut, node, image)
             await self._until_pruned()
 
+    async def yank_at(self, phase: str) -> None:
+        """Insert the drive and yank it as soon as a phase has begun."""
+        async with self._stick() as (node, image):
+            await self.host.until(lambda: self._is_there() and self._phase() == phase)
+            began = time.monotonic()
+            await asyncio.to_thread(_cut, node, image)
+            await self._until_pruned()
+            self.told.seconds[phase].append(time.monotonic() - began)
+            self._look_around()
+
     async def yank(self, share: float) -> None:
         """Insert the drive and yank it at a share of the time that all takes; 1 and more: while it
         runs, and when nothing is wanted of it any more."""
@@ -98,14 +109,18 @@ class Bench:
             await asyncio.to_thread(detach, node)
 
     async def _until_pruned(self) -> None:
-        host = self.host
-        async with asyncio.timeout(PRUNED_S):
-            await host.until(lambda: not any(d.kind == "block" for d in host.snapshot.drives))
-            await host.until(lambda: host.payload(BAD) is None)
-            calm = 0
-            while calm < CALM:  # a child that is being killed may still make a mount point
-                calm = 0 if self._left() else calm + 1
-                await asyncio.sleep(0.01)
+        await self.host.until(lambda: not self._is_there() and self.host.payload(BAD) is None)
+        calm = 0
+
+        def is_calm() -> bool:
+            nonlocal calm  # a child that is being killed may still make a mount point
+            calm = 0 if self._left() else calm + 1
+            return calm == CALM
+
+        await until_async("nothing left", is_calm, evidence=self._left, patience_s=PRUNED_S)
+
+    def _is_there(self) -> bool:
+        return any(drive.kind == "block" for drive in self.host.snapshot.drives)
 
     def _left(self) -> list[str]:
         """Folders, mounts and processes of the payload that was yanked."""
@@ -148,16 +163,14 @@ async def bench(root: Path) -> AsyncIterator[Bench]:
     async with host_in_process(root, sources=sources) as host:
         host.plug(root / "good", "good")
         await host.until_step(GOOD, Step.ACTIVE)
-        made = Bench(host, image, root)
-        await made.measure()
-        yield made
+        yield Bench(host, image, root)
 
 
 async def yank_all(made: Bench, points: int, *, seed: int) -> Yanks:
     """Yank at so many points, uniformly from the coming of the drive until it idles."""
     moments = random.Random(seed)
     for number in range(points):
-        if number % AGAIN == AGAIN - 1:
+        if number % AGAIN == 0:
             await made.measure()
         await made.yank(moments.uniform(0.0, 1.3))
     return made.told
