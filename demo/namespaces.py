@@ -15,6 +15,7 @@ module beyond bridge and veth.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import signal
 import subprocess
@@ -27,6 +28,8 @@ from typing import Any
 
 ROOT = Path(__file__).parent.parent
 PREFIX = "nondum"
+_NUMBERS = itertools.count(1)
+"""One process may have several networks, with machines of the same name."""
 """Namespaces are called `nondum-PID-NAME`, so that those of a process that was killed are known."""
 NEVER = ("pfifo", "limit", "0")
 """A queue that takes nothing: what is sent is lost. (netem is not in every kernel.)"""
@@ -249,7 +252,7 @@ def _namespaces() -> Iterator[str]:
 def _owner(namespace: str) -> int | None:
     """The process that made a namespace; None for one of other programs.
 
-    >>> _owner("nondum-4711-rover"), _owner("vpn")
+    >>> _owner("nondum-4711-1-rover"), _owner("vpn")
     (4711, None)
     """
     match namespace.split("-", 2):
@@ -259,7 +262,7 @@ def _owner(namespace: str) -> int | None:
 
 
 def _add(name: str) -> str:
-    namespace = f"{PREFIX}-{os.getpid()}-{name}"
+    namespace = f"{PREFIX}-{os.getpid()}-{next(_NUMBERS)}-{name}"
     try:
         _run("ip", "netns", "add", namespace)
     except (OSError, subprocess.CalledProcessError) as error:

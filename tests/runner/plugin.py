@@ -33,7 +33,7 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(_Results(Path(file)), "nondum-results")
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def seed(request: pytest.FixtureRequest) -> int:
     """For all that a test draws by lot: the same in each full run, another in a campaign."""
     number: int = request.config.getoption("--seed")

@@ -52,7 +52,8 @@ def counter(bits: int) -> GroundTask:
 
 @pytest.fixture
 def planner() -> PyperplanPlanner:
-    return PyperplanPlanner()
+    """A planner for which no time passes."""
+    return PyperplanPlanner(now_s=lambda: 0.0)
 
 
 def test_planner_is_found_by_its_entry_point() -> None:

@@ -34,6 +34,7 @@ from nondum.transport.peers.pulse import State
 
 BEAT_S = 0.2
 LATE_S = 0.6
+PATIENCE_MS = 2000
 EPOCH = 7
 
 
@@ -57,14 +58,20 @@ class Bad:
         self.socket.linger = 0
         self.socket.sndhwm = self.socket.rcvhwm = 10_000
         self.socket.reconnect_ivl = 1 << 30
-        self.socket.rcvtimeo = self.socket.sndtimeo = 2000
+        self.socket.rcvtimeo = self.socket.sndtimeo = PATIENCE_MS
         self.socket.curve_publickey = self.public.encode()
         self.socket.curve_secretkey = self.secret.encode()
         self.socket.curve_serverkey = self.key.encode()
-        self.ears = self.socket.get_monitor_socket(zmq.EVENT_DISCONNECTED)
+        self.ears = self.socket.get_monitor_socket(
+            zmq.EVENT_DISCONNECTED | zmq.EVENT_HANDSHAKE_FAILED_AUTH
+        )
         self.socket.connect(self.endpoint)
         self.say(Hello((1,), "bad", self.public, EPOCH, self.term, b""))
-        if not isinstance(decode(self.socket.recv()), Welcome):
+        poller = zmq.Poller()
+        poller.register(self.socket, zmq.POLLIN)
+        poller.register(self.ears, zmq.POLLIN)
+        found = dict(poller.poll(PATIENCE_MS))
+        if self.socket not in found or not isinstance(decode(self.socket.recv()), Welcome):
             raise ConnectionRefusedError
 
     def hang_up(self) -> None:

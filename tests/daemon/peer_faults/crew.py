@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import sys
-import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from demo.namespaces import Network, Switch
-from tests.daemon.peer_faults.remote import PATIENCE_S, PORT, Member, Told, taken
+from tests.daemon.peer_faults.remote import PORT, Member, Told, taken
 
 from nondum.sdk.wire import Body
 from nondum.transport.peers import HostKeys
@@ -60,7 +59,9 @@ class Crew:
     def start(self) -> None:
         """Start all, and wait until all see each other."""
         for member in self:
-            member.start()
+            member.launch()
+        for member in self:
+            member.await_start()
         self.all_see({member.name: {} for member in self})
 
     def all_see(self, catalogues: Catalogues, *, by: Sequence[Member] = ()) -> None:
@@ -115,6 +116,27 @@ class Crew:
             assert begun == ended or life in killed, f"{life} goes on with {begun - ended}"
         assert set(answered) <= _pieces(works, "end")
 
+    def clear(self) -> None:
+        """Bring all back to where they began: one network, the right time, nothing published, no
+        work. Nothing may have broken."""
+        self.switch.join()
+        for member in self:
+            member.cable.heal()
+            member.ask("set_clock", skew_s=0)
+        for name, told in self._all("still").items():
+            (member,) = (one for one in self if one.name == name)
+            member.ask("publish", changes=dict.fromkeys(told["published"]))
+        self.all_see({member.name: {} for member in self})
+        self._all("idle")
+        for member in self:
+            member.forget()
+        self.check_whole()
+
+    def check_whole(self) -> None:
+        """No host met an error that it did not expect."""
+        broken = [f"{member.name}: {what}" for member in self for what in member.broken]
+        assert not broken, "\n".join(broken)
+
     def _all(self, do: str) -> dict[str, Told]:
         answers = {member.name: member.order(do) for member in self}
         return {name: taken(answer) for name, answer in answers.items()}
@@ -150,8 +172,7 @@ def crew(work: Path, *names: str, seed: int, trust: Trusting | None = None) -> I
         made = Crew(network, work, trust or Trusting(names), seed)
         made.start()
         yield made
-        broken = [f"{member.name}: {what}" for member in made for what in member.broken]
-        assert not broken, "\n".join(broken)
+        made.check_whole()
 
 
 def _pieces(lines: Iterable[str], word: str) -> set[str]:
@@ -161,13 +182,3 @@ def _pieces(lines: Iterable[str], word: str) -> set[str]:
 def note(text: str) -> None:
     """Tell a figure: pytest shows it with -s, and when the test fails."""
     sys.stdout.write(f"{text}\n")
-
-
-def until(holds: Callable[[], bool]) -> None:
-    """Wait for what nobody tells: the machine's own state."""
-    pause = threading.Event()
-    for _ in range(int(PATIENCE_S / 0.05)):
-        if holds():
-            return
-        pause.wait(0.05)
-    raise AssertionError("it did not come about")

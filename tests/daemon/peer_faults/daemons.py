@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Iterator
+import os
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from demo.namespaces import Cable, Network
 from tests.daemon.neighbours import until_peer
-from tests.daemon.peer_faults.remote import PATIENCE_S
 from tests.kit.payloads import Part
-from tests.kit.running_host import DAEMON, RunningHost
+from tests.kit.running_host import DAEMON, READY_S, RunningHost
+from tests.kit.until import until
 
 from nondum.host.peers.trust_keeper import KEY_NAME, TRUST_NAME
 from nondum.transport.peers import Trust, trust_file
 from nondum.transport.peers.keys import load_or_create
 
+OVER = {"reached", "failed", "halted"}
+"""States of goals that are pursued no more."""
 SECTION = '[workers]\nconfinement = "0"\nminimum_confinement = 0\n[peers]\nenabled = true\n'
 
 
@@ -55,8 +57,26 @@ def wired(work: Path, *names: str) -> Iterator[list[WiredHost]]:
         yield hosts
 
 
-LAMP = '''"""Shines until it is stopped, or signals for a while, and writes down which."""
+def clear(hosts: Sequence[WiredHost]) -> None:
+    """Bring hosts that run back to where they began: all cables in, no goals, no payloads."""
+    for host in hosts:
+        host.cable.put_back()
+        for row in host.view["goals"]:
+            if row["state"] not in OVER:
+                host.ask("halt", id=row["id"])
+        for drive in host.plugged:
+            host.pull(drive)
+    for host in hosts:
+        host.until(
+            "nothing is left",
+            lambda view: not view["payloads"] and not view["components"],
+            timeout_s=READY_S,
+        )
+
+
+LAMP = '''"""Shines until stopped, or signals until told to end, and writes down which."""
 import asyncio
+import os
 from nondum.sdk import Fragment, Unit, behaviour, hookimpl
 
 DOMAIN = """
@@ -95,10 +115,21 @@ async def signal(ctx, u, h):
     note("begun")
     word = "halted"
     try:
-        await ctx.sleep(SIGNAL_S)
+        await told_to_end()
         word = "done"
     finally:
         note(word)
+
+async def told_to_end():
+    fifo = os.open("LOG.end", os.O_RDWR | os.O_NONBLOCK)
+    is_told = asyncio.Event()
+    asyncio.get_running_loop().add_reader(fifo, is_told.set)
+    try:
+        await is_told.wait()
+        os.read(fifo, 1)
+    finally:
+        asyncio.get_running_loop().remove_reader(fifo)
+        os.close(fifo)
 
 def note(word):
     with open("LOG", "a") as log:
@@ -106,19 +137,35 @@ def note(word):
 '''
 
 
-def lamp(log: Path, *, when_lost: str, signal_s: float = 6.0) -> Part:
-    """A lamp that writes down when it shines, and when it signals, which takes a while."""
-    code = LAMP.replace("LOST", when_lost).replace("SIGNAL_S", str(signal_s))
-    return Part("lamp", code.replace("LOG", str(log)))
+class Log:
+    """What a lamp has written down; by this it is also told when to end a signal."""
 
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self._fifo = file.with_name(f"{file.name}.end")
+        os.mkfifo(self._fifo)
 
-def until_written(log: Path, *words: str) -> None:
-    """Wait for a lamp to have written exactly that. Fails at once when it has written more."""
-    pause, found = threading.Event(), []
-    for _ in range(int(PATIENCE_S / 0.05)):
-        found = log.read_text(encoding="utf-8").split() if log.exists() else []
-        if found == list(words):
-            return
-        assert found == list(words)[: len(found)], found
-        pause.wait(0.05)
-    raise AssertionError(found)
+    def lamp(self, *, when_lost: str) -> Part:
+        """The lamp that writes here."""
+        code = LAMP.replace("LOST", when_lost)
+        return Part("lamp", code.replace("LOG", str(self._file)))
+
+    def end_signal(self) -> None:
+        """Tell the signal that has begun to end."""
+        with self._fifo.open("wb", buffering=0) as fifo:
+            fifo.write(b".")
+
+    @property
+    def words(self) -> list[str]:
+        """All that was written, oldest first."""
+        return self._file.read_text(encoding="utf-8").split() if self._file.exists() else []
+
+    def until(self, *words: str) -> None:
+        """Wait until exactly that is written. Fails at once when more is written."""
+
+        def look() -> bool:
+            written = self.words
+            assert written == list(words)[: len(written)], written
+            return len(written) == len(words)
+
+        until(f"written: {words}", look, evidence=lambda: self.words)

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from demo.namespaces import Cable, Machine
+from tests.kit.until import PATIENCE_S, until
 
 from nondum.transport.peers import HostKeys
 
-PATIENCE_S = 60.0
 PORT = 7410
 
 Told = dict[str, Any]
@@ -55,12 +55,20 @@ class Member:
 
     def start(self, **changes: Any) -> int:
         """Start it, `changes` being of its configuration, and wait until it listens; its epoch."""
+        self.launch(**changes)
+        return self.await_start()
+
+    def launch(self, **changes: Any) -> None:
+        """Start its process, `changes` being of its configuration."""
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
         config = json.dumps({**self.config, **changes})
         self._process = self.machine.python("tests.daemon.peer_faults.member", config, **pipes)
         self.forget()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
+
+    def await_start(self) -> int:
+        """Wait until it listens; its epoch."""
         self.epoch = int(self.next("started")["epoch"])
         return self.epoch
 
@@ -122,6 +130,14 @@ class Member:
     def descriptors(self) -> int:
         """Files and sockets that it has open."""
         return len(os.listdir(f"/proc/{self.pid}/fd"))  # noqa: PTH208  # links that may be gone
+
+    def closes(self, most: int) -> None:
+        """Wait until it has no more descriptors open than that."""
+        until(
+            f"{self.name}: at most {most} descriptors",
+            lambda: self.descriptors() <= most,
+            evidence=self.descriptors,
+        )
 
     def _read(self) -> None:
         assert self._process is not None

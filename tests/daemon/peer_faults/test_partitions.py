@@ -5,7 +5,6 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 from tests.daemon.peer_faults.crew import Crew, crew, note
@@ -13,14 +12,22 @@ from tests.daemon.peer_faults.remote import Member
 
 pytestmark = pytest.mark.daemon
 
-ROUNDS = 4
 NAMES = ("rover", "mule", "scout", "base")
+ROUNDS = pytest.mark.parametrize("rounds", [2, pytest.param(4, marks=pytest.mark.long("peers"))])
+"""How often the network is parted and joined."""
+
+
+@pytest.fixture(scope="module")
+def fleet(seed: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Crew]:
+    with crew(tmp_path_factory.mktemp("fleet"), *NAMES, seed=seed) as fleet:
+        yield fleet
 
 
 @pytest.fixture
-def hosts(seed: int, tmp_path: Path) -> Iterator[Crew]:
-    with crew(tmp_path, *NAMES, seed=seed) as hosts:
-        yield hosts
+def hosts(fleet: Crew) -> Iterator[Crew]:
+    """Hosts that see each other, with nothing published."""
+    yield fleet
+    fleet.clear()
 
 
 @pytest.mark.parametrize(
@@ -47,12 +54,13 @@ def test_link_that_loses_in_one_direction_is_noticed_at_both_ends(
     note(f"healed after {time.monotonic() - began_s:.2f} s")
 
 
+@ROUNDS
 def test_halves_of_a_parted_network_go_on_and_know_everything_when_it_is_whole(
-    hosts: Crew,
+    rounds: int, hosts: Crew
 ) -> None:
     chance = random.Random(hosts.seed)
     catalogues: dict[str, dict[str, dict[str, int]]] = {name: {} for name in NAMES}
-    for number in range(ROUNDS):
+    for number in range(rounds):
         members = chance.sample(hosts.members, len(NAMES))
         halves = members[:2], members[2:]
         hosts.switch.split([member.cable for member in halves[0]])
@@ -74,10 +82,11 @@ def test_halves_of_a_parted_network_go_on_and_know_everything_when_it_is_whole(
         note(f"round {number}: alike after {time.monotonic() - began_s:.2f} s")
 
 
-def test_work_goes_on_while_a_network_is_parted_and_joined(hosts: Crew) -> None:
+@ROUNDS
+def test_work_goes_on_while_a_network_is_parted_and_joined(rounds: int, hosts: Crew) -> None:
     chance = random.Random(hosts.seed)
     hosts.live(change_s=0.03, ask_s=0.05)
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         half = chance.sample(hosts.members, 2)
         hosts.switch.split([member.cable for member in half])
         hosts.all_meet(half, [member for member in hosts if member not in half])
