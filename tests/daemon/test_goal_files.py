@@ -32,7 +32,8 @@ def trusting(work: Path, permissions: Sequence[str]) -> Iterator[RunningHost]:
     text = trust_text.to_text(trust_of(roots=[Key("root")], roles=roles, permissions=permissions))
     trust.write_text(text)
     host = RunningHost(work)
-    (work / "host.toml").write_text(configuration(host, trust) + UNCONFINED, encoding="utf-8")
+    more = f"{UNCONFINED}[feedback]\nsafe_s = 0.2\n"  # long enough to be shown
+    (work / "host.toml").write_text(configuration(host, trust) + more, encoding="utf-8")
     try:
         host.start()
         yield host

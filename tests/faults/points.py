@@ -14,7 +14,8 @@ from typing import Any
 from tests.faults.model import Ended, check
 from tests.faults.play import Player, codes_of, has_stopped, trace
 from tests.faults.ways import COMPONENT_WAYS, newer, sound, way
-from tests.kit.fork_server import Nursery, logged
+from tests.kit.evidence import logged
+from tests.kit.fork_server import Nursery
 
 from nondum.host.catalogue.records import Step
 from nondum.host.transitions import COMPONENT_TRANSITIONS, TRANSITIONS

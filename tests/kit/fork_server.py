@@ -1,47 +1,118 @@
-"""Where daemons are born that are to die: forked, with everything imported, instead of started.
+"""Daemons forked from a process that has imported them, in place of a start of Python for each.
 
-    with Nursery() as nursery:
-        ended = nursery.run({"root": …, "kill": …})
+    process = fork_server().start(["nondum.host.cli", "host", "run", "--user"])
+
+A process of the fork server is what `python -m MODULE …` would be, with its own arguments,
+environment, folder and standard streams; it has no other descriptors, and ends as a program ends.
+Two differ: /proc shows the fork server's command line and first environment, and the parent is the
+fork server. What it has started is killed when the process that asked for it ends.
 
 The process that forks has one thread and no loop: this module, run as a program.
 """
 
 from __future__ import annotations
 
-import asyncio
+import atexit
 import contextlib
+import functools
+import importlib
 import json
 import os
+import runpy
+import select
 import signal
+import socket
 import subprocess
 import sys
 import threading
-import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import IO, Any, Self
+
+from tests.kit.evidence import logged
 
 ROOT = Path(__file__).parent.parent.parent
 PATIENCE_S = 90.0
-LONGEST_LOG = 8000
-"""Bytes of a log that a message shows."""
+IMPORTED = (
+    *("nondum.host.app", "nondum.host.cli.main", "nondum.host.cli.host"),
+    "nondum.host.peers.neighbourhood",
+)
+"""What daemons import, and the fork server before them."""
+
+Command = Sequence[str]
+"""A module that is a program, and its arguments."""
 
 
-class Nursery:
-    """The other end: daemons one after the other. Use it as a context."""
+class Forked:
+    """A process of the fork server; the methods are those of `subprocess.Popen`."""
+
+    def __init__(self, pid: int, descriptor: int, status: int, stderr: IO[bytes] | None) -> None:
+        """`descriptor` is its pidfd; its return code can be read from `status`."""
+        self.pid, self.stderr = pid, stderr
+        self.returncode: int | None = None
+        self._descriptor, self._status = descriptor, status
+        self._ended = threading.Lock()
+
+    def poll(self) -> int | None:
+        """The return code, negative for a signal; None while it runs."""
+        return self._ends_within(0)
+
+    def wait(self, timeout: float | None = None) -> int:
+        """The return code, once it has ended. Raises `subprocess.TimeoutExpired`."""
+        code = self._ends_within(timeout)
+        if code is None:
+            raise subprocess.TimeoutExpired(f"process {self.pid}", timeout or 0)
+        return code
+
+    def send_signal(self, number: int) -> None:
+        """Send it a signal, if it runs."""
+        with self._ended:
+            if self.returncode is None:
+                with contextlib.suppress(ProcessLookupError):
+                    signal.pidfd_send_signal(self._descriptor, number)
+
+    def terminate(self) -> None:
+        """Ask it to end."""
+        self.send_signal(signal.SIGTERM)
+
+    def kill(self) -> None:
+        """End it."""
+        self.send_signal(signal.SIGKILL)
+
+    def _ends_within(self, timeout_s: float | None) -> int | None:
+        with self._ended:
+            if self.returncode is not None:
+                return self.returncode
+        ready = select.poll()
+        ready.register(self._status, select.POLLIN)
+        if not ready.poll(None if timeout_s is None else timeout_s * 1000):
+            return None
+        with self._ended:
+            if self.returncode is None:
+                said = os.read(self._status, 16)
+                assert said, "the fork server has ended"
+                self.returncode = int(said)
+                os.close(self._status)
+                os.close(self._descriptor)
+            return self.returncode
+
+
+class ForkServer:
+    """Starts daemons, several at once if need be. Use it as a context, or close it."""
 
     def __init__(self) -> None:
-        self._one_at_a_time = threading.Lock()
+        self._one_request = threading.Lock()
+        self._channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "tests.kit.fork_server", str(theirs.fileno())],
+                pass_fds=[theirs.fileno()],
+                cwd=ROOT,
+            )
 
     def __enter__(self) -> Self:
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "tests.kit.fork_server"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            cwd=ROOT,
-        )
         return self
 
     def __exit__(
@@ -50,8 +121,66 @@ class Nursery:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._process.kill()
-        self._process.communicate()
+        self.close()
+
+    def close(self) -> None:
+        """End it, and kill what it has started and still runs."""
+        self._channel.close()
+        self._process.wait()
+
+    def start(self, command: Command, *, stderr: int | None = None) -> Forked:
+        """Start `python -m command…` in this folder with this environment.
+
+        `stderr` is a descriptor for its standard error, or `subprocess.PIPE`.
+        """
+        with contextlib.ExitStack() as ours:
+            reader, writer = os.pipe() if stderr == subprocess.PIPE else (None, stderr)
+            if reader is not None and writer is not None:
+                ours.callback(os.close, writer)
+            status, theirs = os.pipe()
+            ours.callback(os.close, theirs)
+            pid, descriptor = self._ask(command, [0, 1, 2 if writer is None else writer, theirs])
+        return Forked(pid, descriptor, status, None if reader is None else os.fdopen(reader, "rb"))
+
+    def _ask(self, command: Command, descriptors: list[int]) -> tuple[int, int]:
+        """Have a process forked; its pid and pidfd."""
+        request = json.dumps(
+            {"command": list(command), "folder": str(Path.cwd()), "environment": dict(os.environ)}
+        )
+        with self._one_request:
+            socket.send_fds(self._channel, [request.encode()], descriptors)
+            answer, (descriptor,), _, _ = socket.recv_fds(self._channel, 16, 1)
+        os.set_inheritable(descriptor, False)
+        return int(answer), descriptor
+
+
+def fork_server() -> ForkServer:
+    """The fork server of this process."""
+    return _fork_server_of(os.getpid())
+
+
+@functools.cache
+def _fork_server_of(pid: int) -> ForkServer:
+    server = ForkServer()
+    atexit.register(server.close)
+    return server
+
+
+def module_of(program: Sequence[str]) -> Command | None:
+    """What the fork server is to run for a program; None if that is not `python -m …`."""
+    head, tail = tuple(program[:2]), program[2:]
+    return tail if head == (sys.executable, "-m") else None
+
+
+class Nursery:
+    """Daemons that are to die, one after the other. Use it as a context."""
+
+    def __enter__(self) -> Self:
+        self._server = ForkServer()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._server.close()
 
     def run(
         self,
@@ -69,7 +198,7 @@ class Nursery:
         """
         log = Path(orders["root"], "log")
         start = log.stat().st_size if log.exists() else 0
-        code, was_late = self._run(orders, at_birth, late_s or PATIENCE_S)
+        code, was_late = self._run(orders, log, at_birth, late_s or PATIENCE_S)
         if was_late and late_s is None:
             raise TimeoutError(f"it did not end within {PATIENCE_S:g} s\n{logged(log, start)}")
         if expect is not None and code != expect:
@@ -78,70 +207,118 @@ class Nursery:
         return code
 
     def _run(
-        self, orders: dict[str, Any], at_birth: Callable[[int], None], late_s: float
+        self, orders: dict[str, Any], log: Path, at_birth: Callable[[int], None], late_s: float
     ) -> tuple[int, bool]:
         """The return code, and whether the daemon's time was over."""
-        with self._one_at_a_time:
-            assert self._process.stdin is not None  # both are pipes
-            assert self._process.stdout is not None
-            self._process.stdin.write(json.dumps(orders) + "\n")
-            self._process.stdin.flush()
-            pid = int(self._process.stdout.readline())
-            late = threading.Timer(late_s, lambda: _kill(pid))
-            late.start()
-            try:
-                at_birth(pid)
-                code = int(self._process.stdout.readline())
-            finally:
-                was_late = not late.is_alive()
-                late.cancel()
-            return code, was_late
+        with log.open("ab") as lines:
+            command = ["tests.faults.daemon", json.dumps(orders)]
+            process = self._server.start(command, stderr=lines.fileno())
+        late = threading.Timer(late_s, process.kill)
+        late.start()
+        try:
+            at_birth(process.pid)
+            code = process.wait()
+        finally:
+            was_late = not late.is_alive()
+            late.cancel()
+        return code, was_late
 
 
-def logged(log: Path, start: int = 0) -> str:
-    """The end of a log, from a position on, as far as a person reads it."""
-    with contextlib.suppress(FileNotFoundError), log.open("rb") as file:
-        file.seek(max(start, log.stat().st_size - LONGEST_LOG))
-        said = file.read().decode(errors="replace").rstrip()
-        return f"{log} ends with:\n{said}" if said else f"{log}: nothing was logged"
-    return f"{log} was never made"
+# What follows runs in the fork server.
 
 
-def _kill(pid: int) -> None:
-    with contextlib.suppress(ProcessLookupError):
-        os.kill(pid, signal.SIGKILL)
+@dataclass(frozen=True)
+class _Request:
+    """What a client asks for."""
+
+    command: Command
+    folder: str
+    environment: dict[str, str]
+    descriptors: Sequence[int]
+    """Standard streams, then where the return code is to be written."""
 
 
-def _serve() -> None:
-    from tests.faults import daemon
+@dataclass(frozen=True)
+class _Child:
+    """A process that runs."""
 
-    for line in sys.stdin:
-        orders = json.loads(line)
-        pid = os.fork()
-        if pid == 0:
-            _live(daemon.main, orders)
-        print(pid, flush=True)  # noqa: T201  # that is how it answers
-        _, status = os.waitpid(pid, 0)
-        print(os.waitstatus_to_exitcode(status), flush=True)  # noqa: T201
+    pid: int
+    descriptor: int
+    status: int
 
 
-def _live(main: Any, orders: dict[str, Any]) -> None:
-    """In the child: never returns."""
-    nothing = os.open(os.devnull, os.O_RDWR)
-    os.dup2(nothing, 0)
-    os.dup2(nothing, 1)
-    log = os.open(f"{orders['root']}/log", os.O_CREAT | os.O_WRONLY | os.O_APPEND | os.O_CLOEXEC)
-    os.dup2(log, 2)
-    code = 1
-    try:
-        asyncio.run(main(orders))
-        code = 0
-    except BaseException:
-        traceback.print_exc()
-    finally:
-        sys.stderr.flush()
-        os._exit(code)
+def _serve(channel: socket.socket) -> _Request | None:
+    """Answer requests. Returns in each child with what it is to do, and None when the client has
+    ended."""
+    children: dict[int, _Child] = {}
+    ready = select.poll()
+    ready.register(channel, select.POLLIN)
+    while True:
+        for descriptor, _ in ready.poll():
+            if descriptor != channel.fileno():
+                ready.unregister(descriptor)
+                _see_end(children.pop(descriptor))
+                continue
+            request = _receive(channel)
+            if request is None:
+                _end(children.values())
+                return None
+            *_, status = request.descriptors
+            (_one_thread,) = Path("/proc/self/task").iterdir()  # a fork has one
+            if (pid := os.fork()) == 0:
+                return request
+            child = _Child(pid, os.pidfd_open(pid), status)
+            children[child.descriptor] = child
+            ready.register(child.descriptor, select.POLLIN)
+            for stream in request.descriptors[:-1]:
+                os.close(stream)
+            socket.send_fds(channel, [str(pid).encode()], [child.descriptor])
+
+
+def _receive(channel: socket.socket) -> _Request | None:
+    message, descriptors, _, _ = socket.recv_fds(channel, 1 << 20, 4)
+    if not message:
+        return None
+    asked = json.loads(message)
+    return _Request(asked["command"], asked["folder"], asked["environment"], descriptors)
+
+
+def _see_end(child: _Child) -> None:
+    _, status = os.waitpid(child.pid, 0)
+    with contextlib.suppress(BrokenPipeError):
+        os.write(child.status, str(os.waitstatus_to_exitcode(status)).encode())
+    os.close(child.status)
+    os.close(child.descriptor)
+
+
+def _end(children: Iterable[_Child]) -> None:
+    for child in children:
+        os.kill(child.pid, signal.SIGKILL)
+        os.waitpid(child.pid, 0)
+
+
+def _become(request: _Request) -> None:
+    """Be the program that was asked for."""
+    for number, descriptor in enumerate(request.descriptors[:-1]):
+        os.dup2(descriptor, number)
+    os.closerange(3, os.sysconf("SC_OPEN_MAX"))
+    os.chdir(request.folder)
+    os.environ.clear()
+    os.environ.update(request.environment)
+    module, *arguments = request.command
+    sys.path[0], sys.argv[1:] = request.folder, arguments
+    runpy.run_module(module, run_name="__main__", alter_sys=True)
+
+
+def main() -> None:
+    """Serve the client at the socket whose descriptor is given."""
+    for module in IMPORTED:
+        importlib.import_module(module)
+    channel = socket.socket(fileno=int(sys.argv[1]))
+    if request := _serve(channel):
+        channel.detach()
+        _become(request)
 
 
 if __name__ == "__main__":
-    _serve()
+    main()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import select
 import subprocess
+import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -16,13 +17,18 @@ from pathlib import Path
 from typing import Any
 
 from demo.robot import NONDUM, Robot, TooLate, View, configuration
+from tests.kit import evidence
+from tests.kit.fork_server import Forked, fork_server, module_of
 from tests.kit.payloads import Part, make_payload
 from tests.kit.traces import Traces
+from tests.kit.until import PATIENCE_S
 
-READY_S = 120.0
-GONE_S = 60.0
-END_S = 60.0
+READY_S = PATIENCE_S
+END_S = PATIENCE_S
 DAEMON = (*NONDUM, "host", "run", "--user")
+"""Forked from a process that has imported it."""
+COMMAND = (str(Path(sys.executable).with_name("nondum")), "host", "run", "--user")
+"""What people type, with the whole start of Python."""
 
 Row = View
 """A line of a table, as JSON has it."""
@@ -34,13 +40,14 @@ class RunningHost(Robot):
     def __init__(
         self, work: Path, *, name: str = "spot", more: str = "", program: Sequence[str] = DAEMON
     ) -> None:
-        """`more` are further lines of its configuration; `program` runs a daemon."""
+        """`more` are further lines of its configuration; `program` runs a daemon, in a process of
+        the fork server if it is `python -m …`."""
         super().__init__(work, name=name)
         self.state = work / "state"
         self.views: list[View] = []
         """All that it showed, oldest first, until the daemon was started again."""
         self._program = program
-        self._daemon: subprocess.Popen[bytes] | None = None
+        self._daemon: subprocess.Popen[bytes] | Forked | None = None
         self._threads: list[threading.Thread] = []
         for folder in (self.slots, self.devices):
             folder.mkdir(parents=True)
@@ -51,12 +58,16 @@ class RunningHost(Robot):
     def start(self) -> None:
         """Start a daemon and wait until it listens. Raises `TooLate` with its last words."""
         listens = threading.Event()
-        command = [*self._program, "--config", str(self.work / "host.toml")]
-        self._daemon = subprocess.Popen(command, stderr=subprocess.PIPE)
+        command = (*self._program, "--config", str(self.work / "host.toml"))
+        evidence.keep(self)
+        if module := module_of(command):
+            self._daemon = fork_server().start(module, stderr=subprocess.PIPE)
+        else:
+            self._daemon = subprocess.Popen(command, stderr=subprocess.PIPE)
         self._view, self.views, self._watching = {}, [], True
         self._run(self._keep_log, listens)
         if not listens.wait(READY_S) or self._daemon.poll() is not None:
-            raise TooLate(f"the daemon does not listen:\n{self.log}")
+            raise TooLate(f"the daemon does not listen:\n{evidence.logged(self.log_file)}")
         self._run(self.watch)
         self.until("a first view", lambda view: view, timeout_s=READY_S)
 
@@ -79,9 +90,19 @@ class RunningHost(Robot):
         return self._daemon.pid
 
     @property
+    def runs(self) -> bool:
+        """Whether a daemon was started and has neither been stopped nor killed here."""
+        return self._daemon is not None
+
+    @property
+    def log_file(self) -> Path:
+        """Where all that the daemons write is kept."""
+        return self.work / "daemon.log"
+
+    @property
     def log(self) -> str:
         """What the daemons wrote."""
-        return (self.work / "daemon.log").read_text(encoding="utf-8")
+        return self.log_file.read_text(encoding="utf-8") if self.log_file.exists() else ""
 
     def see(self, view: View) -> None:
         """Take in a newer view, and keep it."""
@@ -136,7 +157,7 @@ class RunningHost(Robot):
 
     def until_gone(self, name: str) -> None:
         """Wait until a payload is not shown any more."""
-        self.until(f"{name}: gone", lambda v: payload(v, name) is None, timeout_s=GONE_S)
+        self.until(f"{name}: gone", lambda v: payload(v, name) is None, timeout_s=READY_S)
 
     def until_component(self, id: str, state: str) -> Row:
         """Wait until a component is in a state; without its age."""
@@ -192,6 +213,9 @@ class RunningHost(Robot):
 
     # Inside
 
+    def _last_words(self) -> str:
+        return f"{super()._last_words()}\n{evidence.logged(self.log_file)}"
+
     def _run(self, work: Any, *arguments: Any) -> None:
         thread = threading.Thread(target=work, args=arguments, daemon=True)
         self._threads.append(thread)
@@ -200,7 +224,7 @@ class RunningHost(Robot):
     def _keep_log(self, listens: threading.Event) -> None:
         assert self._daemon is not None
         assert self._daemon.stderr is not None
-        with self._daemon.stderr as lines, (self.work / "daemon.log").open("ab") as log:
+        with self._daemon.stderr as lines, self.log_file.open("ab") as log:
             for line in lines:
                 log.write(line)
                 log.flush()
