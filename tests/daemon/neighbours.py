@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 from demo.ports import free_port
 from tests.kit.payloads import Part
@@ -26,8 +27,15 @@ def neighbours(work: Path, *names: str, more: str = "") -> Iterator[list[Running
         yield hosts
 
 
+class OpenHost(NamedTuple):
+    """A host that needs no keys, and where it listens."""
+
+    host: RunningHost
+    address: str
+
+
 @contextmanager
-def open_host(work: Path, name: str, port: int = 0) -> Iterator[tuple[RunningHost, str]]:
+def open_host(work: Path, name: str, port: int = 0) -> Iterator[OpenHost]:
     """One host that needs no keys, and where it listens, unless that port is taken."""
     port = port or free_port()
     host = RunningHost(
@@ -35,7 +43,7 @@ def open_host(work: Path, name: str, port: int = 0) -> Iterator[tuple[RunningHos
     )
     try:
         host.start()
-        yield host, f"tcp://127.0.0.1:{port}"
+        yield OpenHost(host, f"tcp://127.0.0.1:{port}")
     finally:
         host.stop()
 

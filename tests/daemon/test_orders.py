@@ -66,7 +66,8 @@ def test_actuator_whose_plugin_does_not_ask_has_one_user_at_a_time(host: Running
         assert list(steps(view).values()).count("established") <= 1
 
 
-def test_mount_that_a_behaviour_needs_is_asked_for_and_then_counts(host: RunningHost) -> None:
+def test_mount_that_a_behaviour_needs_is_asked_for_and_then_counts(own_host: RunningHost) -> None:
+    host = own_host  # what a person says of a mount stays
     host.bring("compass", compass())
     goal = host.want("(bearing-known north spot)", "achieve")
     host.until_told("FRAME_UNKNOWN no way is known from frame 'spot__compass__needle' to 'spot'")

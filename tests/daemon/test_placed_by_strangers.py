@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.daemon.guest import Guest, guest
-from tests.daemon.neighbours import beacon, open_host
+from tests.daemon.neighbours import OpenHost, beacon, open_host
 from tests.kit.payloads import make_payload, seal
 from tests.kit.running_host import RunningHost
+from tests.kit.shared import Shared
 
 from nondum.sdk.wire import Body
 from nondum.transport.peers import CallFailed, Errand, Lease, Loss
 
 pytestmark = pytest.mark.daemon
+
+RELEASES = itertools.count(2, 2)
 
 Twist = Callable[[str, int, bytes], Any]
 """Path of a file, offset and its bytes there → what is sent."""
@@ -54,17 +58,39 @@ class Hands:
         return Lease.STOP
 
 
-@pytest.fixture
-def mule(tmp_path: Path) -> Iterator[tuple[RunningHost, str]]:
-    with open_host(tmp_path / "mule", "mule") as (host, address):
-        yield host, address
+@pytest.fixture(scope="module")
+def one_mule(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shared[OpenHost]]:
+    with Shared(lambda: open_host(tmp_path_factory.mktemp("mule"), "mule")) as shared:
+        yield shared
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    return make_payload(
-        tmp_path / "drive", beacon(tmp_path / "log"), payload_id="org.example.light", release=7
-    )
+def mule(one_mule: Shared[OpenHost]) -> Iterator[OpenHost]:
+    """A host, and where it listens."""
+    with one_mule.lent() as mule:
+        yield mule
+
+
+@pytest.fixture
+def release() -> int:
+    """One that was not here yet, nor was the one before it."""
+    return next(RELEASES)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, release: int) -> Path:
+    part = beacon(tmp_path / "log")
+    return make_payload(tmp_path / "drive", part, payload_id="org.example.light", release=release)
+
+
+@pytest.fixture
+def stored(mule: OpenHost) -> set[str]:
+    """The wheels that are stored before anything is handed over."""
+    return wheels(mule.host)
+
+
+def wheels(host: RunningHost) -> set[str]:
+    return {path.name for path in (host.state / "store").glob("[0-9a-f]*")}
 
 
 def refused(one: Guest, hands: Hands, **more: Any) -> tuple[str, str]:
@@ -74,9 +100,9 @@ def refused(one: Guest, hands: Hands, **more: Any) -> tuple[str, str]:
     return caught.value.code, caught.value.problems[0].where
 
 
-def check_nothing_is_left(host: RunningHost) -> None:
+def check_nothing_is_left(host: RunningHost, stored: set[str]) -> None:
     assert not any((host.state / "placed").glob("*"))
-    assert not any((host.state / "store").glob("[0-9a-f]*"))
+    assert wheels(host) == stored
     assert all(row["event"] != "DriveInserted" for row in host.journal())
 
 
@@ -104,7 +130,7 @@ TWISTS = {
 
 @pytest.mark.parametrize("twist", TWISTS)
 def test_file_that_is_not_as_listed_is_refused(
-    mule: tuple[RunningHost, str], folder: Path, twist: str
+    mule: OpenHost, folder: Path, stored: set[str], twist: str
 ) -> None:
     host, address = mule
     where, change = TWISTS[twist]
@@ -113,7 +139,7 @@ def test_file_that_is_not_as_listed_is_refused(
         code, place = refused(one, hands)
         assert code == "HASH_MISMATCH"
         assert place.startswith(where)
-    check_nothing_is_left(host)
+    check_nothing_is_left(host, stored)
 
 
 @pytest.mark.parametrize(
@@ -132,25 +158,25 @@ def test_file_that_is_not_as_listed_is_refused(
     ids=str,
 )
 def test_offer_that_is_none_is_refused(
-    mule: tuple[RunningHost, str], folder: Path, args: dict[str, Any]
+    mule: OpenHost, folder: Path, stored: set[str], args: dict[str, Any]
 ) -> None:
     host, address = mule
     hands = Hands(folder)
     with guest("liar", ("mule", address), handler=hands) as one:
         assert refused(one, hands, **args)[0] == "CALL_MALFORMED"
-    check_nothing_is_left(host)
+    check_nothing_is_left(host, stored)
 
 
-def test_payload_of_another_name_is_refused(mule: tuple[RunningHost, str], folder: Path) -> None:
+def test_payload_of_another_name_is_refused(mule: OpenHost, folder: Path, stored: set[str]) -> None:
     host, address = mule
     hands = Hands(folder)
     with guest("liar", ("mule", address), handler=hands) as one:
         assert refused(one, hands, payload="org.example.dark")[0] == "CALL_MALFORMED"
-    check_nothing_is_left(host)
+    check_nothing_is_left(host, stored)
 
 
 def test_list_that_leads_out_of_the_folder_is_refused(
-    mule: tuple[RunningHost, str], folder: Path
+    mule: OpenHost, folder: Path, stored: set[str]
 ) -> None:
     host, address = mule
     listed = (folder / "CONTENTS").read_text(encoding="ascii")
@@ -160,10 +186,12 @@ def test_list_that_leads_out_of_the_folder_is_refused(
     with guest("liar", ("mule", address), handler=hands) as one:
         code, _ = refused(one, hands)
         assert code in ("PATH_UNSAFE", "CONTENTS_ENTRY")
-    check_nothing_is_left(host)
+    check_nothing_is_left(host, stored)
 
 
-def test_more_to_judge_than_is_read_is_refused(mule: tuple[RunningHost, str], folder: Path) -> None:
+def test_more_to_judge_than_is_read_is_refused(
+    mule: OpenHost, folder: Path, stored: set[str]
+) -> None:
     host, address = mule
     with (folder / "leaflet.txt").open("wb") as leaflet:
         leaflet.truncate(17 << 20)
@@ -171,12 +199,10 @@ def test_more_to_judge_than_is_read_is_refused(mule: tuple[RunningHost, str], fo
     hands = Hands(folder)
     with guest("liar", ("mule", address), handler=hands) as one:
         assert refused(one, hands)[0] == "TOO_LARGE"
-    check_nothing_is_left(host)
+    check_nothing_is_left(host, stored)
 
 
-def test_sound_payload_is_here_for_as_long_as_the_call(
-    mule: tuple[RunningHost, str], folder: Path
-) -> None:
+def test_sound_payload_is_here_for_as_long_as_the_call(mule: OpenHost, folder: Path) -> None:
     host, address = mule
     hands = Hands(folder)
     with guest("rover", ("mule", address), handler=hands) as one:
@@ -190,23 +216,21 @@ def test_sound_payload_is_here_for_as_long_as_the_call(
     assert not any((host.state / "placed").glob("*"))
 
 
-def test_older_release_than_was_here_is_refused(
-    mule: tuple[RunningHost, str], folder: Path
-) -> None:
+def test_older_release_than_was_here_is_refused(mule: OpenHost, folder: Path, release: int) -> None:
     host, address = mule
     drive = folder.parents[1]
     slot = host.plug(drive)
     host.until_step("light", "active")
     host.pull(slot)
     host.until_gone("light")
-    seal(folder, payload_id=folder.name, release=6)
+    seal(folder, payload_id=folder.name, release=release - 1)
     hands = Hands(folder)
     with guest("rover", ("mule", address), handler=hands) as one:
         assert refused(one, hands)[0] == "ROLLBACK"
 
 
 def test_component_that_is_here_already_is_refused(
-    mule: tuple[RunningHost, str], folder: Path, tmp_path: Path
+    mule: OpenHost, folder: Path, tmp_path: Path
 ) -> None:
     host, address = mule
     host.bring("lamp", beacon(tmp_path / "log"))
@@ -216,7 +240,7 @@ def test_component_that_is_here_already_is_refused(
     assert host.component("beacon") is not None
 
 
-def test_only_who_takes_a_payload_may_fetch_it(mule: tuple[RunningHost, str], folder: Path) -> None:
+def test_only_who_takes_a_payload_may_fetch_it(mule: OpenHost, folder: Path) -> None:
     host, address = mule
     host.plug(folder.parents[1])
     host.until_step("light", "active")

@@ -15,8 +15,9 @@ pytestmark = pytest.mark.daemon
 
 @pytest.mark.parametrize("is_acting", [False, True], ids=["idle", "acting"])
 def test_killed_daemon_comes_back_with_the_same_components(
-    host: RunningHost, *, is_acting: bool
+    own_host: RunningHost, *, is_acting: bool
 ) -> None:
+    host = own_host
     host.bring("write", scribe())
     host.bring("talk", talker())
     if is_acting:
@@ -70,11 +71,12 @@ def test_worker_that_is_killed_too_often_is_quarantined_until_replugged(host: Ru
     assert host.until_told("talker is not ready, it is quarantined: WORKER_CRASH_LOOP")
     assert "WORKER_CRASH_LOOP" in str(host.ask("why")["problems"])
     assert host.component("scribe") == writer
-    host.until_goal(host.want("(written spot)"), "suspended")
+    goal = host.want("(written spot)")
+    host.until_goal(goal, "suspended")
     host.pull("talk")
     host.until_gone("talk")
     host.plug(drive)
-    host.until_goal("1", "holds")
+    host.until_goal(goal, "holds")
     assert host.component("scribe") == writer
 
 

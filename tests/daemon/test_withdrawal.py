@@ -119,7 +119,8 @@ def endings(host: RunningHost, component: str) -> list[str]:
     return [row["detail"]["outcome"] for row in ends]
 
 
-def test_same_drive_plugged_again_is_at_work_again(host: RunningHost) -> None:
+def test_same_drive_plugged_again_is_at_work_again(own_host: RunningHost) -> None:
+    host = own_host  # whose store is empty
     host.bring("write", scribe())
     drive = host.bring("talk", talker())
     goal = host.want("(written spot)")

@@ -6,13 +6,16 @@ leaves behind is looked for in /proc and on disk.
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import select
+import shutil
 import subprocess
 import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +23,10 @@ from demo.robot import NONDUM, Robot, TooLate, View, configuration
 from tests.kit import evidence
 from tests.kit.fork_server import Forked, fork_server, module_of
 from tests.kit.payloads import Part, make_payload
-from tests.kit.traces import Traces
+from tests.kit.traces import Traces, former_payloads
 from tests.kit.until import PATIENCE_S
+
+from nondum.sdk.errors import NondumError
 
 READY_S = PATIENCE_S
 END_S = PATIENCE_S
@@ -45,7 +50,9 @@ class RunningHost(Robot):
         super().__init__(work, name=name)
         self.state = work / "state"
         self.views: list[View] = []
-        """All that it showed, oldest first, until the daemon was started again."""
+        """All that it showed, oldest first, since the daemon was started or `forget`."""
+        self._known = Known()
+        self._release = 1
         self._program = program
         self._daemon: subprocess.Popen[bytes] | Forked | None = None
         self._threads: list[threading.Thread] = []
@@ -65,6 +72,7 @@ class RunningHost(Robot):
         else:
             self._daemon = subprocess.Popen(command, stderr=subprocess.PIPE)
         self._view, self.views, self._watching = {}, [], True
+        self._known = replace(self._known, told=0, goals=frozenset())
         self._run(self._keep_log, listens)
         if not listens.wait(READY_S) or self._daemon.poll() is not None:
             raise TooLate(f"the daemon does not listen:\n{evidence.logged(self.log_file)}")
@@ -112,8 +120,12 @@ class RunningHost(Robot):
     # What people do
 
     def drive(self, name: str, *parts: Part, **options: Any) -> Path:
-        """Write a drive with one payload, `org.example.<name>`."""
+        """Write a drive with one payload, `org.example.<name>`.
+
+        After `forget` it is a newer release than before: one release has one content.
+        """
         drive = self.work / "drives" / name
+        options = {"release": self._release} | options
         make_payload(drive, *parts, payload_id=f"org.example.{name}", **options)
         return drive
 
@@ -181,10 +193,11 @@ class RunningHost(Robot):
         return self.until(f"goal {id}: {state}", found, timeout_s=READY_S)
 
     def until_told(self, words: str, *, since: int = 0) -> str:
-        """Wait for a sentence with these words in it."""
+        """Wait for a sentence with these words in it, told since `forget`."""
+        after = max(since, self._known.told)
 
         def found(view: View) -> str | None:
-            told = (row["text"] for row in view["told"] if row["number"] > since)
+            told = (row["text"] for row in view["told"] if row["number"] > after)
             return next((text for text in told if words in text), None)
 
         return self.until(f"told: {words}", found, timeout_s=READY_S)
@@ -203,13 +216,61 @@ class RunningHost(Robot):
         return {row["fact"]: row["value"] for row in self.ask("facts")}
 
     def journal(self, subject: str | None = None) -> list[Row]:
-        """What happened, oldest first."""
-        rows: list[Row] = self.ask("journal", subject=subject, limit=10_000)
-        return rows
+        """What happened since `forget`, oldest first."""
+        rows = self.ask("journal", subject=subject, limit=10_000)
+        return [row for row in rows if row["id"] > self._known.journal]
+
+    def goals(self) -> list[Row]:
+        """The goals as they are shown now, but for those that ended before `forget`."""
+        return [row for row in self.view["goals"] if row["id"] not in self._known.goals]
 
     def traces(self) -> Traces:
         """All that payloads have on this machine through this host."""
         return Traces.of(self.state, self.work / "drives")
+
+    # Between tests
+
+    def clear(self) -> None:
+        """Halt everything, pull all drives and devices, and have what was here forgotten.
+
+        Raises `TooLate` if something stays.
+        """
+        self.ask("halt", now=True)
+        for folder in (self.slots, self.devices):
+            for slot in folder.iterdir():
+                slot.unlink()
+        self.until("nothing is left", has_nothing, timeout_s=READY_S)
+        for payload_id in former_payloads(self.state):
+            self.ask("forget", payload=payload_id)
+        shutil.rmtree(self.work / "drives", ignore_errors=True)
+
+    def forget(self) -> None:
+        """Show from now on what is told, done and asked for from now on, as if it began here."""
+        goals = frozenset(row["id"] for row in self.view["goals"])
+        journal = self.ask("journal", limit=1)
+        self._known = Known(self.told_number(), journal[-1]["id"] if journal else 0, goals)
+        self._release += 1
+        self.views = [self.view]
+
+    def holdings(self) -> dict[str, object]:
+        """All that a test may leave behind: what it believes, warns of, has and keeps."""
+        names = ("components", "units", "streams", "devices")
+        found = {name: self.ask(name) for name in names}
+        found["peers"] = self.peers()
+        found["warnings"] = self.ask("status")["warnings"]
+        found["facts"] = self.facts().keys() - {f"self {self.name}"}  # that comes by itself
+        traces = dataclasses.asdict(self.traces())
+        traces["rows"] = [row for row in traces["rows"] if row[0] != "known_devices"]
+        return found | traces
+
+    def peers(self) -> list[str]:
+        """The hosts that are its peers now, if it may have any."""
+        try:
+            rows = self.ask("peers")
+        except NondumError as error:
+            assert error.code == "PEERS_OFF", error
+            return []
+        return sorted(row["peer"] for row in rows if row["state"] == "here")
 
     # Inside
 
@@ -238,6 +299,25 @@ class RunningHost(Robot):
         while self._threads:
             self._threads.pop().join(END_S)
         self._daemon = None
+
+
+@dataclass(frozen=True)
+class Known:
+    """What a host said before `forget`, of which it is not asked again."""
+
+    told: int = 0
+    """Number of the last sentence."""
+    journal: int = 0
+    """Number of the last entry."""
+    goals: frozenset[str] = frozenset()
+
+
+def has_nothing(view: View) -> bool:
+    """Whether a host has nothing plugged in, and nothing to do."""
+    own = [row for row in view["components"] if "@" not in row["component"]]
+    open_goals = [row for row in view["goals"] if row["state"] not in ("halted", "reached")]
+    running = view["plan"].get("steps")
+    return not any((view["drives"], view["payloads"], own, open_goals, running))
 
 
 @contextmanager
