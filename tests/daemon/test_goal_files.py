@@ -11,7 +11,8 @@ import pytest
 from demo.robot import configuration
 from tests.daemon.neighbours import BEACON, UNCONFINED
 from tests.kit.payloads import Part, seal
-from tests.kit.running_host import READY_S, Row, RunningHost, goal
+from tests.kit.running_host import READY_S, Row, RunningHost
+from tests.kit.shared import Shared
 from tests.kit.signing import Key, sign_payload, trust_of
 
 from nondum.wheelhouse import goal_payload, goals
@@ -20,7 +21,6 @@ from nondum.wheelhouse.trust import trust_text
 pytestmark = pytest.mark.daemon
 
 ALICE = Key("alice")
-GOAL = "org.example.errand/1"
 SHINE = BEACON.replace("lasting=True,", 'lasting=True, phrase="shine",')
 
 
@@ -41,6 +41,40 @@ def trusting(work: Path, permissions: Sequence[str]) -> Iterator[RunningHost]:
         host.stop()
 
 
+@pytest.fixture(scope="module")
+def one_trusting(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shared[list[RunningHost]]]:
+    """The host that takes goals from Alice."""
+
+    @contextmanager
+    def start() -> Iterator[list[RunningHost]]:
+        with trusting(tmp_path_factory.mktemp("host"), ["goals"]) as host:
+            yield [host]
+
+    with Shared(start) as shared:
+        yield shared
+
+
+@pytest.fixture
+def host(one_trusting: Shared[list[RunningHost]]) -> Iterator[RunningHost]:
+    with one_trusting.lent() as (host,):
+        until_shown(host, "ready")
+        yield host
+
+
+def errand_name(host: RunningHost) -> str:
+    """Another one for each test: goals that are over stay known by their payload."""
+    return f"errand-{host.release}"
+
+
+def errand_id(host: RunningHost) -> str:
+    return f"org.example.{errand_name(host)}"
+
+
+def wanted(host: RunningHost, number: int = 1) -> str:
+    """The id of a goal of the errand."""
+    return f"{errand_id(host)}/{number}"
+
+
 def beacon(host: RunningHost) -> None:
     """Plug in what can shine, signed, and wait for it."""
     source = SHINE.replace("LAMP", "light").replace("LOST", "stop")
@@ -51,10 +85,10 @@ def beacon(host: RunningHost) -> None:
     host.until_step("beacon", "active")
 
 
-def errand(host: RunningHost, *wanted: str, signer: Key | None = ALICE) -> Path:
+def errand(host: RunningHost, *goals: str, signer: Key | None = ALICE) -> Path:
     """A drive with goals only."""
     drive = host.work / "drives/errand"
-    folder = goal_payload.write(drive, "org.example.errand", wanted, release=1)
+    folder = goal_payload.write(drive, errand_id(host), goals, release=1)
     if signer is not None:
         sign_payload(folder, signer)
     return drive
@@ -72,55 +106,50 @@ def until_over(host: RunningHost, id: str) -> Row:
     return host.until_goal(id, "halted")
 
 
-def test_a_goal_is_pursued_while_its_drive_is_in(tmp_path: Path) -> None:
-    with trusting(tmp_path, ["goals"]) as host:
-        beacon(host)
-        name = host.plug(errand(host, "shine"))
-        assert host.until_goal(GOAL, "active")["text"] == "shine"
-        host.until_runs("shine")
+def test_a_goal_is_pursued_while_its_drive_is_in(host: RunningHost) -> None:
+    beacon(host)
+    name = host.plug(errand(host, "shine"))
+    assert host.until_goal(wanted(host), "active")["text"] == "shine"
+    host.until_runs("shine")
+    host.pull(name)
+    assert until_over(host, wanted(host))["reason"] == "the payload that wants it is withdrawn"
+    host.until("nothing runs", lambda v: not v["plan"]["steps"], timeout_s=READY_S)
+
+
+def test_a_drive_that_comes_back_gives_its_goal_again(host: RunningHost) -> None:
+    beacon(host)
+    drive = errand(host, "shine")
+    for _ in range(2):
+        name = host.plug(drive)
+        host.until_goal(wanted(host), "active")
         host.pull(name)
-        assert until_over(host, GOAL)["reason"] == "the payload that wants it is withdrawn"
-        host.until("nothing runs", lambda v: not v["plan"]["steps"], timeout_s=READY_S)
+        until_over(host, wanted(host))
 
 
-def test_a_drive_that_comes_back_gives_its_goal_again(tmp_path: Path) -> None:
-    with trusting(tmp_path, ["goals"]) as host:
-        beacon(host)
-        drive = errand(host, "shine")
-        for _ in range(2):
-            name = host.plug(drive)
-            host.until_goal(GOAL, "active")
-            host.pull(name)
-            until_over(host, GOAL)
+def test_words_wait_for_the_payload_that_knows_them(host: RunningHost) -> None:
+    host.plug(errand(host, "shine"))
+    host.until_step(errand_name(host), "active")
+    shown = until_shown(host, "needs-help", "PHRASE_UNKNOWN")
+    assert shown["payload"] == errand_id(host)
+    beacon(host)
+    host.until_goal(wanted(host), "active")
 
 
-def test_words_wait_for_the_payload_that_knows_them(tmp_path: Path) -> None:
-    with trusting(tmp_path, ["goals"]) as host:
-        host.plug(errand(host, "shine"))
-        host.until_step("errand", "active")
-        shown = until_shown(host, "needs-help", "PHRASE_UNKNOWN")
-        assert shown["payload"] == "org.example.errand"
-        beacon(host)
-        host.until_goal(GOAL, "active")
+def test_words_that_wait_are_forgotten_with_their_drive(host: RunningHost) -> None:
+    name = host.plug(errand(host, "shine"))
+    until_shown(host, "needs-help", "PHRASE_UNKNOWN")
+    host.pull(name)
+    host.until_gone(errand_name(host))
+    beacon(host)
+    until_shown(host, "ready")
+    assert not host.goals()
 
 
-def test_words_that_wait_are_forgotten_with_their_drive(tmp_path: Path) -> None:
-    with trusting(tmp_path, ["goals"]) as host:
-        name = host.plug(errand(host, "shine"))
-        until_shown(host, "needs-help", "PHRASE_UNKNOWN")
-        host.pull(name)
-        host.until_gone("errand")
-        beacon(host)
-        until_shown(host, "ready")
-        assert goal(host.view, GOAL) is None
-
-
-def test_each_line_is_a_goal(tmp_path: Path) -> None:
-    with trusting(tmp_path, ["goals"]) as host:
-        beacon(host)
-        host.plug(errand(host, "blink", "shine"))
-        host.until_goal("org.example.errand/2", "active")
-        host.until_goal(GOAL, "reached")
+def test_each_line_is_a_goal(host: RunningHost) -> None:
+    beacon(host)
+    host.plug(errand(host, "blink", "shine"))
+    host.until_goal(wanted(host, 2), "active")
+    host.until_goal(wanted(host), "reached")
 
 
 def test_a_role_that_may_not_give_goals_is_refused_with_its_payload(tmp_path: Path) -> None:
@@ -128,68 +157,64 @@ def test_a_role_that_may_not_give_goals_is_refused_with_its_payload(tmp_path: Pa
         host.plug(errand(host, "shine"))
         shown = until_shown(host, "refused", "PERMISSION_DENIED")
         assert "'goals'" in shown["sentence"]
-        assert not host.view["goals"]
+        assert not host.goals()
 
 
-def test_a_goal_that_nobody_signed_is_refused_unread(tmp_path: Path) -> None:
-    with trusting(tmp_path, ["goals"]) as host:
-        host.plug(errand(host, "shine", signer=None))
-        until_shown(host, "refused", "SIG_MISSING")
-        assert not host.view["goals"]
+def test_a_goal_that_nobody_signed_is_refused_unread(host: RunningHost) -> None:
+    host.plug(errand(host, "shine", signer=None))
+    until_shown(host, "refused", "SIG_MISSING")
+    assert not host.goals()
 
 
-def test_a_goal_that_was_changed_after_it_was_signed_is_refused(tmp_path: Path) -> None:
-    with trusting(tmp_path, ["goals"]) as host:
-        drive = errand(host, "shine")
-        (drive / "nondum/org.example.errand" / goals.NAME).write_text("smash\n")
-        host.plug(drive)
-        until_shown(host, "refused", "HASH_MISMATCH")
+def test_a_goal_that_was_changed_after_it_was_signed_is_refused(host: RunningHost) -> None:
+    drive = errand(host, "shine")
+    (drive / "nondum" / errand_id(host) / goals.NAME).write_text("smash\n")
+    host.plug(drive)
+    until_shown(host, "refused", "HASH_MISMATCH")
 
 
-def test_a_goal_file_that_is_none_is_refused_though_it_is_signed(tmp_path: Path) -> None:
-    with trusting(tmp_path, ["goals"]) as host:
-        drive = errand(host, "shine")
-        folder = drive / "nondum/org.example.errand"
-        (folder / goals.NAME).write_text("\n# nothing\n")
-        (folder / "CONTENTS.sig").unlink()
-        seal(folder, payload_id="org.example.errand")
-        sign_payload(folder, ALICE)
-        host.plug(drive)
-        until_shown(host, "refused", "GOAL_FILE")
+def test_a_goal_file_that_is_none_is_refused_though_it_is_signed(host: RunningHost) -> None:
+    drive = errand(host, "shine")
+    folder = drive / "nondum" / errand_id(host)
+    (folder / goals.NAME).write_text("\n# nothing\n")
+    (folder / "CONTENTS.sig").unlink()
+    seal(folder, payload_id=errand_id(host))
+    sign_payload(folder, ALICE)
+    host.plug(drive)
+    until_shown(host, "refused", "GOAL_FILE")
 
 
-def test_a_goal_beside_the_payloads_is_told_of_and_never_wanted(tmp_path: Path) -> None:
-    with trusting(tmp_path, ["goals"]) as host:
-        beacon(host)
-        drive = tmp_path / "drives/loose"
-        (drive / "nondum").mkdir(parents=True)
-        (drive / "nondum" / goals.NAME).write_text("shine\n")
-        host.plug(drive)
-        until_shown(host, "refused", "GOAL_UNSIGNED")
-        host.until_told("GOAL_UNSIGNED")
-        assert not host.view["goals"]
+def test_a_goal_beside_the_payloads_is_told_of_and_never_wanted(host: RunningHost) -> None:
+    beacon(host)
+    drive = host.work / "drives/loose"
+    (drive / "nondum").mkdir(parents=True)
+    (drive / "nondum" / goals.NAME).write_text("shine\n")
+    host.plug(drive)
+    until_shown(host, "refused", "GOAL_UNSIGNED")
+    host.until_told("GOAL_UNSIGNED")
+    assert not host.goals()
 
 
 def test_a_daemon_that_starts_again_gives_the_goal_once(tmp_path: Path) -> None:
     with trusting(tmp_path, ["goals"]) as host:
         beacon(host)
         host.plug(errand(host, "shine"))
-        host.until_goal(GOAL, "active")
+        host.until_goal(wanted(host), "active")
         host.kill()
         host.start()
-        host.until_goal(GOAL, "active")
-        assert [row["id"] for row in host.view["goals"]] == [GOAL]
+        host.until_goal(wanted(host), "active")
+        assert [row["id"] for row in host.goals()] == [wanted(host)]
 
 
 def test_a_goal_whose_drive_was_pulled_meanwhile_is_not_taken_up(tmp_path: Path) -> None:
     with trusting(tmp_path, ["goals"]) as host:
         beacon(host)
         name = host.plug(errand(host, "shine"))
-        host.until_goal(GOAL, "active")
+        host.until_goal(wanted(host), "active")
         host.kill()
         host.pull(name)
         host.start()
         host.until_step("beacon", "active")
-        host.until_gone("errand")
+        host.until_gone(errand_name(host))
         until_shown(host, "ready")
-        assert not host.view["goals"]
+        assert not host.goals()

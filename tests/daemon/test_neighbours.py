@@ -3,26 +3,57 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
-import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from tests.daemon.neighbours import beacon, ear, neighbours, routed, say, until_shared, written
 from tests.daemon.plugins import scribe, talker
 from tests.kit.running_host import READY_S, RunningHost
+from tests.kit.shared import Shared
+from tests.kit.until import until
 
 pytestmark = pytest.mark.daemon
+
+Hosts = list[RunningHost]
+
+
+@pytest.fixture(scope="module")
+def one_pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shared[Hosts]]:
+    with Shared(lambda: neighbours(tmp_path_factory.mktemp("two"), "rover", "mule")) as shared:
+        yield shared
+
+
+@pytest.fixture
+def pair(one_pair: Shared[Hosts]) -> Iterator[Hosts]:
+    """Rover and mule, with nothing plugged in."""
+    with one_pair.lent() as hosts:
+        yield hosts
+
+
+@pytest.fixture(scope="module")
+def one_trio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shared[Hosts]]:
+    names = ("rover", "scout", "mule")
+    with Shared(lambda: neighbours(tmp_path_factory.mktemp("three"), *names)) as shared:
+        yield shared
+
+
+@pytest.fixture
+def trio(one_trio: Shared[Hosts]) -> Iterator[Hosts]:
+    """Rover, scout and mule, with nothing plugged in."""
+    with one_trio.lent() as hosts:
+        yield hosts
 
 
 def until_written(log: Path, *words: str) -> None:
     """Wait for a beacon to have written exactly that."""
-    pause = threading.Event()
-    for _ in range(int(READY_S / 0.05)):
-        if written(log) == list(words):
-            return
-        pause.wait(0.05)
-    raise AssertionError(written(log))
+    until(
+        f"a beacon has written {words}",
+        lambda: written(log) == list(words),
+        evidence=lambda: written(log),
+    )
 
 
 def until_lost(host: RunningHost, component: str) -> None:
@@ -34,39 +65,39 @@ def until_lost(host: RunningHost, component: str) -> None:
     )
 
 
-def test_what_is_plugged_into_one_host_is_used_by_the_other(tmp_path: Path) -> None:
+def test_what_is_plugged_into_one_host_is_used_by_the_other(pair: Hosts, tmp_path: Path) -> None:
     log = tmp_path / "log"
-    with neighbours(tmp_path, "rover", "mule") as (rover, mule):
-        mule.bring("light", beacon(log))
-        until_shared(rover, "beacon@mule")
-        goal = rover.want("(lit rover)")
-        rover.until_goal(goal, "holds")
-        assert written(log) == ["on"]
-        rover.ask("halt", id=goal)
-        until_written(log, "on", "off")
+    rover, mule = pair
+    mule.bring("light", beacon(log))
+    until_shared(rover, "beacon@mule")
+    goal = rover.want("(lit rover)")
+    rover.until_goal(goal, "holds")
+    assert written(log) == ["on"]
+    rover.ask("halt", id=goal)
+    until_written(log, "on", "off")
 
 
-def test_phrase_of_a_peers_component_is_understood(tmp_path: Path) -> None:
+def test_phrase_of_a_peers_component_is_understood(pair: Hosts, tmp_path: Path) -> None:
     log = tmp_path / "log"
-    with neighbours(tmp_path, "rover", "mule") as (rover, mule):
-        mule.bring("light", beacon(log))
-        until_shared(rover, "beacon@mule")
-        given = rover.ask("goal", words="blink")
-        rover.until_goal(given["id"], "reached")
-        assert written(log) == ["blink"]
+    rover, mule = pair
+    mule.bring("light", beacon(log))
+    until_shared(rover, "beacon@mule")
+    given = rover.ask("goal", words="blink")
+    rover.until_goal(given["id"], "reached")
+    assert written(log) == ["blink"]
 
 
-def test_pulled_drive_is_withdrawn_everywhere(tmp_path: Path) -> None:
+def test_pulled_drive_is_withdrawn_everywhere(pair: Hosts, tmp_path: Path) -> None:
     log = tmp_path / "log"
-    with neighbours(tmp_path, "rover", "mule") as (rover, mule):
-        mule.bring("light", beacon(log))
-        until_shared(rover, "beacon@mule")
-        goal = rover.want("(lit rover)")
-        rover.until_goal(goal, "holds")
-        mule.pull("light")
-        until_lost(rover, "beacon@mule")
-        rover.until_goal(goal, "suspended")
-        assert "bring the host mule back" in str(rover.ask("why")["problems"])
+    rover, mule = pair
+    mule.bring("light", beacon(log))
+    until_shared(rover, "beacon@mule")
+    goal = rover.want("(lit rover)")
+    rover.until_goal(goal, "holds")
+    mule.pull("light")
+    until_lost(rover, "beacon@mule")
+    rover.until_goal(goal, "suspended")
+    assert "bring the host mule back" in str(rover.ask("why")["problems"])
 
 
 @pytest.mark.parametrize("end", ["kill", "stop", "SIGSTOP"])
@@ -111,23 +142,23 @@ def test_behaviour_ends_with_its_caller_as_its_author_declared(
             until_written(log, "on", "off")
 
 
-def test_unit_in_use_by_one_host_is_planned_with_by_no_other(tmp_path: Path) -> None:
+def test_unit_in_use_by_one_host_is_planned_with_by_no_other(trio: Hosts, tmp_path: Path) -> None:
     log = tmp_path / "log"
-    with neighbours(tmp_path, "rover", "scout", "mule") as (rover, scout, mule):
-        mule.bring("light", beacon(log))
-        for host in (rover, scout):
-            until_shared(host, "beacon@mule")
-        goal = rover.want("(lit rover)")
-        rover.until_goal(goal, "holds")
-        for host in (scout, mule):
-            waiting = host.want(f"(lit {host.name})")
-            host.until_goal(waiting, "suspended")
-            assert "idle mule__beacon__lamp" not in host.facts()
-            host.ask("halt", id=waiting)
-        waiting = scout.want("(lit scout)")
-        rover.ask("halt", id=goal)
-        scout.until_goal(waiting, "holds")
-        assert written(log) == ["on", "off", "on"]
+    rover, scout, mule = trio
+    mule.bring("light", beacon(log))
+    for host in (rover, scout):
+        until_shared(host, "beacon@mule")
+    goal = rover.want("(lit rover)")
+    rover.until_goal(goal, "holds")
+    for host in (scout, mule):
+        waiting = host.want(f"(lit {host.name})")
+        host.until_goal(waiting, "suspended")
+        assert "idle mule__beacon__lamp" not in host.facts()
+        host.ask("halt", id=waiting)
+    waiting = scout.want("(lit scout)")
+    rover.ask("halt", id=goal)
+    scout.until_goal(waiting, "holds")
+    assert written(log) == ["on", "off", "on"]
 
 
 def test_actuators_are_not_offered_unless_the_integrator_says_so(tmp_path: Path) -> None:
@@ -145,17 +176,17 @@ def test_actuators_are_not_offered_unless_the_integrator_says_so(tmp_path: Path)
         rover.until_goal(rover.want("(lit rover)"), "holds")
 
 
-def test_stream_of_one_host_is_read_on_the_other(tmp_path: Path) -> None:
-    with neighbours(tmp_path, "rover", "mule") as (rover, mule):
-        rover.bring("talk", talker("talker"))
-        mule.bring("write", scribe())
-        until_shared(rover, "scribe@mule")
-        goal = rover.want("(written rover)")
-        rover.until_goal(goal, "holds")
-        (row,) = mule.ask("streams")
-        assert (row["component"], row["consumers"]) == ("talker@rover", ["scribe"])
-        rover.ask("halt", id=goal)
-        mule.until("it is read no more", lambda view: not view["streams"], timeout_s=READY_S)
+def test_stream_of_one_host_is_read_on_the_other(pair: Hosts) -> None:
+    rover, mule = pair
+    rover.bring("talk", talker("talker"))
+    mule.bring("write", scribe())
+    until_shared(rover, "scribe@mule")
+    goal = rover.want("(written rover)")
+    rover.until_goal(goal, "holds")
+    (row,) = mule.ask("streams")
+    assert (row["component"], row["consumers"]) == ("talker@rover", ["scribe"])
+    rover.ask("halt", id=goal)
+    mule.until("it is read no more", lambda view: not view["streams"], timeout_s=READY_S)
 
 
 def test_hosts_by_way_of_a_router_use_each_other_all_the_same(tmp_path: Path) -> None:
@@ -164,31 +195,33 @@ def test_hosts_by_way_of_a_router_use_each_other_all_the_same(tmp_path: Path) ->
         rover.bring("talk", talker("talker"))
         mule.bring("write", scribe())
         until_shared(rover, "scribe@mule")
-        rover.until_goal(rover.want("(written rover)"), "holds")
+        goal = rover.want("(written rover)")
+        rover.until_goal(goal, "holds")
         mule.kill()
         until_lost(rover, "scribe@mule")
-        rover.until_goal("1", "suspended")
+        rover.until_goal(goal, "suspended")
 
 
-def test_camera_of_another_body_is_not_planned_with(tmp_path: Path) -> None:
-    with neighbours(tmp_path, "rover", "scout", "mule") as (rover, scout, mule):
-        rover.bring("talk", talker("talker"))
-        mule.bring("write", scribe())
-        for component in ("talker@rover", "scribe@mule"):
-            until_shared(scout, component)
-        scout.until_goal(scout.want("(written scout)"), "suspended")
-        rover.until_goal(rover.want("(written rover)"), "holds")
+def test_camera_of_another_body_is_not_planned_with(trio: Hosts) -> None:
+    rover, scout, mule = trio
+    rover.bring("talk", talker("talker"))
+    mule.bring("write", scribe())
+    for component in ("talker@rover", "scribe@mule"):
+        until_shared(scout, component)
+    scout.until_goal(scout.want("(written scout)"), "suspended")
+    rover.until_goal(rover.want("(written rover)"), "holds")
 
 
-def test_goal_that_is_heard_goes_to_the_peer_that_can_have_it(tmp_path: Path) -> None:
+def test_goal_that_is_heard_goes_to_the_peer_that_can_have_it(pair: Hosts, tmp_path: Path) -> None:
     said, log = tmp_path / "said", tmp_path / "log"
-    with neighbours(tmp_path, "rover", "mule") as (rover, mule):
-        mule.bring("ears", ear(said))
-        rover.bring("light", beacon(log, type="pointer"))
-        until_shared(mule, "beacon@rover")
-        say(said, "rover, blink")
-        mule.until_told("'rover, blink': that is goal 1 of rover")
-        rover.until_goal("1", "reached")
-        mule.until_told("rover: 'blink' is reached")
-        say(said, "blink")
-        mule.until_told("'blink': that is goal 2 of rover")
+    rover, mule = pair
+    mule.bring("ears", ear(said))
+    rover.bring("light", beacon(log, type="pointer"))
+    until_shared(mule, "beacon@rover")
+    say(said, "rover, blink")
+    told = mule.until_told("'rover, blink': that is goal ")
+    (number,) = re.findall(r"that is goal (\d+) of rover", told)
+    rover.until_goal(number, "reached")
+    mule.until_told("rover: 'blink' is reached")
+    say(said, "blink")
+    mule.until_told(f"'blink': that is goal {int(number) + 1} of rover")

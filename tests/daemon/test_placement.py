@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
@@ -21,8 +20,9 @@ from tests.daemon.plugins import talker
 from tests.kit.disk_images import image
 from tests.kit.loop_devices import attached, detach
 from tests.kit.payloads import Part
-from tests.kit.running_host import DAEMON, READY_S, RunningHost
+from tests.kit.running_host import DAEMON, RunningHost
 from tests.kit.traces import until_unmounted
+from tests.kit.until import until
 
 from nondum.sdk.errors import NondumError
 
@@ -112,16 +112,14 @@ def placed(host: RunningHost, name: str) -> dict[str, Any]:
 
 
 def until_place(host: RunningHost, name: str, **wanted: Any) -> dict[str, Any]:
-    """Wait until a host says so of where a payload is."""
+    """Wait until a host says so of where a payload is; views do not show how far it is."""
 
-    def found(_: object) -> dict[str, Any] | None:
+    def found() -> dict[str, Any] | None:
         row = placed(host, name)
-        return row if row and all(row[key] == value for key, value in wanted.items()) else None
+        return row if wanted.items() <= row.items() else None
 
-    ends = time.monotonic() + READY_S
-    while (row := found(None)) is None:  # progress is no news: it is asked for
-        assert time.monotonic() < ends, f"{wanted}: {placed(host, name)}"
-        time.sleep(0.02)
+    row = until(f"{name}: {wanted}", found, evidence=lambda: placed(host, name))
+    assert row is not None
     return row
 
 

@@ -33,7 +33,8 @@ from demo.robot import TooLate
 from tests.campaign.rounds import Limit, Tally
 from tests.faults.play import is_dead
 from tests.faults.ways import Way
-from tests.kit.fork_server import Nursery, logged
+from tests.kit.evidence import logged
+from tests.kit.fork_server import Nursery
 from tests.kit.until import until
 
 FOLDER = Path("build/restarts")

@@ -52,7 +52,8 @@ class RunningHost(Robot):
         self.views: list[View] = []
         """All that it showed, oldest first, since the daemon was started or `forget`."""
         self._known = Known()
-        self._release = 1
+        self.release = 1
+        """Release of the payloads that `drive` writes."""
         self._program = program
         self._daemon: subprocess.Popen[bytes] | Forked | None = None
         self._threads: list[threading.Thread] = []
@@ -125,7 +126,7 @@ class RunningHost(Robot):
         After `forget` it is a newer release than before: one release has one content.
         """
         drive = self.work / "drives" / name
-        options = {"release": self._release} | options
+        options = {"release": self.release} | options
         make_payload(drive, *parts, payload_id=f"org.example.{name}", **options)
         return drive
 
@@ -249,15 +250,15 @@ class RunningHost(Robot):
         goals = frozenset(row["id"] for row in self.view["goals"])
         journal = self.ask("journal", limit=1)
         self._known = Known(self.told_number(), journal[-1]["id"] if journal else 0, goals)
-        self._release += 1
+        self.release += 1
         self.views = [self.view]
 
-    def holdings(self) -> dict[str, object]:
+    def holdings(self) -> dict[str, Any]:
         """All that a test may leave behind: what it believes, warns of, has and keeps."""
         names = ("components", "units", "streams", "devices")
         found = {name: self.ask(name) for name in names}
         found["peers"] = self.peers()
-        found["warnings"] = self.ask("status")["warnings"]
+        found["warnings"] = frozenset(self.ask("status")["warnings"])
         found["facts"] = self.facts().keys() - {f"self {self.name}"}  # that comes by itself
         traces = dataclasses.asdict(self.traces())
         traces["rows"] = [row for row in traces["rows"] if row[0] != "known_devices"]
