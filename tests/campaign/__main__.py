@@ -19,7 +19,7 @@ from tests.campaign.rounds import Limit, minutes_of
 
 ROOT = Path(__file__).parents[2]
 SHORTEST_MINUTES = 5.0
-"""Less is not worth it: fewer campaigns get as much each."""
+"""Less is not worth it, unless it is asked for: fewer campaigns get as much each."""
 INTERRUPTED = 130
 EXAMPLES = """\
 examples:
@@ -65,16 +65,20 @@ def main(words: Sequence[str], root: Path = ROOT) -> int:
     return 1 if any(one.result == page.FAILED for one in outcomes) else 0
 
 
-def shares(minutes: float | None, left: int, elapsed_minutes: float) -> float | None:
+def shares(
+    minutes: float | None, left: int, elapsed_minutes: float, shortest: float = 0.0
+) -> float | None:
     """How many minutes the next of so many campaigns gets; 0: none are left.
 
-    >>> shares(60, 3, 0.0), shares(60, 2, 10.0), shares(60, 10, 58.0), shares(None, 3, 0.0)
+    >>> shares(60, 3, 0.0), shares(60, 2, 10.0), shares(60, 10, 58.0, 5.0), shares(None, 3, 0.0)
     (20.0, 25.0, 2.0, None)
+    >>> shares(12, 12, 0.0), shares(12, 12, 0.0, 5.0)
+    (1.0, 5.0)
     """
     if minutes is None:
         return None
     rest = max(0.0, minutes - elapsed_minutes)
-    return min(rest, max(SHORTEST_MINUTES, rest / left))
+    return min(rest, max(shortest, rest / left))
 
 
 def oldest_first(found: Iterable[Age], dates: dict[str, str]) -> list[str]:
@@ -92,7 +96,8 @@ def _run(root: Path, options: argparse.Namespace, say: Callable[[str], None]) ->
     dates = {name: last.date for name, last in page.load(root).items()}
     names = options.names or oldest_first(ages(root), dates)
     for number, name in enumerate(names):
-        share = shares(options.minutes, len(names) - number, limit.elapsed_s / 60)
+        shortest = 0.0 if options.names else SHORTEST_MINUTES
+        share = shares(options.minutes, len(names) - number, limit.elapsed_s / 60, shortest)
         if share is not None and share < 0.1:
             say(f"no time is left for {', '.join(names[number:])}")
             return
@@ -113,7 +118,8 @@ def _run(root: Path, options: argparse.Namespace, say: Callable[[str], None]) ->
 
 
 def _evidence(outcome: Outcome) -> str:
-    return f" (evidence: {outcome.evidence})" if outcome.result == page.FAILED else ""
+    log = Path(outcome.evidence).with_name("log")
+    return f" (evidence: {outcome.evidence}, {log})" if outcome.result == page.FAILED else ""
 
 
 def _table(outcomes: Sequence[Outcome]) -> None:

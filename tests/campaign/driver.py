@@ -158,7 +158,10 @@ def _command(
     seed: int,
     say: Callable[[str], None],
 ) -> tuple[int, bool]:
-    """Its exit status, and whether it was interrupted. What it says goes on as it comes."""
+    """Its exit status, and whether it was interrupted.
+
+    What it says goes on as it comes; what daemons write to standard error is in the log only.
+    """
     for folder in ("round", "keep"):
         (home / folder).mkdir(exist_ok=True)
     words = campaign.arguments(minutes, seed=seed, folder=home / "round", keep=home / "keep")
@@ -170,7 +173,7 @@ def _command(
             command,
             cwd=root,
             stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
+            stderr=log,
             text=True,
             errors="replace",
             start_new_session=True,

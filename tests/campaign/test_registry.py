@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 from tests.campaign.registry import CAMPAIGNS, Campaign
 
 ROOT = Path(__file__).parents[2]
+MARK = re.compile(r"mark\.(long|short)\(\s*\"(\w+)\"")
 each = pytest.mark.parametrize("campaign", CAMPAIGNS.values(), ids=CAMPAIGNS)
 
 
@@ -21,3 +23,16 @@ def test_every_covered_path_exists(campaign: Campaign) -> None:
 @each
 def test_it_says_what_it_does(campaign: Campaign) -> None:
     assert campaign.sentence and "|" not in campaign.sentence
+
+
+def marks() -> set[tuple[str, str]]:
+    """`long` or `short`, and the campaign that a marker of a test names."""
+    # What tests of the runner write for a pytest of their own are no tests of a campaign.
+    files = (f for f in (ROOT / "tests").rglob("*.py") if f.parent != ROOT / "tests/runner")
+    return {found for file in files for found in MARK.findall(file.read_text(encoding="utf-8"))}
+
+
+def test_markers_name_campaigns() -> None:
+    of_pytest = {one.name for one in CAMPAIGNS.values() if one.is_pytest}
+    assert {name for kind, name in marks() if kind == "long"} <= of_pytest
+    assert {name for kind, name in marks() if kind == "short"} <= CAMPAIGNS.keys()
