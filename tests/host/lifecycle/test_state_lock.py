@@ -136,7 +136,7 @@ async def test_child_that_has_not_executed_yet_has_no_lock(
             assert tmp_path / "lock" in open_files(child), (
                 "it has inherited what a lock is taken by"
             )
-            (await state_lock.lock(tmp_path)).release()
+            (await locked_at_once(tmp_path, clock)).release()
         finally:
             os.kill(child, signal.SIGKILL)
 
