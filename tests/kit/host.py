@@ -14,7 +14,7 @@ from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import JournalEntry, PayloadRecord, Snapshot, Step
 from nondum.host.drives.slots import SlotSource
 from nondum.host.drives.source import DriveSource
-from nondum.host.events import Event, HostStarted
+from nondum.host.events import Event, HostStarted, WheelsCompiled
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
@@ -96,6 +96,25 @@ class HostInProcess:
         record = self.payload(payload_id)
         assert record is not None
         return record
+
+    def release(self, payload_id: str, number: int) -> PayloadRecord | None:
+        """One release of a payload, if it is there."""
+        every = (p for p in self.snapshot.payloads if p.payload_id == payload_id)
+        return next((p for p in every if p.release == number), None)
+
+    async def until_releases(self, payload_id: str, **wanted: Step | None) -> None:
+        """Wait until releases (`r1=…`) are at steps; None: gone."""
+
+        def holds() -> bool:
+            found = {name: self.release(payload_id, int(name[1:])) for name in wanted}
+            return all((one.step if one else None) is wanted[name] for name, one in found.items())
+
+        await self.until(holds)
+
+    async def until_compiled(self, payload_id: str) -> None:
+        """Wait until a payload is active and its wheels have been compiled."""
+        record = await self.until_step(payload_id, Step.ACTIVE)
+        await self.until(lambda: WheelsCompiled(record.key) in self.heard)
 
     async def until_gone(self, payload_id: str) -> None:
         """Wait until nothing of a payload is left."""

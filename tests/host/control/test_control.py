@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.kit.until import arrived
 
 from nondum.host.control import protocol
 from nondum.host.control.client import ControlClient
@@ -187,8 +188,7 @@ async def test_following_ends_when_the_client_leaves(tmp_path: Path) -> None:
 
     async with serving(tmp_path / "control.sock", ended.set):
         assert await asyncio.to_thread(glance) == "begun"
-        async with asyncio.timeout(60):
-            await ended.wait()
+        await arrived("the end of following", ended.wait())
 
 
 async def test_the_next_question_ends_following(tmp_path: Path) -> None:

@@ -35,11 +35,6 @@ def lamp(drive: Path, *, id: str = "lamp", payload_id: str = LAMP_ID, **files: s
     make_payload(drive, Part(id, LAMP + TELLING, files=files), payload_id=payload_id)
 
 
-async def until_compiled(host: HostInProcess, payload_id: str = LAMP_ID) -> None:
-    record = await host.until_step(payload_id, Step.ACTIVE)
-    await host.until(lambda: events.WheelsCompiled(record.key) in host.heard)
-
-
 def said(host: HostInProcess) -> list[str]:
     lines = (event.message for event in host.heard if isinstance(event, events.WorkerLogged))
     return [line for line in lines if line.startswith("from ")]
@@ -63,7 +58,7 @@ async def test_wheels_are_compiled_after_the_payload_is_active(tmp_path: Path) -
     lamp(tmp_path / "drive")
     async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
-        await until_compiled(host)
+        await host.until_compiled(LAMP_ID)
         wheels = store(host).listing()
         assert len(wheels) == 4
         assert all(wheel.compiled_here for wheel in wheels)
@@ -76,7 +71,7 @@ async def test_the_next_worker_starts_from_what_was_compiled(tmp_path: Path) -> 
     lamp(tmp_path / "drive")
     async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
-        await until_compiled(host)
+        await host.until_compiled(LAMP_ID)
         assert said(host) == ["from source"]
         os.kill(host.workers.pids()["lamp"], signal.SIGKILL)
         await host.until(lambda: len(said(host)) == 2)
@@ -87,13 +82,13 @@ async def test_the_next_insertion_starts_from_what_was_compiled(tmp_path: Path) 
     lamp(tmp_path / "drive")
     async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
-        await until_compiled(host)
+        await host.until_compiled(LAMP_ID)
         before = (entry(host).root / CACHED).stat().st_ino
         host.pull()
         await host.until_gone(LAMP_ID)
         host.heard.clear()
         host.plug(tmp_path / "drive")
-        await until_compiled(host)
+        await host.until_compiled(LAMP_ID)
         assert said(host) == ["from bytecode"]
         assert (entry(host).root / CACHED).stat().st_ino == before
 
@@ -102,7 +97,7 @@ async def test_modules_that_do_not_compile_are_left_without(tmp_path: Path) -> N
     lamp(tmp_path / "drive", **{"templates/lamp.py": "class {% name %}: pass"})
     async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
-        await until_compiled(host)
+        await host.until_compiled(LAMP_ID)
         assert [file.path for file in entry(host).compiled_here or ()] == [CACHED]
         component = host.snapshot.component("lamp")
         assert component is not None
@@ -117,7 +112,7 @@ async def test_a_failure_hurts_nobody(tmp_path: Path) -> None:
         await host.until_step(LAMP_ID, Step.ACTIVE)
         shutil.rmtree(entry(host).folder)  # so that it cannot be compiled
         host.plug(tmp_path / "other", "b")
-        await until_compiled(host, "org.example.torch")
+        await host.until_compiled("org.example.torch")
         assert len([e for e in host.heard if isinstance(e, events.WheelsCompiled)]) == 1
         for id in ("lamp", "torch"):
             component = host.snapshot.component(id)
@@ -153,5 +148,5 @@ async def test_what_pip_installed_is_left_as_it_is(tmp_path: Path) -> None:
     options = InstallOptions(allow_unsigned=True, method="pip")
     async with host_in_process(tmp_path, options=options) as host:
         host.plug(tmp_path / "drive")
-        await until_compiled(host)
+        await host.until_compiled(LAMP_ID)
         assert not venv_file(host, CACHED).exists()

@@ -12,7 +12,7 @@ from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 
 from nondum.host import events
-from nondum.host.catalogue.records import PayloadRecord, Step
+from nondum.host.catalogue.records import Step
 from nondum.host.lifecycle.going_back import go_back
 from nondum.host.lifecycle.installed import install, uninstall
 from nondum.host.workers import Timing
@@ -61,21 +61,6 @@ def lamp(root: Path, release: int) -> Path:
     return drive
 
 
-def release(host: HostInProcess, number: int) -> PayloadRecord | None:
-    every = (p for p in host.snapshot.payloads if p.payload_id == LAMP_ID)
-    return next((p for p in every if p.release == number), None)
-
-
-async def until(host: HostInProcess, **wanted: Step | None) -> None:
-    """Wait until releases (`r1=…`) are at steps; None: gone."""
-
-    def holds() -> bool:
-        found = {name: release(host, int(name[1:])) for name in wanted}
-        return all((one.step if one else None) is wanted[name] for name, one in found.items())
-
-    await host.until(holds)
-
-
 def version(host: HostInProcess) -> str:
     """The version of the lamp that is in force."""
     component = host.snapshot.component("lamp")
@@ -90,12 +75,12 @@ async def test_newer_release_takes_over_and_the_old_one_comes_back(tmp_path: Pat
     drives = {number: lamp(tmp_path, number) for number in (1, 2)}
     async with host_in_process(tmp_path, timing=QUICK) as host:
         host.plug(drives[1], "a")
-        await until(host, r1=Step.ACTIVE)
+        await host.until_releases(LAMP_ID, r1=Step.ACTIVE)
         old = host.workers.pids()["lamp"]
         shining = host.workers.behave("lamp", "shine", {"u": UNIT})
         revision = host.snapshot.revision
         host.plug(drives[2], "b")
-        await until(host, r1=Step.SUPERSEDED, r2=Step.ACTIVE)
+        await host.until_releases(LAMP_ID, r1=Step.SUPERSEDED, r2=Step.ACTIVE)
         assert host.snapshot.revision == revision + 1
         assert version(host) == "2.0"
         assert host.workers.pids()["lamp"] != old
@@ -107,10 +92,10 @@ async def test_newer_release_takes_over_and_the_old_one_comes_back(tmp_path: Pat
         kinds = [type(event) for event in host.heard]
         assert events.WorkerExited not in kinds
         host.pull("b")
-        await until(host, r1=Step.ACTIVE, r2=None)
+        await host.until_releases(LAMP_ID, r1=Step.ACTIVE, r2=None)
         assert version(host) == "1.0"
         host.pull("a")
-        await until(host, r1=None)
+        await host.until_releases(LAMP_ID, r1=None)
         assert not left_over(host.folders)
         assert not host.workers.pids()
 
@@ -124,16 +109,16 @@ async def test_components_come_and_go_with_a_release(tmp_path: Path) -> None:
         make_payload(drive, *parts, payload_id=LAMP_ID, version=version, release=number)
     async with host_in_process(tmp_path, timing=WATCHED) as host:
         host.plug(tmp_path / "drive-1", "a")
-        await until(host, r1=Step.ACTIVE)
+        await host.until_releases(LAMP_ID, r1=Step.ACTIVE)
         host.plug(tmp_path / "drive-2", "b")
-        await until(host, r2=Step.PROBED)
+        await host.until_releases(LAMP_ID, r2=Step.PROBED)
         assert set(host.workers.pids()) == set(host.workers.plugins()) == {"bell", "lamp"}
-        await until(host, r1=Step.SUPERSEDED, r2=Step.ACTIVE)
+        await host.until_releases(LAMP_ID, r1=Step.SUPERSEDED, r2=Step.ACTIVE)
         assert {c.id for c in host.snapshot.components} == {"horn", "lamp"}
         await host.until(lambda: set(host.workers.pids()) == {"horn", "lamp"})
         assert set(host.workers.plugins()) == {"horn", "lamp"}
         host.pull("b")
-        await until(host, r1=Step.ACTIVE, r2=None)
+        await host.until_releases(LAMP_ID, r1=Step.ACTIVE, r2=None)
         assert set(host.workers.pids()) == {"bell", "lamp"}
 
 
@@ -155,22 +140,22 @@ async def test_broken_release_leaves_the_old_one_alone(
     make_payload(tmp_path / "drive-2", part, payload_id=LAMP_ID, version="2.0", release=2)
     async with host_in_process(tmp_path, timing=WATCHED) as host:
         host.plug(first, "a")
-        await until(host, r1=Step.ACTIVE)
+        await host.until_releases(LAMP_ID, r1=Step.ACTIVE)
         old, revision = host.workers.pids(), host.snapshot.revision
         host.plug(tmp_path / "drive-2", "b")
-        judged = until(host, r1=Step.ACTIVE, r2=Step.QUARANTINED)
+        judged = host.until_releases(LAMP_ID, r1=Step.ACTIVE, r2=Step.QUARANTINED)
         if source is STUCK:
-            await until(host, r2=Step.STORED)
+            await host.until_releases(LAMP_ID, r2=Step.STORED)
             await clock.advance_until(judged, step_s=WATCHED.startup_s)
         else:
             await judged
         assert host.workers.pids() == old
         assert host.snapshot.revision == revision
-        failed = release(host, 2)
+        failed = host.release(LAMP_ID, 2)
         assert failed is not None
         assert failed.problems
         host.pull("b")
-        await until(host, r1=Step.ACTIVE, r2=None)
+        await host.until_releases(LAMP_ID, r1=Step.ACTIVE, r2=None)
         assert host.workers.pids() == old
 
 
@@ -185,13 +170,13 @@ async def test_release_that_runs_alone_takes_the_place_first(tmp_path: Path, sou
     make_payload(folder, part, payload_id=LAMP_ID, version="2.0", release=2, requires=alone)
     async with host_in_process(tmp_path, timing=QUICK) as host:
         host.plug(first, "a")
-        await until(host, r1=Step.ACTIVE)
+        await host.until_releases(LAMP_ID, r1=Step.ACTIVE)
         old = host.workers.pids()["lamp"]
         host.plug(tmp_path / "drive-2", "b")
         if source == LAMP:
-            await until(host, r1=Step.SUPERSEDED, r2=Step.ACTIVE)
+            await host.until_releases(LAMP_ID, r1=Step.SUPERSEDED, r2=Step.ACTIVE)
         else:
-            await until(host, r1=Step.ACTIVE, r2=Step.QUARANTINED)
+            await host.until_releases(LAMP_ID, r1=Step.ACTIVE, r2=Step.QUARANTINED)
         assert not is_running(old)
         (refused,) = (e for e in host.heard if isinstance(e, events.BesideRefused))
         assert refused.reason == "its manifest says that it runs alone"
@@ -201,12 +186,12 @@ async def test_new_drive_pulled_during_the_bring_up(tmp_path: Path) -> None:
     drives = lamp(tmp_path, 1), lamp(tmp_path, 2)
     async with host_in_process(tmp_path, timing=WATCHED) as host:
         host.plug(drives[0], "a")
-        await until(host, r1=Step.ACTIVE)
+        await host.until_releases(LAMP_ID, r1=Step.ACTIVE)
         old = host.workers.pids()
         host.plug(drives[1], "b")
-        await until(host, r2=Step.PROBED)
+        await host.until_releases(LAMP_ID, r2=Step.PROBED)
         host.pull("b")
-        await until(host, r1=Step.ACTIVE, r2=None)
+        await host.until_releases(LAMP_ID, r1=Step.ACTIVE, r2=None)
         assert host.workers.pids() == old
         assert _processes_of(host.folders.scratches) == set(old.values())
 
@@ -225,13 +210,13 @@ async def test_old_drive_pulled_during_the_bring_up(tmp_path: Path) -> None:
     drives = lamp(tmp_path, 1), lamp(tmp_path, 2)
     async with host_in_process(tmp_path, timing=WATCHED) as host:
         host.plug(drives[0], "a")
-        await until(host, r1=Step.ACTIVE)
+        await host.until_releases(LAMP_ID, r1=Step.ACTIVE)
         host.plug(drives[1], "b")
-        await until(host, r2=Step.PROBED)
+        await host.until_releases(LAMP_ID, r2=Step.PROBED)
         host.pull("a")
-        await until(host, r1=None, r2=Step.ACTIVE)
+        await host.until_releases(LAMP_ID, r1=None, r2=Step.ACTIVE)
         assert version(host) == "2.0"
-        newer = release(host, 2)
+        newer = host.release(LAMP_ID, 2)
         assert newer is not None
         assert {path.name for path in left_over(host.folders)} == {newer.key}
 
@@ -241,19 +226,19 @@ async def test_a_person_goes_back_and_forward(tmp_path: Path) -> None:
     async with host_in_process(tmp_path, timing=QUICK) as host:
         host.plug(drives[0], "a")
         host.plug(drives[1], "b")
-        await until(host, r1=Step.SUPERSEDED, r2=Step.ACTIVE)
-        first = release(host, 1)
+        await host.until_releases(LAMP_ID, r1=Step.SUPERSEDED, r2=Step.ACTIVE)
+        first = host.release(LAMP_ID, 1)
         assert first is not None
         host.bus.emit(events.RollbackAsked(first.key, 1, 2))
-        await until(host, r1=Step.ACTIVE, r2=Step.SUPERSEDED)
+        await host.until_releases(LAMP_ID, r1=Step.ACTIVE, r2=Step.SUPERSEDED)
         assert version(host) == "1.0"
     async with host_in_process(tmp_path, timing=QUICK) as host:
-        await until(host, r1=Step.ACTIVE, r2=Step.SUPERSEDED)
+        await host.until_releases(LAMP_ID, r1=Step.ACTIVE, r2=Step.SUPERSEDED)
         assert version(host) == "1.0"
-        second = release(host, 2)
+        second = host.release(LAMP_ID, 2)
         assert second is not None
         host.bus.emit(events.RetryAsked(second.key))
-        await until(host, r1=Step.SUPERSEDED, r2=Step.ACTIVE)
+        await host.until_releases(LAMP_ID, r1=Step.SUPERSEDED, r2=Step.ACTIVE)
 
 
 async def test_installed_payload_is_upgraded_and_the_one_before_is_kept(tmp_path: Path) -> None:
@@ -262,7 +247,7 @@ async def test_installed_payload_is_upgraded_and_the_one_before_is_kept(tmp_path
         for number, folder in folders.items():
             installed = await install(folder, host.catalogue, host.bus)
             assert (installed.release, installed.step) == (number, Step.ACTIVE)
-        await until(host, r1=None, r2=Step.SUPERSEDED, r3=Step.ACTIVE)
+        await host.until_releases(LAMP_ID, r1=None, r2=Step.SUPERSEDED, r3=Step.ACTIVE)
         with pytest.raises(PayloadRefused) as refused:
             await install(folders[3], host.catalogue, host.bus)
         assert refused.value.code == "ALREADY_PRESENT"
@@ -283,7 +268,7 @@ async def test_install_that_fails_leaves_the_one_before(tmp_path: Path) -> None:
         await install(first, host.catalogue, host.bus)
         with pytest.raises(PayloadRefused):
             await install(broken, host.catalogue, host.bus)
-        await until(host, r1=Step.ACTIVE, r2=None)
+        await host.until_releases(LAMP_ID, r1=Step.ACTIVE, r2=None)
         with pytest.raises(InstallFailed) as refused:
             await go_back(LAMP_ID, host.catalogue, host.bus)
         assert refused.value.code == "ROLLBACK_NOTHING"
@@ -293,13 +278,13 @@ async def test_older_drive_is_let_pass_once(tmp_path: Path) -> None:
     older, newer = lamp(tmp_path, 1), lamp(tmp_path, 2)
     async with host_in_process(tmp_path, timing=QUICK) as host:
         host.plug(newer, "b")
-        await until(host, r2=Step.ACTIVE)
+        await host.until_releases(LAMP_ID, r2=Step.ACTIVE)
         host.plug(older, "a")
-        await until(host, r1=Step.REFUSED, r2=Step.ACTIVE)
+        await host.until_releases(LAMP_ID, r1=Step.REFUSED, r2=Step.ACTIVE)
         back = await go_back(LAMP_ID, host.catalogue, host.bus)
         assert (back.release, version(host)) == (1, "1.0")
-        await until(host, r1=Step.ACTIVE, r2=Step.SUPERSEDED)
+        await host.until_releases(LAMP_ID, r1=Step.ACTIVE, r2=Step.SUPERSEDED)
         host.pull("a")
-        await until(host, r1=None, r2=Step.ACTIVE)
+        await host.until_releases(LAMP_ID, r1=None, r2=Step.ACTIVE)
         host.plug(older, "a")
-        await until(host, r1=Step.REFUSED, r2=Step.ACTIVE)
+        await host.until_releases(LAMP_ID, r1=Step.REFUSED, r2=Step.ACTIVE)
