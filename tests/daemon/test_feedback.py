@@ -8,7 +8,8 @@ from typing import Any
 
 from tests.daemon.neighbours import BEACON, UNCONFINED
 from tests.kit.payloads import Part
-from tests.kit.running_host import READY_S, RunningHost, running
+from tests.kit.running_host import COMMAND, READY_S, RunningHost, running
+from tests.kit.until import until
 
 
 def hook(work: Path, text: str) -> Path:
@@ -34,14 +35,13 @@ def test_a_program_is_told_how_a_payload_fares(tmp_path: Path) -> None:
     told = tmp_path / "told"
     more = feedback(f'hook = ["{hook(tmp_path, f"cat >> {told}")}"]', "hook_deadline_s = 600")
     source = BEACON.replace("LAMP", "light").replace("LOST", "stop")
-    with running(tmp_path, more=more) as host:
+    with running(tmp_path, more=more, program=COMMAND) as host:
         host.bring("beacon", Part("beacon", source.replace("LOG", str(tmp_path / "log"))))
         host.until("safe", lambda v: v["feedback"]["state"] == "safe-to-remove", timeout_s=READY_S)
         host.drive("wrong", manifest="no toml")
         host.plug(tmp_path / "drives/wrong")
         host.until("refused", lambda v: v["feedback"]["state"] == "refused", timeout_s=READY_S)
-        while "refused" not in told.read_text():  # the program runs beside the host
-            host.ask("status")
+        until("the program is told", lambda: "refused" in told.read_text())
     states = [json.loads(line) for line in told.read_text().splitlines()]
     assert states[-1]["state"] == "refused"
     assert (states[-1]["code"], states[-1]["payload"]) == ("MANIFEST_TOML", "org.example.wrong")

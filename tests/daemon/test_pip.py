@@ -7,15 +7,17 @@ from typing import Any
 
 import pytest
 from tests.daemon.plugins import scribe, talker
-from tests.kit.running_host import RunningHost, running
+from tests.kit.running_host import COMMAND, RunningHost, running
 
 pytestmark = pytest.mark.daemon
 
+PIP = '[install]\nmethod = "pip"\n'
+
 
 def test_pip_makes_the_same_components(tmp_path: Path) -> None:
-    with running(tmp_path / "store") as host:
+    with running(tmp_path / "store", program=COMMAND) as host:
         expected = made_of(host)
-    with running(tmp_path / "pip", more='[install]\nmethod = "pip"\n') as host:
+    with running(tmp_path / "pip", more=PIP, program=COMMAND) as host:
         assert made_of(host) == expected
         before = len(host.traces().folders)
         assert not host.ask("store")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import time
 from pathlib import Path
 
 import pytest
@@ -11,6 +10,7 @@ from demo.drives import build
 from tests.host.cli.daemon import BEACON
 from tests.kit.payloads import Part
 from tests.kit.running_host import READY_S, Row, RunningHost
+from tests.kit.until import until
 
 pytestmark = pytest.mark.daemon
 
@@ -76,7 +76,8 @@ def greeted(view: Row) -> bool:
 
 def until_logged(host: RunningHost, words: str) -> None:
     """Wait until the payload has written something; nothing tells of that."""
-    deadline_s = time.monotonic() + READY_S
-    while not any(row["message"] == words for row in host.ask("logs", component="speech")):
-        assert time.monotonic() < deadline_s, host.ask("logs", component="speech")
-        time.sleep(0.1)
+
+    def messages() -> list[str]:
+        return [row["message"] for row in host.ask("logs", component="speech")]
+
+    until(f"logged: {words}", lambda: words in messages(), evidence=messages)

@@ -15,6 +15,7 @@ import pytest
 from demo.robot import NONDUM
 from tests.daemon.neighbours import looking, open_host, until_peer
 from tests.kit.running_host import RunningHost
+from tests.kit.until import until
 
 from nondum.host.control.client import ControlClient
 
@@ -26,7 +27,7 @@ def strangers(work: Path) -> Iterator[tuple[RunningHost, RunningHost]]:
     """Two hosts with keys that look for each other, and were never introduced."""
     with looking(work, "rover", "mule") as (rover, mule):
         for host in (rover, mule):
-            until(host, lambda view: view["hosts"])
+            until_peers(host, lambda view: view["hosts"])
         yield rover, mule
 
 
@@ -41,14 +42,14 @@ def is_peer(host: RunningHost, other: str) -> bool:
     return any(row["peer"] == other and row["state"] == "here" for row in host.ask("peers"))
 
 
-def until(host: RunningHost, found: Callable[[dict[str, Any]], Any]) -> None:
+def until_peers(host: RunningHost, found: Callable[[dict[str, Any]], Any]) -> None:
     """Wait until what a host says of who is here and who is not satisfies `found`."""
-    pause = threading.Event()
-    for _ in range(2400):
-        if found(view := host.ask("peers_why")):
-            return
-        pause.wait(0.05)
-    raise AssertionError(view)
+
+    def said() -> dict[str, Any]:
+        answer: dict[str, Any] = host.ask("peers_why")
+        return answer
+
+    until(f"peers of {host.name}", lambda: found(said()), evidence=said)
 
 
 def paired(first: RunningHost, second: RunningHost) -> None:
@@ -101,7 +102,7 @@ def test_paired_hosts_are_peers_until_one_is_revoked(tmp_path: Path) -> None:
         mule.until_told("the host rover is gone")
         mule.stop()
         mule.start()
-        until(rover, lambda view: view["refused"])
+        until_peers(rover, lambda view: view["refused"])
         assert not is_peer(rover, "mule")
 
 
