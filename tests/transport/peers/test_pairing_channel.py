@@ -14,6 +14,7 @@ import pytest
 import zmq
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.kit.clock import VirtualClock
 from tests.kit.examples import a_share
 from tests.kit.until import until_async
 from tests.transport.peers.hosts import PATIENCE_S, identity
@@ -306,19 +307,19 @@ async def test_try_that_learned_nothing_does_not_count(
         assert here.code == there.code
 
 
-async def test_window_closes_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pairing, "WINDOW_S", 0.5)
+async def test_window_closes_by_itself(
+    monkeypatch: pytest.MonkeyPatch, clock: VirtualClock
+) -> None:
+    monkeypatch.setattr(pairing, "WINDOW_S", 0.5)  # before either gives a sign of life
     async with end("rover") as rover, end("base") as base:
         await compared(rover, base)
         rover.says_yes()
+        await clock.advance(0.5)
         assert await rover.fails() == await base.fails() == "PAIRING_OVER"
         await refuses_connections(base.port)
 
 
-async def test_end_of_the_window_tells_why_nobody_was_reached(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(pairing, "WINDOW_S", 1.0)
+async def test_end_of_the_window_tells_why_nobody_was_reached(clock: VirtualClock) -> None:
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))
         async with end("rover") as rover:
@@ -326,6 +327,7 @@ async def test_end_of_the_window_tells_why_nobody_was_reached(
                 HostKeys.generate().public, [f"tcp://127.0.0.1:{closed.getsockname()[1]}"]
             )
             await rover.gives_up("PEER_SILENT")
+            await clock.advance(pairing.WINDOW_S)
             assert "PEER_SILENT" in (await rover.sees(Failed)).problem.message
 
 
