@@ -36,3 +36,8 @@ def test_markers_name_campaigns() -> None:
     of_pytest = {one.name for one in CAMPAIGNS.values() if one.is_pytest}
     assert {name for kind, name in marks() if kind == "long"} <= of_pytest
     assert {name for kind, name in marks() if kind == "short"} <= CAMPAIGNS.keys()
+
+
+@pytest.mark.parametrize("name", [one.name for one in CAMPAIGNS.values() if one.is_pytest])
+def test_each_campaign_of_pytest_has_a_test(name: str) -> None:
+    assert ("long", name) in marks()

@@ -10,7 +10,19 @@ from tests.lab.lab import Lab
 from tests.lab.scenarios import starts
 
 PAYLOAD = "org.example.talker"
-BEGUN = "until ls -d /var/lib/nondum/staging/*; do sleep 0.02; done"
+BEGUN = """
+python3 -I - <<'END'
+import ctypes, os
+staging = "/var/lib/nondum/staging"
+libc = ctypes.CDLL(None, use_errno=True)
+watching, CREATE, MOVED_TO = libc.inotify_init(), 0x100, 0x80
+assert libc.inotify_add_watch(watching, staging.encode(), CREATE | MOVED_TO) >= 0
+if not os.listdir(staging):
+    os.read(watching, 4096)
+END
+"""
+"""Returns with the first folder of a payload that is copied. It sleeps until then: to look again
+and again would take the processor from the daemon that it waits for."""
 BEGUN_S = 120.0
 
 
