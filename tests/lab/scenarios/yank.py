@@ -13,12 +13,18 @@ PAYLOAD = "org.example.talker"
 BEGUN = """
 python3 -I - <<'END'
 import ctypes, os
-staging = "/var/lib/nondum/staging"
+state, CREATE, MOVED_TO = "/var/lib/nondum", 0x100, 0x80
 libc = ctypes.CDLL(None, use_errno=True)
-watching, CREATE, MOVED_TO = libc.inotify_init(), 0x100, 0x80
-assert libc.inotify_add_watch(watching, staging.encode(), CREATE | MOVED_TO) >= 0
+def watch(folder):
+    watching = libc.inotify_init()
+    assert libc.inotify_add_watch(watching, folder.encode(), CREATE | MOVED_TO) >= 0, folder
+    return watching
+above, staging = watch(state), state + "/staging"
+while not os.path.isdir(staging):
+    os.read(above, 4096)
+inside = watch(staging)
 if not os.listdir(staging):
-    os.read(watching, 4096)
+    os.read(inside, 4096)
 END
 """
 """Returns with the first folder of a payload that is copied. It sleeps until then: to look again
