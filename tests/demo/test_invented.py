@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -38,6 +39,9 @@ def strangers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[
     for stranger in made:
         monkeypatch.syspath_prepend(stranger.folder)
     yield made
+    roots = {stranger.entry_point.split(".")[0] for stranger in made}
+    for name in [name for name in sys.modules if name.split(".")[0] in roots]:
+        del sys.modules[name]  # the next test has strangers of these names in another folder
 
 
 def contribution(invented: Invented) -> Contribution:

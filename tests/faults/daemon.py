@@ -33,7 +33,7 @@ from nondum.host.catalogue.state import HostState
 from nondum.host.drives.slots import SlotSource
 from nondum.host.lifecycle import state_lock
 from nondum.host.lifecycle.bus import Bus
-from nondum.host.lifecycle.children import watch_without_threads
+from nondum.host.lifecycle.children import watched_without_threads
 from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
 from nondum.host.lifecycle.folders import Folders
@@ -204,10 +204,14 @@ class Script:
 
 
 async def main(orders: dict[str, Any]) -> None:
+    with watched_without_threads():
+        await _main(orders)
+
+
+async def _main(orders: dict[str, Any]) -> None:
     root = Path(orders["root"])
     os.environ[MARK] = str(root)
     told = os.open(root / "told", os.O_CREAT | os.O_APPEND | os.O_WRONLY | os.O_CLOEXEC)
-    watch_without_threads()
     folders = Folders(root / "state")
     held = await state_lock.lock(folders.root)
     bus = Bus()

@@ -91,6 +91,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_W}/checking.py": (f"{_TW}/test_checking.py",),
     f"{_W}/venvs.py": (f"{_TW}/test_venvs.py",),
     # Whether it may come in, among what is here.
+    f"{_H}/lifecycle/state_lock.py": (f"{_TH}/lifecycle/test_state_lock.py",),
     f"{_H}/lifecycle/admission.py": _RELEASES,
     f"{_H}/lifecycle/payload_rules.py": (
         *_RELEASES,

@@ -21,7 +21,13 @@ INSTALLED = ("-o", "pythonpath=.")
 COMPUTE = (
     "tests/benchmarks",
     "tests/demo/shuffle",
+    "tests/demo/test_compton.py",
+    "tests/demo/test_following_loop.py",
     "tests/docs",
+    "tests/fuzz",
+    "tests/host/cli/test_bad_input.py",
+    "tests/host/cli/test_main.py",
+    "tests/host/cli/test_pddl.py",
     "tests/mutation",
     "tests/planning",
     "tests/plugins",

@@ -37,7 +37,7 @@ from nondum.host.goal_files import GoalFiles, of_people
 from nondum.host.helper import privileged
 from nondum.host.lifecycle import safe_mode, state_lock
 from nondum.host.lifecycle.bus import Bus
-from nondum.host.lifecycle.children import watch_without_threads
+from nondum.host.lifecycle.children import watched_without_threads
 from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
 from nondum.host.lifecycle.folders import Folders
@@ -83,8 +83,9 @@ async def run_host(
     Raises `ConfigRefused` (ALREADY_RUNNING, STATE_BUSY, SYSTEM_TREE, …) before anything has begun.
     """
     stop = _told_to_stop()
-    async with Service(notifier or Notifier()) as service:
-        await _run_as(service, config, more_drives, safety, stop)
+    with watched_without_threads():
+        async with Service(notifier or Notifier()) as service:
+            await _run_as(service, config, more_drives, safety, stop)
 
 
 async def _run_as(
@@ -94,7 +95,6 @@ async def _run_as(
     asked: Safety,
     stop: asyncio.Event,
 ) -> None:
-    watch_without_threads()
     heap.give_back_what_is_big()
     _make_slots(config)
     folders = Folders(config.host.state)

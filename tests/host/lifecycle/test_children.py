@@ -22,7 +22,7 @@ from nondum.host.lifecycle.children import (
     STALL_S,
     START_S,
     Children,
-    watch_without_threads,
+    watched_without_threads,
 )
 from nondum.sdk.errors import DriveGone, InstallFailed
 
@@ -161,7 +161,7 @@ async def test_work_aside_is_idle_and_ends_with_its_child(tmp_path: Path) -> Non
 @pytest.mark.skipif(os.geteuid() != 0, reason="the way back from idle needs root or RLIMIT_NICE")
 async def test_work_aside_is_not_idle_when_it_is_to_end(tmp_path: Path) -> None:
     """It would wait for a processor that others have, and be taken for one that hangs in a disk."""
-    with reaped_on_the_loop():
+    with watched_without_threads():
         async with children() as pool:
             job = asyncio.create_task(pool.run_aside("verify", staged_fifo(tmp_path)))
             await until_async("a child", pool.pids)
@@ -217,20 +217,6 @@ async def test_one_spare_stays_when_work_has_ended(tmp_path: Path, clock: Virtua
             await ended.wait()
         assert not pool.kept()
         assert len(pool.pids()) <= 1
-
-
-@contextlib.contextmanager
-def reaped_on_the_loop() -> Iterator[None]:
-    """Children that ended are there until the loop sees to them, as in the daemon."""
-    if sys.version_info >= (3, 12):
-        yield
-        return
-    former = asyncio.get_child_watcher()
-    watch_without_threads()
-    try:
-        yield
-    finally:
-        asyncio.set_child_watcher(former)
 
 
 @contextlib.contextmanager

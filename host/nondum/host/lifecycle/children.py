@@ -15,7 +15,7 @@ import os
 import signal
 import sys
 from asyncio.subprocess import PIPE, Process
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -213,15 +213,22 @@ class Children:
         self._left_behind = {other for other in self._left_behind if other.returncode is None}
 
 
-def watch_without_threads() -> None:
-    """Be told of children's ends by descriptors (pidfd_open(2)), as Python 3.12 does by itself.
+@contextlib.contextmanager
+def watched_without_threads() -> Iterator[None]:
+    """Wait for children by descriptors (pidfd_open(2)) meanwhile, as Python 3.12 does by itself.
 
     3.11 has a thread for each child, which there is no memory for just when it is needed.
     """
-    if sys.version_info < (3, 12):
-        watcher = asyncio.PidfdChildWatcher()
-        watcher.attach_loop(asyncio.get_running_loop())
-        asyncio.set_child_watcher(watcher)
+    if sys.version_info >= (3, 12):
+        yield
+        return
+    former, watcher = asyncio.get_child_watcher(), asyncio.PidfdChildWatcher()
+    watcher.attach_loop(asyncio.get_running_loop())
+    asyncio.set_child_watcher(watcher)
+    try:
+        yield
+    finally:
+        asyncio.set_child_watcher(former)
 
 
 async def _spawn() -> Process:
