@@ -18,6 +18,7 @@ _QUIET = [HealthCheck.too_slow]
 settings.register_profile(
     "gate", deadline=None, derandomize=True, database=None, suppress_health_check=_QUIET
 )
+settings.register_profile("quick", settings.get_profile("gate"), max_examples=20)
 settings.register_profile(
     "campaign", deadline=None, max_examples=1000, print_blob=True, suppress_health_check=_QUIET
 )

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from tests.campaign import age
-from tests.runner import budget, hardware, job, report, stages, unstable, yardstick
+from tests.runner import budget, hardware, job, report, result, stages, unstable, yardstick
 from tests.runner.job import Done, Job
 from tests.runner.result import Result
 from tests.runner.stages import PROCESSORS, ROOT
@@ -29,7 +29,8 @@ def run(tox: Sequence[str]) -> int:
     before = Usage.now()
 
     options = ("--current", ",".join(one.campaign for one in ages if one.is_current))
-    done = job.beside(*stages.of_checkout(folder, tox)) if tox else []
+    checks = stages.of_checkout(folder, tox) if tox else ([stages.of_examples(folder)],)
+    done = job.beside(*checks)
     done.append(job.run(stages.of_hosts(folder, options), shown=True))
     done += job.beside(*stages.of_demonstrations(folder, options))
     after = Usage.now()
@@ -53,6 +54,7 @@ def run(tox: Sequence[str]) -> int:
     _print(report.skips(skipped, unknown, is_root=os.geteuid() == 0))
     _print([f"{(after.at_s - before.at_s) / 60:.1f} minutes on {PROCESSORS} processors"])
     _print(found.lines(folder))
+    result.write(ROOT / "build/tests.jsonl", results)
     if found.is_green and not found.unstable:
         shutil.rmtree(folder, ignore_errors=True)
     return 0 if found.is_green else 1

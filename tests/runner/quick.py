@@ -7,15 +7,16 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from tests.runner import stages
+from tests.runner import budget, stages
 from tests.runner.stages import PROCESSORS, ROOT
 
 PURE = (
     "tests/kit",
     "tests/planning",
-    "tests/runner",
     "tests/sdk",
-    "tests/transport",
+    "tests/transport/test_broker.py",
+    "tests/transport/test_token_bucket.py",
+    "tests/transport/test_worker_link.py",
     "tests/wheelhouse",
     "tests/test_errors.py",
     "tests/test_layout.py",
@@ -25,7 +26,7 @@ PURE = (
     "tests/host/trust",
 )
 """Folders of tests that start no daemon and no worker."""
-FILTER = "not daemon and not slow and not process"
+FILTER = "not daemon and not slow"
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -35,8 +36,11 @@ def run(arguments: Sequence[str]) -> int:
         if status.returncode:
             return status.returncode
     places = ordered(changed_files())
-    command = [sys.executable, "-m", "pytest", "-q", *stages.at_once(PROCESSORS), "-m", FILTER]
-    return subprocess.run([*command, *places, *arguments], cwd=ROOT, check=False).returncode
+    slow = (f"--ignore={file}" for file in budget.read().slow_files)
+    fewer = "--hypothesis-profile=quick"
+    options = (*stages.at_once(PROCESSORS), "-m", FILTER, fewer, *slow, *places, *arguments)
+    command = [sys.executable, "-m", "pytest", "-q", *options]
+    return subprocess.run(command, cwd=ROOT, check=False).returncode
 
 
 def ordered(changed: Iterable[str]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,13 @@ class Result:
 
     def to_dict(self) -> dict[str, Any]:
         return asdict(self)
+
+
+def write(file: Path, results: Iterable[Result]) -> None:
+    """Write results to a file of JSON lines, in place of what it had."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    lines = (json.dumps(one.to_dict()) + "\n" for one in results)
+    file.write_text("".join(lines), encoding="utf-8")
 
 
 def read(file: Path) -> tuple[Result, ...]:

@@ -35,6 +35,12 @@ COMPUTE = (
 )
 """Tests that only compute: they run with what the demonstrations leave of the processors."""
 LOWEST = 19
+WITH_EXAMPLES = (
+    *("host", "planning", "transport", "wheelhouse/nondum", "plugins/sdk/nondum", "demo"),
+    *("benchmarks/recompose", "benchmarks/execution", "benchmarks/composition"),
+)
+"""Source with examples in its docstrings."""
+NOT_SOURCE = ("*/template/*", "benchmarks/recompose/plugins/*")
 
 
 def pytest_job(
@@ -62,15 +68,21 @@ def at_once(number: int) -> tuple[str, ...]:
     return ("-n", str(number), "--dist", "loadfile", "--no-loadscope-reorder")
 
 
+def of_examples(run: Path) -> Job:
+    """The examples in docstrings."""
+    ignored = (f"--ignore-glob={pattern}" for pattern in NOT_SOURCE)
+    return pytest_job("examples", run, ("--doctest-modules", *ignored, *WITH_EXAMPLES))
+
+
 def of_checkout(run: Path, tox: Sequence[str]) -> tuple[list[Job], ...]:
-    """Lanes of what needs no tests environment: an emulated machine, lint, types, doctests."""
+    """Lanes: lint, types and examples; an emulated machine."""
 
     def env(name: str) -> Job:
         command = (*tox, "run", "-q", "-e", name, "--skip-pkg-install")
         return Job(name, command, ROOT, run / f"{name}.log")
 
     lab = Job("lab", ("./run", "lab", "--short"), ROOT, run / "lab.log")
-    return [env("lint"), env("type"), env("docs")], [lab]
+    return [env("lint"), env("type"), of_examples(run)], [lab]
 
 
 def of_hosts(run: Path, options: Sequence[str]) -> Job:

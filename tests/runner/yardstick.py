@@ -15,7 +15,7 @@ SLOWER_BY = 1.25
 OTHERS = 0.10
 """Nor is one of whose processor time others take this share."""
 
-_ROUNDS = 60
+_ROUNDS = 600
 _BLOCK = bytes(1_000_000)
 
 

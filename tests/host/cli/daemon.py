@@ -13,12 +13,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tests.kit import evidence
+from tests.kit.fork_server import Forked, fork_server, module_of
 from tests.kit.payloads import Part, make_payload
+from tests.kit.until import PATIENCE_S, until
 
 from nondum.host.control.client import ControlClient
 
 HOST = "panther"
-PATIENCE_S = 60.0
 
 BEACON = '''"""A light that shines for people and greets them."""
 
@@ -113,7 +115,27 @@ class Daemon:
     """One host, running."""
 
     root: Path
-    process: subprocess.Popen[str]
+    process: subprocess.Popen[str] | Forked
+
+    name = HOST
+
+    @property
+    def runs(self) -> bool:
+        return self.process.poll() is None
+
+    @property
+    def log_file(self) -> Path:
+        """Where what it writes is kept, if `running` or `killed` has started it."""
+        return self.root / "daemon.log"
+
+    @property
+    def log(self) -> str:
+        return self.log_file.read_text(encoding="utf-8")
+
+    @property
+    def listens(self) -> bool:
+        """Whether it has said so."""
+        return "listens at" in self.log
 
     @property
     def control(self) -> Path:
@@ -254,27 +276,23 @@ def running(root: Path, more: str = "", *, allow_unsigned: bool = True) -> Itera
     with killed(root, more, allow_unsigned=allow_unsigned) as daemon:
         yield daemon
         daemon.process.terminate()
-        _, err = daemon.process.communicate(timeout=PATIENCE_S)
-        assert daemon.process.returncode == 0, err
-        assert "Traceback" not in err, err
+        assert daemon.process.wait(PATIENCE_S) == 0, daemon.log
+        assert "Traceback" not in daemon.log, daemon.log
 
 
 @contextmanager
 def killed(root: Path, more: str = "", *, allow_unsigned: bool = True) -> Iterator[Daemon]:
     """Run a daemon, `more` in its configuration, and end it without a warning (SIGKILL)."""
     config = write_config(root, more, allow_unsigned=allow_unsigned)
-    process = subprocess.Popen(
-        command("host", "run", "--user", "--config", config),
-        stderr=subprocess.PIPE,
-        text=True,
-        env=quiet_environment(),
-    )
-    assert process.stderr is not None
-    with process:
-        try:
-            for line in process.stderr:
-                if "listens at" in line:
-                    break
-            yield Daemon(root, process)
-        finally:
-            process.kill()
+    program = module_of(command("host", "run", "--user", "--config", config))
+    assert program is not None, "it is a module"
+    with (root / "daemon.log").open("wb") as log:
+        process = fork_server().start(program, stderr=log.fileno())
+    daemon = Daemon(root, process)
+    evidence.keep(daemon)
+    try:
+        until("a daemon that listens", lambda: daemon.listens or process.poll() is not None)
+        yield daemon
+    finally:
+        process.kill()
+        process.wait(PATIENCE_S)

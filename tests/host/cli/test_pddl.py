@@ -9,9 +9,9 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from tests.host.cli.daemon import PATIENCE_S, Ran, at_terminal, command, nondum, quiet_environment
+from tests.host.cli.daemon import Ran, at_terminal, command, nondum, quiet_environment
 from tests.kit.endless_problem import ENDLESS, endless
-from tests.kit.until import until
+from tests.kit.until import PATIENCE_S, until
 from tests.planning.differential.texts import TEXTS
 
 ROADS = """(define (domain roads)
