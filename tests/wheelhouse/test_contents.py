@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import string
 
 import pytest
 from hypothesis import example, given
@@ -32,15 +33,15 @@ LISTS = st.builds(
     payload_id=st.from_regex(names.PAYLOAD_ID, fullmatch=True),
     version=st.sampled_from(["1", "1.0", "2.0rc1", "1!3.post4+local"]),
     release=st.integers(0, contents.MAX_RELEASE),
-    fleet=st.from_regex(r"\A[a-z0-9.-]{0,64}\Z"),
+    fleet=st.text(f"{string.ascii_lowercase}{string.digits}.-", max_size=64),
     minimum_nondum=st.just("0.1"),
     built=st.just("2026-01-01T00:00:00Z"),
     entries=st.lists(
         st.builds(
             Entry,
-            sha256=st.from_regex(r"\A[0-9a-f]{64}\Z"),
+            sha256=st.text("0123456789abcdef", min_size=64, max_size=64),
             size=st.integers(0, contents.MAX_FILE_BYTES),
-            path=st.from_regex(r"\A[a-z0-9]{1,8}(/[a-z0-9]{1,8}){0,3}\Z"),
+            path=st.from_regex(r"[a-z0-9]{1,8}(/[a-z0-9]{1,8}){0,3}", fullmatch=True),
         ),
         unique_by=lambda entry: entry.path,
     ).map(lambda entries: tuple(sorted(entries, key=lambda entry: entry.path))),
