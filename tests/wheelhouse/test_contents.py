@@ -10,7 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from nondum.sdk.errors import PayloadRefused
-from nondum.wheelhouse import contents, names
+from nondum.wheelhouse import contents
 from nondum.wheelhouse.contents import Contents, Entry
 
 SHA = "a" * 64
@@ -28,9 +28,10 @@ def codes(data: bytes | str) -> list[str]:
     return [problem.code for problem in refused.value.problems]
 
 
+WORD = st.from_regex(r"[a-z0-9][a-z0-9-]{0,9}", fullmatch=True)
 LISTS = st.builds(
     Contents,
-    payload_id=st.from_regex(names.PAYLOAD_ID, fullmatch=True),
+    payload_id=st.lists(WORD, min_size=2, max_size=5).map(".".join),
     version=st.sampled_from(["1", "1.0", "2.0rc1", "1!3.post4+local"]),
     release=st.integers(0, contents.MAX_RELEASE),
     fleet=st.text(f"{string.ascii_lowercase}{string.digits}.-", max_size=64),
