@@ -52,7 +52,7 @@ def year(daemon: Daemon) -> int:
 
 def test_clock_that_jumps_changes_nothing(tmp_path: Path, clock: Path) -> None:
     (tmp_path / "host").mkdir()
-    with running(tmp_path / "host") as daemon:
+    with running(tmp_path / "host", is_forked=False) as daemon:
         daemon.plug(BEACON_ID, Part("beacon", BEACON))
         daemon.until_state(BEACON_ID, "active")
         daemon.run("goal", "shine").ok()

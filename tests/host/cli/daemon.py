@@ -271,9 +271,11 @@ def write_config(root: Path, more: str = "", *, allow_unsigned: bool = True) -> 
 
 
 @contextmanager
-def running(root: Path, more: str = "", *, allow_unsigned: bool = True) -> Iterator[Daemon]:
+def running(
+    root: Path, more: str = "", *, allow_unsigned: bool = True, is_forked: bool = True
+) -> Iterator[Daemon]:
     """Run a daemon; it must end well when it is told to."""
-    with killed(root, more, allow_unsigned=allow_unsigned) as daemon:
+    with killed(root, more, allow_unsigned=allow_unsigned, is_forked=is_forked) as daemon:
         yield daemon
         daemon.process.terminate()
         assert daemon.process.wait(PATIENCE_S) == 0, daemon.log
@@ -281,18 +283,27 @@ def running(root: Path, more: str = "", *, allow_unsigned: bool = True) -> Itera
 
 
 @contextmanager
-def killed(root: Path, more: str = "", *, allow_unsigned: bool = True) -> Iterator[Daemon]:
-    """Run a daemon, `more` in its configuration, and end it without a warning (SIGKILL)."""
+def killed(
+    root: Path, more: str = "", *, allow_unsigned: bool = True, is_forked: bool = True
+) -> Iterator[Daemon]:
+    """Run a daemon, `more` in its configuration, and end it without a warning (SIGKILL).
+
+    One that is not forked is executed: only then does the dynamic linker see the environment.
+    """
     config = write_config(root, more, allow_unsigned=allow_unsigned)
-    program = module_of(command("host", "run", "--user", "--config", config))
-    assert program is not None, "it is a module"
+    program = command("host", "run", "--user", "--config", config)
     with (root / "daemon.log").open("wb") as log:
-        process = fork_server().start(program, stderr=log.fileno())
-    daemon = Daemon(root, process)
+        daemon = Daemon(root, _started(program, log.fileno(), is_forked=is_forked))
     evidence.keep(daemon)
     try:
-        until("a daemon that listens", lambda: daemon.listens or process.poll() is not None)
+        until("a daemon that listens", lambda: daemon.listens or not daemon.runs)
         yield daemon
     finally:
-        process.kill()
-        process.wait(PATIENCE_S)
+        daemon.process.kill()
+        daemon.process.wait(PATIENCE_S)
+
+
+def _started(program: list[str], log: int, *, is_forked: bool) -> subprocess.Popen[str] | Forked:
+    if is_forked and (module := module_of(program)) is not None:
+        return fork_server().start(module, stderr=log)
+    return subprocess.Popen(program, stderr=log, text=True, env=quiet_environment())
