@@ -12,6 +12,7 @@ import sqlite3
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from tests.faults.daemon import HOST, OPTIONS, QUICK
@@ -25,6 +26,9 @@ from nondum.host.drives.mounts import mounted_below
 from nondum.host.lifecycle.folders import Folders, missing, sweep
 from nondum.host.lifecycle.recovery import recover
 from nondum.wheelhouse.store import Store
+
+ENDED_S = 5.0
+"""So long processes may take to follow their daemon."""
 
 VOLATILE = frozenset({"journal", "tries", "host", "sqlite_sequence"})
 """Tables that another start changes: it is written down, and counted."""
@@ -87,7 +91,8 @@ def _look_at_catalogue(file: Path, told: list[Told]) -> Iterator[str]:
 def until_none_of(root: Path) -> None:
     """Wait until no process belongs to a daemon of that root. Raises `TooLate`."""
     what = f"no process of {root}"
-    until(what, lambda: not processes_of(root), evidence=lambda: processes_of(root))
+    left = partial(processes_of, root)
+    until(what, lambda: not left(), evidence=left, patience_s=ENDED_S)
 
 
 def processes_of(folder: Path) -> list[str]:
