@@ -22,6 +22,7 @@ from nondum.sdk.errors import InstallFailed, PayloadRefused
 pytestmark = pytest.mark.anyio
 
 LAMP_ID = "org.example.lamp"
+BROUGHT_UP = Timing(settle_beats=1)
 WATCHED = Timing(settle_beats=1, missed=1_000_000)
 """Long enough to see a worker fall, short enough to wait for. No worker hangs but at its start."""
 QUICK = Timing(startup_s=20.0, settle_beats=0)
@@ -107,7 +108,7 @@ async def test_components_come_and_go_with_a_release(tmp_path: Path) -> None:
         version = f"{number}.0"
         drive = tmp_path / f"drive-{number}"
         make_payload(drive, *parts, payload_id=LAMP_ID, version=version, release=number)
-    async with host_in_process(tmp_path, timing=WATCHED) as host:
+    async with host_in_process(tmp_path, timing=BROUGHT_UP) as host:
         host.plug(tmp_path / "drive-1", "a")
         await host.until_releases(LAMP_ID, r1=Step.ACTIVE)
         host.plug(tmp_path / "drive-2", "b")
@@ -184,7 +185,7 @@ async def test_release_that_runs_alone_takes_the_place_first(tmp_path: Path, sou
 
 async def test_new_drive_pulled_during_the_bring_up(tmp_path: Path) -> None:
     drives = lamp(tmp_path, 1), lamp(tmp_path, 2)
-    async with host_in_process(tmp_path, timing=WATCHED) as host:
+    async with host_in_process(tmp_path, timing=BROUGHT_UP) as host:
         host.plug(drives[0], "a")
         await host.until_releases(LAMP_ID, r1=Step.ACTIVE)
         old = host.workers.pids()
@@ -208,7 +209,7 @@ def _processes_of(folder: Path) -> set[int]:
 
 async def test_old_drive_pulled_during_the_bring_up(tmp_path: Path) -> None:
     drives = lamp(tmp_path, 1), lamp(tmp_path, 2)
-    async with host_in_process(tmp_path, timing=WATCHED) as host:
+    async with host_in_process(tmp_path, timing=BROUGHT_UP) as host:
         host.plug(drives[0], "a")
         await host.until_releases(LAMP_ID, r1=Step.ACTIVE)
         host.plug(drives[1], "b")
