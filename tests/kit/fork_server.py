@@ -25,13 +25,14 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self
 
 from tests.kit.evidence import logged
+
+from nondum.host.lifecycle.fork_server import ANSWER_BYTES, answer, ask, serve
 
 ROOT = Path(__file__).parent.parent.parent
 PATIENCE_S = 90.0
@@ -91,7 +92,7 @@ class Forked:
             return None
         with self._ended:
             if self.returncode is None:
-                said = os.read(self._status, 16)
+                said = os.read(self._status, ANSWER_BYTES)
                 assert said, "the fork server has ended"
                 self.returncode = int(said)
                 os.close(self._status)
@@ -148,10 +149,8 @@ class ForkServer:
             {"command": list(command), "folder": str(Path.cwd()), "environment": dict(os.environ)}
         )
         with self._one_request:
-            socket.send_fds(self._channel, [request.encode()], descriptors)
-            answer, (descriptor,), _, _ = socket.recv_fds(self._channel, 16, 1)
-        os.set_inheritable(descriptor, False)
-        return int(answer), descriptor
+            ask(self._channel, request.encode(), descriptors)
+            return answer(self._channel)
 
 
 def fork_server() -> ForkServer:
@@ -227,86 +226,13 @@ class Nursery:
 # What follows runs in the fork server.
 
 
-@dataclass(frozen=True)
-class _Request:
-    """What a client asks for."""
-
-    command: Command
-    folder: str
-    environment: dict[str, str]
-    descriptors: Sequence[int]
-    """Standard streams, then where the return code is to be written."""
-
-
-@dataclass(frozen=True)
-class _Child:
-    """A process that runs."""
-
-    pid: int
-    descriptor: int
-    status: int
-
-
-def _serve(channel: socket.socket) -> _Request | None:
-    """Answer requests. Returns in each child with what it is to do, and None when the client has
-    ended."""
-    children: dict[int, _Child] = {}
-    ready = select.poll()
-    ready.register(channel, select.POLLIN)
-    while True:
-        for descriptor, _ in ready.poll():
-            if descriptor != channel.fileno():
-                ready.unregister(descriptor)
-                _see_end(children.pop(descriptor))
-                continue
-            request = _receive(channel)
-            if request is None:
-                _end(children.values())
-                return None
-            *_, status = request.descriptors
-            (_one_thread,) = Path("/proc/self/task").iterdir()  # a fork has one
-            if (pid := os.fork()) == 0:
-                return request
-            child = _Child(pid, os.pidfd_open(pid), status)
-            children[child.descriptor] = child
-            ready.register(child.descriptor, select.POLLIN)
-            for stream in request.descriptors[:-1]:
-                os.close(stream)
-            socket.send_fds(channel, [str(pid).encode()], [child.descriptor])
-
-
-def _receive(channel: socket.socket) -> _Request | None:
-    message, descriptors, _, _ = socket.recv_fds(channel, 1 << 20, 4)
-    if not message:
-        return None
-    asked = json.loads(message)
-    return _Request(asked["command"], asked["folder"], asked["environment"], descriptors)
-
-
-def _see_end(child: _Child) -> None:
-    _, status = os.waitpid(child.pid, 0)
-    with contextlib.suppress(BrokenPipeError):
-        os.write(child.status, str(os.waitstatus_to_exitcode(status)).encode())
-    os.close(child.status)
-    os.close(child.descriptor)
-
-
-def _end(children: Iterable[_Child]) -> None:
-    for child in children:
-        os.kill(child.pid, signal.SIGKILL)
-        os.waitpid(child.pid, 0)
-
-
-def _become(request: _Request) -> None:
+def _become(command: Command, folder: str, environment: dict[str, str]) -> None:
     """Be the program that was asked for."""
-    for number, descriptor in enumerate(request.descriptors[:-1]):
-        os.dup2(descriptor, number)
-    os.closerange(3, os.sysconf("SC_OPEN_MAX"))
-    os.chdir(request.folder)
+    os.chdir(folder)
     os.environ.clear()
-    os.environ.update(request.environment)
-    module, *arguments = request.command
-    sys.path[0], sys.argv[1:] = request.folder, arguments
+    os.environ.update(environment)
+    module, *arguments = command
+    sys.path[0], sys.argv[1:] = folder, arguments
     runpy.run_module(module, run_name="__main__", alter_sys=True)
 
 
@@ -314,10 +240,8 @@ def main() -> None:
     """Serve the client at the socket whose descriptor is given."""
     for module in IMPORTED:
         importlib.import_module(module)
-    channel = socket.socket(fileno=int(sys.argv[1]))
-    if request := _serve(channel):
-        channel.detach()
-        _become(request)
+    if request := serve(socket.socket(fileno=int(sys.argv[1]))):
+        _become(**json.loads(request))
 
 
 if __name__ == "__main__":

@@ -49,7 +49,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def started(server: ForkServer, folder: Path, source: str, *arguments: str) -> Forked:
     """A program that runs in a process of the server."""
-    (folder / "program.py").write_text(source, encoding="utf-8")
+    program = folder / "program.py"
+    if not program.exists():  # another process may be reading it
+        program.write_text(source, encoding="utf-8")
     return server.start(["program", *arguments], stderr=subprocess.PIPE)
 
 

@@ -189,7 +189,7 @@ async def test_slow_start_is_not_the_drive_s(
     monkeypatch.setattr(sys, "executable", str(slow))
     async with children() as pool:
         job = asyncio.create_task(pool.run("look", drive(tmp_path), stall_s=1.5))
-        await until_async("a child", pool.pids)
+        await until_async("its server", lambda: pool.server)
         await clock.advance(START_S * 0.9)
         await asyncio.to_thread(gate.write_text, "")  # it opens the other end, and goes on
         assert await job == NOTHING
@@ -208,7 +208,7 @@ async def test_work_aside_gives_its_answer(tmp_path: Path, clock: VirtualClock) 
         assert not pool.pids()
 
 
-async def test_one_spare_stays_when_work_has_ended(tmp_path: Path, clock: VirtualClock) -> None:
+async def test_no_child_is_kept_when_work_has_ended(tmp_path: Path, clock: VirtualClock) -> None:
     async with children() as pool:
         await pool.run("look", drive(tmp_path), owner="a")
         await clock.advance(QUIET_S * 0.9)
@@ -216,7 +216,7 @@ async def test_one_spare_stays_when_work_has_ended(tmp_path: Path, clock: Virtua
             await clock.advance(QUIET_S * 0.1)
             await ended.wait()
         assert not pool.kept()
-        assert len(pool.pids()) <= 1
+        assert not pool.pids()
 
 
 @contextlib.contextmanager

@@ -1,23 +1,28 @@
 """The other end of `children.py`: a process that does jobs, one after the other.
 
-It dies with the daemon, and what it may use is bounded: what it reads was written by strangers.
+Run as a program, this is the fork server that such processes come from. They die with it, and it
+with the daemon; what they may use is bounded: what they read was written by strangers.
 """
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import json
 import os
-import select
+import socket
 import sys
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TextIO
 
 from nondum.host.brief import brief
 from nondum.host.confinement import own_children
-from nondum.host.lifecycle import jobs
+from nondum.host.inside import kernel
+from nondum.host.lifecycle import fork_server, jobs
 from nondum.host.lifecycle.allowance import allowed, confine_process
 from nondum.sdk.errors import NondumError, Problem
 from nondum.wheelhouse import disk
@@ -25,31 +30,49 @@ from nondum.wheelhouse import disk
 PROGRESS_S = 0.1
 """Between two reports of one phase."""
 
-IDLE_S = 0.1
-"""A child that has nothing to do for so long makes ready for whatever comes."""
 
+def main(daemon: int, channel: int) -> None:
+    """Fork a child for each request that comes over a socket. Returns in those that are done, too.
 
-def main(daemon: int) -> None:
-    """Do jobs from stdin until it ends."""
+    What this process gives up, its children have not, either.
+    """
     own_children.settle(daemon, keeps=("mounts",))  # drives are mounted by them
     confine_process()
-    if not select.select([sys.stdin], [], [], IDLE_S)[0]:
-        _warm()
-    # Whatever prints goes to stderr: stdout belongs to the conversation.
-    with os.fdopen(os.dup(1), "w", buffering=1) as answers:
-        os.dup2(2, 1)
-        for line in sys.stdin:
+    server = os.getpid()
+    if fork_server.serve(socket.socket(fileno=channel), prepare=_prepare, ahead=_ahead()):
+        kernel.end_with(server)
+        os.setsid()
+        work()
+
+
+def work() -> None:
+    """Do the jobs that come over descriptor 0, a socket, until it ends."""
+    with os.fdopen(os.dup(0)) as requests, os.fdopen(os.dup(0), "w", buffering=1) as answers:
+        os.dup2(1, 0)  # what it starts does not take part in the conversation,
+        os.dup2(2, 1)  # nor does whatever prints
+        for line in requests:
             request = json.loads(line)
             _say(answers, _do(request["job"], request["arguments"], answers))
 
 
-def _warm() -> None:
-    """Find and import what is then there when somebody waits for a job."""
-    from nondum.wheelhouse import preflight
+def _prepare(job: bytes) -> None:
+    """Import what a child is to do, once for all that will do it."""
+    _import(job.decode())
+    gc.freeze()  # a collection in a child would make pages its own that are shared
 
+
+def _ahead() -> Iterator[None]:
+    """Import what is then there when somebody waits for a job."""
     for job in jobs.AT_ONCE:
-        jobs.find(job)
+        _import(job)
+        yield
+    preflight = import_module("nondum.wheelhouse.preflight")
     preflight.probe(Path.cwd(), reserve_mb=0, confinement=0)
+
+
+def _import(job: str) -> None:
+    with contextlib.suppress(Exception):  # it will be the child's, which tells of it
+        jobs.find(job)
 
 
 def _do(job: str, arguments: dict[str, Any], answers: TextIO) -> dict[str, Any]:
@@ -98,4 +121,4 @@ def _say(answers: TextIO, answer: dict[str, Any]) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    main(int(sys.argv[1]), int(sys.argv[2]))

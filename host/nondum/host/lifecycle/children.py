@@ -1,8 +1,9 @@
 """Child processes that do what may block, hang or choke on hostile bytes: the daemon's end.
 
-Requests go down a child's stdin and answers come up its stdout, one JSON object a line. A spare
-child is kept warm, since starting an interpreter costs more than most jobs. What a child reads of a
-drive could take it over, so from then on it works for that drive only and never for anybody else.
+Requests go to a child and answers come back over a socket, one JSON object a line. Children are
+forked from a process that has imported what they need and has read nothing (`fork_server.py`). What
+a child reads of a drive could take it over, so from then on it works for that drive only and never
+for anybody else.
 """
 
 from __future__ import annotations
@@ -14,32 +15,27 @@ import logging
 import os
 import signal
 import sys
-from asyncio.subprocess import PIPE, Process
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from nondum.host.lifecycle.fork_client import ForkClient, Forked
 from nondum.sdk import errors
 from nondum.sdk.errors import InstallFailed, NondumError, Problem
 from nondum.wheelhouse import disk
 
-LINE_LIMIT = 16 * 1024 * 1024
-"""Bytes of one answer: it may hold the descriptions of many components."""
-
 KEPT = 4
 """Children that wait for more work of their owners; those that worked last are kept."""
 
-WARM_S = 0.3
-"""After a spare was taken, the next is made: what it was taken for has the processor first."""
-
 QUIET_S = 30.0
-"""Without work for so long, nothing is kept but the spare."""
+"""Without work for so long, no child is kept."""
 
 STALL_S = 60.0
 """Silence that is borne from a child, unless its job is one that says more or less of itself."""
 
 START_S = 60.0
-"""How long a child may take until it begins with its job."""
+"""How long the fork server may take to start, and a child until it begins with its job."""
+
 ASIDE_STALL_S = 600.0
 """Silence that is borne from a child that works only while nobody else does."""
 
@@ -52,18 +48,16 @@ log = logging.getLogger(__name__)
 
 
 class Children:
-    """A pool that grows as jobs need it and shrinks to one spare. `close` it."""
+    """A pool that grows as jobs need it, and shrinks to nothing. `close` it."""
 
     def __init__(self, *, quiet_s: float = QUIET_S) -> None:
         self._quiet_s = quiet_s
-        self._spares: list[Process] = []
-        """Those that have done nothing yet."""
-        self._kept: dict[str, Process] = {}
+        self._forks = ForkClient("nondum.host.lifecycle.child")
+        self._kept: dict[str, Forked] = {}
         """Owner → the child that worked for it, and for nobody else; the last ones last."""
-        self._busy: set[Process] = set()
-        self._left_behind: set[Process] = set()
+        self._busy: set[Forked] = set()
+        self._left_behind: set[Forked] = set()
         """Those that were killed and have not ended yet: a disk may hold one for ever."""
-        self._warming: asyncio.Task[None] | None = None
         self._shrinking: asyncio.Task[None] | None = None
 
     async def run(
@@ -83,7 +77,7 @@ class Children:
         started, CHILD_LIMIT when it used up its processor time, CHILD_DIED when it ended without an
         answer otherwise.
         """
-        child = await self._take(owner)
+        child = await self._take(owner, job)
         self._busy.add(child)
         try:
             async with asyncio.timeout(None) as deadline:
@@ -106,7 +100,7 @@ class Children:
 
         Otherwise as `run`; the child ends with its job.
         """
-        child = await self._spawn()
+        child = await self._spawn(job)
         self._busy.add(child)
         try:
             _make_idle(child.pid)
@@ -124,14 +118,14 @@ class Children:
         if child is not None:
             await self._end(child)
 
-    def warm(self) -> None:
-        """Have a spare, soon, if there is none."""
-        if not self._spares and (self._warming is None or self._warming.done()):
-            self._warming = asyncio.create_task(self._warm())
-
     def pids(self) -> set[int]:
         """Processes of all children."""
-        return {child.pid for child in (*self._spares, *self._kept.values(), *self._busy)}
+        return {child.pid for child in (*self._kept.values(), *self._busy)}
+
+    @property
+    def server(self) -> int | None:
+        """The process that they are forked from, while there is one."""
+        return self._forks.pid
 
     def kept(self) -> dict[str, int]:
         """Owner → the process of the child that waits for more of its work."""
@@ -139,45 +133,37 @@ class Children:
 
     async def close(self) -> None:
         """Kill all children."""
-        for task in (self._warming, self._shrinking):
-            if task is not None:
-                task.cancel()
-                await asyncio.wait([task])
-        everyone = (*self._spares, *self._kept.values(), *self._busy)
+        if self._shrinking is not None:
+            self._shrinking.cancel()
+            await asyncio.wait([self._shrinking])
+        everyone = {*self._kept.values(), *self._busy, *self._left_behind}
         await asyncio.gather(*(self._end(child) for child in everyone))
-        self._spares.clear()
         self._kept.clear()
-        if self._left_behind:
-            ends = [asyncio.ensure_future(child.wait()) for child in self._left_behind]
-            _, hanging = await asyncio.wait(ends, timeout=END_S)
-            for end in hanging:
-                end.cancel()
         for child in self._left_behind:
-            # asyncio has no other way of not waiting for a process.
-            child._transport.close()  # type: ignore[attr-defined]  # it is there, and not told
+            child.close()
+        await self._forks.close()
 
-    async def _take(self, owner: str) -> Process:
+    async def _take(self, owner: str, job: str) -> Forked:
         """A child that nobody else's bytes have touched."""
-        if owner in self._kept:
-            return self._kept.pop(owner)
-        child = self._spares.pop() if self._spares else await self._spawn()
-        self.warm()
-        return child
+        return self._kept.pop(owner, None) or await self._spawn(job)
 
-    async def _warm(self) -> None:
-        await asyncio.sleep(WARM_S)
-        self._spares.append(await self._spawn())
+    async def _spawn(self, job: str) -> Forked:
+        """A new child.
 
-    async def _spawn(self) -> Process:
-        """A new child; one that was begun when this is cancelled is not lost."""
-        spawning = asyncio.ensure_future(_spawn())
+        Raises `InstallFailed` (NO_RESOURCES, IO_ERROR, CHILD_DIED, CHILD_STALLED).
+        """
         try:
-            return await asyncio.shield(spawning)
-        except asyncio.CancelledError:
-            self._spares.append(await spawning)
-            raise
+            return await self._forks.fork(job, START_S)
+        except TimeoutError as error:
+            raise _stalled(job, START_S) from error
+        except OSError as error:
+            text = "a child process cannot be started"
+            raise disk.failed(error, text, Path(sys.executable)) from error
+        except EOFError as error:
+            message = f"{job}: no child can be forked: {error}"
+            raise InstallFailed(Problem("CHILD_DIED", message, fix=_TRY_AGAIN)) from error
 
-    async def _keep(self, child: Process, owner: str) -> None:
+    async def _keep(self, child: Forked, owner: str) -> None:
         """Keep a child for its owner, in the place of whichever was kept longest."""
         self._busy.discard(child)
         if not owner:
@@ -200,17 +186,18 @@ class Children:
         while self._kept:
             await self._end(self._kept.pop(next(iter(self._kept))))
 
-    async def _end(self, child: Process) -> None:
+    async def _end(self, child: Forked) -> None:
         self._busy.discard(child)
         self._left_behind.add(child)  # whoever waits here may be cancelled: then `close` waits
         _make_ordinary(child.pid)  # or, while others work, it gets no processor to end with
-        with contextlib.suppress(ProcessLookupError):
-            child.kill()
+        child.kill()
         try:
             await asyncio.wait_for(child.wait(), END_S)
         except TimeoutError:
             log.warning("child %d hangs in its disk and is left behind", child.pid)
-        self._left_behind = {other for other in self._left_behind if other.returncode is None}
+        for other in [each for each in self._left_behind if each.returncode is not None]:
+            self._left_behind.discard(other)
+            other.close()
 
 
 @contextlib.contextmanager
@@ -231,40 +218,21 @@ def watched_without_threads() -> Iterator[None]:
         asyncio.set_child_watcher(former)
 
 
-async def _spawn() -> Process:
-    """Start a child. Raises `InstallFailed` (NO_RESOURCES, IO_ERROR)."""
-    try:
-        return await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "nondum.host.lifecycle.child", str(os.getpid())),
-            stdin=PIPE,
-            stdout=PIPE,
-            limit=LINE_LIMIT,
-            start_new_session=True,
-        )
-    except OSError as error:
-        text = "a child process cannot be started"
-        raise disk.failed(error, text, Path(sys.executable)) from error
-
-
 async def _converse(
-    child: Process,
+    child: Forked,
     job: str,
     arguments: Mapping[str, Any],
     on_progress: OnProgress | None,
     deadline: asyncio.Timeout,
     stall_s: float,
 ) -> dict[str, Any]:
-    assert child.stdin is not None  # both are pipes
-    assert child.stdout is not None
     loop = asyncio.get_running_loop()
     line = json.dumps({"job": job, "arguments": dict(arguments)}) + "\n"
-    with contextlib.suppress(ConnectionError):  # it died: the answer below is missing
-        child.stdin.write(line.encode())
-        await child.stdin.drain()
+    await child.say(line.encode())
     patience_s = max(stall_s, START_S)  # on a small computer that has much to do, Python takes long
     while True:
         deadline.reschedule(loop.time() + patience_s)
-        heard = await child.stdout.readline()
+        heard = await child.hear()
         if not heard:
             raise _died(job, await child.wait())
         answer: dict[str, Any] = json.loads(heard)

@@ -1,0 +1,208 @@
+"""The daemon's end of its fork server: starts it, and talks with the processes that it forks."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import os
+import signal
+import socket
+import sys
+from asyncio.subprocess import DEVNULL, Process
+from collections.abc import Iterator
+
+from nondum.host.lifecycle import fork_server
+
+LINE_LIMIT = 16 * 1024 * 1024
+"""Bytes of one line from a process."""
+END_S = 1.0
+"""How long a killed server is waited for."""
+
+log = logging.getLogger(__name__)
+
+
+class Forked:
+    """A process of the fork server, with a conversation in lines. `close` it once it has ended, or
+    is to be left behind."""
+
+    def __init__(
+        self,
+        pid: int,
+        descriptor: int,
+        status: int,
+        reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+    ) -> None:
+        """`descriptor` is its pidfd; its return code can be read from `status`."""
+        self.pid = pid
+        self._reader, self._writer = reader, writer
+        self.returncode: int | None = None
+        """None until it has ended; negative for a signal."""
+        self._descriptor, self._status = descriptor, status
+        self._ended = asyncio.Event()
+        asyncio.get_running_loop().add_reader(status, self._see_end)
+
+    async def say(self, line: bytes) -> None:
+        """Write a line to it; one that has ended does not hear it."""
+        with contextlib.suppress(ConnectionError):
+            self._writer.write(line)
+            await self._writer.drain()
+
+    async def hear(self) -> bytes:
+        """The next line from it; b"" if it ended before."""
+        try:
+            return await self._reader.readline()
+        except ConnectionError:  # it ended before it had read everything
+            return b""
+
+    def kill(self) -> None:
+        """SIGKILL it, if it runs."""
+        if self._status >= 0:
+            with contextlib.suppress(ProcessLookupError):
+                signal.pidfd_send_signal(self._descriptor, signal.SIGKILL)
+
+    async def wait(self) -> int:
+        """Its return code, once it has ended."""
+        await self._ended.wait()
+        assert self.returncode is not None
+        return self.returncode
+
+    def close(self) -> None:
+        """Hear no more of it, whether it has ended or not."""
+        self._writer.close()
+        self._forget()
+
+    def _see_end(self) -> None:
+        said = os.read(self._status, fork_server.ANSWER_BYTES)
+        self.returncode = int(said or -signal.SIGKILL)  # the server's end is that of all it forked
+        self._forget()
+        self._ended.set()
+
+    def _forget(self) -> None:
+        if self._status >= 0:
+            asyncio.get_running_loop().remove_reader(self._status)
+            os.close(self._status)
+            os.close(self._descriptor)
+            self._status = -1
+
+
+class ForkClient:
+    """Starts the fork server when it is first wanted, and anew when it has ended. `close` it."""
+
+    def __init__(self, module: str) -> None:
+        """`module` is run as a program with this process's id and the descriptor of its end of the
+        channel (`fork_server.serve`)."""
+        self._module = module
+        self._server: Process | None = None
+        self._channel: socket.socket | None = None
+        self._turn = asyncio.Lock()
+
+    @property
+    def pid(self) -> int | None:
+        """The server's process, while there is one."""
+        return self._server.pid if self._server is not None else None
+
+    async def fork(self, message: str, patience_s: float) -> Forked:
+        """A new process.
+
+        Raises `OSError` when none can be started, `EOFError` when the server ends as soon as it is
+        started, `TimeoutError` when it does not answer for so long: then all that it forked ends.
+        """
+        forking = asyncio.ensure_future(self._in_turn(message, patience_s))
+        try:
+            return await asyncio.shield(forking)
+        except asyncio.CancelledError:  # the answer is read, or the next one would be taken for it
+            with contextlib.suppress(OSError, EOFError, TimeoutError):
+                unwanted = await forking
+                unwanted.kill()
+                unwanted.close()
+            raise
+
+    async def close(self) -> None:
+        """End the server, and all that it forked."""
+        async with self._turn:
+            await self._end()
+
+    async def _in_turn(self, message: str, patience_s: float) -> Forked:
+        async with self._turn:
+            try:
+                async with asyncio.timeout(patience_s):
+                    return await self._from_a_server(message)
+            except BaseException as error:
+                if not isinstance(error, OSError) or isinstance(error, TimeoutError):
+                    await self._end()
+                raise
+
+    async def _from_a_server(self, message: str) -> Forked:
+        if self._channel is not None:
+            with contextlib.suppress(ConnectionError, EOFError):
+                return await self._fork(self._channel, message)
+            log.warning("the fork server has ended, and is started anew")
+            await self._end()
+        self._channel = await self._start()
+        return await self._fork(self._channel, message)
+
+    async def _start(self) -> socket.socket:
+        channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        channel.settimeout(0)
+        with theirs:
+            try:
+                self._server = await asyncio.create_subprocess_exec(
+                    *(sys.executable, "-m", self._module, str(os.getpid()), str(theirs.fileno())),
+                    stdin=DEVNULL,
+                    stdout=DEVNULL,
+                    pass_fds=(theirs.fileno(),),
+                    start_new_session=True,
+                )
+            except BaseException:
+                channel.close()
+                raise
+        return channel
+
+    async def _fork(self, channel: socket.socket, message: str) -> Forked:
+        ours, theirs = socket.socketpair()
+        reader, writer = await asyncio.open_unix_connection(sock=ours, limit=LINE_LIMIT)
+        status, of_server = os.pipe()
+        try:
+            with theirs, _closed(of_server):
+                fork_server.ask(channel, message.encode(), (theirs.fileno(), of_server))
+            pid, descriptor = await _answer(channel)
+        except BaseException:
+            writer.close()
+            os.close(status)
+            raise
+        return Forked(pid, descriptor, status, reader, writer)
+
+    async def _end(self) -> None:
+        if self._channel is not None:
+            self._channel.close()
+            self._channel = None
+        server, self._server = self._server, None
+        if server is None:
+            return
+        with contextlib.suppress(ProcessLookupError):
+            server.kill()
+        try:
+            await asyncio.wait_for(server.wait(), END_S)
+        except TimeoutError:
+            log.warning("the fork server %d cannot be ended, and is left behind", server.pid)
+
+
+async def _answer(channel: socket.socket) -> tuple[int, int]:
+    """See `fork_server.answer`."""
+    loop, is_there = asyncio.get_running_loop(), asyncio.Event()
+    loop.add_reader(channel, is_there.set)
+    try:
+        await is_there.wait()
+    finally:
+        loop.remove_reader(channel)
+    return fork_server.answer(channel)
+
+
+@contextlib.contextmanager
+def _closed(descriptor: int) -> Iterator[None]:
+    try:
+        yield
+    finally:
+        os.close(descriptor)
