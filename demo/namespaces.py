@@ -24,7 +24,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Protocol
 
 ROOT = Path(__file__).parent.parent
 PREFIX = "nondum"
@@ -39,13 +39,20 @@ class NamespacesUnavailable(Exception):
     """This machine or user may not make network namespaces."""
 
 
+class Process(Protocol):
+    """What runs on a machine, and ends with it."""
+
+    def communicate(self) -> tuple[Any, Any]:
+        """What else it writes to its output and its errors, once it has ended."""
+
+
 @dataclass
 class Machine:
     """One machine: processes that run there see its network only."""
 
     name: str
     namespace: str
-    processes: list[subprocess.Popen[Any]] = field(default_factory=list)
+    processes: list[Process] = field(default_factory=list)
     cables: list[Cable] = field(default_factory=list)
 
     def command(self, *words: str) -> list[str]:

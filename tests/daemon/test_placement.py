@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
@@ -28,10 +27,9 @@ from nondum.sdk.errors import NondumError
 
 pytestmark = pytest.mark.daemon
 
-OTHER_MACHINE = ("setarch", "linux32")
-"""What is run so is told by the kernel that it is on a 32-bit machine: wheels for this one do not
-fit it."""
-ROVER_IS_OTHER = {"rover": (*OTHER_MACHINE, *DAEMON)}
+PYTHON, DASH_M, *DAEMON_MODULE = DAEMON
+OTHER_MACHINE = (PYTHON, DASH_M, "tests.kit.other_machine")
+ROVER_IS_OTHER = {"rover": (*OTHER_MACHINE, *DAEMON_MODULE)}
 NOTHING_ELSE: Mapping[str, Sequence[str]] = {}
 
 
@@ -245,7 +243,7 @@ def test_what_cannot_be_placed_is_said(tmp_path: Path) -> None:
     os.geteuid() != 0 or not Path("/dev/loop-control").exists(), reason="loop devices need root"
 )
 def test_stick_that_was_let_go_is_mounted_again_to_hand_it_over(tmp_path: Path) -> None:
-    loops = (sys.executable, "-m", "tests.daemon.loop_daemon", str(tmp_path))
+    loops = ("tests.daemon.loop_daemon", str(tmp_path))
     programs = {"rover": (*OTHER_MACHINE, *loops)}
     with hosts(tmp_path, "rover", "mule", programs=programs, more="place = true") as (rover, mule):
         before = rover.traces()

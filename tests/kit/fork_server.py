@@ -49,9 +49,12 @@ Command = Sequence[str]
 class Forked:
     """A process of the fork server; the methods are those of `subprocess.Popen`."""
 
-    def __init__(self, pid: int, descriptor: int, status: int, stderr: IO[bytes] | None) -> None:
+    def __init__(
+        self, pid: int, descriptor: int, status: int, streams: Sequence[IO[Any] | None]
+    ) -> None:
         """`descriptor` is its pidfd; its return code can be read from `status`."""
-        self.pid, self.stderr = pid, stderr
+        self.pid = pid
+        self.stdin, self.stdout, self.stderr = streams
         self.returncode: int | None = None
         self._descriptor, self._status = descriptor, status
         self._ended = threading.Lock()
@@ -82,6 +85,18 @@ class Forked:
         """End it."""
         self.send_signal(signal.SIGKILL)
 
+    def communicate(self) -> tuple[Any, Any]:
+        """What else it writes to its output and its errors, once it has ended; closes its pipes."""
+        if self.stdin is not None:
+            with contextlib.suppress(BrokenPipeError):
+                self.stdin.close()
+        said = [stream and stream.read() for stream in (self.stdout, self.stderr)]
+        for stream in (self.stdout, self.stderr):
+            if stream is not None:
+                stream.close()
+        self.wait()
+        return said[0], said[1]
+
     def _ends_within(self, timeout_s: float | None) -> int | None:
         with self._ended:
             if self.returncode is not None:
@@ -98,6 +113,10 @@ class Forked:
                 os.close(self._status)
                 os.close(self._descriptor)
             return self.returncode
+
+
+_MODES = {(True, True): "w", (True, False): "wb", (False, True): "r", (False, False): "rb"}
+"""(Whether it is written to, whether it is text) → how a pipe is opened."""
 
 
 class ForkServer:
@@ -129,19 +148,36 @@ class ForkServer:
         self._channel.close()
         self._process.wait()
 
-    def start(self, command: Command, *, stderr: int | None = None) -> Forked:
+    def start(
+        self,
+        command: Command,
+        *,
+        stdin: int | None = None,
+        stdout: int | None = None,
+        stderr: int | None = None,
+        text: bool = False,
+    ) -> Forked:
         """Start `python -m command…` in this folder with this environment.
 
-        `stderr` is a descriptor for its standard error, or `subprocess.PIPE`.
+        Each stream is a descriptor, or `subprocess.PIPE`; `text` makes pipes of text.
         """
+        streams: list[IO[Any] | None] = []
         with contextlib.ExitStack() as ours:
-            reader, writer = os.pipe() if stderr == subprocess.PIPE else (None, stderr)
-            if reader is not None and writer is not None:
-                ours.callback(os.close, writer)
-            status, theirs = os.pipe()
-            ours.callback(os.close, theirs)
-            pid, descriptor = self._ask(command, [0, 1, 2 if writer is None else writer, theirs])
-        return Forked(pid, descriptor, status, None if reader is None else os.fdopen(reader, "rb"))
+            theirs: list[int] = []
+            for number, wanted in enumerate((stdin, stdout, stderr)):
+                if wanted != subprocess.PIPE:
+                    streams.append(None)
+                    theirs.append(number if wanted is None else wanted)
+                    continue
+                reader, writer = os.pipe()
+                mine, its = (writer, reader) if number == 0 else (reader, writer)
+                streams.append(os.fdopen(mine, _MODES[number == 0, text]))
+                theirs.append(its)
+                ours.callback(os.close, its)
+            status, of_server = os.pipe()
+            ours.callback(os.close, of_server)
+            pid, descriptor = self._ask(command, [*theirs, of_server])
+        return Forked(pid, descriptor, status, streams)
 
     def _ask(self, command: Command, descriptors: list[int]) -> tuple[int, int]:
         """Have a process forked; its pid and pidfd."""

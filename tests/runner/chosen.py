@@ -21,7 +21,7 @@ def run(arguments: Sequence[str]) -> int:
         command = [sys.executable, "-m", "pytest", *stages.INSTALLED, *arguments]
         return subprocess.run(command, cwd=ROOT, check=False).returncode
     folder = full.evidence_folder()
-    beside = (*stages.at_once(stages.PROCESSORS + 1), "-m", "not alone", *arguments)
+    beside = (*stages.at_once(2 * stages.PROCESSORS), "-m", "not alone", *arguments)
     jobs = [stages.pytest_job("chosen", folder, (*stages.INSTALLED, *beside))]
     if has_alone(arguments):
         options = (*stages.INSTALLED, "-m", "alone", *arguments)

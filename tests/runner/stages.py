@@ -1,6 +1,6 @@
 """What a full run consists of: which jobs, in which order, and which of them beside each other.
 
-Tests run beside each other, one more than there are processors, since most wait now and then. The
+Tests run beside each other, two for each processor, since most wait half of their time. The
 demonstrations (marker `alone`) are judged in real time, as a person would: no other whole daemon
 runs beside them, and what only computes does so at the lowest priority.
 """
@@ -88,7 +88,7 @@ def of_checkout(run: Path, tox: Sequence[str]) -> tuple[list[Job], ...]:
 def of_hosts(run: Path, options: Sequence[str]) -> Job:
     """All that is neither alone nor of what only computes."""
     ignored = (f"--ignore={place}" for place in COMPUTE)
-    chosen = (*INSTALLED, *at_once(PROCESSORS + 1), "-m", "not alone", *ignored, *options)
+    chosen = (*INSTALLED, *at_once(2 * PROCESSORS), "-m", "not alone", *ignored, *options)
     return pytest_job("hosts", run, chosen)
 
 

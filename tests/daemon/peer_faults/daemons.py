@@ -9,6 +9,7 @@ from pathlib import Path
 
 from demo.namespaces import Cable, Network
 from tests.daemon.neighbours import until_peer
+from tests.kit.on_machine import on
 from tests.kit.payloads import Part
 from tests.kit.running_host import DAEMON, READY_S, RunningHost
 from tests.kit.until import until
@@ -28,7 +29,9 @@ class WiredHost(RunningHost):
     def __init__(self, work: Path, cable: Cable) -> None:
         machine = cable.machine
         work.mkdir()
-        super().__init__(work, name=machine.name, more=SECTION, program=machine.command(*DAEMON))
+        _, _, module, *arguments = DAEMON
+        program = on(machine, module, *arguments)
+        super().__init__(work, name=machine.name, more=SECTION, program=program)
         self.cable = cable
         (self.state / "peers").mkdir(parents=True, mode=0o700)
         self.keys = load_or_create(self.state / "peers" / KEY_NAME)

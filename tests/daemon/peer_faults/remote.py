@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from demo.namespaces import Cable, Machine
+from tests.kit.fork_server import Forked
+from tests.kit.on_machine import started
 from tests.kit.until import PATIENCE_S, until
 
 from nondum.transport.peers import HostKeys
@@ -33,7 +35,7 @@ class Member:
         self.killed: set[int] = set()
         """Epochs of those that it has lost without a word."""
         self._ids = itertools.count(1)
-        self._process: subprocess.Popen[str] | None = None
+        self._process: Forked | None = None
         self._told: queue.SimpleQueue[Told] = queue.SimpleQueue()
         self._answers: dict[int, queue.SimpleQueue[Told]] = {}
         self._reader: threading.Thread | None = None
@@ -62,7 +64,7 @@ class Member:
         """Start its process, `changes` being of its configuration."""
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
         config = json.dumps({**self.config, **changes})
-        self._process = self.machine.python("tests.daemon.peer_faults.member", config, **pipes)
+        self._process = started(self.machine, "tests.daemon.peer_faults.member", config, **pipes)
         self.forget()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()

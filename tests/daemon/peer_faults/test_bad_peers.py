@@ -10,6 +10,7 @@ import pytest
 from tests.daemon.peer_faults.crew import Crew, Trusting, crew
 from tests.daemon.peer_faults.figures import measured
 from tests.daemon.peer_faults.remote import PORT, Member
+from tests.kit.on_machine import started
 from tests.kit.until import until
 
 from nondum.transport.peers import HostKeys
@@ -116,7 +117,7 @@ def bad_peer(hosts: Crew, kind: str, victim: Member) -> Iterator[None]:
     machine, keys = hosts.network.machine(f"bad-{kind}"), KEYS[kind]
     hosts.network.plug(machine, hosts.switch)
     words = kind, victim.cable.address, str(PORT), victim.keys.public, keys.public, keys.secret
-    process = machine.python("tests.daemon.peer_faults.bad_peers", *words, stdout=subprocess.PIPE)
+    process = started(machine, "tests.daemon.peer_faults.bad_peers", *words, stdout=subprocess.PIPE)
     assert process.stdout is not None
     assert process.stdout.readline() == b"in\n"
     yield

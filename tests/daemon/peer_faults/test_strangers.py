@@ -12,6 +12,7 @@ import pytest
 from tests.daemon.peer_faults.crew import Crew, crew
 from tests.daemon.peer_faults.figures import measured
 from tests.daemon.peer_faults.remote import PORT, Member
+from tests.kit.on_machine import started
 from tests.kit.until import until
 
 pytestmark = pytest.mark.daemon
@@ -92,7 +93,7 @@ def attack(hosts: Crew, kind: str, victim: Member) -> Iterator[None]:
     hosts.network.plug(machine, hosts.switch)
     before = victim.descriptors()
     words = kind, victim.cable.address, str(PORT), victim.keys.public
-    stranger = machine.python("tests.daemon.peer_faults.attacks", *words, stdout=subprocess.PIPE)
+    stranger = started(machine, "tests.daemon.peer_faults.attacks", *words, stdout=subprocess.PIPE)
     assert stranger.stdout is not None
     assert stranger.stdout.readline() == b"begun\n"
     yield

@@ -224,7 +224,12 @@ def process_ended(pid: int) -> Iterator[asyncio.Event]:
     """Set when a process ends (pidfd_open(2))."""
     ended, descriptor = asyncio.Event(), os.pidfd_open(pid)
     loop = asyncio.get_running_loop()
-    loop.add_reader(descriptor, ended.set)
+
+    def see_end() -> None:
+        loop.remove_reader(descriptor)  # it stays readable
+        ended.set()
+
+    loop.add_reader(descriptor, see_end)
     try:
         yield ended
     finally:

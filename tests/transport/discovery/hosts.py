@@ -20,6 +20,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from demo.namespaces import Machine
+from tests.kit.on_machine import started
 
 from nondum.transport.discovery import Announcement, Discovery, Hint
 from nondum.transport.peers.keys import HostKeys, PeerKey
@@ -94,7 +95,8 @@ class Host:
     def __init__(self, machine: Machine, **config: Any) -> None:
         """`config`: static, multicast, port, key, epoch."""
         self.name = machine.name
-        self._process = machine.python(
+        self._process = started(
+            machine,
             "tests.transport.discovery.hosts",
             json.dumps({"name": machine.name, **config}),
             stdin=subprocess.PIPE,
