@@ -55,3 +55,20 @@ async def test_input_is_real(clock: VirtualClock) -> None:
     clock.remove_reader(reading)
     os.close(reading)
     os.close(writing)
+
+
+async def test_rest_of_a_period_passes(clock: VirtualClock) -> None:
+    """A period is over when its rest has been slept, however small a float the rest is."""
+    begun_s, period_s, rounds = clock.time(), 0.1, 0
+
+    async def wait() -> None:
+        nonlocal rounds
+        while (rest_s := begun_s + period_s - clock.time()) > 0:
+            rounds += 1
+            await asyncio.sleep(rest_s)
+
+    waiting = asyncio.create_task(wait())
+    await clock.advance(0.03)
+    await clock.advance(period_s)
+    assert waiting.done()
+    assert rounds <= 2

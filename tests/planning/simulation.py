@@ -32,6 +32,8 @@ class Troubles:
     """Somebody else makes something true or false, per moment."""
     losses: float = 0.0
     """A unit is unplugged for a while, per moment."""
+    refuses: float = 0.0
+    """An action has failed by the time that it is handed over."""
 
 
 @dataclass
@@ -88,6 +90,8 @@ class Robot:
         assert action.name not in alive, "started twice"
         assert self.words(action.precondition) <= self.world.facts, f"{action.name} cannot start"
         self.started.append(action.name)
+        if self.troubles.refuses and self.random.random() < self.troubles.refuses:
+            return SimulatedAction(action, takes=0, state=RunState.FAILED, reason="not now")
         running = SimulatedAction(action, takes=self.random.randint(1, 3))
         self.running.append(running)
         return running

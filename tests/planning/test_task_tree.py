@@ -39,6 +39,7 @@ TROUBLES = {
     "deaths": Troubles(dies=0.05),
     "outside changes": Troubles(changes=0.1),
     "component loss": Troubles(losses=0.05),
+    "refusals": Troubles(refuses=0.15),
     "everything": Troubles(0.1, 0.05, 0.02, 0.05, 0.02),
 }
 
@@ -212,6 +213,16 @@ def test_failing_action_is_given_up_after_tries() -> None:
     assert tree.control.exhausted == ("pick ball0 a",)
     assert tree.needs_replan == "pick ball0 a failed 3 times: it went wrong"
     assert robot.started == ["pick ball0 a"] * 3
+
+
+def test_action_that_fails_as_it_is_started_is_tried_again_and_tells_why() -> None:
+    robot = Robot(gripper_task(1), frozenset(), troubles=Troubles(refuses=1.0))
+    tree = task_tree(robot, plan_of(robot.task, "pick ball0 a", "move a b", "drop ball0 b"))
+    tree.tick_once()
+    assert (tree.control.phase, tree.needs_replan) == (Phase.UNDER_WAY, None)
+    let_pass(robot, tree, 5)
+    assert robot.started == ["pick ball0 a"] * 3
+    assert tree.needs_replan == "pick ball0 a failed 3 times: not now"
 
 
 def test_effects_may_take_their_time_to_be_seen() -> None:

@@ -300,7 +300,10 @@ class TaskControl:
     def _may_change(self, now_s: float) -> bool:
         """Whether something that this task started, halted or waits for can bring it further."""
         return any(self.attempts.is_settling(n, now_s) for n in self.attempts.names()) or any(
-            run.is_pending or run.is_halting or run.ineffective_s is not None
+            run.is_pending
+            or run.is_halting
+            or run.ineffective_s is not None
+            or run.action.state.has_ended  # as soon as it was started: judged next time
             for run in self.runs.values()
         )
 

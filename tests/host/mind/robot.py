@@ -34,6 +34,7 @@ from nondum.host.mind.system_tree import SystemTree, default_tree
 from nondum.planning.attempts import Patience
 from nondum.planning.running import RunState
 from nondum.sdk.description import PluginDescription
+from nondum.sdk.errors import HostUnreachable, Problem
 
 HOST = "rover"
 
@@ -82,6 +83,8 @@ class Robot:
     """Behaviours, of all components or of one, that never get anywhere."""
     broken: set[str] = field(default_factory=set)
     """Components whose behaviours fail."""
+    unreachable: set[str] = field(default_factory=set)
+    """Components whose host has just gone."""
     early_news: dict[str, list[Event]] = field(default_factory=dict)
     """What components say before they are in the catalogue."""
     patience: Patience | None = None
@@ -110,6 +113,8 @@ class Robot:
         arguments: Mapping[str, str],
         values: Sequence[FactValue],
     ) -> RobotCall:
+        if component in self.unreachable:
+            raise HostUnreachable(Problem("PEER_DOWN", "there is no link to the peer"))
         call = RobotCall(self, next(self._ids), component, behaviour, arguments, tuple(values))
         self.calls.append(call)
         declared = self.components[component].description.behaviours

@@ -184,6 +184,30 @@ async def test_alternative_is_used_after_failures(robot: Robot) -> None:
     assert "thermal-camera.stream" in robot.running
 
 
+async def test_host_that_is_gone_is_told_and_not_a_failure_of_its_behaviours(robot: Robot) -> None:
+    await follow(robot)
+    robot.unreachable = {"recorded-camera"}
+    robot.call("stream").end(RunState.FAILED, "PEER_LOST")
+    for _ in range(10):
+        robot.mind.tick()
+    assert not [event for event in robot.events if isinstance(event, PlanMissing)]
+    robot.unplug("recorded-camera")
+    await robot.until_goal("suspended")
+    [missing] = [event for event in robot.events if isinstance(event, PlanMissing)]
+    assert "recorded-camera used to supply it" in str(missing.problems)
+
+
+async def test_behaviour_of_a_host_that_is_back_is_started_again(robot: Robot) -> None:
+    await follow(robot)
+    robot.unreachable = {"recorded-camera"}
+    robot.call("stream").end(RunState.FAILED, "PEER_LOST")
+    robot.mind.tick()
+    robot.unreachable = set()
+    robot.see()
+    await robot.until(lambda: robot.started.count("recorded-camera.stream") == 2)
+    await robot.until_holding()
+
+
 async def test_behaviour_that_never_establishes_makes_way_for_another() -> None:
     patience = Patience(establish_s=0.1)
     async with at_work(Robot(Planners.installed(memory_mb=512), patience=patience)) as robot:

@@ -91,8 +91,12 @@ class RunningBehaviour:
 
     def halt(self) -> None:
         """Ask it to end."""
-        if self.call is not None and not self.state.has_ended:
+        if self.state.has_ended:
+            return
+        if self.call is not None:
             self.call.halt()
+        else:
+            self.state = RunState.HALTED
 
 
 class BehaviourRunner:
@@ -104,6 +108,8 @@ class BehaviourRunner:
         self._now_s = now_s
         self._composition: Composition | None = None
         self._running: dict[tuple[str, int], RunningBehaviour] = {}
+        self._unreached: list[RunningBehaviour] = []
+        """Those of a host that is gone, though the composition does not know it yet."""
 
     def __iter__(self) -> Iterator[RunningBehaviour]:
         """All that runs, in the order it was started."""
@@ -112,6 +118,10 @@ class BehaviourRunner:
     def adopt(self, composition: Composition) -> None:
         """From now on steps are read with this composition's words."""
         self._composition = composition
+        for run in self._unreached:
+            if not run.state.has_ended:
+                run.state = RunState.FAILED
+        self._unreached.clear()
 
     def start(self, step: Step) -> RunningBehaviour:
         """Ask the component that owns the actor for the behaviour of the step's action."""
@@ -130,7 +140,11 @@ class BehaviourRunner:
             values = [self._valued(text) for text in valued]
             run.call = self._calls.behave(component, action.behaviour, arguments, values)
         except NondumError as error:
-            run.state, run.reason = RunState.FAILED, str(error)
+            run.reason = str(error)
+            if error.code == "PEER_DOWN":  # no failure of the action: the host is to be pruned
+                self._unreached.append(run)
+            else:
+                run.state = RunState.FAILED
             return run
         self._running[component, run.call.id] = run
         if run.call.state.has_ended:
