@@ -31,6 +31,7 @@ class VirtualClock(asyncio.SelectorEventLoop):
     _is_settling = False
     _scheduled: list[asyncio.TimerHandle]
     """asyncio's own heap of timers, soonest first."""
+    _clock_resolution: float
     _ready: Any
     """asyncio's own queue of what runs next."""
 
