@@ -190,6 +190,7 @@ async def test_host_that_is_gone_is_told_and_not_a_failure_of_its_behaviours(rob
     robot.call("stream").end(RunState.FAILED, "PEER_LOST")
     for _ in range(10):
         robot.mind.tick()
+        await robot.until(lambda: not robot.mind.pursuit.is_searching)
     assert not [event for event in robot.events if isinstance(event, PlanMissing)]
     robot.unplug("recorded-camera")
     await robot.until_goal("suspended")
