@@ -32,6 +32,7 @@ class VirtualClock(asyncio.SelectorEventLoop):
     _scheduled: list[asyncio.TimerHandle]
     """asyncio's own heap of timers, soonest first."""
     _clock_resolution: float
+    """asyncio's own: it fires timers early by up to as much, in seconds."""
     _ready: Any
     """asyncio's own queue of what runs next."""
 

@@ -60,7 +60,10 @@ class Calls(Protocol):
         values: Sequence[FactValue],
     ) -> Call:
         """Ask a component for a behaviour, its streams wired as the arguments say. Returns at once.
-        Raises `NondumError` where that cannot even be asked."""
+
+        Raises `NondumError` where that cannot even be asked: PEER_DOWN if the component's host is
+        gone, which a new composition without it will tell.
+        """
         ...
 
     def tell_values(self, component: str, values: Sequence[FactValue]) -> None:
@@ -116,7 +119,8 @@ class BehaviourRunner:
         return iter(tuple(self._running.values()))
 
     def adopt(self, composition: Composition) -> None:
-        """From now on steps are read with this composition's words."""
+        """From now on steps are read with this composition's words, and what could not reach its
+        host is to be started again, if its host is there."""
         self._composition = composition
         for run in self._unreached:
             if not run.state.has_ended:
@@ -141,7 +145,7 @@ class BehaviourRunner:
             run.call = self._calls.behave(component, action.behaviour, arguments, values)
         except NondumError as error:
             run.reason = str(error)
-            if error.code == "PEER_DOWN":  # no failure of the action: the host is to be pruned
+            if error.code == "PEER_DOWN":  # to be pruned; no failure that the plan may be stuck by
                 self._unreached.append(run)
             else:
                 run.state = RunState.FAILED
