@@ -15,7 +15,8 @@ from pathlib import Path
 
 import pytest
 from tests.confinement.processes import children
-from tests.kit.workers import HOST, LIBRARIES, SDK, WorkersUnderTest, until_gone
+from tests.kit.processes import until_gone
+from tests.kit.workers import HOST, LIBRARIES, SDK, WorkersUnderTest
 
 from nondum.host.confinement import bubblewrap
 from nondum.host.events import WorkerLogged

@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 from tests.confinement.baits import SMALL, attempted, laid
 from tests.confinement.processes import children
+from tests.kit.processes import is_alive, until_gone
 from tests.kit.until import until
-from tests.kit.workers import is_alive, until_gone
 
 from nondum.host.confinement import bubblewrap, refusals
 from nondum.host.workers.confinements import Boxed, Confinement, Held

@@ -164,30 +164,6 @@ class WorkersUnderTest:
         self._arrived.set()
 
 
-def is_alive(pid: int) -> bool:
-    """Whether a process exists and is no zombie."""
-    try:
-        status = Path(f"/proc/{pid}/stat").read_text(encoding="ascii")
-    except OSError:
-        return False
-    return status.rpartition(")")[2].split()[0] not in {"Z", "X"}
-
-
-async def until_gone(pid: int, timeout_s: float = PATIENCE_S) -> None:
-    """Wait for a process to end, whosever child it is."""
-    try:
-        descriptor = os.pidfd_open(pid)
-    except ProcessLookupError:
-        return
-    ended = asyncio.Event()
-    asyncio.get_running_loop().add_reader(descriptor, ended.set)
-    try:
-        await arrived(f"end of process {pid}", ended.wait(), patience_s=timeout_s)
-    finally:
-        asyncio.get_running_loop().remove_reader(descriptor)
-        os.close(descriptor)
-
-
 def camera(name: str = "camera", *, always: bool = False) -> Unit:
     """A unit with one image output, `frames`."""
     return Unit(name, "camera", outputs=(Output("frames", "image", always=always),))
@@ -203,8 +179,6 @@ __all__ = [
     "TIMING",
     "WorkersUnderTest",
     "camera",
-    "is_alive",
     "pose_reader",
     "replace",
-    "until_gone",
 ]

@@ -25,7 +25,7 @@ from tests.host.bridge.hosts import (
     pair,
     sent,
 )
-from tests.kit.workers import until_gone
+from tests.kit.processes import until_gone
 
 from nondum.host.bridge.bridge import Bridge
 from nondum.sdk.errors import WorkerFailed

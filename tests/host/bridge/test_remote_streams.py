@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 from tests.host.bridge.hosts import HERE, PATIENCE_S
 from tests.host.workers.streaming import CAMERA, STREAM, WATCH, WATCHER, sees
-from tests.kit.workers import WorkersUnderTest, is_alive, until_gone
+from tests.kit.processes import is_alive, until_gone
+from tests.kit.workers import WorkersUnderTest
 
 from nondum.host.bridge.bridge import Bridge
 from nondum.host.bridge.remote_streams import RemoteStreams

@@ -11,6 +11,7 @@ import wave
 from pathlib import Path
 
 import pytest
+from tests.kit.processes import until_gone
 
 from nondum.host.feedback import program
 from nondum.host.feedback.hook import Hook
@@ -36,19 +37,6 @@ def script(tmp_path: Path, text: str) -> str:
     return str(path)
 
 
-async def until_ended(pid: int) -> None:
-    """Wait for a process to end, whosever child it is."""
-    try:
-        descriptor = os.pidfd_open(pid)
-    except ProcessLookupError:
-        return
-    ended, loop = asyncio.Event(), asyncio.get_running_loop()
-    loop.add_reader(descriptor, ended.set)
-    await ended.wait()
-    loop.remove_reader(descriptor)
-    os.close(descriptor)
-
-
 async def test_a_hook_is_told_everything_in_three_ways(tmp_path: Path) -> None:
     out = tmp_path / "out"
     hook = Hook(
@@ -70,14 +58,14 @@ async def test_a_hook_that_does_not_end_is_killed_with_its_children(tmp_path: Pa
         await hook.show(REFUSED)
     assert overdue.value.code == "PROGRAM_OVERDUE"
     for pid in map(int, pids.read_text().split()):
-        await until_ended(pid)
+        await until_gone(pid)
 
 
 async def test_what_a_hook_leaves_behind_ends_with_it(tmp_path: Path) -> None:
     pids = tmp_path / "pids"
     hook = Hook([script(tmp_path, f"sleep 999 & echo $! > {pids}")], FOR_EVER_S)
     await hook.show(REFUSED)
-    await until_ended(int(pids.read_text()))
+    await until_gone(int(pids.read_text()))
 
 
 async def test_a_hook_is_killed_with_the_daemon(tmp_path: Path) -> None:
@@ -88,7 +76,7 @@ async def test_a_hook_is_killed_with_the_daemon(tmp_path: Path) -> None:
     pid = int(await asyncio.to_thread(fifo.read_text))
     showing.cancel()
     await asyncio.gather(showing, return_exceptions=True)
-    await until_ended(pid)
+    await until_gone(pid)
 
 
 @pytest.mark.parametrize(

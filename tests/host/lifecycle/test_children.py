@@ -7,12 +7,13 @@ import contextlib
 import os
 import signal
 import sys
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.kit.clock import VirtualClock
+from tests.kit.processes import process_ended
 from tests.kit.until import until_async
 
 from nondum.host.lifecycle.children import (
@@ -22,7 +23,6 @@ from nondum.host.lifecycle.children import (
     STALL_S,
     START_S,
     Children,
-    watched_without_threads,
 )
 from nondum.sdk.errors import DriveGone, InstallFailed
 
@@ -161,19 +161,16 @@ async def test_work_aside_is_idle_and_ends_with_its_child(tmp_path: Path) -> Non
 @pytest.mark.skipif(os.geteuid() != 0, reason="the way back from idle needs root or RLIMIT_NICE")
 async def test_work_aside_is_not_idle_when_it_is_to_end(tmp_path: Path) -> None:
     """It would wait for a processor that others have, and be taken for one that hangs in a disk."""
-    with watched_without_threads():
-        async with children() as pool:
-            job = asyncio.create_task(pool.run_aside("verify", staged_fifo(tmp_path)))
-            await until_async("a child", pool.pids)
-            (pid,) = pool.pids()
-            job.cancel()
-            seen = []
-            with contextlib.suppress(ProcessLookupError):
-                while True:
-                    seen.append(os.sched_getscheduler(pid))
-                    await asyncio.sleep(0)
-            assert seen[-1] == os.SCHED_OTHER
-            await asyncio.wait([job])
+    async with children() as pool:
+        job = asyncio.create_task(pool.run_aside("verify", staged_fifo(tmp_path)))
+        await until_async("a child", pool.pids)
+        (pid,) = pool.pids()
+        assert pool.server is not None
+        os.kill(pool.server, signal.SIGSTOP)  # what has ended stays to be looked at
+        job.cancel()
+        await until_async("an ordinary child", lambda: os.sched_getscheduler(pid) == os.SCHED_OTHER)
+        os.kill(pool.server, signal.SIGCONT)
+        await asyncio.wait([job])
 
 
 async def test_slow_start_is_not_the_drive_s(
@@ -217,24 +214,6 @@ async def test_no_child_is_kept_when_work_has_ended(tmp_path: Path, clock: Virtu
             await ended.wait()
         assert not pool.kept()
         assert not pool.pids()
-
-
-@contextlib.contextmanager
-def process_ended(pid: int) -> Iterator[asyncio.Event]:
-    """Set when a process ends (pidfd_open(2))."""
-    ended, descriptor = asyncio.Event(), os.pidfd_open(pid)
-    loop = asyncio.get_running_loop()
-
-    def see_end() -> None:
-        loop.remove_reader(descriptor)  # it stays readable
-        ended.set()
-
-    loop.add_reader(descriptor, see_end)
-    try:
-        yield ended
-    finally:
-        loop.remove_reader(descriptor)
-        os.close(descriptor)
 
 
 async def test_no_child_outlives_the_pool(tmp_path: Path) -> None:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 from tests.kit.clock import VirtualClock
-from tests.kit.workers import WorkersUnderTest, is_alive
+from tests.kit.processes import is_alive
+from tests.kit.workers import WorkersUnderTest
 
 
 @pytest.fixture

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 from tests.kit.clock import VirtualClock
-from tests.kit.workers import WorkersUnderTest, is_alive
+from tests.kit.processes import is_alive
+from tests.kit.workers import WorkersUnderTest
 
 from nondum.host.events import WorkerLogged, WorkerReady
 from nondum.host.workers import WorkerSpec

@@ -10,7 +10,8 @@ import anyio
 import pytest
 from tests.host.workers.excesses import DO, FORK, PLUGIN, WATCHED, strained_by_spinning
 from tests.kit.clock import VirtualClock
-from tests.kit.workers import HOST, WorkersUnderTest, is_alive
+from tests.kit.processes import is_alive
+from tests.kit.workers import HOST, WorkersUnderTest
 
 from nondum.host.cgroups import Cages
 from nondum.host.events import WorkerExited, WorkerLogged

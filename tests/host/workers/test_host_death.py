@@ -9,8 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.kit.processes import is_alive, until_gone
 from tests.kit.until import arrived, until_async
-from tests.kit.workers import WorkersUnderTest, is_alive, until_gone
+from tests.kit.workers import WorkersUnderTest
 
 from nondum.host.workers import end_leftovers
 from nondum.host.workers.launcher import owner_mark

@@ -9,8 +9,9 @@ from dataclasses import replace
 
 import pytest
 from tests.kit.clock import VirtualClock
+from tests.kit.processes import is_alive, until_gone
 from tests.kit.until import arrived
-from tests.kit.workers import HOST, WorkersUnderTest, is_alive, until_gone
+from tests.kit.workers import HOST, WorkersUnderTest
 
 from nondum.host.events import (
     BehaviourEstablished,
@@ -121,11 +122,12 @@ async def test_stopped_process_is_a_hang(tested: WorkersUnderTest, clock: Virtua
     assert not is_alive(pid)
 
 
-async def test_closed_link_ends_the_worker(tested: WorkersUnderTest) -> None:
+async def test_closed_link_ends_the_worker(tested: WorkersUnderTest, clock: VirtualClock) -> None:
+    """After a while in which it may end by itself."""
     body = "link().shutdown(socket.SHUT_RDWR)\nawait asyncio.to_thread(time.sleep, 3600)"
     await guest(tested, body)
     tested.behave("guest", "do", u=UNIT)
-    await tested.until(WorkerExited)
+    await clock.advance_until(tested.until(WorkerExited))
 
 
 async def test_worker_that_crashed_is_restarted_after_a_growing_delay(

@@ -6,7 +6,8 @@ import asyncio
 from dataclasses import replace
 
 import pytest
-from tests.kit.workers import HOST, WorkersUnderTest, is_alive
+from tests.kit.processes import is_alive
+from tests.kit.workers import HOST, WorkersUnderTest
 
 from nondum.host.events import FactKnown, TrialFailed, WorkerExited, WorkerReady
 from nondum.host.workers import WorkerSpec

@@ -14,7 +14,8 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from tests.kit.workers import SDK, WorkersUnderTest, is_alive, until_gone
+from tests.kit.processes import is_alive, until_gone
+from tests.kit.workers import SDK, WorkersUnderTest
 
 from nondum.host.inside.bootstrap import PRELOADED
 from nondum.host.workers import base_interpreter

@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from tests.kit.workers import HOST, WorkersUnderTest, is_alive
+from tests.kit.processes import is_alive
+from tests.kit.workers import HOST, WorkersUnderTest
 
 from nondum.host.events import (
     BehaviourEnded,

@@ -31,6 +31,8 @@ class Granted:
     def __init__(self, exporter: Exporter, reader: HostKeys, kind: str = "image") -> None:
         loop = asyncio.get_running_loop()
         self.claimed: asyncio.Future[None] = loop.create_future()
+        self.sends_at_once = 0
+        """As many frames leave before anything that the reader says after its claim is read."""
         self.over: asyncio.Future[Problem] = loop.create_future()
         self.outgoing: Outgoing = exporter.grant(
             secrets.token_hex(16), reader.public, kind, self._on_room, self.over.set_result
@@ -39,6 +41,8 @@ class Granted:
     def _on_room(self) -> None:
         if not self.claimed.done():
             self.claimed.set_result(None)
+            for _ in range(self.sends_at_once):
+                self.send()
 
     def send(self, bulk: bytes = b"pixels") -> None:
         self.outgoing.send(Coding.RAW, {"number": self.outgoing.frames_sent + 1}, bulk)
@@ -50,6 +54,8 @@ class Reading:
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], keys: HostKeys, place: Place):
         loop = asyncio.get_running_loop()
         self.frames: list[Frame] = []
+        self.untimed: list[Frame] = []
+        """Frames whose stamps nobody here can tell the meaning of."""
         self.opened: asyncio.Future[str] = loop.create_future()
         self.over: asyncio.Future[Problem] = loop.create_future()
         self.handles = True
@@ -73,6 +79,8 @@ class Reading:
 
     def _on_frame(self, frame: Frame) -> None:
         self.frames.append(frame)
+        if not self.incoming.clocks.are_known:
+            self.untimed.append(frame)
         self._news.set()
         if self.handles:
             self.incoming.handled(frame.seq)

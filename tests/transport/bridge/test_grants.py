@@ -217,3 +217,15 @@ async def test_signs_of_life_tell_the_owners_clock() -> None:
         assert isinstance(answer, Pong)
         assert answer.at_s == 42.0
         assert answer.clock_s <= asyncio.get_running_loop().time()
+
+
+async def test_frames_wait_until_the_owners_clock_is_known() -> None:
+    async with owner() as host:
+        granted = host.grant(READER)
+        granted.sends_at_once = 2
+        reading = host.read(READER, granted)
+        await reading.until(2)
+        granted.send()
+        await reading.until(3)
+        assert [frame.seq for frame in reading.frames] == [1, 2, 3]
+        assert reading.untimed == []

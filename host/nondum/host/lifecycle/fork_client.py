@@ -136,7 +136,7 @@ class ForkClient:
 
     async def _from_a_server(self, message: str) -> Forked:
         if self._channel is not None:
-            with contextlib.suppress(ConnectionError, EOFError):
+            with contextlib.suppress(EOFError):
                 return await self._fork(self._channel, message)
             log.warning("the fork server has ended, and is started anew")
             await self._end()
@@ -168,9 +168,11 @@ class ForkClient:
             with theirs, _closed(of_server):
                 fork_server.ask(channel, message.encode(), (theirs.fileno(), of_server))
             pid, descriptor = await _answer(channel)
-        except BaseException:
+        except BaseException as error:
             writer.close()
             os.close(status)
+            if isinstance(error, ConnectionError):  # it ended before it had read the request
+                raise EOFError("the fork server has ended") from error
             raise
         return Forked(pid, descriptor, status, reader, writer)
 
@@ -181,8 +183,9 @@ class ForkClient:
         server, self._server = self._server, None
         if server is None:
             return
-        with contextlib.suppress(ProcessLookupError):
-            server.kill()
+        if server.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(server.pid, signal.SIGKILL)  # its own `kill` may take its end from asyncio
         try:
             await asyncio.wait_for(server.wait(), END_S)
         except TimeoutError:

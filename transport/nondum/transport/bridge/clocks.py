@@ -36,6 +36,11 @@ class Clocks:
             self._bounds = newer
 
     @property
+    def are_known(self) -> bool:
+        """Whether any ping was answered."""
+        return self._bounds is not None
+
+    @property
     def ahead_s(self) -> float:
         """How far the owner's clock is ahead: 0 as long as nothing says that they differ.
 

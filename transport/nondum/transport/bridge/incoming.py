@@ -54,7 +54,8 @@ class Incoming:
         on_frame: Callable[[Frame], None],
         on_over: Callable[[Problem], None],
     ) -> None:
-        """`on_opened` is told the stream's type. Answer each `on_frame` by `handled`, in order.
+        """`on_opened` is told the stream's type. Answer each `on_frame` by `handled`, in order: the
+        first comes once `clocks` can tell what its stamp means.
 
         `on_over` is called once, at the end or instead of the beginning; not after `close`.
         """
@@ -67,6 +68,8 @@ class Incoming:
         self._pongs = TokenBucket(packets.PINGS_HZ, packets.PINGS_HZ, self._began_s)
         self._window = Window()
         """As the owner must keep it: what breaks it would fill the memory here."""
+        self._early: list[Frame] = []
+        """Came before the owner's clock was known."""
         self._is_opened = False
         self._is_closed = False
         self._descriptor: int | None = None
@@ -136,14 +139,24 @@ class Incoming:
                 self._on_opened(kind)
             case Frame(seq) if self._is_opened and self._window.has_room:
                 self._window.sent(seq, length, now_s)
-                self._on_frame(message)
+                if self.clocks.are_known:
+                    self._on_frame(message)
+                else:
+                    self._early.append(message)
             case Pong(at_s, clock_s) if self._pongs.take(1, now_s):
                 if at_s:
                     self.clocks.heard(at_s, clock_s, now_s)
+                    self._hand_on_early()
             case Over(problem):
                 self._lose(problem)
             case _:
                 self._lose(Problem("BRIDGE_PACKET", "a message out of its turn"))
+
+    def _hand_on_early(self) -> None:
+        early, self._early = self._early, []
+        for frame in early:
+            if not self._is_closed:
+                self._on_frame(frame)
 
     def _say(self, message: packets.Asked) -> None:
         if self._winner is not None and not self._is_closed:

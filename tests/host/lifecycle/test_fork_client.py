@@ -1,0 +1,181 @@
+"""The daemon outlives its fork server, whatever happens to it, and is told what did."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import logging
+import os
+import signal
+import sys
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+
+import pytest
+from tests.kit.clock import VirtualClock
+from tests.kit.processes import process_ended
+from tests.kit.until import until_async
+
+from nondum.host.lifecycle.children import START_S, Children
+from nondum.host.lifecycle.fork_client import ForkClient
+from nondum.sdk.errors import InstallFailed
+
+pytestmark = pytest.mark.anyio
+
+JOB = "listing"
+WithPython = Callable[[str], None]
+
+
+@contextlib.asynccontextmanager
+async def fork_client(module: str = "nondum.host.lifecycle.child") -> AsyncIterator[ForkClient]:
+    client = ForkClient(module)
+    try:
+        yield client
+    finally:
+        await client.close()
+
+
+@contextlib.asynccontextmanager
+async def children() -> AsyncIterator[Children]:
+    pool = Children()
+    try:
+        yield pool
+    finally:
+        await pool.close()
+
+
+@pytest.fixture
+def with_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> WithPython:
+    """Have the server be started by this shell script instead of Python."""
+
+    def replace(script: str) -> None:
+        program = tmp_path / "python"
+        program.write_text(f"#!/bin/sh\n{script}\n")
+        program.chmod(0o755)
+        monkeypatch.setattr(sys, "executable", str(program))
+
+    return replace
+
+
+def server_of(client: ForkClient) -> int:
+    assert client.pid is not None
+    return client.pid
+
+
+async def test_killed_server_takes_its_processes_along() -> None:
+    async with fork_client() as client:
+        forked = await client.fork(JOB, START_S)
+        with process_ended(forked.pid) as ended:
+            os.kill(server_of(client), signal.SIGKILL)
+            await ended.wait()
+        assert await forked.wait() == -signal.SIGKILL
+        assert await forked.hear() == b""
+        forked.close()
+
+
+async def test_killed_server_is_started_anew_with_a_warning(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async with fork_client() as client:
+        first = await client.fork(JOB, START_S)
+        former = server_of(client)
+        os.kill(former, signal.SIGKILL)
+        await first.wait()
+        with caplog.at_level(logging.WARNING):
+            second = await client.fork(JOB, START_S)
+        assert server_of(client) != former
+        assert [record.name for record in caplog.records] == ["nondum.host.lifecycle.fork_client"]
+        os.kill(second.pid, 0)
+        first.close()
+        second.close()
+
+
+async def test_return_code_is_that_of_the_process() -> None:
+    async with fork_client() as client:
+        killed, ends = await client.fork(JOB, START_S), await client.fork(JOB, START_S)
+        await ends.say(b"\n")
+        killed.kill()
+        assert await killed.wait() == killed.returncode == -signal.SIGKILL
+        running = await client.fork(JOB, START_S)
+        assert running.returncode is None
+        for forked in (killed, ends, running):
+            forked.close()
+
+
+async def test_process_that_nobody_waits_for_any_more_is_killed() -> None:
+    async with fork_client() as client:
+        (await client.fork(JOB, START_S)).close()
+        forking = asyncio.create_task(client.fork(JOB, START_S))
+        await asyncio.sleep(0)  # its request is under way from now on
+        forking.cancel()
+        await asyncio.wait([forking])
+        assert forking.cancelled()
+        wanted = await client.fork(JOB, START_S)
+        await until_async("one process", lambda: forked_by(server_of(client)) == [wanted.pid])
+        wanted.close()
+
+
+async def test_server_and_its_processes_end_with_the_client() -> None:
+    async with fork_client() as client:
+        forked = await client.fork(JOB, START_S)
+        server = server_of(client)
+        with process_ended(forked.pid) as forked_ended, process_ended(server) as server_ended:
+            await client.close()
+            await asyncio.gather(forked_ended.wait(), server_ended.wait())
+        assert client.pid is None
+        forked.close()
+
+
+async def test_server_that_cannot_fork_says_why_and_goes_on() -> None:
+    async with fork_client("tests.host.lifecycle.server_that_cannot_fork") as client:
+        with pytest.raises(OSError) as first:
+            await client.fork(JOB, START_S)
+        assert first.value.errno == errno.EAGAIN
+        server = server_of(client)
+        with pytest.raises(OSError) as second:
+            await client.fork(JOB, START_S)
+        assert second.value.errno == errno.EAGAIN
+        assert server_of(client) == server
+
+
+async def test_server_that_ends_as_it_starts_is_told(with_python: WithPython) -> None:
+    with_python("exit 1")
+    async with children() as pool:
+        with pytest.raises(InstallFailed) as failed:
+            await pool.run(JOB, {})
+        assert failed.value.code == "CHILD_DIED"
+        assert pool.server is None
+
+
+async def test_server_that_is_not_there_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "nowhere"))
+    async with children() as pool:
+        with pytest.raises(InstallFailed) as failed:
+            await pool.run(JOB, {})
+        assert failed.value.code == "IO_ERROR"
+        assert pool.server is None
+
+
+async def test_server_that_says_nothing_is_given_up(
+    with_python: WithPython, clock: VirtualClock
+) -> None:
+    with_python("exec sleep infinity")
+    async with children() as pool:
+        job = asyncio.create_task(pool.run(JOB, {}))
+        await until_async("its server", lambda: pool.server)
+        silent = pool.server
+        assert silent is not None
+        with process_ended(silent) as ended:
+            await clock.advance(START_S)
+            with pytest.raises(InstallFailed) as failed:
+                await job
+            await ended.wait()
+        assert failed.value.code == "CHILD_STALLED"
+        assert pool.server is None
+
+
+def forked_by(pid: int) -> list[int]:
+    return [int(each) for each in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
