@@ -175,6 +175,7 @@ ASIDE: Mapping[str, str] = {
     f"{_H}/lifecycle/children.py": _RUNS,
     f"{_H}/lifecycle/compiling.py": _RUNS,
     f"{_H}/lifecycle/executor.py": _RUNS,
+    f"{_H}/lifecycle/fork_client.py": _RUNS,
     f"{_H}/lifecycle/fork_server.py": _RUNS,
     f"{_H}/lifecycle/installation.py": _RUNS,
     f"{_H}/lifecycle/going_back.py": "has a person's wish fulfilled by what was admitted",
