@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from tests.kit.clock import VirtualClock
+from tests.kit.processes import is_alive
 from tests.kit.until import until_async
 from tests.kit.workers import TIMING, WorkersUnderTest
 
-from nondum.host.events import WorkerStrained
+from nondum.host.events import WorkerExited, WorkerStrained
 from nondum.host.workers.gauge import Gauge
 from nondum.sdk.description import Behaviour
 
@@ -44,3 +45,20 @@ async def strained_by_spinning(tested: WorkersUnderTest, clock: VirtualClock) ->
         await until_async("a spinning thread", is_enough)
         await clock.advance(WATCHED.look_s)
     return tested.told(WorkerStrained)[0]
+
+
+async def exited_by_forking(tested: WorkersUnderTest, clock: VirtualClock) -> WorkerExited:
+    """Let time pass as fast as the worker `guest` computes, which runs `FORK`, until it has ended:
+    it is refused processes between any two looks at it, however slowly it comes to run."""
+    pid = tested.workers.pids()["guest"]
+    gauge = Gauge(lambda: pid, None)
+    enough_s = 0.0
+
+    def is_enough() -> bool:
+        return not is_alive(pid) or gauge.usage().cpu_s >= enough_s
+
+    while is_alive(pid):
+        enough_s = gauge.usage().cpu_s + 0.02
+        await until_async("a worker that forks", is_enough)
+        await clock.advance(WATCHED.look_s)
+    return await clock.advance_until(tested.until(WorkerExited))

@@ -8,7 +8,14 @@ from pathlib import Path
 
 import anyio
 import pytest
-from tests.host.workers.excesses import DO, FORK, PLUGIN, WATCHED, strained_by_spinning
+from tests.host.workers.excesses import (
+    DO,
+    FORK,
+    PLUGIN,
+    WATCHED,
+    exited_by_forking,
+    strained_by_spinning,
+)
 from tests.kit.clock import VirtualClock
 from tests.kit.processes import is_alive
 from tests.kit.workers import HOST, WorkersUnderTest
@@ -102,7 +109,10 @@ async def test_too_much_ends_that_worker_alone(
 ) -> None:
     await begin(caged, "guest", body)
     call = caged.behave("guest", "do", u=f"{HOST}__guest__it")
-    exited = await clock.advance_until(caged.until(WorkerExited))
+    if body == FORK:
+        exited = await exited_by_forking(caged, clock)
+    else:
+        exited = await clock.advance_until(caged.until(WorkerExited))
     assert exited.component == "guest"
     assert exited.reason.startswith(code), exited.reason
     assert "→" in exited.reason, "it is told what to do"

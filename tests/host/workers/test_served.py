@@ -9,7 +9,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.host.workers.excesses import DO, FORK, PLUGIN, WATCHED, strained_by_spinning
+from tests.host.workers.excesses import (
+    DO,
+    FORK,
+    PLUGIN,
+    WATCHED,
+    exited_by_forking,
+    strained_by_spinning,
+)
 from tests.kit.clock import VirtualClock
 from tests.kit.workers import HOST, WorkersUnderTest
 
@@ -76,7 +83,7 @@ async def test_service_that_forks_without_end_is_ended(
     served: WorkersUnderTest, clock: VirtualClock
 ) -> None:
     await begin(served, FORK)
-    exited = await clock.advance_until(served.until(WorkerExited))
+    exited = await exited_by_forking(served, clock)
     assert exited.reason.startswith("WORKER_TASKS"), exited.reason
 
 
