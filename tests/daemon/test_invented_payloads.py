@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import random
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from random import Random
 
 import pytest
 from demo.robot import Robot, View, running
@@ -30,10 +30,9 @@ class Stranger:
 
 
 @pytest.fixture(scope="module")
-def strangers(tmp_path_factory: pytest.TempPathFactory) -> list[Stranger]:
+def strangers(tmp_path_factory: pytest.TempPathFactory, seed: int) -> list[Stranger]:
     """Two talkers and two listeners under names that nobody has read before."""
-    seed = random.randrange(2**32)
-    folder, words = tmp_path_factory.mktemp(f"invented-by-seed-{seed}-"), Words(seed)
+    folder, words = tmp_path_factory.mktemp("invented"), Words(seed)
     options = Options(targets=(Target.here(),), libraries=(SDK,))
     made = []
     for write in (talker, talker, listener, listener):
@@ -45,15 +44,15 @@ def strangers(tmp_path_factory: pytest.TempPathFactory) -> list[Stranger]:
 
 
 @pytest.fixture
-def robot(tmp_path: Path) -> Iterator[Robot]:
-    with running(tmp_path, name=Words(random.randrange(2**32)).word(), initial={}) as robot:
+def robot(tmp_path: Path, seed: int) -> Iterator[Robot]:
+    with running(tmp_path, name=Words(-seed).word(), initial={}) as robot:
         yield robot
 
 
-def plug(robot: Robot, *strangers: Stranger) -> None:
-    """Plug drives in, in any order, and wait until all are in use."""
+def plug(robot: Robot, seed: int, *strangers: Stranger) -> None:
+    """Plug drives in, in the order that the seed gives, and wait until all are in use."""
     wanted = {stranger.plugin.payload_id for stranger in strangers}
-    for stranger in random.sample(strangers, len(strangers)):
+    for stranger in Random(seed).sample(strangers, len(strangers)):
         robot.plug(stranger.drive)
 
     def all_active(view: View) -> bool:
@@ -89,9 +88,11 @@ def fact(robot: Robot, ear: Stranger, mouth: Stranger) -> str:
     return f"{ear.plugin['heard']} {unit} {mouth.plugin.object(robot.name, 'slot')}"
 
 
-def test_a_sentence_is_carried_out_by_strangers(robot: Robot, strangers: list[Stranger]) -> None:
+def test_a_sentence_is_carried_out_by_strangers(
+    robot: Robot, strangers: list[Stranger], seed: int
+) -> None:
     mouth, ear = strangers[0], strangers[2]
-    plug(robot, mouth, ear)
+    plug(robot, seed, mouth, ear)
     reach(robot, words=sentence(ear.plugin))
     assert heard(robot, ear, mouth) == mouth.plugin["says"]
     done = f"{ear.plugin['done']} {ear.plugin['thing']} {robot.name}"
@@ -99,10 +100,10 @@ def test_a_sentence_is_carried_out_by_strangers(robot: Robot, strangers: list[St
 
 
 def test_swapping_two_objects_in_the_plan_swaps_the_feed(
-    robot: Robot, strangers: list[Stranger]
+    robot: Robot, strangers: list[Stranger], seed: int
 ) -> None:
     mouths, ears = strangers[:2], strangers[2:]
-    plug(robot, *strangers)
+    plug(robot, seed, *strangers)
     for order in (mouths, mouths[::-1]):
         pairs = list(zip(ears, order, strict=True))
         facts = " ".join(f"({fact(robot, ear, mouth)})" for ear, mouth in pairs)

@@ -12,6 +12,7 @@ from demo.robot import NONDUM, View
 from tests.daemon.plugins import TALKER, scribe, talker
 from tests.kit.payloads import Part, make_payload
 from tests.kit.running_host import READY_S, RunningHost
+from tests.kit.until import until
 
 pytestmark = pytest.mark.daemon
 
@@ -54,8 +55,16 @@ def until_holds_with(host: RunningHost, version: str, goal: str) -> None:
         return versions(view).get("talker") == version
 
     host.until(f"talker {version}", found, timeout_s=READY_S)
+    until("it is written what that talker says", lambda: is_written_since_activation(host))
     host.until_goal(goal, "holds")
-    host.until_runs("talk")
+
+
+def is_written_since_activation(host: RunningHost) -> bool:
+    """Whether the scribe's behaviour was established after the last activation of a talker. What
+    used the talker before has ended by then; the view may still show that for a moment."""
+    rows = [(row["event"], row["subject"]) for row in host.journal()]
+    activated = max(n for n, row in enumerate(rows) if row == ("PayloadActivated", TALK))
+    return ("BehaviourEstablished", "scribe") in rows[activated:]
 
 
 def versions(view: View) -> dict[str, str]:

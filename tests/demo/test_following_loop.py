@@ -20,8 +20,17 @@ def score(robot: Robot, reference: Reference) -> float:
     return score_following(robot.headings, robot.frames, reference)
 
 
-@pytest.mark.parametrize("kind", ["colour", "thermal"])
-@pytest.mark.parametrize("latency_s", [0.1, 0.25, 0.4])
+long = pytest.mark.long("demonstrations")
+
+
+@pytest.mark.parametrize(
+    ("kind", "latency_s"),
+    [
+        *(("colour", 0.1), ("colour", 0.4), ("thermal", 0.25)),
+        *(pytest.param("colour", 0.25, marks=long), pytest.param("thermal", 0.1, marks=long)),
+        pytest.param("thermal", 0.4, marks=long),
+    ],
+)
 def test_follower_passes(kind: str, latency_s: float, reference: Reference) -> None:
     assert score(Robot(kind, latency_s), reference) >= WANTED_FRACTION
 
@@ -44,12 +53,13 @@ def test_follower_passes_when_it_begins_late(reference: Reference) -> None:
     [lambda turn: 0.0, lambda turn: -turn, lambda turn: 0.4],
     ids=["frozen", "inverted", "spinning"],
 )
+@pytest.mark.parametrize("walks", [1, pytest.param(2, marks=long)])
 def test_body_that_does_not_follow_fails_in_every_window(
-    obedience: Obedience, reference: Reference
+    obedience: Obedience, walks: int, reference: Reference
 ) -> None:
     """The demonstration takes the first window that passes, so none may."""
     robot = Robot(obedience=obedience)
-    robot.run(2 * SECONDS)
+    robot.run(walks * SECONDS)
     ends = range(1, len(robot.frames) + 1, 5)
     shares = [score_following(robot.headings, robot.frames[:end], reference) for end in ends]
     assert max(shares) < WANTED_FRACTION

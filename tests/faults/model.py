@@ -16,6 +16,7 @@ from functools import partial
 from pathlib import Path
 
 from tests.faults.daemon import HOST, OPTIONS, QUICK
+from tests.faults.ways import let_start
 from tests.kit.host import HostInProcess, host_in_process, left_over
 from tests.kit.until import until
 
@@ -168,6 +169,7 @@ async def bring_to_an_end(root: Path) -> Ended:
     pull everything, and see that nothing is left."""
     begun = time.monotonic()
     wrong: list[str] = []
+    let_start(root)
     async with host_in_process(root, options=OPTIONS, timing=QUICK) as host:
         restart_s = time.monotonic() - begun
         await until_settled(host)

@@ -18,13 +18,16 @@ from nondum.sdk.description import PluginDescription
 LAMP_ID = "org.example.lamp"
 NOTHING = PluginDescription(name="test-lamp", version="1.0")
 
+GO = "go"
+"""The file, beside the drives, that a slow plugin waits for."""
 SLOW = """
 @hookimpl
 def start(ctx):
-    import threading
-    threading.Event().wait()
+    import os, time
+    while not os.path.exists({go!r}):
+        time.sleep(0.05)
 """
-"""It never becomes ready."""
+"""It does not become ready before the file is there."""
 
 Write = Callable[[Path], None]
 
@@ -40,9 +43,14 @@ def newer(drive: Path) -> None:
 
 
 def slow(drive: Path) -> None:
-    """One that never ends to start: others come to STORED meanwhile."""
-    lamp = Part("lamp", LAMP + SLOW)
+    """One that starts once it may (`let_start`): others come to STORED meanwhile."""
+    lamp = Part("lamp", LAMP + SLOW.format(go=str(drive.parent.parent / GO)))
     make_payload(drive, lamp, payload_id=LAMP_ID)
+
+
+def let_start(root: Path) -> None:
+    """Have slow plugins become ready."""
+    (root / GO).touch()
 
 
 def unfit(drive: Path) -> None:

@@ -29,9 +29,7 @@ def run(tox: Sequence[str]) -> int:
     before = Usage.now()
 
     options = ("--current", ",".join(one.campaign for one in ages if one.is_current))
-    checks = stages.of_checkout(folder, tox) if tox else ([stages.of_examples(folder)],)
-    done = job.beside(*checks)
-    done.append(job.run(stages.of_hosts(folder, options), shown=True))
+    done = job.beside(*stages.beside_all(folder, options, tox))
     done += job.beside(*stages.of_demonstrations(folder, options))
     after = Usage.now()
     others = yardstick.load_of_others(before, after, PROCESSORS)

@@ -1,8 +1,9 @@
 """What a full run consists of: which jobs, in which order, and which of them beside each other.
 
-Tests run beside each other, two for each processor, since most wait half of their time. The
-demonstrations (marker `alone`) are judged in real time, as a person would: no other whole daemon
-runs beside them, and what only computes does so at the lowest priority.
+Tests run beside each other, two for each processor, since most wait half of their time; an emulated
+machine and the plugins' own tests run beside them. The demonstrations (marker `alone`) are judged
+in real time, as a person would: no other whole daemon runs meanwhile, and what only computes does
+so at the lowest priority.
 """
 
 from __future__ import annotations
@@ -74,15 +75,22 @@ def of_examples(run: Path) -> Job:
     return pytest_job("examples", run, ("--doctest-modules", *ignored, *WITH_EXAMPLES))
 
 
-def of_checkout(run: Path, tox: Sequence[str]) -> tuple[list[Job], ...]:
-    """Lanes: lint, types and examples; an emulated machine."""
+def beside_all(run: Path, options: Sequence[str], tox: Sequence[str]) -> tuple[list[Job], ...]:
+    """Lanes: what is judged in no real time; an emulated machine, and the plugins.
+
+    With `tox`, also lint, types and that machine: what has environments of its own.
+    """
 
     def env(name: str) -> Job:
         command = (*tox, "run", "-q", "-e", name, "--skip-pkg-install")
         return Job(name, command, ROOT, run / f"{name}.log")
 
-    lab = Job("lab", ("./run", "lab", "--short"), ROOT, run / "lab.log")
-    return [env("lint"), env("type"), of_examples(run)], [lab]
+    checks = [env("lint"), env("type")] if tox else []
+    # As urgent as the tests beside it: else it would begin when they are over.
+    urgent = {"NONDUM_LAB_NICE": "0"}
+    command = ("./run", "lab", "--short")
+    lab = [Job("lab", command, ROOT, run / "lab.log", more=urgent)] if tox else []
+    return [*checks, of_examples(run), of_hosts(run, options)], [*lab, *of_plugins(run)]
 
 
 def of_hosts(run: Path, options: Sequence[str]) -> Job:
@@ -96,13 +104,12 @@ def of_demonstrations(run: Path, options: Sequence[str]) -> tuple[list[Job], ...
     """Lanes: what is judged in real time, and what computes meanwhile."""
     alone = pytest_job("alone", run, (*INSTALLED, "-m", "alone", "tests/demo", *options))
     chosen = (*INSTALLED, *at_once(PROCESSORS), *COMPUTE, *options)
-    compute = pytest_job("compute", run, chosen, niceness=LOWEST)
-    return [alone], [compute, *of_plugins(run)]
+    return [alone], [pytest_job("compute", run, chosen, niceness=LOWEST)]
 
 
 def of_plugins(run: Path) -> Iterable[Job]:
-    """Each plugin's own tests, as its author runs them."""
+    """Each plugin's own tests, as its author runs them; their names are paths from its folder."""
     for tests in sorted(ROOT.glob("plugins/*/tests")):
         folder = tests.parent
         prefix = f"{folder.relative_to(ROOT)}/"
-        yield pytest_job(folder.name, run, (), folder=folder, prefix=prefix, niceness=LOWEST)
+        yield pytest_job(folder.name, run, ("--rootdir", "."), folder=folder, prefix=prefix)
