@@ -86,21 +86,6 @@ def test_host_names_no_plugin() -> None:
             assert not found, f"{portion}: {path} names {found}"
 
 
-HELPERS_IN_TEST_MODULES = {
-    "tests/confinement/test_walls.py",
-    "tests/daemon/test_bad_payloads.py",
-    "tests/daemon/test_hostile_plugin.py",
-    "tests/host/lifecycle/test_claims.py",
-    "tests/host/lifecycle/test_former.py",
-    "tests/host/lifecycle/test_releases.py",
-    "tests/host/lifecycle/test_safe_mode.py",
-    "tests/host/lifecycle/test_tries.py",
-    "tests/host/service/test_telling.py",
-    "tests/host/workers/test_served.py",
-}
-"""Modules that still import from test modules; none may join them."""
-
-
 def test_helpers_do_not_live_in_test_modules() -> None:
     found = {
         path.relative_to(ROOT).as_posix()
@@ -108,7 +93,7 @@ def test_helpers_do_not_live_in_test_modules() -> None:
         for path in folder.rglob("*.py")
         if "data" not in path.parts and imported_test_modules(path.read_text(encoding="utf-8"))
     }
-    assert found <= HELPERS_IN_TEST_MODULES, found - HELPERS_IN_TEST_MODULES
+    assert not found
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,10 @@
 """Remove each step of verification in turn, and see a test fail: `python -m tests.mutation`.
 
 What the page has already is not tried again, unless `--all` is given; then the guard that it names
-is tried first. With `--folder`, all are tried of which neither the module nor a file of its guards
-is as it was when that was noted in the folder: so it can be stopped and goes on where it was, and
-only what has changed is tried again. Exits with 1 when a step has no guard.
+is tried first. With `--folder`, those are tried whose module, or a file of its guards, has changed
+since that was noted in the folder or in docs/reliability/verification.json: so it can be stopped
+and goes on where it was, and a fresh checkout tries only what has changed. Exits with 1 when a step
+has no guard.
 """
 
 from __future__ import annotations

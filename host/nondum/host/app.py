@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import signal
-from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from nondum.host import heap, verbs
@@ -46,6 +46,7 @@ from nondum.host.lifecycle.lanes import in_thread
 from nondum.host.lifecycle.tally import Tally
 from nondum.host.mind.frames import mounts_of_all
 from nondum.host.mind.mind import Mind
+from nondum.host.mind.mounts import TellingMounts
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.system_tree import load_system_tree
 from nondum.host.news import News
@@ -340,18 +341,15 @@ class _Listener:
     """Tells mind and workers what the bus tells."""
 
     def __init__(self, catalogue: Catalogue, mind: Mind, workers: Workers) -> None:
-        self._catalogue, self._mind, self._workers = catalogue, mind, workers
-        self._mounts: Mapping[str, Any] = {}
-        self._told_mounts: Mapping[str, Any] = {}
+        self._catalogue, self._mind = catalogue, mind
+        self._mounts = TellingMounts(workers.remount, mind.after_tick)
 
     def on_event(self, event: Event) -> None:
         """A start or a recomposition is a new snapshot; everything else is news."""
         if isinstance(event, HostStarted | Recomposed):
             snapshot = self._catalogue.snapshot()
-            self._mounts = mounts_of_all(snapshot)
-            self._remount({**self._told_mounts, **self._mounts})
+            self._mounts.see(mounts_of_all(snapshot))
             self._mind.see(snapshot)
-            self._mind.after_tick(self._forget_mounts)
             if isinstance(event, HostStarted):
                 self._mind.restore(of_people(snapshot.goals))
             return
@@ -359,16 +357,6 @@ class _Listener:
         if sentence is not None:
             self._mind.people.tell(sentence)
         self._mind.on_event(event)
-
-    def _forget_mounts(self) -> None:
-        """Only after a tick: what looked from where a unit was has been asked to halt by then, and
-        does not fail for that."""
-        if self._told_mounts != self._mounts:
-            self._remount(self._mounts)
-
-    def _remount(self, mounts: Mapping[str, Any]) -> None:
-        self._told_mounts = mounts
-        self._workers.remount(mounts)
 
 
 def _install_options(config: HostConfig) -> InstallOptions:

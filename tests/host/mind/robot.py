@@ -27,7 +27,9 @@ from nondum.host.events import (
     FactKnown,
     StreamFlowing,
 )
+from nondum.host.mind.frames import mounts_of_all
 from nondum.host.mind.mind import Mind
+from nondum.host.mind.mounts import TellingMounts
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.runner import FactValue
 from nondum.host.mind.system_tree import SystemTree, default_tree
@@ -51,8 +53,11 @@ class RobotCall:
     values: tuple[FactValue, ...]
     state: RunState = RunState.STARTING
     reason: str = ""
+    is_to_halt: bool = False
+    """Whether it was asked to halt."""
 
     def halt(self) -> None:
+        self.is_to_halt = True
         asyncio.get_running_loop().call_soon(self.end, RunState.HALTED)
 
     def establish(self) -> None:
@@ -89,6 +94,10 @@ class Robot:
     """What components say before they are in the catalogue."""
     patience: Patience | None = None
     revision: int = 0
+    told_mounts: list[Mapping[str, Any]] = field(default_factory=list)
+    """What workers were told of where units sit."""
+    on_mounts: Callable[[Mapping[str, Any]], None] = lambda mounts: None
+    """Called as they are told."""
     mind: Mind = field(init=False)
 
     def __post_init__(self) -> None:
@@ -102,6 +111,7 @@ class Robot:
             patience=self.patience,
             system_tree=self.system_tree,
         )
+        self._mounts = TellingMounts(self._remount, self.mind.after_tick)
         self.see()
 
     # Calls
@@ -181,7 +191,12 @@ class Robot:
             mounts=self.mounts,
             former=tuple(self.former.values()),
         )
+        self._mounts.see(mounts_of_all(snapshot))
         self.mind.see(snapshot)
+
+    def _remount(self, mounts: Mapping[str, Any]) -> None:
+        self.told_mounts.append(mounts)
+        self.on_mounts(mounts)
 
     # News
 

@@ -7,13 +7,15 @@ import os
 from dataclasses import replace
 
 import pytest
-from tests.kit.until import until_async
+from tests.kit.until import PATIENCE_S, until_async
 from tests.transport.discovery import spoofing
 from tests.transport.discovery.hosts import Seeker, here, seeking
 
-from nondum.transport.discovery import Announcement
+from nondum.transport.discovery import Announcement, Hint
+from nondum.transport.discovery import interfaces as network
 from nondum.transport.discovery.book import MAX_PEERS
 from nondum.transport.discovery.hint import MAX_ADDRESSES, instance, to_txt
+from nondum.transport.discovery.multicast import Multicast
 from nondum.transport.peers.keys import PeerKey
 
 pytestmark = pytest.mark.anyio
@@ -53,6 +55,28 @@ async def test_hosts_find_each_other_in_both_directions() -> None:
         assert hint.name == "base"
         await base.found(rover)
         assert rover.announcement.key not in rover.discovery.hints
+
+
+async def test_host_that_is_heard_while_this_one_starts_is_told() -> None:
+    """It says the same again a second later, but zeroconf may take that for a duplicate."""
+    base, hints = here("base"), asyncio.Queue[Hint]()
+    multicast = Multicast(
+        base.security,
+        on_hint=hints.put_nowait,
+        on_gone=lambda key: None,
+        on_refused=lambda problem: None,
+    )
+    loopback = network.loopback(network.read())
+    starting = asyncio.create_task(multicast.reconcile(here("rover"), loopback))
+    await asyncio.sleep(0)  # its sockets are open now, and it waits for what reads them
+    spoof(spoofed(base))
+    await starting
+    try:
+        async with asyncio.timeout(PATIENCE_S):
+            while (await hints.get()).key != base.key:
+                pass
+    finally:
+        await multicast.close()
 
 
 async def test_a_goodbye_ends_the_hint() -> None:

@@ -21,6 +21,7 @@ from tests.transport.peers.hosts import Servant
 
 from nondum.sdk.wire import Body
 from nondum.transport.fleet import Fleet, FleetEvent, Mesh, PeerChanged
+from nondum.transport.fleet.mesh import Find
 from nondum.transport.fleet.zenoh import ZenohFleet
 from nondum.transport.fleet.zenoh_line import RouterAccess
 from nondum.transport.peers import (
@@ -238,7 +239,12 @@ def zenoh_member(
 
 
 def mesh_member(
-    name: str, keys: HostKeys | None, trust: Trust, *, listen: str = "tcp://127.0.0.1:0"
+    name: str,
+    keys: HostKeys | None,
+    trust: Trust,
+    *,
+    listen: str = "tcp://127.0.0.1:0",
+    find: Find | None = None,
 ) -> tuple[Mesh, Member]:
     servant = Servant()
     mesh = Mesh(
@@ -247,6 +253,7 @@ def mesh_member(
         servant,
         on_event=lambda event: found.hear(event),
         listen=[listen],
+        find=find,
     )
     found = Member(name, mesh, servant)
     return mesh, found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Sequence
 
@@ -47,6 +48,33 @@ async def started(
         yield mesh, member
     finally:
         await mesh.close()
+
+
+class SlowFinder:
+    """Takes as long as it is told to, to look no more, as multicast does to say goodbye."""
+
+    def __init__(self) -> None:
+        self.may_close = asyncio.Event()
+
+    async def start(self) -> None:
+        """Begin to look."""
+
+    async def close(self) -> None:
+        await self.may_close.wait()
+
+
+async def test_peers_hear_of_a_departure_before_the_finder_has_ended() -> None:
+    hosts, finder = pairs("rover", "base"), SlowFinder()
+    trust = trust_in(hosts)
+    mesh, _ = mesh_member(*hosts[0], trust, find=lambda mesh: finder)
+    await mesh.start()
+    async with started(hosts[1], trust) as (base, told):
+        mesh.meet(base.key, base.addresses)
+        await told.told(PeerUp)
+        closing = asyncio.create_task(mesh.close())
+        assert (await told.told(PeerLost)).reason is Loss.DEPARTED
+        finder.may_close.set()
+        await closing
 
 
 @pytest.mark.parametrize("dialler", [0, 1], ids=["smaller key", "bigger key"])
@@ -209,6 +237,16 @@ async def test_strangers_hints_are_bounded() -> None:
     assert len(dialled.dials) == WISHES
     assert all(len(addresses) == ADDRESSES for addresses in dialled.dials.values())
     meeting.close()
+
+
+async def test_nobody_is_dialled_once_it_is_closed() -> None:
+    """A finder may hint at hosts until it has ended, too."""
+    dialled = Dialled()
+    meeting = Meeting(PeerKey("a"), dialled, lambda key: True)
+    meeting.close()
+    meeting.hinted(PeerKey("b"), ["tcp://10.0.0.1:1"])
+    assert not dialled.dials
+    assert not meeting.looked_for
 
 
 async def test_host_that_was_met_keeps_its_place_among_strangers() -> None:
