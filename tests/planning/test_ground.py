@@ -215,6 +215,7 @@ def test_reachable_goal_needs_a_search() -> None:
     assert quick_answer(task(MOVE, [*ROAD, f"at {LEFT} a"], f"(at {LEFT} c)")) is None
 
 
+@pytest.mark.slow
 def test_action_that_binds_everything_is_refused() -> None:
     wide = "(:action w :parameters (?u - base ?a ?b ?c ?d ?e ?f ?g ?h ?i) :effect (done ?u))"
     with pytest.raises(FragmentRefused, match=r"'drive\.w'") as refused:

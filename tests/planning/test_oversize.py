@@ -66,6 +66,7 @@ def test_oversized_component_is_left_out_alone() -> None:
     }
 
 
+@pytest.mark.slow
 def test_real_oversized_fragment_is_left_out_at_the_hosts_limit() -> None:
     found = fit([*followers(), knobs("wide", 60, "?x ?y ?z")], limit=INSTANCES_LIMIT)
     assert set(found.left_out) == {"wide"}

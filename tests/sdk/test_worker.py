@@ -163,6 +163,7 @@ async def test_workers_pass_streams_without_the_host(worker: Start) -> None:
             await call
 
 
+@pytest.mark.slow
 async def test_output_that_stalls_does_not_flow(worker: Start) -> None:
     one = await (await worker()).ready()
     assert await one.event("flow") == {"stream": "robot__greeter__volume", "flowing": True}

@@ -135,6 +135,7 @@ CALLS = ("mkdir", "chmod", "rename", "syncfs", "fsync", "unlink", "unlinkat", "r
 """Of compiling, what leaves a trace on disk; the bytes of files are written in between."""
 
 
+@pytest.mark.slow
 def test_killed_at_any_call_the_entry_is_whole(
     store: Store, entry: StoredWheel, tmp_path: Path
 ) -> None:
