@@ -103,7 +103,7 @@ def run(
         took = (time.monotonic() - began_s) / 60
         _write_state(home, replace(state, minutes=state.minutes + took))
         changed = checkout.contents(root, campaign.covers) != state.contents
-        if (changed or checkout.commit(root) != commit) and not commit.endswith(page.DIRTY):
+        if changed and not commit.endswith(page.DIRTY):
             commit += page.DIRTY
         tally = Tally.read(home / "round")
         outcome = Outcome(

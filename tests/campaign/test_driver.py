@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -46,7 +47,13 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Checkout:
     return made
 
 
-def run(checkout: Checkout, *, seed: int | None = None, again: bool = False) -> Outcome:
+def run(
+    checkout: Checkout,
+    *,
+    seed: int | None = None,
+    again: bool = False,
+    say: Callable[[str], None] = lambda _: None,
+) -> Outcome:
     return driver.run(
         checkout.root,
         FAULTS,
@@ -54,7 +61,7 @@ def run(checkout: Checkout, *, seed: int | None = None, again: bool = False) -> 
         7 if seed is None else seed,
         again=again,
         is_seed_asked=seed is not None,
-        say=lambda _: None,
+        say=say,
     )
 
 
@@ -89,6 +96,24 @@ def test_a_changed_tree_counts_for_no_commit(checkout: Checkout) -> None:
     assert outcome.result == page.PASSED
     assert outcome.commit.endswith(page.DIRTY)
     assert last(checkout).passed_at == ""
+
+
+@pytest.mark.parametrize(
+    ("file", "counts"), [("docs/page.md", True), ("tests/faults/test_one.py", False)]
+)
+def test_what_changes_meanwhile_counts_only_where_it_is_covered(
+    checkout: Checkout, file: str, *, counts: bool
+) -> None:
+    run(checkout)
+
+    def change(_line: str) -> None:
+        checkout.write(file, "changed")
+        checkout.commit()
+
+    begun_at = checkout.git("rev-parse", "--short=10", "HEAD")
+    outcome = run(checkout, say=change)
+    assert outcome.commit == (begun_at if counts else begun_at + page.DIRTY)
+    assert last(checkout).passed_at == (begun_at if counts else "")
 
 
 def test_once_it_is_committed_what_was_done_before_counts(checkout: Checkout) -> None:

@@ -70,13 +70,14 @@ def main(name: str, cases: int, folder: Path, seconds: int) -> None:
     seeds = [*fuzzing.target.seeds(), *fuzzing.target.refused()]
     for number, seed in enumerate(seeds):
         (corpus / f"seed-{number}").write_bytes(seed)
-    words = folder / "tokens"
+    words = folder / "tokens"  # libFuzzer refuses a dictionary without a word
     lines = ("".join(f"\\x{byte:02x}" for byte in token) for token in fuzzing.target.tokens)
     words.write_text("".join(f'"{line}"\n' for line in lines))
     atexit.register(fuzzing.write)
     arguments = [
         *(sys.argv[0], str(corpus), f"-runs={cases}", f"-max_len={fuzzing.target.longest}"),
-        *(f"-dict={words}", f"-artifact_prefix={folder}/", "-rss_limit_mb=2048", "-timeout=30"),
+        *([f"-dict={words}"] if fuzzing.target.tokens else []),
+        *(f"-artifact_prefix={folder}/", "-rss_limit_mb=2048", "-timeout=30"),
         f"-max_total_time={seconds}",
     ]
     atheris.Setup(arguments, fuzzing.one)
