@@ -26,7 +26,7 @@ FAILED_RETENTION = ("-o", "tmp_path_retention_policy=failed")
 def main(words: Sequence[str]) -> int:
     """Run what there is time for; 1 if anything failed."""
     options = _options(words)
-    chosen = ["--campaign", options.name, "--seed", str(options.seed)]
+    chosen = [f"--campaign={options.name}", f"--seed={options.seed}"]
     files = files_of(chosen)
     if not files:
         print(f"no test is marked long({options.name!r})")

@@ -28,7 +28,7 @@ def run(tox: Sequence[str]) -> int:
     slower = yardstick.measured_s(PROCESSORS) / known.yardstick_s
     before = Usage.now()
 
-    options = ("--current", ",".join(one.campaign for one in ages if one.is_current))
+    options = (f"--current={','.join(one.campaign for one in ages if one.is_current)}",)
     done = job.beside(*stages.beside_all(folder, options, tox))
     done += job.beside(*stages.of_demonstrations(folder, options))
     after = Usage.now()

@@ -57,7 +57,7 @@ def pytest_job(
     results = run / f"{name}.jsonl"
     command = (
         *(sys.executable, "-m", "pytest", "-q", "--basetemp", str(run / name)),
-        *("-p", "tests.runner.plugin", "--results", str(results), *options),
+        *("-p", "tests.runner.plugin", f"--results={results}", *options),
     )
     log = run / f"{name}.log"
     more = {"PYTHONPATH": str(ROOT)} if folder != ROOT else {}
