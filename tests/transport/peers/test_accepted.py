@@ -6,6 +6,8 @@ import os
 import socket
 from pathlib import Path
 
+import pytest
+
 from nondum.transport.peers import accepted
 
 
@@ -17,6 +19,13 @@ def test_descriptor_that_is_no_socket_any_more_leaves_nothing_open() -> None:
     accepted.cut(descriptor, "127.0.0.1:1")
     assert open_files() == before
     os.close(descriptor)
+
+
+@pytest.mark.parametrize("family", [socket.AF_NETLINK, socket.AF_UNIX], ids=["netlink", "unix"])
+def test_descriptor_that_is_another_kind_of_socket_now_has_no_other_end(family: int) -> None:
+    """A netlink socket has a peer whose address begins with a number."""
+    with socket.socket(family, socket.SOCK_DGRAM) as other:
+        assert accepted.other_end(other.fileno()) == ""
 
 
 def test_connection_to_another_end_is_not_cut() -> None:

@@ -90,9 +90,14 @@ class AcceptedConnections:
 
 
 def other_end(descriptor: int) -> str:
-    """The other end of a TCP connection; empty when there is none."""
+    """The other end of a TCP connection; empty when there is none.
+
+    ZeroMQ may have closed it by now, and the descriptor be another socket's of this process.
+    """
     try:
         with closing(_duplicate(descriptor)) as connection:
+            if connection.family not in (socket.AF_INET, socket.AF_INET6):
+                return ""
             return written(connection.getpeername())
     except (OSError, ValueError):
         return ""
