@@ -78,7 +78,7 @@ def of_examples(run: Path) -> Job:
 def beside_all(run: Path, options: Sequence[str], tox: Sequence[str]) -> tuple[list[Job], ...]:
     """Lanes: what is judged in no real time; an emulated machine, and the plugins.
 
-    With `tox`, also lint, types and that machine: what has environments of its own.
+    `tox` adds lint, type checks and the emulated machine, which have their own environments.
     """
 
     def env(name: str) -> Job:

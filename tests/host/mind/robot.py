@@ -97,7 +97,7 @@ class Robot:
     told_mounts: list[Mapping[str, Any]] = field(default_factory=list)
     """What workers were told of where units sit."""
     on_mounts: Callable[[Mapping[str, Any]], None] = lambda mounts: None
-    """Called as they are told."""
+    """Called with each mount update that workers get."""
     mind: Mind = field(init=False)
 
     def __post_init__(self) -> None:

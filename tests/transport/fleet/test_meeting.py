@@ -51,7 +51,7 @@ async def started(
 
 
 class SlowFinder:
-    """Takes as long as it is told to, to look no more, as multicast does to say goodbye."""
+    """A finder whose `close` waits for `may_close`, as multicast takes time to say goodbye."""
 
     def __init__(self) -> None:
         self.may_close = asyncio.Event()

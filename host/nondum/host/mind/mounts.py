@@ -1,4 +1,4 @@
-"""What workers are told of where units sit, and when a place is forgotten."""
+"""Sends mount updates to workers: new mounts at once, removals after the next tick."""
 
 from __future__ import annotations
 
