@@ -8,11 +8,14 @@ this interpreter has installed or, for the SDK, from its source folder.
 
 from __future__ import annotations
 
+import atexit
 import base64
 import functools
 import hashlib
 import importlib.metadata
 import json
+import os
+import shutil
 import tempfile
 import types
 import zipfile
@@ -256,4 +259,11 @@ def _tag_lines(tag: str) -> str:
 
 @functools.cache
 def _cache() -> Path:
-    return Path(tempfile.mkdtemp(prefix="nondum-test-wheels-"))
+    folder, maker = Path(tempfile.mkdtemp(prefix="nondum-test-wheels-")), os.getpid()
+
+    def remove() -> None:
+        if os.getpid() == maker:  # not a child that was forked
+            shutil.rmtree(folder, ignore_errors=True)
+
+    atexit.register(remove)
+    return folder

@@ -147,7 +147,7 @@ async def _run(
     mind = Mind(
         config.host.name,
         neighbours.calls if neighbours else workers,
-        Planners.installed(memory_mb=config.planning.memory_mb),
+        Planners.installed(memory_mb=config.planning.memory_mb, temporary=folders.planning),
         emit=bus.emit,
         deadline_s=config.planning.deadline_s,
         patience=Patience(

@@ -26,8 +26,6 @@ HEALTHY = ("talker", "scribe")
 GOAL = "(written spot)"
 JUDGED_S = 60.0
 PRUNED_S = 20.0
-PLANNERS = "/nondum-fast-downward-"
-"""Where planners write down what they search."""
 OVER = ("refused", "quarantined", "active")
 REMEDY = "→ "
 """Stands before what to do, in each problem that is told."""
@@ -246,8 +244,7 @@ class Gauntlet:
         """Note what the daemon takes when it is at rest."""
         self.outcome.pids.add(self.host.pid)
         self.outcome.footprints.append(Footprint.of(self.host.pid, self.host.state))
-        found = [str(p) for folder in self._elsewhere for p in folder.iterdir()]
-        self.outcome.strays = [path for path in found if PLANNERS not in path]
+        self.outcome.strays = [str(p) for folder in self._elsewhere for p in folder.iterdir()]
 
 
 @contextmanager

@@ -32,7 +32,7 @@ from nondum.sdk.planner import (
 pytestmark = pytest.mark.anyio
 
 SHAM = """
-import os, time
+import os, tempfile, time
 from nondum.sdk.planner import AlreadyTrue, GaveUp, Plan, PlanText, Unsolvable
 class Planner:
     speaks = "ground"
@@ -45,6 +45,11 @@ class Blind(Planner):
     def plan(self, task, deadline_s): return AlreadyTrue()
 class Hanger(Planner):
     def plan(self, task, deadline_s): time.sleep(3600)
+class Writer(Planner):
+    def plan(self, task, deadline_s):
+        handle, name = tempfile.mkstemp()
+        os.write(handle, b"searched")
+        time.sleep(3600)
 class Raiser(Planner):
     def plan(self, task, deadline_s): print("psst"); raise ValueError("no idea")
 class Dier(Planner):
@@ -85,7 +90,12 @@ async def planner(tmp_path: Path) -> AsyncIterator[Make]:
     def make(name: str) -> PlannerProcess:
         environment = {"PYTHONPATH": os.pathsep.join(paths)}
         reference = REFERENCES.get(name, f"sham:{name.capitalize()}")
-        made.append(PlannerProcess(name, reference, memory_mb=512, environment=environment))
+        folder = tmp_path / "planning"
+        made.append(
+            PlannerProcess(
+                name, reference, memory_mb=512, environment=environment, temporary=folder
+            )
+        )
         return made[-1]
 
     yield make
@@ -167,6 +177,33 @@ async def test_misbehaving_planner_gave_up(
     found = await arrived("an answer", planning)
     assert isinstance(found.answer, GaveUp)
     assert why in found.answer.why
+
+
+async def test_what_a_planner_had_written_goes_when_it_is_killed(
+    planner: Make, task: GroundTask, tmp_path: Path
+) -> None:
+    process, folder = planner("writer"), tmp_path / "planning/writer"
+    searching = asyncio.create_task(process.plan(Request(task), 3600.0))
+    await until_async("its file", lambda: folder.is_dir() and any(folder.iterdir()))
+    searching.cancel()
+    await asyncio.wait([searching])
+    assert not folder.exists()
+
+
+async def test_what_the_planner_of_a_killed_daemon_had_written_goes(
+    planner: Make, tmp_path: Path
+) -> None:
+    (tmp_path / "planning/writer").mkdir(parents=True)
+    (tmp_path / "planning/writer/output.sas").write_text("searched")
+    await planner("writer").warm()
+    assert not any((tmp_path / "planning/writer").iterdir())
+
+
+async def test_planner_works_where_no_folder_can_be_made(
+    planner: Make, task: GroundTask, tmp_path: Path
+) -> None:
+    (tmp_path / "planning").write_text("a file")
+    assert isinstance((await Planners([planner("native")]).plan(task, 5.0)).answer, Plan)
 
 
 async def test_first_valid_plan_wins(planner: Make, task: GroundTask) -> None:

@@ -75,6 +75,11 @@ class Folders:
         """Payloads that other hosts have handed over: each a folder like a drive."""
         return self.root / "placed"
 
+    @property
+    def planning(self) -> Path:
+        """The temporary files of planners."""
+        return self.root / "planning"
+
     def staging(self, payload: str) -> Path:
         """A payload while it is copied and checked."""
         return self.root / "staging" / payload

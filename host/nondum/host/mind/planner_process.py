@@ -10,8 +10,10 @@ import sys
 import time
 from asyncio.subprocess import DEVNULL, PIPE, Process
 from collections.abc import Mapping
+from pathlib import Path
 
 from nondum.host.mind import planner_wire as wire
+from nondum.host.mind.planner_folder import PlannerFolder
 from nondum.sdk.errors import PlannerFailed, Problem
 from nondum.sdk.planner import Answer, GaveUp, PlanText
 
@@ -34,12 +36,15 @@ class PlannerProcess:
         *,
         memory_mb: int,
         environment: Mapping[str, str] | None = None,
+        temporary: Path | None = None,
     ) -> None:
         """`reference` (`module:class`) is what entry point `name` in group `nondum.planners` names.
-        The child's environment is that of this process, with `environment` added."""
+        The child's environment is that of this process, with `environment` added. Its temporary
+        files are in a folder below `temporary`, or where this machine has such."""
         self.name = name
         self._reference = reference
         self._memory_mb = memory_mb
+        self._folder = PlannerFolder(name, temporary)
         self._environment = {**os.environ, "PYTHONHASHSEED": "0", **(environment or {})}
         self._process: Process | None = None
         self._is_ready = False
@@ -115,6 +120,7 @@ class PlannerProcess:
         if self._process is not None and self._process.returncode is None and self._is_ready:
             return self._process
         await self._kill()
+        folder = await asyncio.to_thread(self._folder.make)
         module = "nondum.host.mind.planner_child"
         self._process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", module, self._reference),
@@ -122,7 +128,7 @@ class PlannerProcess:
             stdin=PIPE,
             stdout=PIPE,
             stderr=DEVNULL,
-            env=self._environment,
+            env={**self._environment, **folder},
             start_new_session=True,
         )
         try:
@@ -161,6 +167,7 @@ class PlannerProcess:
         self._endings.add(ending)
         ending.add_done_callback(self._endings.discard)
         await asyncio.shield(ending)
+        await asyncio.to_thread(self._folder.remove)
 
     def _failure(self, code: str, message: str) -> PlannerFailed:
         return PlannerFailed(Problem(code, message, where=f"planner {self.name}"))

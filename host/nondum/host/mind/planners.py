@@ -12,6 +12,7 @@ import asyncio
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeAlias
 
 from importlib_metadata import entry_points
@@ -58,11 +59,14 @@ class Planners:
         self._processes = tuple(processes)
 
     @classmethod
-    def installed(cls, *, memory_mb: int) -> Planners:
+    def installed(cls, *, memory_mb: int, temporary: Path | None = None) -> Planners:
         """Those that are installed in this host's own environment."""
         found = {entry.name: entry.value for entry in entry_points(group=GROUP)}
         return cls(
-            [PlannerProcess(name, found[name], memory_mb=memory_mb) for name in sorted(found)]
+            [
+                PlannerProcess(name, found[name], memory_mb=memory_mb, temporary=temporary)
+                for name in sorted(found)
+            ]
         )
 
     @property
