@@ -60,7 +60,7 @@ _ALL = (
             "tests/faults",
         ),
         "tests.faults",
-        ("--points", "100", *_SEED),
+        ("--points", "40", *_SEED),
     ),
     Campaign(
         "restarts",
@@ -90,14 +90,14 @@ _ALL = (
     ),
     Campaign(
         "drives",
-        "Hostile drives, 500 yanks, a crowd of a hundred drives and a soak",
+        "Hostile drives, drives yanked at any moment, a crowd of a hundred drives and a soak",
         (
             *(f"{HOST}/{room}" for room in ("drives", "lifecycle", "workers", "catalogue")),
             "wheelhouse/nondum",
             "tests/faults",
         ),
         "tests.faults.drive_figures",
-        ("--due",),
+        ("--due", "--rounds", "3", "--points", "100", "--cycles", "160", *_SEED),
     ),
     Campaign(
         "machines",
