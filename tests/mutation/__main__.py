@@ -65,8 +65,8 @@ def main() -> int:
                     broken += 1
                 else:
                     guards[key] = guard or page.MISSING
-                if tried:
-                    tried.add(key, guard or "")
+                    if tried:
+                        tried.add(key, guard)
                 told = "not tried" if guard is None else guards[key]
                 sys.stdout.write(f"{limit} {number}/{len(due)} {steps[key].name}: {told}\n")
                 sys.stdout.flush()
@@ -77,7 +77,7 @@ def main() -> int:
             _write(steps, guards, told)
     if tried:
         sys.stdout.write(f"{tried.tally} tried, {len(tried.tally.failed)} without a guard\n")
-        return 1 if tried.tally.failed else 0
+        return 1 if tried.tally.failed or broken else 0
     missing = [key for key in due if guards.get(key, page.MISSING) == page.MISSING]
     sys.stdout.write(f"{len(steps)} steps, {len(due)} tried, {len(missing)} without a guard\n")
     return 1 if missing or broken else 0
