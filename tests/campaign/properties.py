@@ -2,13 +2,17 @@
 
 Hypothesis draws a thousand examples where a test does not ask for a number, other ones for each
 seed. Each file with such tests is a piece of the round; its tests run once for each of some seeds.
+As many files as there are processors run at the same time: they compute, and are not timed.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
+import threading
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from tests.campaign import suites
@@ -23,14 +27,30 @@ def main(words: Sequence[str]) -> int:
     options = _options(words)
     only = ["-p", "tests.campaign.only_properties", "--hypothesis-profile=campaign"]
     work = Round(options.folder, suites.files_of(only), Limit(options.minutes))
-    for file in work.due():
-        note = ""
-        for seed in range(options.seed, options.seed + SEEDS):
-            chosen = [*only, f"--hypothesis-seed={seed}", "--timeout=1800"]
-            passed, note = suites.run_file(work.folder, file, chosen)
-            if not passed:
-                break
-        work.add(file, passed=passed, note=note)
+    due, taking, ending = work.due(), threading.Lock(), threading.Event()
+    seeds = [f"--hypothesis-seed={n}" for n in range(options.seed, options.seed + SEEDS)]
+
+    def next_file() -> str | None:
+        with taking:
+            return None if ending.is_set() else next(due, None)
+
+    def work_off() -> None:
+        while (file := next_file()) is not None:
+            for seed in seeds:
+                chosen = [*only, seed, "--timeout=1800"]
+                passed, note = suites.run_file(work.folder, file, chosen)
+                if not passed:
+                    break
+            work.add(file, passed=passed, note=note)
+
+    at_once = os.cpu_count() or 1
+    with ThreadPoolExecutor(at_once) as pool:
+        try:
+            for one in [pool.submit(work_off) for _ in range(at_once)]:
+                one.result()
+        except KeyboardInterrupt:
+            ending.set()
+            raise
     return work.end()
 
 

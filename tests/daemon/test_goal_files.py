@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from demo.robot import configuration
 from tests.daemon.neighbours import BEACON, UNCONFINED
 from tests.kit.payloads import Part, seal
-from tests.kit.running_host import READY_S, Row, RunningHost
+from tests.kit.running_host import READY_S, Row, RunningHost, running
 from tests.kit.shared import Shared
 from tests.kit.signing import Key, sign_payload, trust_of
 
@@ -31,14 +30,9 @@ def trusting(work: Path, permissions: Sequence[str]) -> Iterator[RunningHost]:
     roles = {"maker": (["org.example"], [ALICE])}
     text = trust_text.to_text(trust_of(roots=[Key("root")], roles=roles, permissions=permissions))
     trust.write_text(text)
-    host = RunningHost(work)
     more = f"{UNCONFINED}[feedback]\nsafe_s = 0.2\n"  # long enough to be shown
-    (work / "host.toml").write_text(configuration(host, trust) + more, encoding="utf-8")
-    try:
-        host.start()
+    with running(work, trust=trust, more=more) as host:
         yield host
-    finally:
-        host.stop()
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -109,7 +109,8 @@ def test_host_that_is_lost_is_pruned_and_its_goal_waits_for_it(end: str, tmp_pat
         goal = rover.want("(lit rover)")
         rover.until_goal(goal, "holds")
         stopped = mule.pid
-        {"kill": mule.kill, "stop": mule.stop}.get(end, lambda: os.kill(stopped, signal.SIGSTOP))()
+        ends: dict[str, Callable[[], object]] = {"kill": mule.kill, "stop": mule.stop}
+        ends.get(end, lambda: os.kill(stopped, signal.SIGSTOP))()
         try:
             rover.until_told("the host mule is gone")
             until_lost(rover, "beacon@mule")

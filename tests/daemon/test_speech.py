@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from demo.drives import build
-from tests.host.cli.daemon import BEACON
+from tests.kit.beacon import BEACON
 from tests.kit.payloads import Part
 from tests.kit.running_host import READY_S, Row, RunningHost
 from tests.kit.until import until

@@ -9,14 +9,15 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, running
+from demo.robot import View
+from tests.kit.beacon import BEACON
 from tests.kit.payloads import Part
+from tests.kit.running_host import COMMAND, RunningHost, running
 
 pytestmark = pytest.mark.daemon
 
 LIBRARIES = ("libfaketimeMT.so.1", "libfaketime.so.1")
 JUMPS = ("-10y", "+10y")
-TORCH_ID = "org.example.torch"
 TORCH = BEACON.replace("beacon", "torch")
 
 
@@ -42,33 +43,34 @@ def clock(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     yield file
 
 
-def year(daemon: Daemon) -> int:
+def year(host: RunningHost) -> int:
     """What year it is for the daemon, by the last entry of its journal."""
-    with closing(sqlite3.connect(daemon.root / "state/catalogue.sqlite")) as connection:
+    with closing(sqlite3.connect(host.state / "catalogue.sqlite")) as connection:
         query = "SELECT strftime('%Y', wall_s, 'unixepoch') FROM journal ORDER BY id DESC LIMIT 1"
         (found,) = connection.execute(query).fetchone()
     return int(found)
 
 
 def test_clock_that_jumps_changes_nothing(tmp_path: Path, clock: Path) -> None:
-    (tmp_path / "host").mkdir()
-    with running(tmp_path / "host", is_forked=False) as daemon:
-        daemon.plug(BEACON_ID, Part("beacon", BEACON))
-        daemon.until_state(BEACON_ID, "active")
-        daemon.run("goal", "shine").ok()
-        daemon.until(lambda view: any(goal["holds"] for goal in view["goals"]))
-        began = year(daemon)
+    def kept(view: View) -> View | None:
+        return view if any(goal["holds"] for goal in view["goals"]) else None
+
+    # One that is forked would not have its dynamic linker see the shim.
+    with running(tmp_path / "host", program=COMMAND) as host:
+        host.bring("beacon", Part("beacon", BEACON))
+        host.run("goal", "shine").ok()
+        host.until("the goal holds", kept)
+        began = year(host)
         for jump in JUMPS:
             clock.write_text(jump)
-            daemon.plug(TORCH_ID, Part("torch", TORCH))
-            daemon.until_state(TORCH_ID, "active")
-            assert abs(year(daemon) - began) >= 9, "the clock did jump"
-            daemon.pull(TORCH_ID)
-            daemon.until(lambda view: len(view["payloads"]) == 1)
-            (tmp_path / "host/drives" / TORCH_ID).rename(tmp_path / f"old{jump}")
-            view = daemon.until(lambda view: any(goal["holds"] for goal in view["goals"]))
+            drive = host.bring("torch", Part("torch", TORCH))
+            assert abs(year(host) - began) >= 9, "the clock did jump"
+            host.pull("torch")
+            host.until("the torch is gone", lambda view: len(view["payloads"]) == 1)
+            drive.rename(tmp_path / f"old{jump}")
+            view = host.until("the goal holds", kept)
             assert [row["state"] for row in view["payloads"]] == ["active"]
-        told = daemon.run("journal", "--json").ok().json
+        told = host.run("journal", "--json").ok().json
     assert not [entry for entry in told if entry["event"] in ("WorkerExited", "WorkerFailed")]
 
 

@@ -3,43 +3,46 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
-from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, killed, running
+from demo.robot import View
+from tests.kit.beacon import BEACON
 from tests.kit.payloads import Part
+from tests.kit.running_host import RunningHost, running
 
 
-def goals(view: dict[str, Any]) -> dict[str, tuple[str, str]]:
+def goals(view: View) -> dict[str, tuple[str, str]]:
     return {row["text"]: (row["id"], row["state"]) for row in view["goals"]}
 
 
-def until(daemon: Daemon, wanted: dict[str, str]) -> dict[str, tuple[str, str]]:
+def until(host: RunningHost, wanted: dict[str, str]) -> dict[str, tuple[str, str]]:
     """Wait until each of these goals, by its text, is in its state; give all goals."""
 
-    def is_so(view: dict[str, Any]) -> bool:
+    def look(view: View) -> dict[str, tuple[str, str]] | None:
         found = goals(view)
-        return all(text in found and found[text][1] == state for text, state in wanted.items())
+        is_so = all(text in found and found[text][1] == state for text, state in wanted.items())
+        return found if is_so else None
 
-    return goals(daemon.until(is_so))
+    return host.until(f"goals are {wanted}", look)
 
 
 def test_open_goals_survive_a_daemon_that_is_killed(tmp_path: Path) -> None:
     waiting = "(reported person panther)"
-    with killed(tmp_path) as daemon:
-        daemon.plug(BEACON_ID, Part("beacon", BEACON))
-        daemon.until_state(BEACON_ID, "active")
-        daemon.run("goal", "shine", "--wait").ok()
-        daemon.run("goal", "greet people", "--wait").ok()
-        daemon.run("goal", "--pddl", waiting, "--priority", "2").ok()
-        halted = daemon.run("goal", "--pddl", "(found person self)", "--json").ok().json["id"]
-        daemon.run("halt", "--goal", halted).ok()
-        before = until(daemon, {"shine": "active", waiting: "suspended"})
     wanted = {"shine": "active", waiting: "suspended"}
-    with running(tmp_path) as daemon:
-        after = until(daemon, wanted)
+    with running(tmp_path, name="panther") as host:
+        host.bring("beacon", Part("beacon", BEACON))
+        host.run("goal", "shine", "--wait").ok()
+        host.run("goal", "greet people", "--wait").ok()
+        host.run("goal", "--pddl", waiting, "--priority", "2").ok()
+        halted = host.run("goal", "--pddl", "(found person self)", "--json").ok().json["id"]
+        host.run("halt", "--goal", halted).ok()
+        before = until(host, wanted)
+        host.kill()
+        host.start()
+        after = until(host, wanted)
         assert after == {text: before[text] for text in wanted}
-        daemon.until(lambda view: any(row["holds"] for row in view["goals"]))
-        given = daemon.run("goal", "greet people", "--wait", "--json").ok().json
+        host.until("a goal holds", lambda view: any(row["holds"] for row in view["goals"]))
+        given = host.run("goal", "greet people", "--wait", "--json").ok().json
         assert int(given["id"]) > max(int(id) for id, _ in after.values())
-    with running(tmp_path) as daemon:  # one that ended well has kept them too
-        assert until(daemon, wanted) == after
+        assert host.stop() == 0
+        host.start()  # one that ended well has kept them too
+        assert until(host, wanted) == after

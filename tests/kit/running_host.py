@@ -10,6 +10,7 @@ import dataclasses
 import os
 import select
 import shutil
+import signal
 import subprocess
 import sys
 import threading
@@ -21,6 +22,7 @@ from typing import Any
 
 from demo.robot import NONDUM, Robot, TooLate, View, configuration
 from tests.kit import evidence
+from tests.kit.command_line import Ran, command, nondum, quiet_environment
 from tests.kit.fork_server import Forked, fork_server, module_of
 from tests.kit.payloads import Part, make_payload
 from tests.kit.traces import Traces, former_payloads
@@ -43,10 +45,17 @@ class RunningHost(Robot):
     """One daemon after the other on one state folder; every view that it showed is kept."""
 
     def __init__(
-        self, work: Path, *, name: str = "spot", more: str = "", program: Sequence[str] = DAEMON
+        self,
+        work: Path,
+        *,
+        name: str = "spot",
+        trust: Path | None = None,
+        more: str = "",
+        program: Sequence[str] = DAEMON,
     ) -> None:
-        """`more` are further lines of its configuration; `program` runs a daemon, in a process of
-        the fork server if it is `python -m …`."""
+        """`trust` is the trust file that it goes by, which need not be there yet; without one, it
+        takes any payload. `more` are further lines of its configuration; `program` runs a daemon,
+        in a process of the fork server if it is `python -m …`."""
         super().__init__(work, name=name)
         self.state = work / "state"
         self.views: list[View] = []
@@ -59,25 +68,25 @@ class RunningHost(Robot):
         self._threads: list[threading.Thread] = []
         for folder in (self.slots, self.devices):
             folder.mkdir(parents=True)
-        (work / "host.toml").write_text(configuration(self) + more, encoding="utf-8")
+        self.config.write_text(configuration(self, trust) + more, encoding="utf-8")
 
     # The daemon's life
 
     def start(self) -> None:
         """Start a daemon and wait until it listens. Raises `TooLate` with its last words."""
         listens = threading.Event()
-        command = (*self._program, "--config", str(self.work / "host.toml"))
+        program = (*self._program, "--config", str(self.config))
         evidence.keep(self)
-        if module := module_of(command):
+        if module := module_of(program):
             self._daemon = fork_server().start(module, stderr=subprocess.PIPE)
         else:
-            self._daemon = subprocess.Popen(command, stderr=subprocess.PIPE)
+            self._daemon = subprocess.Popen(program, stderr=subprocess.PIPE)
         self._view, self.views, self._watching = {}, [], True
         self._known = replace(self._known, told=0, goals=frozenset())
-        self._run(self._keep_log, listens)
+        self._begin(self._keep_log, listens)
         if not listens.wait(READY_S) or self._daemon.poll() is not None:
             raise TooLate(f"the daemon does not listen:\n{evidence.logged(self.log_file)}")
-        self._run(self.watch)
+        self._begin(self.watch)
         self.until("a first view", lambda view: view, timeout_s=READY_S)
 
     def kill(self) -> None:
@@ -86,11 +95,12 @@ class RunningHost(Robot):
         self._daemon.kill()
         self._see_end()
 
-    def stop(self) -> None:
-        """Stop the daemon as an operator does, if it runs."""
-        if self._daemon is not None:
-            self._daemon.terminate()
-            self._see_end()
+    def stop(self, number: int = signal.SIGTERM) -> int | None:
+        """Stop the daemon by a signal, as an operator does, if it runs; returns its status."""
+        if self._daemon is None:
+            return None
+        self._daemon.send_signal(number)
+        return self._see_end()
 
     @property
     def pid(self) -> int:
@@ -102,6 +112,11 @@ class RunningHost(Robot):
     def runs(self) -> bool:
         """Whether a daemon was started and has neither been stopped nor killed here."""
         return self._daemon is not None
+
+    @property
+    def config(self) -> Path:
+        """What its daemons are told."""
+        return self.work / "host.toml"
 
     @property
     def log_file(self) -> Path:
@@ -140,6 +155,26 @@ class RunningHost(Robot):
     def want(self, pddl: str, kind: str = "maintain") -> str:
         """Give a goal; returns its id."""
         return str(self.ask("goal", pddl=pddl, kind=kind)["id"])
+
+    def run(self, *arguments: str | Path, **environment: str) -> Ran:
+        """Run the command line for this host."""
+        return nondum("--control", self.control, *arguments, **environment)
+
+    @contextmanager
+    def started(self, *arguments: str | Path) -> Iterator[subprocess.Popen[str]]:
+        """Run the command line for this host for as long as the context lasts."""
+        process = subprocess.Popen(
+            command("--control", self.control, *arguments),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=quiet_environment() | {"PYTHONUNBUFFERED": "1"},
+        )
+        with process:
+            try:
+                yield process
+            finally:
+                process.kill()
 
     # What people see
 
@@ -278,7 +313,7 @@ class RunningHost(Robot):
     def _last_words(self) -> str:
         return f"{super()._last_words()}\n{evidence.logged(self.log_file)}"
 
-    def _run(self, work: Any, *arguments: Any) -> None:
+    def _begin(self, work: Any, *arguments: Any) -> None:
         thread = threading.Thread(target=work, args=arguments, daemon=True)
         self._threads.append(thread)
         thread.start()
@@ -294,12 +329,13 @@ class RunningHost(Robot):
                     listens.set()
         listens.set()
 
-    def _see_end(self) -> None:
+    def _see_end(self) -> int:
         assert self._daemon is not None
-        self._daemon.wait(END_S)
+        status = self._daemon.wait(END_S)
         while self._threads:
             self._threads.pop().join(END_S)
         self._daemon = None
+        return status
 
 
 @dataclass(frozen=True)
@@ -323,13 +359,15 @@ def has_nothing(view: View) -> bool:
 
 @contextmanager
 def running(work: Path, **options: Any) -> Iterator[RunningHost]:
-    """A host that runs, and is stopped at last."""
+    """A host that runs, and that ends well when it is stopped at last, if it runs still."""
     host = RunningHost(work, **options)
     try:
         host.start()
         yield host
     finally:
-        host.stop()
+        status = host.stop()
+    assert status in (None, 0), host.log
+    assert "Traceback" not in host.log, host.log
 
 
 def payload(view: View, name: str) -> Row | None:

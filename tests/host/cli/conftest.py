@@ -9,17 +9,19 @@ from pathlib import Path
 from typing import Protocol
 
 import pytest
-from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, running
+from tests.kit.beacon import BEACON, HOST
 from tests.kit.payloads import Part
+from tests.kit.running_host import RunningHost, running
 
 
 @pytest.fixture(scope="module")
-def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningHost]:
     unwatched = "[workers]\nsettle_beats = 0\n"  # newer releases take over at once
-    with running(tmp_path_factory.mktemp("host"), unwatched) as daemon:
-        daemon.plug(BEACON_ID, Part("beacon", BEACON))
-        daemon.until_state(BEACON_ID, "active")
-        daemon.until(lambda view: any(row["ready"] for row in view["components"]))
+    with running(tmp_path_factory.mktemp("host"), name=HOST, more=unwatched) as daemon:
+        daemon.bring("beacon", Part("beacon", BEACON))
+        daemon.until(
+            "the beacon is ready", lambda view: any(row["ready"] for row in view["components"])
+        )
         yield daemon
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
+from demo.robot import View
 from tests.daemon.plugins import gauge, scribe, talker
-from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, nondum
+from tests.kit.beacon import BEACON, BEACON_ID
+from tests.kit.command_line import nondum
 from tests.kit.payloads import Part, make_payload
+from tests.kit.running_host import RunningHost
 
 from nondum.host.cli.mind import GLANCES
 from nondum.wheelhouse.lock import file_name
@@ -158,14 +160,14 @@ def test_payload_is_of_use_without_its_component_whose_fragments_are_wrong(
     assert left_out["payload"] == "org.example.half"
 
 
-def test_host_that_runs_needs_only_what_it_lacks(daemon: Daemon, shelf: Path) -> None:
+def test_host_that_runs_needs_only_what_it_lacks(daemon: RunningHost, shelf: Path) -> None:
     ran = daemon.run("advise", "(lit self)").ok()
     assert ran.out == "goal (lit self)\nit can be had now: test-beacon.shine\n"
     ways = daemon.run("advise", WRITTEN, "--wheelhouse", shelf, "--json").ok().json["ways"]
     assert len(ways) == 2
 
 
-def test_device_that_is_not_plugged_in_is_a_caveat(daemon: Daemon, tmp_path: Path) -> None:
+def test_device_that_is_not_plugged_in_is_a_caveat(daemon: RunningHost, tmp_path: Path) -> None:
     make_payload(tmp_path, gauge(), payload_id="org.example.gauge")
     ran = daemon.run("advise", "(measured self)", "--wheelhouse", tmp_path, "--json").ok()
     [way] = ran.json["ways"]
@@ -174,7 +176,7 @@ def test_device_that_is_not_plugged_in_is_a_caveat(daemon: Daemon, tmp_path: Pat
     assert caveat["need"] == "ID_MODEL=Gauge"
 
 
-def test_why_says_what_a_goal_lacks_and_what_would_help(daemon: Daemon, shelf: Path) -> None:
+def test_why_says_what_a_goal_lacks_and_what_would_help(daemon: RunningHost, shelf: Path) -> None:
     shown = daemon.run("why", "(found person self)", "--wheelhouse", shelf).ok().out
     assert shown.splitlines()[:2] == [
         "goal (found person self)",
@@ -183,14 +185,14 @@ def test_why_says_what_a_goal_lacks_and_what_would_help(daemon: Daemon, shelf: P
     assert "payloads that are known of would help" in shown
 
 
-def test_why_of_everything_says_what_would_help_each_goal(daemon: Daemon, shelf: Path) -> None:
+def test_why_of_everything_says_what_would_help_each_goal(daemon: RunningHost, shelf: Path) -> None:
     waiting = "(found person self)"
     ids = [daemon.run("goal", "--pddl", waiting, "--json").ok().json["id"] for _ in range(5)]
 
-    def are_suspended(view: dict[str, Any]) -> bool:
+    def are_suspended(view: View) -> bool:
         return {row["id"] for row in view["goals"] if row["state"] == "suspended"} >= {*ids}
 
-    daemon.until(are_suspended)
+    daemon.until("the goals are suspended", are_suspended)
     shown = daemon.run("why", "--wheelhouse", shelf).ok().out
     advice = daemon.run("why", "--wheelhouse", shelf, "--json").ok().json["advice"]
     daemon.run("halt").ok()
@@ -204,12 +206,12 @@ def test_why_of_everything_says_what_would_help_each_goal(daemon: Daemon, shelf:
     assert advice[-1] == {"goal": ids[-1]}
 
 
-def test_why_of_a_fact_that_holds_explains_the_fact(daemon: Daemon) -> None:
+def test_why_of_a_fact_that_holds_explains_the_fact(daemon: RunningHost) -> None:
     shown = daemon.run("why", "(self panther)").ok().out
     assert shown.startswith("(self panther) holds\nfor it: this is the host that plans")
 
 
-def test_why_of_a_goal_that_is_none_is_refused(daemon: Daemon) -> None:
+def test_why_of_a_goal_that_is_none_is_refused(daemon: RunningHost) -> None:
     daemon.run("why", "4711").refused(1, "GOAL_UNKNOWN there is no goal '4711'")
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import subprocess
 
 import pytest
-from tests.host.cli.daemon import BEACON_ID, BRIGHTNESS, LAMP, Daemon, nondum
+from tests.kit.beacon import BEACON_ID, BRIGHTNESS, LAMP
+from tests.kit.command_line import nondum
+from tests.kit.running_host import RunningHost
 
 
-def completed(daemon: Daemon, line: str) -> list[str]:
+def completed(daemon: RunningHost, line: str) -> list[str]:
     """What bash would offer for the last word of a line."""
     words = line.split(" ")
     ran = nondum(
@@ -41,11 +43,11 @@ def completed(daemon: Daemon, line: str) -> list[str]:
         ("nondum plan --j", ["--json"]),
     ],
 )
-def test_the_host_says_what_fits(daemon: Daemon, line: str, offered: list[str]) -> None:
+def test_the_host_says_what_fits(daemon: RunningHost, line: str, offered: list[str]) -> None:
     assert completed(daemon, line) == offered
 
 
-def test_open_goals_are_offered_to_be_halted(daemon: Daemon) -> None:
+def test_open_goals_are_offered_to_be_halted(daemon: RunningHost) -> None:
     id = daemon.run("goal", "--pddl", "(reported person self)", "--json").ok().json["id"]
     try:
         assert completed(daemon, "nondum halt --goal ") == [id]

@@ -10,35 +10,36 @@ from pathlib import Path
 import pytest
 from demo import slots
 from tests.daemon.plugins import gauge
-from tests.host.cli.daemon import Daemon, nondum, running
+from tests.kit.command_line import nondum
 from tests.kit.payloads import make_payload
+from tests.kit.running_host import RunningHost, running
 
-GAUGE = "org.example.gauge"
 SERVING = {"ID_MODEL": "Gauge", "ID_VENDOR_ID": "0403", "ID_MODEL_ID": "6001"}
 OTHER = {"ID_MODEL": "Knob", "SUBSYSTEM": "hidraw"}
 KEYS = {"ID_MODEL": "Keys", "SUBSYSTEM": "input", "ID_INPUT_KEYBOARD": "1"}
 
 
 @pytest.fixture(scope="module")
-def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningHost]:
     line, other = pty.openpty()
     with running(tmp_path_factory.mktemp("host")) as daemon:
-        folder = daemon.slots.parent / "devices"
         for name, properties in (("line", SERVING), ("knob", OTHER), ("keys", KEYS)):
-            slots.plug(folder, name, os.ttyname(other), properties)
-        daemon.plug(GAUGE, gauge())
-        daemon.until(lambda view: any(row["ready"] for row in view["components"]))
+            slots.plug(daemon.devices, name, os.ttyname(other), properties)
+        daemon.plug(daemon.drive("gauge", gauge()))
+        daemon.until(
+            "the gauge is ready", lambda view: any(row["ready"] for row in view["components"])
+        )
         yield daemon
     os.close(line)
     os.close(other)
 
 
-def rows(daemon: Daemon, *arguments: str) -> list[list[str]]:
+def rows(daemon: RunningHost, *arguments: str) -> list[list[str]]:
     shown = daemon.run("devices", *arguments).ok().out
     return [line.split("  ") for line in shown.splitlines()]
 
 
-def test_it_is_told_who_has_what_and_what_is_left_alone(daemon: Daemon) -> None:
+def test_it_is_told_who_has_what_and_what_is_left_alone(daemon: RunningHost) -> None:
     users = {row[0]: row[-1].strip() for row in rows(daemon)[1:]}
     assert users == {
         "keys": "left alone: it is a keyboard",
@@ -47,7 +48,7 @@ def test_it_is_told_who_has_what_and_what_is_left_alone(daemon: Daemon) -> None:
     }
 
 
-def test_data_have_all_that_is_known(daemon: Daemon) -> None:
+def test_data_have_all_that_is_known(daemon: RunningHost) -> None:
     shown = {row["device"]: row for row in daemon.run("devices", "--json").ok().json}
     line = shown["line"]
     assert (line["component"], line["need"], line["vendor"]) == ("gauge", "gauge", "0403")
@@ -56,7 +57,7 @@ def test_data_have_all_that_is_known(daemon: Daemon) -> None:
     assert [node["node"] for node in line["nodes"]] == [line["node"]]
 
 
-def test_why_tells_every_rule_and_what_was_found(daemon: Daemon) -> None:
+def test_why_tells_every_rule_and_what_was_found(daemon: RunningHost) -> None:
     said = daemon.run("devices", "--why", "knob").ok().out
     assert "  used by: nobody\n" in said
     assert "  gauge (gauge): does not match\n" in said
@@ -66,7 +67,7 @@ def test_why_tells_every_rule_and_what_was_found(daemon: Daemon) -> None:
     assert "it is a keyboard" in kept
 
 
-def test_device_may_be_named_by_its_node(daemon: Daemon) -> None:
+def test_device_may_be_named_by_its_node(daemon: RunningHost) -> None:
     ((line, *_),) = [row for row in rows(daemon) if row[0] == "line"]
     (shown,) = daemon.run("devices", line, "--json").ok().json
     name = Path(shown["node"]).name
@@ -74,20 +75,19 @@ def test_device_may_be_named_by_its_node(daemon: Daemon) -> None:
     assert "line" in {row["device"] for row in found}
 
 
-def test_device_that_is_none_is_refused(daemon: Daemon) -> None:
+def test_device_that_is_none_is_refused(daemon: RunningHost) -> None:
     daemon.run("devices", "nothing").refused(2, "DEVICE_UNKNOWN").refused(2, "keys, knob, line")
 
 
-def test_software_for_a_device_without_is_named(daemon: Daemon, tmp_path: Path) -> None:
+def test_software_for_a_device_without_is_named(daemon: RunningHost, tmp_path: Path) -> None:
     folder = tmp_path / "shelf"
     make_payload(folder, gauge("meter"), payload_id="org.example.meter")
-    devices = daemon.slots.parent / "devices"
-    slots.plug(devices, "second", "/dev/null", SERVING)
+    slots.plug(daemon.devices, "second", "/dev/null", SERVING)
     try:
-        daemon.until(lambda _: len(rows(daemon)) == 5)
+        daemon.until("the second one is shown", lambda _: len(rows(daemon)) == 5)
         said = daemon.run("devices", "--wheelhouse", folder).ok().out
     finally:
-        slots.unplug(devices, "second")
+        slots.unplug(daemon.devices, "second")
     assert "second: nothing here drives Gauge; org.example.meter 1.0 (" in said
     gone = daemon.run("devices", "--all").ok().out
     assert "at second" in gone

@@ -8,7 +8,8 @@ import socket
 from pathlib import Path
 
 import pytest
-from tests.host.cli.daemon import nondum, running
+from tests.kit.command_line import nondum
+from tests.kit.running_host import running
 
 
 def test_every_finding_has_its_place_in_the_table() -> None:
@@ -59,17 +60,16 @@ def test_it_tells_which_disks_are_whose() -> None:
 
 def test_everything_is_looked_at_for_who_asks_for_nothing_in_particular(tmp_path: Path) -> None:
     """And what is bad has an exit code of its own."""
-    with running(tmp_path) as daemon:
-        config = daemon.root / "host.toml"
-        told = nondum("doctor", "--user", "--config", config, "--json")
+    with running(tmp_path, name="panther") as host:
+        told = nondum("doctor", "--user", "--config", host.config, "--json")
         found = {one["check"]: one for one in told.json["findings"]}
         is_bad = any(one["result"] == "bad" for one in found.values())
         assert (told.code, told.json["ok"]) == ((3, False) if is_bad else (0, True))
-        assert found["config"]["detail"] == f"{config} is right"
+        assert found["config"]["detail"] == f"{host.config} is right"
         assert found["daemon"]["detail"].startswith("panther answers")
         assert all(bool(one["fix"]) or one["result"] == "ok" for one in told.json["findings"])
-    config.write_text("[hots]\n", encoding="utf-8")
-    shown = nondum("doctor", "--user", "--config", config)
+    host.config.write_text("[hots]\n", encoding="utf-8")
+    shown = nondum("doctor", "--user", "--config", host.config)
     assert shown.code == 3
     assert shown.out.splitlines()[0].split() == ["RESULT", "CHECK", "SUBJECT", "DETAIL"]
     assert "→ config: correct it" in shown.out

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.host.cli.daemon import nondum
+from tests.kit.command_line import nondum
 
 from nondum.sdk import codes
 

@@ -7,8 +7,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from tests.host.cli.daemon import Daemon, command, nondum, quiet_environment, running, write_config
-from tests.kit.until import PATIENCE_S
+from tests.kit.command_line import command, nondum, quiet_environment
+from tests.kit.running_host import RunningHost, running
 
 
 def host_run(*arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -55,11 +55,12 @@ def test_a_configuration_that_is_not_there_is_told(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["Spot 7", "a--b", "-a", "", "spot_7"])
 def test_a_name_is_held_to_the_rules_of_the_configuration(tmp_path: Path, name: str) -> None:
-    refused(host_run("--config", write_config(tmp_path), "--name", name), "is not a host name")
+    config = RunningHost(tmp_path).config
+    refused(host_run("--config", config, "--name", name), "is not a host name")
 
 
 def test_a_system_tree_that_is_none_is_told(tmp_path: Path) -> None:
-    config = write_config(tmp_path)
+    config = RunningHost(tmp_path).config
     text = config.read_text(encoding="utf-8")
     tree = '[host]\nsystem_tree = "nobody.knows:it"'
     config.write_text(text.replace("[host]", tree), encoding="utf-8")
@@ -67,37 +68,36 @@ def test_a_system_tree_that_is_none_is_told(tmp_path: Path) -> None:
 
 
 def test_a_state_folder_that_cannot_be_is_told(tmp_path: Path) -> None:
-    config = write_config(tmp_path)
-    (tmp_path / "state").write_text("a file", encoding="utf-8")
-    refused(host_run("--config", config), "STATE_UNWRITABLE", str(tmp_path / "state"))
+    host = RunningHost(tmp_path)
+    host.state.write_text("a file", encoding="utf-8")
+    refused(host_run("--config", host.config), "STATE_UNWRITABLE", str(host.state))
 
 
 def test_every_slot_folder_that_cannot_be_is_told(tmp_path: Path) -> None:
-    config = write_config(tmp_path)
-    for name in ("slots", "devices"):
-        (tmp_path / name).rmdir()
-        (tmp_path / name).write_text("a file", encoding="utf-8")
-    done = host_run("--config", config)
-    refused(done, f"CONFIG_FOLDER {tmp_path}/slots", f"CONFIG_FOLDER {tmp_path}/devices")
+    host = RunningHost(tmp_path)
+    for folder in (host.slots, host.devices):
+        folder.rmdir()
+        folder.write_text("a file", encoding="utf-8")
+    done = host_run("--config", host.config)
+    refused(done, f"CONFIG_FOLDER {host.slots}", f"CONFIG_FOLDER {host.devices}")
 
 
 def test_two_hosts_cannot_share_state_or_socket(tmp_path: Path) -> None:
-    with running(tmp_path) as daemon:
-        refused(host_run("--config", daemon.root / "host.toml"), "ALREADY_RUNNING")
-        other = daemon.root / "other.toml"
-        text = (daemon.root / "host.toml").read_text(encoding="utf-8")
+    with running(tmp_path, name="panther") as host:
+        refused(host_run("--config", host.config), "ALREADY_RUNNING")
+        other = tmp_path / "other.toml"
+        text = host.config.read_text(encoding="utf-8")
         other.write_text(text.replace("/state", "/state-2"), encoding="utf-8")
         refused(host_run("--config", other), "CONTROL_IN_USE")
-        assert daemon.run("status").ok().out.startswith("host panther")
+        assert host.run("status").ok().out.startswith("host panther")
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_host_ends_well_when_told_to(tmp_path: Path, number: signal.Signals) -> None:
-    with running(tmp_path) as daemon:
-        daemon.process.send_signal(number)
-        assert daemon.process.wait(PATIENCE_S) == 0
-        assert daemon.log.splitlines()[-1].partition("listens at")[1], daemon.log
-        daemon.run("status").refused(4, "HOST_UNREACHABLE")
+    with running(tmp_path) as host:
+        assert host.stop(number) == 0
+        assert host.log.splitlines()[-1].partition("listens at")[1], host.log
+        host.run("status").refused(4, "HOST_UNREACHABLE")
 
 
 def test_defaults_of_a_user_need_no_configuration(tmp_path: Path) -> None:
@@ -108,11 +108,10 @@ def test_defaults_of_a_user_need_no_configuration(tmp_path: Path) -> None:
         text=True,
         env=quiet_environment() | places,
     )
-    daemon = Daemon(tmp_path, process)
     assert process.stderr is not None
     with process:
         try:
             assert any("listens at" in line for line in process.stderr)
             assert nondum("status", **places).ok().out.startswith("host lone-host")
         finally:
-            daemon.process.terminate()
+            process.terminate()

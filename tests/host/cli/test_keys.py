@@ -6,8 +6,10 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from tests.host.cli.daemon import BEACON, BEACON_ID, nondum, running
+from tests.kit.beacon import BEACON, BEACON_ID
+from tests.kit.command_line import nondum
 from tests.kit.payloads import Part, make_payload
+from tests.kit.running_host import running
 from tests.kit.signing import MADE, Key
 
 from nondum.wheelhouse.trust import editing, owners_folder, trust_file
@@ -135,7 +137,7 @@ def test_a_host_is_given_its_trust_and_keeps_to_it(owner: Path) -> None:
     trust, alice = owner / "trust.toml", owner / "alice"
     drive = owner / "drive"
     make_payload(drive, Part("beacon", BEACON), payload_id=BEACON_ID)
-    with running(owner / "host", allow_unsigned=False) as host:
+    with running(owner / "host", trust=owner / "host/trust.toml") as host:
         assert "trusts nobody" in host.run("status").ok().out
         host.run("payload", "install", drive).refused(1, "SIG_MISSING")
         nondum("payload", "sign", drive, "--key", alice).ok()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.host.cli.daemon import nondum
+from tests.kit.command_line import nondum
 from tests.kit.payloads import Part, make_payload
 
 LAMP = "from nondum.sdk import hookimpl\n"

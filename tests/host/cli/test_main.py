@@ -13,7 +13,7 @@ from pathlib import Path
 import click
 import pytest
 from tests.host.cli.conftest import Answering
-from tests.host.cli.daemon import command, in_terminal, nondum, quiet_environment
+from tests.kit.command_line import command, in_terminal, nondum, quiet_environment
 
 from nondum.host.cli.main import COMMANDS, cli
 

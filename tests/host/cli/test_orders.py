@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import signal
 from collections.abc import Iterator
-from typing import Any
 
 import pytest
-from tests.host.cli.daemon import BEACON, BEACON_ID, BRIGHTNESS, LAMP, Daemon
+from tests.kit.beacon import BEACON, BEACON_ID, BRIGHTNESS, LAMP
 from tests.kit.payloads import Part, make_payload
+from tests.kit.running_host import RunningHost, goal
 
 from nondum.sdk.description import PluginDescription
 
@@ -27,19 +27,19 @@ TORCH_ID = "org.example.torch"
 
 
 @pytest.fixture(autouse=True)
-def at_rest(daemon: Daemon) -> Iterator[None]:
+def at_rest(daemon: RunningHost) -> Iterator[None]:
     """Each test finds, and leaves, a host that does nothing."""
     yield
     daemon.run("halt", "--now").ok()
-    daemon.until(lambda view: not view["plan"]["steps"])
+    daemon.until("nothing is done", lambda view: not view["plan"]["steps"])
 
 
-def goal(view: dict[str, Any], id: str) -> dict[str, Any]:
-    found: dict[str, Any] = next(row for row in view["goals"] if row["id"] == id)
-    return found
+def until_alone(daemon: RunningHost) -> None:
+    """Wait until the beacon is the only payload."""
+    daemon.until("the beacon is alone", lambda view: len(view["payloads"]) == 1)
 
 
-def test_a_goal_in_words_is_kept_up(daemon: Daemon) -> None:
+def test_a_goal_in_words_is_kept_up(daemon: RunningHost) -> None:
     given = daemon.run("goal", "shine", "for", "all", "--wait", "--json").ok().json
     assert (given["text"], given["kind"], given["state"]) == ("shine for all", "maintain", "active")
     assert given["holds"]
@@ -49,56 +49,57 @@ def test_a_goal_in_words_is_kept_up(daemon: Daemon) -> None:
     assert f"1     {SHINE}" in daemon.run("plan").ok().out
 
 
-def test_a_goal_is_reached_while_another_is_kept_up(daemon: Daemon) -> None:
+def test_a_goal_is_reached_while_another_is_kept_up(daemon: RunningHost) -> None:
     daemon.run("goal", "shine", "--wait").ok()
     reached = daemon.run("goal", "greet people", "--wait").ok().out
     assert reached.split("  ")[1:] == ["(greeted person panther)", "reached", "it holds\n"]
 
 
-def test_a_goal_in_pddl_is_understood(daemon: Daemon) -> None:
+def test_a_goal_in_pddl_is_understood(daemon: RunningHost) -> None:
     given = daemon.run("goal", "--pddl", "(lit self)", "--maintain", "--wait", "--json").ok().json
     assert (given["goal"], given["kind"], given["holds"]) == ("(lit panther)", "maintain", True)
 
 
-def test_words_that_ask_for_nothing_are_refused_with_the_nearest(daemon: Daemon) -> None:
+def test_words_that_ask_for_nothing_are_refused_with_the_nearest(daemon: RunningHost) -> None:
     daemon.run("goal", "shien", "brightly").refused(1, "PHRASE_")
 
 
-def test_pddl_amiss_is_refused_with_a_caret(daemon: Daemon) -> None:
+def test_pddl_amiss_is_refused_with_a_caret(daemon: RunningHost) -> None:
     ran = daemon.run("goal", "--pddl", "(lit nobody)").refused(1, "(lit nobody)\n")
     assert ran.err.rstrip().endswith("^\n→ declare it, or correct its spelling")
 
 
-def test_a_goal_without_a_plan_says_what_is_missing(daemon: Daemon) -> None:
+def test_a_goal_without_a_plan_says_what_is_missing(daemon: RunningHost) -> None:
     ran = daemon.run("goal", "--pddl", "(reported person self)", "--wait")
     assert ran.code == 1
     assert "suspended" in ran.out
     assert "WHY_" in ran.out
-    daemon.until(lambda view: view["state"] == "ready")
+    daemon.until("the host is ready", lambda view: view["state"] == "ready")
     assert "WHY_" in daemon.run("why").ok().out
 
 
-def test_halting_one_goal_leaves_the_others(daemon: Daemon) -> None:
+def test_halting_one_goal_leaves_the_others(daemon: RunningHost) -> None:
     first = daemon.run("goal", "shine", "--wait", "--json").ok().json["id"]
     second = daemon.run("goal", "--pddl", "(reported person self)", "--json").ok().json["id"]
     halted = daemon.run("halt", "--goal", second, "--json").ok().json
     assert halted == {"goals": [second], "halted": []}
-    view = daemon.until(lambda view: goal(view, second)["state"] == "halted")
-    assert goal(view, first)["state"] == "active"
+    daemon.until_goal(second, "halted")
+    kept = goal(daemon.view, first)
+    assert kept and kept["state"] == "active"
 
 
-def test_halting_now_halts_what_runs(daemon: Daemon) -> None:
+def test_halting_now_halts_what_runs(daemon: RunningHost) -> None:
     id = daemon.run("goal", "shine", "--wait", "--json").ok().json["id"]
     shown = daemon.run("halt", "--now").ok().out
     assert shown == f"goal {id} is halted\nhalting {SHINE}\n"
     assert daemon.run("halt").ok().out == "nothing was asked for, nothing was running\n"
 
 
-def test_a_goal_that_is_none_cannot_be_halted(daemon: Daemon) -> None:
+def test_a_goal_that_is_none_cannot_be_halted(daemon: RunningHost) -> None:
     daemon.run("halt", "--goal", "999").refused(1, "GOAL_UNKNOWN")
 
 
-def test_a_mount_is_told_and_what_is_not_said_stays(daemon: Daemon) -> None:
+def test_a_mount_is_told_and_what_is_not_said_stays(daemon: RunningHost) -> None:
     shown = daemon.run("mount", LAMP, "--xyz", "0.1", "-0.2", "0.4").ok().out
     assert shown == f"{LAMP} is mounted at xyz 0.1 -0.2 0.4, rpy 0 0 0\n"
     turned = daemon.run("mount", LAMP, "--rpy", "0", "0", "-1.5", "--json").ok().json
@@ -107,23 +108,23 @@ def test_a_mount_is_told_and_what_is_not_said_stays(daemon: Daemon) -> None:
     assert (unit["xyz"], unit["rpy"], unit["mount"]) == ([0.1, -0.2, 0.4], [0, 0, -1.5], "person")
 
 
-def test_an_implausible_mount_is_doubted(daemon: Daemon) -> None:
+def test_an_implausible_mount_is_doubted(daemon: RunningHost) -> None:
     ran = daemon.run("mount", LAMP, "--xyz", "400", "0", "0", "--rpy", "0", "0", "90")
     assert ran.code == 0
     assert "metres are meant" in ran.err
     assert "radians are meant, not degrees" in ran.err
 
 
-def test_no_place_at_all_is_refused(daemon: Daemon) -> None:
+def test_no_place_at_all_is_refused(daemon: RunningHost) -> None:
     daemon.run("mount", LAMP, "--xyz", "nan", "0", "0").refused(1, "CONTROL_ARGUMENT")
 
 
-def test_a_unit_that_is_none_is_refused_with_the_nearest(daemon: Daemon) -> None:
+def test_a_unit_that_is_none_is_refused_with_the_nearest(daemon: RunningHost) -> None:
     ran = daemon.run("mount", "panther__beacon__lmap", "--xyz", "0", "0", "0")
     ran.refused(1, "UNIT_UNKNOWN").refused(1, f"did you mean '{LAMP}'?")
 
 
-def test_a_stream_is_followed_message_by_message(daemon: Daemon) -> None:
+def test_a_stream_is_followed_message_by_message(daemon: RunningHost) -> None:
     daemon.run("goal", "shine", "--wait").ok()
     lines = daemon.run("streams", "--follow", BRIGHTNESS, "--count", "3", "--json").ok().out
     messages = [json.loads(line) for line in lines.splitlines()]
@@ -134,32 +135,30 @@ def test_a_stream_is_followed_message_by_message(daemon: Daemon) -> None:
     assert shown.split("  ")[1:] == [LAMP, shown.split("  ")[2], "value=0.5 unit=1\n"]
 
 
-def test_a_stream_ends_with_its_component(daemon: Daemon) -> None:
-    source = BEACON.replace("beacon", "torch")
-    daemon.plug("org.example.torch", Part("torch", source))
-    daemon.until_state("org.example.torch", "active")
+def test_a_stream_ends_with_its_component(daemon: RunningHost) -> None:
+    daemon.bring("torch", Part("torch", BEACON.replace("beacon", "torch")))
     daemon.run(
         "goal", "--pddl", "(flowing panther__torch__brightness)", "--maintain", "--wait"
     ).ok()
     with daemon.started("streams", "-f", "panther__torch__brightness") as process:
         assert process.stdout is not None
         assert "panther__torch__lamp" in process.stdout.readline()
-        daemon.pull("org.example.torch")
+        daemon.pull("torch")
         _, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (0, "panther__torch__brightness has ended\n")
-    daemon.until(lambda view: len(view["payloads"]) == 1)
+    until_alone(daemon)
 
 
-def test_what_is_sound_is_not_tried_again(daemon: Daemon) -> None:
+def test_what_is_sound_is_not_tried_again(daemon: RunningHost) -> None:
     daemon.run("retry", BEACON_ID).refused(1, "RETRY_NOTHING")
     daemon.run("retry", "org.example.baecon").refused(1, "did you mean 'org.example.beacon'?")
 
 
-def test_what_was_refused_is_told_and_tried_again(daemon: Daemon) -> None:
+def test_what_was_refused_is_told_and_tried_again(daemon: RunningHost) -> None:
     said = PluginDescription("test-broken", "1.0")
     broken = Part("broken", "raise RuntimeError('no bulb')", description=said)
-    daemon.plug("org.example.broken", broken)
-    row = daemon.until_state("org.example.broken", "quarantined")
+    daemon.plug(daemon.drive("broken", broken))
+    row = daemon.until_step("broken", "quarantined")
     assert "IMPORT_FAILED" in row["codes"]
     status = daemon.run("status").ok().out
     assert "ready, with problems" in status
@@ -167,15 +166,15 @@ def test_what_was_refused_is_told_and_tried_again(daemon: Daemon) -> None:
     assert "no bulb" in daemon.run("why").ok().out
     retried = daemon.run("retry", "org.example.broken", "--json").ok().json
     assert retried == {"payloads": ["org.example.broken"]}
-    daemon.until_state("org.example.broken", "quarantined")
-    daemon.pull("org.example.broken")
-    daemon.until(lambda view: len(view["payloads"]) == 1)
+    daemon.until_step("broken", "quarantined")
+    daemon.pull("broken")
+    until_alone(daemon)
 
 
-def test_a_payload_is_installed_for_good_and_removed(daemon: Daemon) -> None:
-    drive = daemon.root / "drives/torch-to-install"
+def test_a_payload_is_installed_for_good_and_removed(daemon: RunningHost) -> None:
+    drive = daemon.work / "drives/torch-to-install"
     torch = Part("torch", BEACON.replace("beacon", "torch"))
-    make_payload(drive, torch, payload_id="org.example.torch")
+    make_payload(drive, torch, payload_id=TORCH_ID)
     shown = daemon.run("payload", "install", drive).ok().out
     assert shown == "installed org.example.torch 1.0\n"
     daemon.run("payload", "install", drive).refused(1, "ALREADY_PRESENT")
@@ -184,8 +183,8 @@ def test_a_payload_is_installed_for_good_and_removed(daemon: Daemon) -> None:
     daemon.run("payload", "uninstall", "org.example.torch").refused(1, "NOT_INSTALLED")
 
 
-def test_a_payload_is_taken_back_to_the_release_before(daemon: Daemon) -> None:
-    drives = {n: daemon.root / f"drives/torch-{n}" for n in (1, 2)}
+def test_a_payload_is_taken_back_to_the_release_before(daemon: RunningHost) -> None:
+    drives = {n: daemon.work / f"drives/torch-{n}" for n in (1, 2)}
     for release, drive in drives.items():
         version = f"{release}.0"
         torch = Part("torch", BEACON.replace("beacon", "torch"), version=version)
@@ -204,26 +203,27 @@ def test_a_payload_is_taken_back_to_the_release_before(daemon: Daemon) -> None:
     assert "1 (gone back from 2)" in daemon.run("components").ok().out
     daemon.run("retry", TORCH_ID).ok()
     daemon.until(
-        lambda view: {r["release"]: r["state"] for r in view["payloads"]}.get(2) == "active"
+        "release 2 is active",
+        lambda view: {r["release"]: r["state"] for r in view["payloads"]}.get(2) == "active",
     )
     daemon.run("payload", "uninstall", TORCH_ID).ok()
 
 
-def test_what_cannot_be_installed_leaves_nothing(daemon: Daemon) -> None:
-    drive = daemon.root / "drives/broken-to-install"
+def test_what_cannot_be_installed_leaves_nothing(daemon: RunningHost) -> None:
+    drive = daemon.work / "drives/broken-to-install"
     said = PluginDescription("test-broken", "1.0")
     broken = Part("broken", "raise RuntimeError('no bulb')", description=said)
     make_payload(drive, broken, payload_id="org.example.broken")
     daemon.run("payload", "install", drive).refused(1, "no bulb")
-    daemon.until(lambda view: len(view["payloads"]) == 1)
+    until_alone(daemon)
 
 
-def test_an_interrupted_installation_leaves_nothing(daemon: Daemon) -> None:
-    drive = daemon.root / "drives/slow-to-install"
+def test_an_interrupted_installation_leaves_nothing(daemon: RunningHost) -> None:
+    drive = daemon.work / "drives/slow-to-install"
     slow = Part("slow", SLOW)
     make_payload(drive, slow, payload_id="org.example.slow")
     with daemon.started("payload", "install", drive) as process:
-        daemon.until_state("org.example.slow", "stored")
+        daemon.until_step("slow", "stored")
         process.send_signal(signal.SIGINT)
         assert process.wait(timeout=60) == 130
-        daemon.until(lambda view: len(view["payloads"]) == 1)
+        until_alone(daemon)

@@ -6,7 +6,8 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.host.cli.daemon import BEACON, BEACON_ID, in_terminal, nondum
+from tests.kit.beacon import BEACON, BEACON_ID
+from tests.kit.command_line import in_terminal, nondum
 from tests.kit.payloads import Part, make_payload
 from tests.kit.signing import Key
 

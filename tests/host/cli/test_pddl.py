@@ -9,7 +9,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from tests.host.cli.daemon import Ran, at_terminal, command, nondum, quiet_environment
+from tests.kit.command_line import Ran, at_terminal, command, nondum, quiet_environment
 from tests.kit.endless_problem import ENDLESS, endless
 from tests.kit.until import PATIENCE_S, until
 from tests.planning.differential.texts import TEXTS

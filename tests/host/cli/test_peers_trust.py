@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.host.cli.daemon import Ran, command, nondum, quiet_environment
 from tests.host.peers.hints import Network
+from tests.kit.command_line import Ran, command, nondum, quiet_environment
 
 from nondum.host.control.arguments import Arguments
 from nondum.host.control.server import ControlServer

@@ -8,7 +8,8 @@ from datetime import datetime
 from typing import Any
 
 import pytest
-from tests.host.cli.daemon import BEACON_ID, BRIGHTNESS, LAMP, Daemon
+from tests.kit.beacon import BEACON_ID, BRIGHTNESS, LAMP
+from tests.kit.running_host import RunningHost
 
 GOAL_KEYS = {"id", "goal", "text", "kind", "priority", "state", "reason", "problems", "holds"}
 ROWS: dict[str, set[str]] = {
@@ -95,8 +96,8 @@ host panther  revision N  ready
 warning: payloads without a signature are accepted (allow_unsigned)
 workers are confined at level N: WALLS
 
-PAYLOAD             VERSION  AGE  STATE   DRIVE               COMPONENTS
-org.example.beacon  1.0      AGE  active  org.example.beacon  beacon
+PAYLOAD             VERSION  AGE  STATE   DRIVE   COMPONENTS
+org.example.beacon  1.0      AGE  active  beacon  beacon
 
 > beacon is here: it can greet, shine
 """
@@ -175,18 +176,18 @@ def normalised(text: str) -> str:
     return re.sub(r"(revision|world model  —|people  —) \d+", r"\1 N", text)
 
 
-def rows(daemon: Daemon, *arguments: str) -> list[dict[str, Any]]:
+def rows(daemon: RunningHost, *arguments: str) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = daemon.run(*arguments, "--json").ok().json
     return found
 
 
 @pytest.mark.parametrize("verb", SHOWN)
-def test_a_hundred_columns_are_enough(daemon: Daemon, verb: str) -> None:
+def test_a_hundred_columns_are_enough(daemon: RunningHost, verb: str) -> None:
     assert normalised(daemon.run(verb, COLUMNS="100").ok().out) == SHOWN[verb]
 
 
 @pytest.mark.parametrize("verb", ROWS)
-def test_rows_have_these_keys_in_json(daemon: Daemon, verb: str) -> None:
+def test_rows_have_these_keys_in_json(daemon: RunningHost, verb: str) -> None:
     found = rows(daemon, verb)
     assert found
     for row in found:
@@ -194,12 +195,12 @@ def test_rows_have_these_keys_in_json(daemon: Daemon, verb: str) -> None:
 
 
 @pytest.mark.parametrize("verb", VIEWS)
-def test_views_have_these_keys_in_json(daemon: Daemon, verb: str) -> None:
+def test_views_have_these_keys_in_json(daemon: RunningHost, verb: str) -> None:
     assert daemon.run(verb, "--json").ok().json.keys() == VIEWS[verb]
 
 
 @pytest.mark.parametrize("verb", ["status", "components"])
-def test_a_payload_is_as_old_as_it_says(daemon: Daemon, verb: str) -> None:
+def test_a_payload_is_as_old_as_it_says(daemon: RunningHost, verb: str) -> None:
     before_s = time.time()
     told = daemon.run(verb, "--json").ok().json
     after_s = time.time()
@@ -208,49 +209,49 @@ def test_a_payload_is_as_old_as_it_says(daemon: Daemon, verb: str) -> None:
     assert before_s <= asked_s <= after_s
 
 
-def test_a_payload_has_these_keys_and_phases(daemon: Daemon) -> None:
+def test_a_payload_has_these_keys_and_phases(daemon: RunningHost) -> None:
     (payload,) = daemon.run("status", "--json").ok().json["payloads"]
     assert payload.keys() == PAYLOAD_KEYS
     phases = [payload["phases"][name] for name in ("seen", "verified", "installed", "ready")]
     assert phases == sorted(phases)
 
 
-def test_a_pipe_folds_nothing(daemon: Daemon) -> None:
+def test_a_pipe_folds_nothing(daemon: RunningHost) -> None:
     lines = daemon.run("journal").ok().out.splitlines()
     assert any(line.split()[2:] and "DriveInserted" in line for line in lines)
     assert max(map(len, lines)) > 100
 
 
-def test_the_journal_tells_a_payload_step_by_step(daemon: Daemon) -> None:
+def test_the_journal_tells_a_payload_step_by_step(daemon: RunningHost) -> None:
     found = rows(daemon, "journal", "--subject", BEACON_ID)
     steps = [row["step"] for row in found if row["step"]]
     assert steps == ["received", "copied", "verified", "staged", "stored", "probed", "active"]
     assert rows(daemon, "journal", "--subject", BEACON_ID, "--limit", "2") == found[-2:]
 
 
-def test_the_journal_is_silent_of_strangers(daemon: Daemon) -> None:
+def test_the_journal_is_silent_of_strangers(daemon: RunningHost) -> None:
     shown = daemon.run("journal", "--subject", "nobody").ok().out
     assert shown == "the journal says nothing of it\n"
 
 
-def test_logs_are_lines_with_time_component_and_level(daemon: Daemon) -> None:
+def test_logs_are_lines_with_time_component_and_level(daemon: RunningHost) -> None:
     shown = normalised(daemon.run("logs", "beacon").ok().out).splitlines()
     assert "WHEN  beacon  info  polished" in shown
     assert "WHEN  beacon  stdout  plain words" in shown
 
 
-def test_logs_of_a_stranger_are_refused_with_the_nearest(daemon: Daemon) -> None:
+def test_logs_of_a_stranger_are_refused_with_the_nearest(daemon: RunningHost) -> None:
     daemon.run("logs", "baecon").refused(1, "COMPONENT_UNKNOWN").refused(1, "'beacon'?")
 
 
-def test_the_store_says_who_needs_what(daemon: Daemon) -> None:
+def test_the_store_says_who_needs_what(daemon: RunningHost) -> None:
     shown = daemon.run("store").ok().out.splitlines()
     own = next(line for line in shown if line.startswith("test_beacon-1.0"))
     assert BEACON_ID in own
     assert re.fullmatch(r"4 wheels, \d+\.\d MB", shown[-1])
 
 
-def test_one_fact_is_explained_whether_it_is_true_or_not(daemon: Daemon) -> None:
+def test_one_fact_is_explained_whether_it_is_true_or_not(daemon: RunningHost) -> None:
     shown = re.sub(
         r"\d+ s ago", "AGE ago", daemon.run("facts", "--why", f"(ready {LAMP})").ok().out
     )
@@ -267,19 +268,19 @@ def test_one_fact_is_explained_whether_it_is_true_or_not(daemon: Daemon) -> None
     )
 
 
-def test_a_fact_amiss_gets_the_nearest_words(daemon: Daemon) -> None:
+def test_a_fact_amiss_gets_the_nearest_words(daemon: RunningHost) -> None:
     assert "did you mean 'flowing'?" in daemon.run("facts", "--why", "flowin x").ok().out
     assert "did you mean 'panther'?" in daemon.run("facts", "--why", "(lit panter)").ok().out
     arity = daemon.run("facts", "--why", "lit", "--json").ok().json
     assert arity["hint"] == "'lit' takes 1 arguments, not 0"
 
 
-def test_nothing_is_parked(daemon: Daemon) -> None:
+def test_nothing_is_parked(daemon: RunningHost) -> None:
     assert daemon.run("facts", "--parked").ok().out == "nothing waits for an object\n"
     daemon.run("facts", "--parked", "--why", "lit").refused(2, "choose one")
 
 
-def test_a_stream_that_is_none_is_refused_with_the_nearest(daemon: Daemon) -> None:
+def test_a_stream_that_is_none_is_refused_with_the_nearest(daemon: RunningHost) -> None:
     ran = daemon.run("streams", "--follow", "panther__beacon__brightnes")
     ran.refused(1, "STREAM_UNKNOWN").refused(1, f"did you mean '{BRIGHTNESS}'?")
 
@@ -287,7 +288,7 @@ def test_a_stream_that_is_none_is_refused_with_the_nearest(daemon: Daemon) -> No
 @pytest.mark.parametrize(
     "follow", [["status", "-f"], ["tree", "-f"], ["tree", "--watch"]], ids=" ".join
 )
-def test_following_draws_what_asking_does(daemon: Daemon, follow: list[str]) -> None:
+def test_following_draws_what_asking_does(daemon: RunningHost, follow: list[str]) -> None:
     with daemon.started(*follow) as process:
         assert process.stdout is not None
         first = process.stdout.readline()

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
-from tests.host.cli.daemon import BEACON, running
+from demo.robot import View
+from tests.kit.beacon import BEACON
 from tests.kit.payloads import Part
+from tests.kit.running_host import running
 
 ECHO = """
 '''Hears what it has been told, and answers.'''
@@ -57,32 +58,33 @@ def listen(ctx):
 
 
 def test_robot_is_told_by_voice_and_answers(tmp_path: Path) -> None:
-    with running(tmp_path) as daemon:
+    with running(tmp_path) as host:
         for id, source in (("beacon", BEACON), ("mute", MUTE), ("echo", ECHO)):
-            daemon.plug(f"org.example.{id}", Part(id, source))
-        daemon.until(lambda view: [r["ready"] for r in view["components"]] == [True] * 3)
-        daemon.run("goal", "shine", "--wait").ok()
+            host.plug(host.drive(id, Part(id, source)))
+        host.until("all are ready", lambda view: are_ready(view, 3))
+        host.run("goal", "shine", "--wait").ok()
 
-        def greeted(view: dict[str, Any]) -> bool:
-            return any((g["text"], g["holds"]) == ("greet people", True) for g in view["goals"])
+        def greeted(view: View) -> View | None:
+            goals = [(goal["text"], goal["holds"]) for goal in view["goals"]]
+            return view if ("greet people", True) in goals else None
 
-        view = daemon.until(greeted)
+        view = host.until("the goal that was heard holds", greeted)
     told = [row["text"] for row in view["told"]]
     assert any(text.startswith("echo heard 'mumble mumble': PHRASE_UNKNOWN") for text in told)
     assert "echo heard 'greet people': that is goal 2" in told
 
 
 def test_listener_learns_what_can_be_said_and_when_that_changes(tmp_path: Path) -> None:
-    with running(tmp_path) as daemon:
-        daemon.plug("org.example.pupil", Part("pupil", PUPIL))
-        daemon.until(lambda view: [r["ready"] for r in view["components"]] == [True])
-        daemon.plug("org.example.beacon", Part("beacon", BEACON))
-        beacon = "'learnt greet {class} shine [for {text}] people person'"
-        daemon.until(lambda view: _was_told(view, f"pupil heard {beacon}"))
+    with running(tmp_path) as host:
+        host.plug(host.drive("pupil", Part("pupil", PUPIL)))
+        host.until("the pupil is ready", lambda view: are_ready(view, 1))
+        host.plug(host.drive("beacon", Part("beacon", BEACON)))
+        host.until_told("pupil heard 'learnt greet {class} shine [for {text}] people person'")
         lamp = BEACON.replace("shine [for {words:text}]", "light up")
-        daemon.plug("org.example.lamp", Part("lamp", lamp))
-        daemon.until(lambda view: _was_told(view, "light up"))
+        host.plug(host.drive("lamp", Part("lamp", lamp)))
+        host.until_told("light up")
 
 
-def _was_told(view: dict[str, Any], words: str) -> bool:
-    return any(words in row["text"] for row in view["told"])
+def are_ready(view: View, count: int) -> bool:
+    """Whether there are so many components, all ready."""
+    return [row["ready"] for row in view["components"]] == [True] * count

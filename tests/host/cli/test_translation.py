@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from tests.host.cli.daemon import BEACON, BEACON_ID, Daemon, at_terminal, running
+from demo.robot import View
+from tests.kit.beacon import BEACON
+from tests.kit.command_line import at_terminal
 from tests.kit.payloads import Part
+from tests.kit.running_host import RunningHost, running
 
 INTERPRETER = """
 '''Understands what it is told to.'''
@@ -45,50 +48,57 @@ LIT = "understood by interpreter as maintain (lit panther)"
 
 
 @pytest.fixture(scope="module")
-def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningHost]:
     patience = "[planning]\ntranslate_s = 1.0\n"
-    with running(tmp_path_factory.mktemp("host"), patience) as daemon:
-        daemon.plug(BEACON_ID, Part("beacon", BEACON))
-        daemon.plug("org.example.interpreter", Part("interpreter", INTERPRETER))
-        daemon.until(lambda view: [r["ready"] for r in view["components"]] == [True, True])
+    with running(tmp_path_factory.mktemp("host"), name="panther", more=patience) as daemon:
+        for name, source in (("beacon", BEACON), ("interpreter", INTERPRETER)):
+            daemon.plug(daemon.drive(name, Part(name, source)))
+        daemon.until(
+            "both are ready", lambda view: [r["ready"] for r in view["components"]] == [True, True]
+        )
         yield daemon
 
 
 @pytest.fixture(autouse=True)
-def at_rest(daemon: Daemon) -> Iterator[None]:
+def at_rest(daemon: RunningHost) -> Iterator[None]:
     yield
     daemon.run("halt", "--now").ok()
-    daemon.until(lambda view: not view["plan"]["steps"])
+    daemon.until("nothing is done", lambda view: not view["plan"]["steps"])
 
 
-def test_translation_is_taken_where_the_person_said_so(daemon: Daemon) -> None:
+def holds(view: View) -> bool:
+    """Whether a goal that is kept up does."""
+    return any(row["holds"] and row["state"] == "active" for row in view["goals"])
+
+
+def test_translation_is_taken_where_the_person_said_so(daemon: RunningHost) -> None:
     shown = daemon.run("goal", "brighten", "up", "--yes", "--wait").ok().out
     assert shown.startswith(f"{LIT}\ngoal ")
-    view = daemon.until(lambda view: any(row["holds"] for row in view["goals"]))
-    assert view["goals"][-1]["text"] == "brighten up"
+    daemon.until("the goal holds", holds)
+    assert daemon.view["goals"][-1]["text"] == "brighten up"
     assert f"> 'brighten up' is {LIT}" in daemon.run("status").ok().out
 
 
-def test_machine_is_told_who_understood_what(daemon: Daemon) -> None:
+def test_machine_is_told_who_understood_what(daemon: RunningHost) -> None:
     given = daemon.run("goal", "repeat", "--yes", "--json").ok().json
     expected = {"goal": "(lit panther)", "kind": "maintain", "by": ["interpreter"]}
     assert given["understood"] == expected
 
 
-def test_translation_is_never_taken_unasked(daemon: Daemon) -> None:
+def test_translation_is_never_taken_unasked(daemon: RunningHost) -> None:
     before = len(daemon.run("goals", "--json").ok().json["given"])
     daemon.run("goal", "brighten up").refused(1, f"TRANSLATION_UNCONFIRMED {LIT} → give --yes")
     assert len(daemon.run("goals", "--json").ok().json["given"]) == before
 
 
-def test_person_confirms_at_the_terminal(daemon: Daemon) -> None:
+def test_person_confirms_at_the_terminal(daemon: RunningHost) -> None:
     asked = ("--control", daemon.control, "goal", "brighten up")
     code, shown = at_terminal(*asked, typed="y\n")
     assert (code, LIT in shown) == (0, True), shown
-    daemon.until(lambda view: any(row["holds"] for row in view["goals"]))
+    daemon.until("the goal holds", holds)
 
 
-def test_person_declines_at_the_terminal(daemon: Daemon) -> None:
+def test_person_declines_at_the_terminal(daemon: RunningHost) -> None:
     asked = ("--control", daemon.control, "goal", "brighten up")
     code, shown = at_terminal(*asked, typed="n\n")
     assert (code, "nothing was asked for" in shown) == (1, True), shown
@@ -105,18 +115,17 @@ def test_person_declines_at_the_terminal(daemon: Daemon) -> None:
         ("what do you know", "PHRASE_UNKNOWN"),
     ],
 )
-def test_what_means_nothing_is_refused_by_name(daemon: Daemon, words: str, why: str) -> None:
+def test_what_means_nothing_is_refused_by_name(daemon: RunningHost, words: str, why: str) -> None:
     ran = daemon.run("goal", words, "--yes")
     ran.refused(1, "PHRASE_UNKNOWN").refused(1, why)
 
 
-def test_different_translations_are_told_and_none_is_chosen(daemon: Daemon) -> None:
-    daemon.plug("org.example.other", Part("other", OTHER))
-    daemon.until_state("org.example.other", "active")
+def test_different_translations_are_told_and_none_is_chosen(daemon: RunningHost) -> None:
+    daemon.bring("other", Part("other", OTHER))
     ran = daemon.run("goal", "brighten up", "--yes").refused(1, "TRANSLATION_AMBIGUOUS")
     assert "understood by interpreter as maintain (lit panther), or" in ran.err
     assert "understood by other as achieve (greeted person panther)" in ran.err
     same = daemon.run("goal", "say hello to everybody", "--yes", "--json").ok().json
     assert same["understood"]["by"] == ["interpreter", "other"]
-    daemon.pull("org.example.other")
-    daemon.until(lambda view: len(view["components"]) == 2)
+    daemon.pull("other")
+    daemon.until("the other one is gone", lambda view: len(view["components"]) == 2)

@@ -14,17 +14,19 @@ import click
 import pytest
 from tests.host.cli import pictures
 from tests.host.cli.btcpp import refusals
-from tests.host.cli.daemon import BEACON_ID, BRIGHTNESS, LAMP, Daemon, command, quiet_environment
 from tests.host.cli.dot import read_dot
+from tests.kit.beacon import BEACON_ID, BRIGHTNESS, LAMP
+from tests.kit.command_line import command, quiet_environment
+from tests.kit.running_host import RunningHost
 
 
 @pytest.fixture
-def shining(daemon: Daemon) -> Iterator[dict[str, Any]]:
+def shining(daemon: RunningHost) -> Iterator[dict[str, Any]]:
     """The host's tree while it shines for people."""
     daemon.run("goal", "shine", "--wait").ok()
     yield daemon.run("tree", "--json").ok().json
     daemon.run("halt", "--now").ok()
-    daemon.until(lambda view: not any(stream["flowing"] for stream in view["streams"]))
+    daemon.until("nothing flows", lambda view: not any(s["flowing"] for s in view["streams"]))
 
 
 def test_a_kept_step_says_why(shining: dict[str, Any]) -> None:
@@ -39,20 +41,20 @@ def test_a_kept_step_says_why(shining: dict[str, Any]) -> None:
     assert step["ended"] is None
 
 
-def test_eighty_columns_show_it(daemon: Daemon, shining: dict[str, Any]) -> None:
+def test_eighty_columns_show_it(daemon: RunningHost, shining: dict[str, Any]) -> None:
     shown = daemon.run("tree", COLUMNS="80").ok().out
     assert "∞ 1 test-beacon.shine  kept since " in shown
     assert "kept for: the goal: (lit panther)" in shown
     assert max(map(len, shown.splitlines())) <= 80
 
 
-def test_graphviz_and_groot_can_read_it(daemon: Daemon, shining: dict[str, Any]) -> None:
+def test_graphviz_and_groot_can_read_it(daemon: RunningHost, shining: dict[str, Any]) -> None:
     nodes = read_dot(daemon.run("tree", "--graphviz").ok().out).nodes.values()
     assert "1 test-beacon.shine\nkept" in {node["label"] for node in nodes}
     assert refusals(daemon.run("tree", "--groot").ok().out) == []
 
 
-def test_one_way_of_drawing_at_a_time(daemon: Daemon) -> None:
+def test_one_way_of_drawing_at_a_time(daemon: RunningHost) -> None:
     for wrong in (["--graphviz", "--groot"], ["--watch", "--groot"]):
         daemon.run("tree", *wrong).refused(2, "one way of drawing at a time")
     told = daemon.run("tree", "--graphviz", "--json")
@@ -60,7 +62,7 @@ def test_one_way_of_drawing_at_a_time(daemon: Daemon) -> None:
     assert "one way of drawing at a time" in told.json["problems"][0]["message"]
 
 
-def test_watching_prints_a_line_of_json_for_each_change(daemon: Daemon) -> None:
+def test_watching_prints_a_line_of_json_for_each_change(daemon: RunningHost) -> None:
     with daemon.started("tree", "--watch", "--json") as process:
         assert process.stdout is not None
         assert not pictures.steps(json.loads(process.stdout.readline()))
@@ -77,7 +79,7 @@ def _with_steps(process: subprocess.Popen[str]) -> Iterator[list[dict[str, Any]]
             yield steps
 
 
-def test_watching_on_a_terminal_draws_in_one_place(daemon: Daemon) -> None:
+def test_watching_on_a_terminal_draws_in_one_place(daemon: RunningHost) -> None:
     with _terminal("--control", daemon.control, "tree", "--watch") as terminal:
         first = _until(terminal, b"sentences told")
         assert first.startswith("\x1b[H")

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.host.cli.daemon import nondum, running
+from tests.kit.command_line import nondum
 from tests.kit.payloads import Part, make_payload, make_wheel, seal
+from tests.kit.running_host import running
 
 ID = "org.example.test"
 PLAIN = Part("blinker", "X = 1\n", with_sdk=False)
@@ -90,11 +91,11 @@ def test_the_host_that_runs_here_says_how_it_confines(
 ) -> None:
     unsigned = ("--unsigned",) if verb == "verify" else ()
     at_none = '[workers]\nconfinement = "0"\nminimum_confinement = 0\n'
-    with running(tmp_path / "host", at_none) as daemon:
-        ran = daemon.run("payload", verb, confined, *unsigned, "--json")
+    with running(tmp_path / "host", more=at_none) as host:
+        ran = host.run("payload", verb, confined, *unsigned, "--json")
         (problem,) = ran.json["problems"]
         assert (problem["code"], problem["have"]) == ("CONFINEMENT", "level 0")
-        daemon.run("payload", verb, confined, *unsigned, "--anywhere").ok()
+        host.run("payload", verb, confined, *unsigned, "--anywhere").ok()
 
 
 def test_without_a_host_the_best_level_that_is_to_be_had_counts(confined: Path) -> None:

@@ -13,8 +13,9 @@ from contextlib import asynccontextmanager, closing, contextmanager, suppress
 from pathlib import Path
 
 import pytest
-from tests.host.cli.daemon import Daemon, command, quiet_environment, running, write_config
 from tests.kit.clock import VirtualClock
+from tests.kit.command_line import quiet_environment
+from tests.kit.running_host import DAEMON, RunningHost, running, until_ended
 from tests.kit.until import until
 
 from nondum.host.events import HostStarted
@@ -45,21 +46,23 @@ def heard(manager: socket.socket, *wanted: str) -> list[str]:
 
 
 @contextmanager
-def served(root: Path, manager: socket.socket, watchdog_s: float = 60.0) -> Iterator[Daemon]:
-    """A real daemon, as systemd would start it."""
+def served(
+    host: RunningHost, manager: socket.socket, watchdog_s: float = 60.0
+) -> Iterator[subprocess.Popen[str]]:
+    """A real daemon of a host, as systemd would start it."""
     asked = {
         "NOTIFY_SOCKET": manager.getsockname(),
         "WATCHDOG_USEC": str(round(watchdog_s * 1e6)),
     }
     process = subprocess.Popen(
-        command("host", "run", "--user", "--config", write_config(root)),
+        [*DAEMON, "--config", str(host.config)],
         stderr=subprocess.PIPE,
         text=True,
         env=quiet_environment() | asked,
     )
     with process:
         try:
-            yield Daemon(root, process)
+            yield process
         finally:
             process.send_signal(signal.SIGCONT)
             process.terminate()
@@ -68,12 +71,13 @@ def served(root: Path, manager: socket.socket, watchdog_s: float = 60.0) -> Iter
 def test_daemon_is_ready_once_it_answers_and_says_what_it_does(
     tmp_path: Path, manager: socket.socket
 ) -> None:
-    with served(tmp_path, manager) as daemon:
+    host = RunningHost(tmp_path)
+    with served(host, manager) as daemon:
         said = heard(manager, "EXTEND_TIMEOUT_USEC=", "READY=1")
-        assert daemon.run("status").ok().out.startswith("host ")
+        assert host.run("status").ok().out.startswith("host ")
         assert "STATUS=starting" in said
         heard(manager, "STATUS=0 components at work")
-        daemon.process.terminate()
+        daemon.terminate()
         heard(manager, "STOPPING=1")
 
 
@@ -81,28 +85,30 @@ def test_daemon_that_is_started_while_the_one_before_it_ends_comes_up_after_it(
     tmp_path: Path, manager: socket.socket
 ) -> None:
     """The first one is stopped while it ends, until the other one waits for it."""
-    with running(tmp_path) as before:
-        with locked_catalogue(tmp_path):  # for its last words
-            before.process.terminate()
-            until("it shows that it is ending", lambda: holder(tmp_path / "state").is_ending)
-            before.process.send_signal(signal.SIGSTOP)
-        with served(tmp_path, manager):
-            heard(manager, f"STATUS=waiting for process {before.process.pid} ")
-            before.process.send_signal(signal.SIGCONT)
-            assert before.process.wait(PATIENCE_S) == 0
+    with running(tmp_path) as host:
+        before = host.pid
+        with locked_catalogue(host):  # for its last words
+            os.kill(before, signal.SIGTERM)
+            until("it shows that it is ending", lambda: holder(host).is_ending)
+            os.kill(before, signal.SIGSTOP)
+        with served(host, manager):
+            heard(manager, f"STATUS=waiting for process {before} ")
+            os.kill(before, signal.SIGCONT)
+            until_ended(before)
+            assert host.stop() == 0
             heard(manager, "READY=1")
 
 
-def holder(state: Path) -> Holder:
-    found = state_lock.attempt(state)
+def holder(host: RunningHost) -> Holder:
+    found = state_lock.attempt(host.state)
     assert isinstance(found, Holder), "nothing has the lock"
     return found
 
 
 @contextmanager
-def locked_catalogue(root: Path) -> Iterator[None]:
+def locked_catalogue(host: RunningHost) -> Iterator[None]:
     """Nothing can be written to it."""
-    with closing(sqlite3.connect(root / "state/catalogue.sqlite")) as connection:
+    with closing(sqlite3.connect(host.state / "catalogue.sqlite")) as connection:
         connection.execute("BEGIN IMMEDIATE")
         yield
 
@@ -110,13 +116,13 @@ def locked_catalogue(root: Path) -> Iterator[None]:
 def test_daemon_gives_signs_of_life_whenever_it_runs(
     tmp_path: Path, manager: socket.socket
 ) -> None:
-    with served(tmp_path, manager, watchdog_s=0.4) as daemon:
+    with served(RunningHost(tmp_path), manager, watchdog_s=0.4) as daemon:
         heard(manager, "READY=1", "WATCHDOG=1")
         heard(manager, "WATCHDOG=1")
-        daemon.process.send_signal(signal.SIGSTOP)
-        os.waitid(os.P_PID, daemon.process.pid, os.WSTOPPED)
+        daemon.send_signal(signal.SIGSTOP)
+        os.waitid(os.P_PID, daemon.pid, os.WSTOPPED)
         said(manager)
-        daemon.process.send_signal(signal.SIGCONT)
+        daemon.send_signal(signal.SIGCONT)
         manager.settimeout(PATIENCE_S)
         heard(manager, "WATCHDOG=1")
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from demo.namespaces import Machine, Network
-from tests.host.cli.daemon import command
+from tests.kit.command_line import command
 from tests.transport.discovery.hosts import Host, here, seeking
 
 from nondum.transport.discovery.doctor import (

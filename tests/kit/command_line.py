@@ -1,0 +1,102 @@
+"""`nondum` as a process of its own, and what came of it; in a terminal too."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import subprocess
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from demo.robot import NONDUM
+from tests.kit.until import PATIENCE_S
+
+
+@dataclass(frozen=True)
+class Ran:
+    """What one run of the command line came to."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> Any:
+        """Standard output, parsed."""
+        return json.loads(self.out)
+
+    def ok(self) -> Ran:
+        """This, if the command did what it was asked for."""
+        assert self.code == 0, (self.code, self.out, self.err)
+        assert not self.err, self.err
+        return self
+
+    def refused(self, code: int, words: str) -> Ran:
+        """This, if the command refused with that exit code and those words, without a traceback."""
+        assert "Traceback" not in self.err, self.err
+        assert self.code == code, (self.code, self.out, self.err)
+        assert words in self.err, self.err
+        return self
+
+
+def nondum(*arguments: str | Path, **environment: str) -> Ran:
+    """Run `nondum` as a process of its own."""
+    done = subprocess.run(
+        command(*arguments),
+        capture_output=True,
+        text=True,
+        env=quiet_environment() | environment,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+    return Ran(done.returncode, done.stdout, done.stderr)
+
+
+def in_terminal(*arguments: str | Path, **environment: str) -> str:
+    """Run `nondum` in a terminal, and give everything that it shows there."""
+    code, shown = at_terminal(*arguments, typed="", environment=environment)
+    assert code == 0, shown
+    return shown
+
+
+def at_terminal(
+    *arguments: str | Path, typed: str, environment: Mapping[str, str] | None = None
+) -> tuple[int, str]:
+    """Run `nondum` in a terminal where a person types; give its code and all that it shows."""
+    ours, theirs = pty.openpty()
+    os.write(ours, typed.encode())
+    process = subprocess.Popen(
+        command(*arguments),
+        stdin=theirs,
+        stdout=theirs,
+        stderr=theirs,
+        env=quiet_environment() | {"TERM": "xterm"} | dict(environment or {}),
+    )
+    os.close(theirs)
+    shown = b""
+    with process:
+        while some := _read(ours):
+            shown += some
+    os.close(ours)
+    return process.returncode, shown.decode()
+
+
+def _read(terminal: int) -> bytes:
+    try:
+        return os.read(terminal, 65536)
+    except OSError:  # how Linux tells that nobody has the other end open
+        return b""
+
+
+def command(*arguments: str | Path) -> list[str]:
+    """The command line that runs `nondum`."""
+    return [*NONDUM, *map(str, arguments)]
+
+
+def quiet_environment() -> dict[str, str]:
+    """This process's environment, less what would change what is printed, or who answers."""
+    changing = {"NONDUM_CONTROL", "COLUMNS", "NO_COLOR", "FORCE_COLOR"}
+    return {key: value for key, value in os.environ.items() if key not in changing}
