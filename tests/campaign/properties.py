@@ -10,13 +10,11 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-import threading
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from tests.campaign import suites
-from tests.campaign.rounds import Limit, Round
+from tests.campaign.rounds import Limit, Round, work_off
 
 SEEDS = 3
 """A test that asks for a number of examples gets as many for each of these."""
@@ -27,30 +25,17 @@ def main(words: Sequence[str]) -> int:
     options = _options(words)
     only = ["-p", "tests.campaign.only_properties", "--hypothesis-profile=campaign"]
     work = Round(options.folder, suites.files_of(only), Limit(options.minutes))
-    due, taking, ending = work.due(), threading.Lock(), threading.Event()
     seeds = [f"--hypothesis-seed={n}" for n in range(options.seed, options.seed + SEEDS)]
 
-    def next_file() -> str | None:
-        with taking:
-            return None if ending.is_set() else next(due, None)
+    def try_seeds(_: int, file: str) -> None:
+        for seed in seeds:
+            chosen = [*only, seed, "--timeout=1800"]
+            passed, note = suites.run_file(work.folder, file, chosen)
+            if not passed:
+                break
+        work.add(file, passed=passed, note=note)
 
-    def work_off() -> None:
-        while (file := next_file()) is not None:
-            for seed in seeds:
-                chosen = [*only, seed, "--timeout=1800"]
-                passed, note = suites.run_file(work.folder, file, chosen)
-                if not passed:
-                    break
-            work.add(file, passed=passed, note=note)
-
-    at_once = os.cpu_count() or 1
-    with ThreadPoolExecutor(at_once) as pool:
-        try:
-            for one in [pool.submit(work_off) for _ in range(at_once)]:
-                one.result()
-        except KeyboardInterrupt:
-            ending.set()
-            raise
+    work_off(work.due(), os.cpu_count() or 1, try_seeds)
     return work.end()
 
 

@@ -109,6 +109,7 @@ _ALL = (
             "tests/lab",
         ),
         "tests.lab",
+        ("--jobs", "2"),
         needs=("lab",),
     ),
     Campaign(

@@ -10,6 +10,7 @@ import json
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -129,6 +130,40 @@ class Round:
             self._say(f"FAILED {piece}")
         self._say(f"{self.tally} done, {len(self.tally.failed)} failed")
         return 1 if self.tally.failed else 0
+
+
+def work_off(
+    pieces: Iterator[str],
+    at_once: int,
+    do: Callable[[int, str], None],
+    on_interrupt: Callable[[], None] = lambda: None,
+) -> None:
+    """Do pieces, so many at the same time; `do` is told which of the workers it is, from 0.
+
+    Of an exception (Ctrl-C, too) no further piece is begun, and those that were are waited for;
+    `on_interrupt` may end them.
+    """
+    taking, ending = threading.Lock(), threading.Event()
+
+    def next_piece() -> str | None:
+        with taking:
+            return None if ending.is_set() else next(pieces, None)
+
+    def work(number: int) -> None:
+        while (piece := next_piece()) is not None:
+            do(number, piece)
+
+    if at_once == 1:  # here, where Ctrl-C arrives
+        work(0)
+        return
+    with ThreadPoolExecutor(at_once) as pool:
+        try:
+            for one in as_completed([pool.submit(work, number) for number in range(at_once)]):
+                one.result()
+        except BaseException:
+            ending.set()
+            on_interrupt()
+            raise
 
 
 def _among(names: Iterable[str], pieces: Sequence[str]) -> tuple[str, ...]:

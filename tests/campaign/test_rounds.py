@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
-from tests.campaign.rounds import Limit, Round, Tally
+import pytest
+from tests.campaign.rounds import Limit, Round, Tally, work_off
+from tests.kit.until import PATIENCE_S
 
 PIECES = ("one", "two", "three")
 
@@ -76,3 +79,34 @@ def test_elapsed_and_left_time_are_told() -> None:
     clock.now_s += 192.0
     assert str(limit) == "[3:12, 6:48 left]"
     assert str(Limit(None, clock)) == "[0:00]"
+
+
+def test_pieces_are_done_once_each_and_some_at_the_same_time() -> None:
+    both, done = threading.Barrier(2, timeout=PATIENCE_S), []
+
+    def do(worker: int, piece: str) -> None:
+        both.wait()
+        done.append((worker, piece))
+
+    pieces = ("one", "two", "three", "four")
+    work_off(iter(pieces), 2, do)
+    assert sorted(piece for _, piece in done) == sorted(pieces)
+    assert {worker for worker, _ in done} == {0, 1}
+
+
+@pytest.mark.parametrize("at_once", [1, 2])
+def test_no_piece_is_begun_after_one_that_raised(at_once: int) -> None:
+    begun: list[str] = []
+    raised, ended = threading.Event(), threading.Event()
+
+    def do(_: int, piece: str) -> None:
+        begun.append(piece)
+        if piece == PIECES[0]:
+            raised.set()
+            raise KeyboardInterrupt
+        assert raised.wait(PATIENCE_S)
+        assert ended.wait(PATIENCE_S)
+
+    with pytest.raises(KeyboardInterrupt):
+        work_off(iter(PIECES), at_once, do, ended.set)
+    assert begun in ([PIECES[0]], [PIECES[0], PIECES[1]], [PIECES[1], PIECES[0]])

@@ -7,15 +7,17 @@ import shutil
 import signal
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from tests.campaign.rounds import Limit, Round
+from tests.campaign.rounds import Limit, Round, work_off
+from tests.kit.payloads import sdk_wheel
 from tests.lab.building import built
 from tests.lab.lab import Lab
 from tests.lab.recipe import RECIPES, X86_64
-from tests.lab.scenario import SHORT, Result, Scenario, keep, run_all, scenarios
+from tests.lab.scenario import SHORT, Result, Scenario, keep, run, scenarios
 from tests.lab.shell import talk
 from tests.lab.software import software
 
@@ -34,34 +36,51 @@ def main(words: Sequence[str]) -> int:
     began = time.monotonic()
     disk = software(machine, asked.commit)
     _told("nondum is built for it", began)
+    sdk_wheel()  # before two of them would make it at the same time
     work = Path(tempfile.mkdtemp(prefix="nondum-lab-"))
-    lab = Lab(machine, disk, asked.commit, work, brought=asked.payload)
+    labs = []
+    for number in range(asked.jobs):
+        (folder := work / str(number)).mkdir()
+        labs.append(Lab(machine, disk, asked.commit, folder, brought=asked.payload))
     try:
         if asked.shell:
-            return talk(lab)
+            return talk(labs[0])
         names = asked.scenario or (SHORT if asked.short else list(known))
-        folder = asked.folder or work
-        due = Round(folder, names, Limit(asked.minutes), say=lambda _: None)
-        return _run(lab, known, due, asked)
+        due = Round(asked.folder or work, names, Limit(asked.minutes), say=lambda _: None)
+        return _run(labs, known, due, asked)
     finally:
-        lab.close()
+        for lab in labs:
+            lab.close()
         shutil.rmtree(work)
 
 
-def _run(lab: Lab, known: dict[str, Scenario], due: Round, asked: argparse.Namespace) -> int:
+def _run(labs: list[Lab], known: dict[str, Scenario], due: Round, asked: argparse.Namespace) -> int:
     results = []
-    names = due.due() if asked.folder else due.pieces
-    for result in run_all((known[name] for name in names), lab):
+    ended = threading.Event()
+
+    def try_one(number: int, name: str) -> None:
+        lab = labs[number]
+        result = run(known[name], lab)
+        if ended.is_set():  # its machines were switched off
+            return
         results.append(result)
-        due.add(result.scenario.name, passed=not result.failure)
+        due.add(name, passed=not result.failure)
         _show(result, f"{due.limit} {due.tally}  " if asked.folder else "")
         if asked.keep and result.kept is None:
-            print(f"    kept: {keep(result.scenario.name, lab)}")
+            print(f"    kept: {keep(name, lab)}")
+
+    def end() -> None:
+        ended.set()
+        for lab in labs:
+            lab.close()
+
+    names = due.due() if asked.folder else iter(due.pieces)
+    work_off(names, len(labs), try_one, end)
     failed = sum(1 for r in results if r.failure)
     for result in results:
         if result.failure:
             print(f"\n{result.scenario.name}\n{result.failure}\nkept: {result.kept}")
-    boots = ", ".join(f"{seconds:.0f}" for seconds in lab.boots_s)
+    boots = ", ".join(f"{seconds:.0f}" for lab in labs for seconds in lab.boots_s)
     replugs = sum(result.replugs for result in results)
     print(f"\nboots: {boots} s; drives plugged in again because they stalled: {replugs}")
     print(f"{len(results) - failed} passed, {failed} failed")
@@ -93,6 +112,7 @@ def _arguments(known: dict[str, Scenario], words: Sequence[str]) -> argparse.Nam
     parser.add_argument("--short", action="store_true", help=f"only {', '.join(SHORT)}")
     parser.add_argument("--minutes", type=float, help="begin no further scenario after so long")
     parser.add_argument("--folder", type=Path, help="what was done so far: that is not done again")
+    parser.add_argument("--jobs", type=int, default=1, help="scenarios at the same time")
     parser.add_argument("--keep", action="store_true", help="keep consoles and journals of all")
     parser.add_argument("--commit", help="nondum as of a commit, not as the checkout is now")
     parser.add_argument("--shell", action="store_true", help="boot one and run what you type")

@@ -6,7 +6,7 @@ import importlib
 import shutil
 import time
 import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -54,20 +54,20 @@ def scenarios() -> dict[str, Scenario]:
     return {s.name: s for s in map(_loaded, sorted(FOLDER.glob("[a-z]*.py")))}
 
 
-def run_all(wanted: Iterable[Scenario], lab: Lab) -> Iterator[Result]:
-    """Run scenarios, each whatever became of the others."""
-    for scenario in wanted:
-        began, before_s, replugs = time.monotonic(), lab.cpu_s(), lab.replugs()
-        try:
-            with lab.scenario():
-                note, failure, kept = _run(scenario, lab)
-                if failure:
-                    raise _Failed
-        except _Failed:
-            pass
-        spent_s = lab.cpu_s() - before_s
-        took_s, again = time.monotonic() - began, lab.replugs() - replugs
-        yield Result(scenario, took_s, spent_s, note, again, failure, kept)
+def run(scenario: Scenario, lab: Lab) -> Result:
+    """Run a scenario, and switch off what it used alone, and if it failed, all that it used."""
+    began, before_s, replugs = time.monotonic(), lab.cpu_s(), lab.replugs()
+    note, failure, kept = "", "", None
+    try:
+        with lab.scenario():
+            note, failure, kept = _run(scenario, lab)
+            if failure:
+                raise _Failed
+    except _Failed:
+        pass
+    spent_s = lab.cpu_s() - before_s
+    took_s, again = time.monotonic() - began, lab.replugs() - replugs
+    return Result(scenario, took_s, spent_s, note, again, failure, kept)
 
 
 class _Failed(Exception):
