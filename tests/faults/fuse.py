@@ -35,6 +35,10 @@ _MOST = 128 * 1024
 _FLAGS = 0x1 | 0x2 | 0x4 | 0x8
 """Read-only, and without set-uid, devices and execution."""
 
+_FORCE, _DETACH = 1, 2
+"""Of umount2(2). The first ends the connection, whoever still waits for an answer."""
+_END_S = 60.0
+
 _libc = ctypes.CDLL(None, use_errno=True)
 
 
@@ -58,7 +62,7 @@ class FuseDrive:
     """Paths that were asked for by name, whether they are there or not."""
     _nodes: list[str] = field(default_factory=lambda: [""])
     _device: int = -1
-    _openings: dict[int, int] = field(default_factory=dict)
+    _writing: threading.Lock = field(default_factory=threading.Lock)
 
     def serve(self) -> None:
         """Answer until the drive is unmounted."""
@@ -66,7 +70,7 @@ class FuseDrive:
             try:
                 request = os.read(self._device, _MOST + 4096)
             except OSError as error:
-                if error.errno in (errno.ENODEV, errno.EBADF):  # unmounted; and closed, too
+                if error.errno == errno.ENODEV:  # unmounted
                     return
                 if error.errno in (errno.ENOENT, errno.EINTR):
                     continue
@@ -82,8 +86,15 @@ class FuseDrive:
             body, error = self._body(opcode, node, request[_IN.size :]), 0
         except OSError as failed:
             body, error = b"", failed.errno or errno.EIO
-        with suppress(OSError):  # who asked gave up meanwhile
-            os.write(self._device, _OUT.pack(_OUT.size + len(body), -error, unique) + body)
+        with self._writing, suppress(OSError):  # who asked gave up meanwhile
+            if self._device >= 0:
+                os.write(self._device, _OUT.pack(_OUT.size + len(body), -error, unique) + body)
+
+    def close(self) -> None:
+        """Let go of the device: its number may be another file's from now on."""
+        with self._writing:
+            os.close(self._device)
+            self._device = -1
 
     def _body(self, opcode: int, node: int, given: bytes) -> bytes:
         path = self._nodes[node - 1] if 0 < node <= len(self._nodes) else ""
@@ -160,5 +171,7 @@ def served(root: Path, mount: Path) -> Iterator[FuseDrive]:
     try:
         yield drive
     finally:
-        _libc.umount2(target, 2)
-        os.close(drive._device)
+        _libc.umount2(target, _FORCE | _DETACH)
+        serving.join(_END_S)
+        assert not serving.is_alive(), "it would read whatever has its descriptor's number next"
+        drive.close()
