@@ -66,11 +66,12 @@ class SlowFinder:
 async def test_peers_hear_of_a_departure_before_the_finder_has_ended() -> None:
     hosts, finder = pairs("rover", "base"), SlowFinder()
     trust = trust_in(hosts)
-    mesh, _ = mesh_member(*hosts[0], trust, find=lambda mesh: finder)
+    mesh, rover = mesh_member(*hosts[0], trust, find=lambda mesh: finder)
     await mesh.start()
     async with started(hosts[1], trust) as (base, told):
         mesh.meet(base.key, base.addresses)
         await told.told(PeerUp)
+        await rover.told(PeerUp)  # before, it knows nobody to say goodbye to
         closing = asyncio.create_task(mesh.close())
         assert (await told.told(PeerLost)).reason is Loss.DEPARTED
         finder.may_close.set()
