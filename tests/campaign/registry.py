@@ -60,7 +60,7 @@ _ALL = (
             "tests/faults",
         ),
         "tests.faults",
-        ("--points", "40", *_SEED),
+        ("--points", "100", *_SEED),
     ),
     Campaign(
         "restarts",
