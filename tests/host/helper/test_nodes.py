@@ -65,6 +65,7 @@ def test_node_is_made_for_its_user_alone_and_removed(tmp_path: Path) -> None:
     [
         pytest.param("devices/pci0000:00/nvme/nvme0", "nvme", "ff 00", id="disk controller"),
         pytest.param(f"{INTERFACE}/host6/sg1", "scsi_generic", "08 50", id="raw SCSI of a stick"),
+        pytest.param(f"{INTERFACE}/host6/sg1", "scsi_generic", "ff 00", id="raw SCSI of a bridge"),
         pytest.param(f"{INTERFACE}/other", "usbmisc", "08 50", id="drive's interface"),
         pytest.param(f"{INTERFACE}/0003:1/input/event3", "input", "03 01", id="keyboard"),
         pytest.param(f"{INTERFACE}/0003:1/hidraw/hidraw0", "hidraw", "03 01", id="raw keyboard"),
