@@ -13,7 +13,7 @@ from tests.lab.lab import Lab
 CHECKOUT = Path(__file__).parents[3]
 PARTS = (
     *("tests/confinement/baits.py", "tests/confinement/escape.py", "tests/confinement/table.py"),
-    *("tests/kit/workers.py", "plugins/sdk/nondum"),
+    *("tests/kit/until.py", "tests/kit/workers.py", "demo/robot.py", "plugins/sdk/nondum"),
 )
 PLACE = "/var/lib/checkout"
 PROGRAM = """
@@ -35,7 +35,7 @@ LEFT_AT_2 = frozenset({"know the host name"})
 def run(lab: Lab) -> str:
     """Run it as root's, where every bait is to be had; keep what it reached for the docs."""
     machine = lab.booted_once().machine
-    machine.put(f"{PLACE}.tar", _packed())
+    machine.put(f"{PLACE}.tar", packed())
     machine.put(f"{PLACE}/tried.py", PROGRAM)
     machine.run(f"tar -C {PLACE} -xf {PLACE}.tar")
     said = machine.run(
@@ -51,7 +51,7 @@ def run(lab: Lab) -> str:
     return f"{len(columns['3'])} attempts; level 3: none, level 2: {len(reached['2'])}"
 
 
-def _packed() -> bytes:
+def packed() -> bytes:
     """What the guest needs of this checkout."""
     buffer = io.BytesIO()
     with tarfile.open(fileobj=buffer, mode="w") as archive:
