@@ -138,10 +138,11 @@ def work_off(
     do: Callable[[int, str], None],
     on_interrupt: Callable[[], None] = lambda: None,
 ) -> None:
-    """Do pieces, so many at the same time; `do` is told which of the workers it is, from 0.
+    """Call `do` with the number of a worker thread (from 0) and a piece, for each piece, in
+    `at_once` threads; in this thread if that is 1.
 
-    Of an exception (Ctrl-C, too) no further piece is begun, and those that were are waited for;
-    `on_interrupt` may end them.
+    After an exception (Ctrl-C, too) no further piece is begun. Pieces that have begun are waited
+    for; with several threads, `on_interrupt` is called before, and may end them.
     """
     taking, ending = threading.Lock(), threading.Event()
 

@@ -1,4 +1,4 @@
-"""`nondum` as a process of its own, and what came of it; in a terminal too."""
+"""Runs the command `nondum` in a process, also in a pseudo-terminal: exit code and output."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Ran:
 
 
 def nondum(*arguments: str | Path, **environment: str) -> Ran:
-    """Run `nondum` as a process of its own."""
+    """Run `nondum` in a process, to its end."""
     done = subprocess.run(
         command(*arguments),
         capture_output=True,
@@ -87,7 +87,7 @@ def at_terminal(
 def _read(terminal: int) -> bytes:
     try:
         return os.read(terminal, 65536)
-    except OSError:  # how Linux tells that nobody has the other end open
+    except OSError:  # EIO: no process has the other end open any more (pty(7))
         return b""
 
 

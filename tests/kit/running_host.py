@@ -115,7 +115,7 @@ class RunningHost(Robot):
 
     @property
     def config(self) -> Path:
-        """What its daemons are told."""
+        """Its configuration file."""
         return self.work / "host.toml"
 
     @property

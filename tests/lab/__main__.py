@@ -112,7 +112,9 @@ def _arguments(known: dict[str, Scenario], words: Sequence[str]) -> argparse.Nam
     parser.add_argument("--short", action="store_true", help=f"only {', '.join(SHORT)}")
     parser.add_argument("--minutes", type=float, help="begin no further scenario after so long")
     parser.add_argument("--folder", type=Path, help="what was done so far: that is not done again")
-    parser.add_argument("--jobs", type=int, default=1, help="scenarios at the same time")
+    parser.add_argument(
+        "--jobs", type=int, default=1, choices=range(1, 9), help="scenarios at the same time"
+    )
     parser.add_argument("--keep", action="store_true", help="keep consoles and journals of all")
     parser.add_argument("--commit", help="nondum as of a commit, not as the checkout is now")
     parser.add_argument("--shell", action="store_true", help="boot one and run what you type")
