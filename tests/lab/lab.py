@@ -157,7 +157,7 @@ class Lab:
     @contextmanager
     def scenario(self) -> Iterator[None]:
         """For the time of one scenario: whatever it switched on for itself is off afterwards, and
-        the shared machine as well should the scenario have failed."""
+        the shared machine as well should the scenario have failed; else nothing is plugged in."""
         self.machines = []
         try:
             yield
@@ -165,7 +165,9 @@ class Lab:
             self.close()
             raise
         for machine in self.machines:
-            if self._shared is None or machine is not self._shared.machine:
+            if self._shared is not None and machine is self._shared.machine:
+                machine.unplug_all()
+            else:
                 machine.close()
         self._remove_lans()
 

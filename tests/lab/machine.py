@@ -191,6 +191,10 @@ class Machine:
         """Pull a hub out, and with it all that is plugged into it."""
         self._usb.pull(name)
 
+    def unplug_all(self) -> None:
+        """Pull out all that is plugged in."""
+        self._usb.pull_all()
+
     def plug_line(
         self, path: Path | None = None, *, port: str | None = None, serial: str | None = None
     ) -> str:

@@ -76,6 +76,11 @@ class Usb:
             if behind is not None:
                 self._let_go(*behind)
 
+    def pull_all(self) -> None:
+        """Pull everything out."""
+        for name in tuple(self._plugged):
+            self.pull(name)
+
     def _name(self, kind: str) -> str:
         return f"{kind}{next(self._numbers)}"
 
