@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import io
 import json
 import secrets
 import signal
@@ -37,7 +39,7 @@ The last result of each is written into docs/reliability/campaigns.md.
 def main(words: Sequence[str], root: Path = ROOT) -> int:
     """Run what is asked for; 1 if anything failed."""
     if "--needs" in words:
-        print(*sorted(needs(words)))
+        print(*sorted(needs([word for word in words if word != "--needs"])))
         return 0
     options = _options(words)
     if options.write:
@@ -159,11 +161,17 @@ def needs(words: Sequence[str]) -> set[str]:
 
     >>> sorted(needs(["faults"])), sorted(needs([])), sorted(needs(["--list"]))
     ([], ['fuzz', 'lab'], [])
+    >>> sorted(needs(["no-such-campaign"]))
+    []
     """
-    if {"-h", "--help", "--list"} & set(words):
+    unread = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(unread), contextlib.redirect_stderr(unread):
+            options = _options(words)
+    except SystemExit:  # --help, or a mistake: told by the command itself, which runs nothing
         return set()
-    chosen = [CAMPAIGNS[word] for word in words if word in CAMPAIGNS] or CAMPAIGNS.values()
-    return {need for campaign in chosen for need in campaign.needs}
+    chosen = () if options.list else options.names or CAMPAIGNS
+    return {need for name in chosen for need in CAMPAIGNS[name].needs}
 
 
 def _to_stdout(line: str) -> None:
@@ -201,9 +209,12 @@ def _options(words: Sequence[str]) -> argparse.Namespace:
 
 
 def _minutes(text: str) -> float:
-    minutes = float(text)
+    try:
+        minutes = float(text)
+    except ValueError:
+        minutes = 0.0
     if not 0 < minutes < float("inf"):
-        raise argparse.ArgumentTypeError("must be more than 0")
+        raise argparse.ArgumentTypeError(f"{text!r} must be more than 0 minutes")
     return minutes
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.runner import toml_file
 from tests.runner.result import Result
 
 FILE = Path(__file__).parents[1] / "budget.toml"
@@ -55,8 +55,7 @@ class Spent:
 
 def read(file: Path = FILE) -> Budget:
     """Read the budgets."""
-    with file.open("rb") as opened:
-        table = tomllib.load(opened)
+    table = toml_file.load(file)
     return Budget(table["yardstick_s"], table["folders"], table.get("slow_files", {}))
 
 

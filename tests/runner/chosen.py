@@ -17,6 +17,7 @@ ONE_PROCESS = ("-n", "-m", "-s", "--pdb", "--collect-only", "--co", "--fixtures"
 
 def run(arguments: Sequence[str]) -> int:
     """Run what was asked for with pytest; the exit status."""
+    stages.check_places(arguments)
     if any(word.split("=")[0] in ONE_PROCESS for word in arguments):
         command = [sys.executable, "-m", "pytest", *stages.INSTALLED, *arguments]
         return subprocess.run(command, cwd=ROOT, check=False).returncode

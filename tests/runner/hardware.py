@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import fnmatch
-import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.runner import toml_file
 from tests.runner.result import Result
 
 FILE = Path(__file__).parents[1] / "hardware.toml"
@@ -30,8 +30,7 @@ class KnownSkip:
 
 def read(file: Path = FILE) -> tuple[KnownSkip, ...]:
     """Read the list."""
-    with file.open("rb") as opened:
-        return tuple(KnownSkip(**row) for row in tomllib.load(opened).get("skip", []))
+    return tuple(KnownSkip(**row) for row in toml_file.load(file).get("skip", []))
 
 
 def unknown(skipped: Iterable[Result], known: Sequence[KnownSkip]) -> tuple[Result, ...]:

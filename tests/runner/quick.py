@@ -31,6 +31,7 @@ FILTER = "not daemon and not slow"
 
 def run(arguments: Sequence[str]) -> int:
     """Lint, then test; the exit status."""
+    stages.check_places(arguments)
     for words in (["check", "-q"], ["format", "--check", "-q"]):
         status = subprocess.run([sys.executable, "-m", "ruff", *words], cwd=ROOT, check=False)
         if status.returncode:

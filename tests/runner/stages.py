@@ -44,6 +44,15 @@ WITH_EXAMPLES = (
 NOT_SOURCE = ("*/template/*", "benchmarks/recompose/plugins/*")
 
 
+def check_places(arguments: Iterable[str]) -> None:
+    """Ends the run with status 2 if a test file or folder that is named is not there."""
+    named = (word.split("::", 1)[0] for word in arguments if not word.startswith("-"))
+    absent = [at for at in named if ("/" in at or at.endswith(".py")) and not (ROOT / at).exists()]
+    if absent:
+        print(f"no such file or folder: {', '.join(absent)}", file=sys.stderr)
+        raise SystemExit(2)
+
+
 def pytest_job(
     name: str,
     run: Path,

@@ -69,3 +69,11 @@ def test_every_test_file_has_a_budget() -> None:
     files = [*ROOT.glob("tests/**/test_*.py"), *ROOT.glob("plugins/*/tests/test_*.py")]
     names = [str(file.relative_to(ROOT)) for file in files if "data" not in file.parts]
     assert {known.folder_of(name) for name in names} <= set(known.folders), Path(budget.FILE).name
+
+
+def test_mistake_in_the_file_is_told_with_file_and_line(tmp_path: Path) -> None:
+    file = tmp_path / "budget.toml"
+    file.write_text("yardstick_s = 1.0\nfolders = [\n")
+    with pytest.raises(SystemExit, match=rf"{file}: .*") as ended:
+        budget.read(file)
+    assert ended.value.code not in (0, None)
