@@ -192,8 +192,9 @@ class Machine:
         self._usb.pull(name)
 
     def unplug_all(self) -> None:
-        """Pull out all that is plugged in."""
-        self._usb.pull_all()
+        """Pull out all that is plugged in, if it runs."""
+        if self._qmp is not None:
+            self._usb.pull_all()
 
     def plug_line(
         self, path: Path | None = None, *, port: str | None = None, serial: str | None = None
