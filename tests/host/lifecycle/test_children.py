@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import os
+import select
 import signal
 import sys
 from collections.abc import AsyncIterator
@@ -216,12 +218,29 @@ async def test_no_child_is_kept_when_work_has_ended(tmp_path: Path, clock: Virtu
         assert not pool.pids()
 
 
+async def test_child_whose_end_the_server_has_not_told_is_not_said_to_hang(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with children() as pool:
+        await pool.run("look", drive(tmp_path), owner="a")
+        assert pool.server is not None
+        os.kill(pool.server, signal.SIGSTOP)
+        try:
+            with caplog.at_level(logging.WARNING):
+                await pool.release("a")
+        finally:
+            os.kill(pool.server, signal.SIGCONT)
+    assert caplog.records == []
+
+
 async def test_no_child_outlives_the_pool(tmp_path: Path) -> None:
     async with children() as pool:
         await pool.run("look", drive(tmp_path), owner="a")
-        pid = pool.kept()["a"]
-    with pytest.raises(ProcessLookupError):
-        os.kill(pid, 0)
+        child = os.pidfd_open(pool.kept()["a"])
+    try:
+        assert select.select([child], [], [], 0)[0], "a pidfd can be read once its process is over"
+    finally:
+        os.close(child)
 
 
 async def test_listing_of_an_empty_store_is_empty(tmp_path: Path) -> None:

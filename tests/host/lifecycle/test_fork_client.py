@@ -103,6 +103,20 @@ async def test_return_code_is_that_of_the_process() -> None:
             forked.close()
 
 
+async def test_end_of_a_process_is_seen_while_the_server_has_no_time_to_tell_it() -> None:
+    async with fork_client() as client:
+        child = await client.fork(JOB, START_S)
+        os.kill(server_of(client), signal.SIGSTOP)
+        try:
+            child.kill()
+            await child.over()
+            assert child.is_over and child.returncode is None, "the server has told nothing"
+        finally:
+            os.kill(server_of(client), signal.SIGCONT)
+        assert await child.wait() == -signal.SIGKILL
+        child.close()
+
+
 async def test_process_that_nobody_waits_for_any_more_is_killed() -> None:
     async with fork_client() as client:
         (await client.fork(JOB, START_S)).close()

@@ -192,10 +192,10 @@ class Children:
         _make_ordinary(child.pid)  # or, while others work, it gets no processor to end with
         child.kill()
         try:
-            await asyncio.wait_for(child.wait(), END_S)
+            await asyncio.wait_for(child.over(), END_S)
         except TimeoutError:
             log.warning("child %d hangs in its disk and is left behind", child.pid)
-        for other in [each for each in self._left_behind if each.returncode is not None]:
+        for other in [each for each in self._left_behind if each.is_over]:
             self._left_behind.discard(other)
             other.close()
 

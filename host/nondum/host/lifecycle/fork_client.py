@@ -40,8 +40,10 @@ class Forked:
         self.returncode: int | None = None
         """None until it has ended; negative for a signal."""
         self._descriptor, self._status = descriptor, status
-        self._ended = asyncio.Event()
-        asyncio.get_running_loop().add_reader(status, self._see_end)
+        self._over, self._ended = asyncio.Event(), asyncio.Event()
+        loop = asyncio.get_running_loop()
+        loop.add_reader(descriptor, self._see_over)
+        loop.add_reader(status, self._see_end)
 
     async def say(self, line: bytes) -> None:
         """Write a line to it; one that has ended does not hear it."""
@@ -62,8 +64,17 @@ class Forked:
             with contextlib.suppress(ProcessLookupError):
                 signal.pidfd_send_signal(self._descriptor, signal.SIGKILL)
 
+    @property
+    def is_over(self) -> bool:
+        """Whether it runs no more."""
+        return self._over.is_set()
+
+    async def over(self) -> None:
+        """Wait until it runs no more. The server may be too busy to tell the return code as yet."""
+        await self._over.wait()
+
     async def wait(self) -> int:
-        """Its return code, once it has ended."""
+        """Its return code, once the server has told it."""
         await self._ended.wait()
         assert self.returncode is not None
         return self.returncode
@@ -73,15 +84,22 @@ class Forked:
         self._writer.close()
         self._forget()
 
+    def _see_over(self) -> None:
+        asyncio.get_running_loop().remove_reader(self._descriptor)
+        self._over.set()
+
     def _see_end(self) -> None:
         said = os.read(self._status, fork_server.ANSWER_BYTES)
         self.returncode = int(said or -signal.SIGKILL)  # the server's end is that of all it forked
         self._forget()
+        self._over.set()
         self._ended.set()
 
     def _forget(self) -> None:
         if self._status >= 0:
-            asyncio.get_running_loop().remove_reader(self._status)
+            loop = asyncio.get_running_loop()
+            loop.remove_reader(self._descriptor)
+            loop.remove_reader(self._status)
             os.close(self._status)
             os.close(self._descriptor)
             self._status = -1
