@@ -25,7 +25,6 @@ from measuring import Spread, machine, percentile, table
 
 from nondum.host import heap
 from nondum.host.cgroups import Cages
-from nondum.host.confinement.level import Level
 from nondum.host.events import Event, WorkerExited, WorkerLogged, WorkerStrained
 from nondum.host.workers import Limits, WorkerLauncher, Workers, WorkerSpec, base_interpreter
 from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined
@@ -294,15 +293,15 @@ def _row(way: Way, rounds: Sequence[Round]) -> list[str]:
     ]
 
 
-CONFINEMENTS: dict[int, Callable[[], Confinement]] = {
-    int(Level.BOX): lambda: Boxed("bwrap"),
-    int(Level.KERNEL): Held,
-    int(Level.LIMITS): Unconfined,
+CONFINEMENTS: dict[str, Callable[[], Confinement]] = {
+    "sandboxed": lambda: Boxed("bwrap"),
+    "restricted": Held,
+    "none": Unconfined,
 }
 PAGE_TEXT = """# Workers that misbehave
 
 Written by `python benchmarks/misbehaviour.py`. Two good workers are called in turn, every 2 ms,
-while a third one misbehaves: each way {times} times, at confinement level {level}, with
+while a third one misbehaves: each way {times} times, at confinement level `{level}`, with
 {memory_mb} MB of memory, {tasks} tasks, {descriptors} descriptors, {scratch_mb} MB of scratch and
 one processor. *Told* is when the host acts on it or says so, *gone* when nothing of the worker is
 left; medians (lowest-highest). The good workers are the same processes from the first row to the
@@ -323,7 +322,7 @@ again after 1, 2 and 4 s, and not a fourth time within a minute.
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--times", type=int, default=50)
-    parser.add_argument("--level", type=int, choices=CONFINEMENTS, default=int(Level.BOX))
+    parser.add_argument("--level", choices=CONFINEMENTS, default="sandboxed")
     told = parser.parse_args()
     found = asyncio.run(main(told.times, CONFINEMENTS[told.level]()))
     limits = {name: getattr(LIMITS, name) for name in ("memory_mb", "tasks", "descriptors")}

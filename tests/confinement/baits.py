@@ -28,9 +28,9 @@ ESCAPE = Path(__file__).with_name("escape.py")
 SMALL = Limits(memory_mb=256, tasks=100, descriptors=64, file_mb=16)
 TOKEN = "nondum-bait"  # a word to look for
 IPC_CREAT, IPC_EXCL = 0o1000, 0o2000  # sys/ipc.h
-LEFT_AT_1 = {"be root", "know the host name", "see a process of the host"}
-"""What level 1 does not hide: other processes' names are to be seen, though nothing of what they
-hold. It is root where the host is, and the interpreter is root's alone."""
+LEFT_WHEN_RESTRICTED = {"be root", "know the host name", "see a process of the host"}
+"""What is not hidden from restricted workers: other processes' names are to be seen, though nothing
+of what they hold. It is root where the host is, and the interpreter is root's alone."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.confinement.baits import LEFT_AT_1, attempted, laid
+from tests.confinement.baits import LEFT_WHEN_RESTRICTED, attempted, laid
 from tests.confinement.escape import ATTEMPTS
 
 from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined
@@ -26,8 +26,10 @@ async def test_nothing_leaves_a_room(tmp_path: Path, bait: dict[str, Any]) -> No
     assert await reached(tmp_path, bait, Boxed(shutil.which("bwrap") or "bwrap")) == set()
 
 
-async def test_little_is_reached_at_level_1(tmp_path: Path, bait: dict[str, Any]) -> None:
-    assert await reached(tmp_path, bait, Held()) <= LEFT_AT_1
+async def test_little_is_reached_by_a_restricted_worker(
+    tmp_path: Path, bait: dict[str, Any]
+) -> None:
+    assert await reached(tmp_path, bait, Held()) <= LEFT_WHEN_RESTRICTED
 
 
 async def test_baits_are_there_to_be_reached(tmp_path: Path, bait: dict[str, Any]) -> None:

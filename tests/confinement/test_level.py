@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from nondum.host.confinement import choice, landlock, level, probe, sight
-from nondum.host.confinement.level import Finding, Level, Standing
+from nondum.host.confinement.level import Finding, Standing
 from nondum.sdk.errors import ConfigRefused
+from nondum.wheelhouse.confinement import Level
 
 HELD = {
     "capabilities": 0,
@@ -33,14 +34,14 @@ def no_bwrap(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def test_this_machine_has_rooms() -> None:
-    assert probe.findings() == (Finding(Level.BOX, is_available=True),)
+    assert probe.findings() == (Finding(Level.SANDBOXED, is_available=True),)
 
 
 def test_without_bubblewrap_the_kernel_has_to_do(no_bwrap: None) -> None:
-    box, *_, kernel = probe.findings()
+    box, kernel = probe.findings()
     assert (box.is_available, box.reason) == (False, "bubblewrap is not installed")
     assert box.fix == "apt install bubblewrap"
-    assert kernel == Finding(Level.KERNEL, is_available=True)
+    assert kernel == Finding(Level.RESTRICTED, is_available=True)
 
 
 def test_bubblewrap_that_fails_is_told_in_its_words(
@@ -71,8 +72,8 @@ def test_bubblewrap_that_fails_is_told_in_its_words(
     ids=lambda value: value if isinstance(value, str) else None,
 )
 def test_room_with_a_hole_is_none(hole: dict[str, object], said: str) -> None:
-    assert sight.judged(Level.BOX, HELD).is_available
-    finding = sight.judged(Level.BOX, {**HELD, **hole})
+    assert sight.judged(Level.SANDBOXED, HELD).is_available
+    finding = sight.judged(Level.SANDBOXED, {**HELD, **hole})
     assert not finding.is_available
     assert finding.reason == f"in it a process still {said}"
     assert finding.fix
@@ -81,7 +82,7 @@ def test_room_with_a_hole_is_none(hole: dict[str, object], said: str) -> None:
 def test_what_is_not_told_counts_as_a_hole() -> None:
     for key in set(HELD) - {"signals_host"}:
         told = {name: value for name, value in HELD.items() if name != key}
-        assert not sight.judged(Level.BOX, told).is_available, key
+        assert not sight.judged(Level.SANDBOXED, told).is_available, key
 
 
 def test_findings_are_kept_until_something_changes(tmp_path: Path) -> None:
@@ -97,36 +98,44 @@ def test_findings_are_kept_until_something_changes(tmp_path: Path) -> None:
     assert probe.findings(file) == found
 
 
+@pytest.mark.parametrize(
+    ("number", "level"), [(3, Level.SANDBOXED), (2, Level.SANDBOXED), (1, Level.RESTRICTED)]
+)
+def test_findings_that_an_earlier_version_kept_are_read(number: int, level: Level) -> None:
+    row = {"level": number, "name": "as it was", "available": False, "reason": "", "fix": ""}
+    assert Finding.from_dict(row) == Finding(level, is_available=False)
+
+
 def test_best_level_is_taken(no_bwrap: None) -> None:
-    standing = choice.standing("auto", 1)
-    assert standing.level == Level.KERNEL
-    assert standing.to_dict()["missing"][0]["level"] == 3
+    standing = choice.standing("auto", Level.RESTRICTED)
+    assert standing.level == Level.RESTRICTED
+    assert [row["level"] for row in standing.to_dict()["missing"]] == ["sandboxed"]
     assert not list(standing.warnings())
 
 
 def test_level_that_is_asked_for_is_taken() -> None:
-    assert choice.standing("1", 1).level == Level.KERNEL
-    standing = choice.standing("0", 1)
-    assert standing.level == Level.LIMITS
+    assert choice.standing(Level.RESTRICTED, Level.RESTRICTED).level == Level.RESTRICTED
+    standing = choice.standing(Level.NONE, Level.RESTRICTED)
+    assert standing.level == Level.NONE
     (warning,) = standing.warnings()
     assert warning.startswith("plugins are not confined")
 
 
 def test_level_that_is_not_there_is_refused(no_bwrap: None) -> None:
     with pytest.raises(ConfigRefused) as caught:
-        choice.standing("3", 0)
+        choice.standing(Level.SANDBOXED, Level.NONE)
     (problem,) = caught.value.problems
     assert problem.code == "CONFINEMENT_UNAVAILABLE"
-    assert (problem.need, problem.have) == ("level 3", "level 0")
+    assert (problem.need, problem.have) == ("level sandboxed", "level none")
     assert problem.fix and "apt install bubblewrap" in problem.fix
 
 
 def test_level_that_is_wanted_is_had_or_refused_whatever_the_minimum() -> None:
-    box = Finding(Level.BOX, is_available=False, reason="no bwrap", fix="install it")
-    (problem,) = level.refusals((box,), Level.BOX, Level.LIMITS)
+    box = Finding(Level.SANDBOXED, is_available=False, reason="no bwrap", fix="install it")
+    (problem,) = level.refusals((box,), Level.SANDBOXED, Level.NONE)
     assert "no bwrap" in str(problem)
-    assert not list(level.refusals((box,), Level.LIMITS, Level.LIMITS))
-    (problem,) = level.refusals((box,), None, Level.KERNEL)
+    assert not list(level.refusals((box,), Level.NONE, Level.NONE))
+    (problem,) = level.refusals((box,), "auto", Level.RESTRICTED)
     assert "minimum_confinement" in problem.where
 
 
@@ -135,34 +144,22 @@ def test_host_does_not_start_below_its_minimum(
 ) -> None:
     monkeypatch.setattr(landlock, "version", lambda: 0)
     with pytest.raises(ConfigRefused) as caught:
-        choice.standing("auto", 1)
+        choice.standing("auto", Level.RESTRICTED)
     (problem,) = caught.value.problems
-    assert problem.where == "[workers] minimum_confinement = 1"
+    assert problem.where == '[workers] minimum_confinement = "restricted"'
     assert "the kernel has no Landlock" in problem.message
-    standing = choice.standing("auto", 0)
-    assert standing.level == Level.LIMITS
+    standing = choice.standing("auto", Level.NONE)
+    assert standing.level == Level.NONE
     assert "the kernel has no Landlock" in next(standing.warnings())
 
 
 def test_standing_tells_only_what_is_above_it() -> None:
     findings = (
-        Finding(Level.BOX, is_available=False, reason="no bwrap"),
-        Finding(Level.KERNEL, is_available=True),
+        Finding(Level.SANDBOXED, is_available=False, reason="no bwrap"),
+        Finding(Level.RESTRICTED, is_available=True),
     )
-    assert Standing(Level.KERNEL, findings).to_dict() == {
-        "level": 1,
-        "name": "Landlock and filtered system calls",
-        "scratch": "disk",
+    assert Standing(Level.RESTRICTED, findings).to_dict() == {
+        "level": "restricted",
+        "mechanism": "Landlock and filtered system calls",
         "missing": [findings[0].to_dict()],
     }
-
-
-def test_scratch_that_ends_with_its_worker_is_told() -> None:
-    standing = Standing(Level.SERVICE)
-    assert standing.to_dict()["scratch"] == "memory"
-    (warning,) = standing.warnings()
-    assert warning == (
-        "what plugins write to their scratch folders is in memory (level 2, systemd service): "
-        "it ends with their workers"
-    )
-    assert not list(Standing(Level.BOX).warnings())

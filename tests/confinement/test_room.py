@@ -131,7 +131,7 @@ async def test_device_is_there_before_the_plugin_starts(
 CONNECT = "socket.create_connection(('127.0.0.1', {port}), 2).close()"
 
 
-@pytest.mark.parametrize("make", [Boxed, Held], ids=["level 3", "level 1"])
+@pytest.mark.parametrize("make", [Boxed, Held], ids=["sandboxed", "restricted"])
 async def test_network_is_a_permission(tmp_path: Path, make: type[Boxed] | type[Held]) -> None:
     confinement: Confinement = Boxed(shutil.which("bwrap") or "bwrap") if make is Boxed else Held()
     with socket.create_server(("127.0.0.1", 0)) as listener:

@@ -69,7 +69,7 @@ ON_THE_HOST = {
     "sockets": ("connect to a path", ("user",)),
     "spying": ("trace a child", ("user",)),
 }
-"""The same of level 1. Landlock and filters need a process that may gain no privileges."""
+"""Likewise of restricted workers. Landlock and filters need one that may gain no privileges."""
 
 LIMITS = {
     "memory_mb": ("take all memory", 2048),
@@ -120,7 +120,7 @@ async def test_nothing_of_that_is_possible_in_a_whole_room(
     assert not await possible(tmp_path, bait, Boxed(BWRAP), names)
 
 
-async def test_nothing_of_that_is_possible_at_the_whole_of_level_1(
+async def test_nothing_of_that_is_possible_for_a_restricted_worker(
     tmp_path: Path, bait: dict[str, Any]
 ) -> None:
     """But for what only its being another user than the host's hides."""
@@ -148,7 +148,9 @@ async def test_wall_of_a_room_matters(tmp_path: Path, bait: dict[str, Any], wall
 
 
 @pytest.mark.parametrize("wall", ON_THE_HOST)
-async def test_wall_of_level_1_matters(tmp_path: Path, bait: dict[str, Any], wall: str) -> None:
+async def test_wall_of_a_restricted_worker_matters(
+    tmp_path: Path, bait: dict[str, Any], wall: str
+) -> None:
     name, away = ON_THE_HOST[wall]
     broken = Held(without=(*away, wall))
     if away:

@@ -12,7 +12,7 @@ from tests.kit.payloads import Part
 from tests.kit.running_host import READY_S, RunningHost
 from tests.transport.fleet.fleets import router
 
-UNCONFINED = '[workers]\nconfinement = "0"\nminimum_confinement = 0\n\n'
+UNCONFINED = '[workers]\nconfinement = "none"\n\n'
 """Plugins of these tests write down beside their rooms what they are made to do."""
 
 

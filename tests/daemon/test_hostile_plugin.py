@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from tests.confinement.baits import ESCAPE, LEFT_AT_1, laid
+from tests.confinement.baits import ESCAPE, LEFT_WHEN_RESTRICTED, laid
 from tests.confinement.escape import ATTEMPTS
 from tests.daemon.plugins import talker
 from tests.kit.payloads import Part
@@ -34,6 +34,6 @@ def test_hostile_payload_gets_nowhere(host: RunningHost, tmp_path: Path) -> None
     assert {row["name"] for row in rows} == set(attempts)
     could = {r["name"] for r in rows if r["could"] and Path(r.get("must exist", "/")).exists()}
     level = host.ask("status")["confinement"]["level"]
-    assert could <= (set() if level == 3 else LEFT_AT_1)
+    assert could <= (set() if level == "sandboxed" else LEFT_WHEN_RESTRICTED)
     assert host.until_component("escape", "ready")["confinement"] == level
     assert host.component("talker") == talking, "the other one never noticed"

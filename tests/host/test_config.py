@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from nondum.host.config import HOST_NAME as HOST_NAME_PATTERN
 from nondum.host.config import HostConfig, default_name, load, parse
 from nondum.sdk.errors import ConfigRefused
+from nondum.wheelhouse.confinement import Level
 
 
 def refused(text: str) -> list[str]:
@@ -33,6 +34,38 @@ def test_what_is_written_stands_over_the_defaults() -> None:
     assert config.drives.slots == (Path("/a"), Path("/b"))
     assert config.planning.deadline_s == 3.0
     assert config.host.state == HostConfig().host.state
+
+
+@pytest.mark.parametrize(
+    ("value", "level"),
+    [
+        ('"sandboxed"', Level.SANDBOXED),
+        ('"3"', Level.SANDBOXED),
+        ("3", Level.SANDBOXED),
+        ('"2"', Level.SANDBOXED),
+        ('"restricted"', Level.RESTRICTED),
+        ("1", Level.RESTRICTED),
+        ('"none"', Level.NONE),
+        ('"0"', Level.NONE),
+    ],
+)
+def test_levels_of_confinement_are_named_or_numbered(value: str, level: Level) -> None:
+    text = f"[workers]\nconfinement = {value}\nminimum_confinement = {value}\n"
+    workers = parse(text, "host.toml", HostConfig()).workers
+    assert (workers.confinement, workers.minimum_confinement) == (level, level)
+
+
+def test_the_best_confinement_may_be_asked_for() -> None:
+    text = '[workers]\nconfinement = "auto"\n'
+    assert parse(text, "host.toml", HostConfig()).workers.confinement == "auto"
+
+
+@pytest.mark.parametrize("value", ['"high"', "4", "true", '["none"]'])
+def test_what_is_no_level_of_confinement_is_refused(value: str) -> None:
+    text = f"[workers]\nconfinement = {value}\nminimum_confinement = {value}\n"
+    highest, least = refused(text)
+    assert "confinement = " in highest and 'expected "auto", "sandboxed", "restricted"' in highest
+    assert "minimum_confinement" in least and 'expected "sandboxed", "restricted"' in least
 
 
 def test_all_mistakes_are_told_at_once() -> None:

@@ -15,7 +15,8 @@ from typing import Any, TypeVar
 import pluggy
 from tests.kit.until import PATIENCE_S, arrived
 
-from nondum.host.confinement import Level, choice
+from nondum.host.confinement import choice
+from nondum.host.confinement.level import parse_wanted
 from nondum.host.events import BehaviourEnded, Event, WorkerExited, WorkerReady
 from nondum.host.workers import (
     Call,
@@ -29,6 +30,7 @@ from nondum.host.workers import (
 from nondum.host.workers.confinements import Confinement
 from nondum.host.workers.launcher import MARK
 from nondum.sdk.description import Behaviour, Input, Output, PluginDescription, Unit
+from nondum.wheelhouse.confinement import Level
 
 SDK = Path(__file__).parents[2] / "plugins/sdk"
 LIBRARIES = Path(pluggy.__file__).parents[1]
@@ -36,7 +38,7 @@ HOST = "rover"
 TIMING = Timing(backoff_s=0.0)
 """As the product has it, but that workers are restarted at once."""
 
-LEVEL = os.environ.get("NONDUM_TEST_LEVEL", choice.AUTO)
+LEVEL = os.environ.get("NONDUM_TEST_LEVEL", "auto")
 """Level of confinement at which workers are tested; `auto`: the best of this machine."""
 
 _E = TypeVar("_E", bound=Event)
@@ -45,7 +47,7 @@ _E = TypeVar("_E", bound=Event)
 @functools.cache
 def level() -> Level:
     """The level at which workers are tested."""
-    return choice.standing(LEVEL, 0).level
+    return choice.standing(parse_wanted(LEVEL), Level.NONE).level
 
 
 @dataclass

@@ -13,6 +13,7 @@ from tests.wheelhouse.sources import PLUGIN, make_source
 
 from nondum.sdk.errors import ConfigRefused, InstallFailed, NondumError, PayloadRefused
 from nondum.wheelhouse import build, contents, drive, index, lock, preflight
+from nondum.wheelhouse.confinement import Level
 from nondum.wheelhouse.library_wheels import library_wheel
 from nondum.wheelhouse.resolve import Sources
 from nondum.wheelhouse.signatures import UnsignedAllowed
@@ -56,7 +57,7 @@ def refused(act: Callable[[], object], kind: type[NondumError]) -> list[str]:
 
 def test_a_source_becomes_a_payload_that_hosts_take(built: Build, tmp_path: Path) -> None:
     folder = built(make_source(tmp_path / "src"))
-    facts = preflight.probe(tmp_path, reserve_mb=0, confinement=0)
+    facts = preflight.probe(tmp_path, reserve_mb=0, confinement=Level.NONE)
     assert verify(folder, UnsignedAllowed(), facts).problems == ()
     assert drive.find_payloads(tmp_path / "drive") == (folder,)
     listed = contents.parse(drive.read_contents(folder), "CONTENTS")

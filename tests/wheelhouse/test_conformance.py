@@ -20,6 +20,7 @@ import pytest
 from tests.kit.payloads import installed_wheel
 
 from nondum.wheelhouse import bytecode, lock, locking, preflight, venvs, wheel
+from nondum.wheelhouse.confinement import Level
 from nondum.wheelhouse.store import Store
 from nondum.wheelhouse.stored import StoredWheel
 from nondum.wheelhouse.target import Target
@@ -59,7 +60,7 @@ def stored(folder: Path) -> list[StoredWheel]:
     """The wheels as chosen from the lock, in the store."""
     store = Store(folder / "store")
     parsed = lock.parse((folder / "pylock.popular.toml").read_text(), "lock")
-    facts = preflight.probe(folder, reserve_mb=0, confinement=0)
+    facts = preflight.probe(folder, reserve_mb=0, confinement=Level.NONE)
     chosen = lock.select(parsed, facts.environment, facts.tags)
     for one in chosen:
         store.add(folder / one.path, one.sha256)
@@ -182,7 +183,7 @@ def test_the_distributions_work_together(ours: Path) -> None:
 @long
 def test_the_other_method_gives_the_same_tree(folder: Path, pips: Path) -> None:
     parsed = lock.parse((folder / "pylock.popular.toml").read_text(), "lock")
-    facts = preflight.probe(folder, reserve_mb=0, confinement=0)
+    facts = preflight.probe(folder, reserve_mb=0, confinement=Level.NONE)
     venvs.make_with_pip(
         folder / "by-pip", PYTHON, folder, lock.select(parsed, facts.environment, facts.tags)
     )

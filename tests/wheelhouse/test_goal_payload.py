@@ -10,6 +10,7 @@ from tests.kit.signing import Key, sign_payload, trust_of
 
 from nondum.sdk.errors import PayloadRefused
 from nondum.wheelhouse import drive, goal_payload, goals, preflight
+from nondum.wheelhouse.confinement import Level
 from nondum.wheelhouse.signatures import UnsignedAllowed
 from nondum.wheelhouse.trust.judging import Circumstances, Judging
 from nondum.wheelhouse.verification import Verified, verify
@@ -20,7 +21,7 @@ ALICE, ROOT, ID = Key("alice"), Key("root"), "org.example.errand"
 def judged(folder: Path, *permissions: str) -> Verified:
     roles = {"maker": (["org.example"], [ALICE])}
     trust = trust_of(roots=[ROOT], roles=roles, permissions=permissions)
-    facts = preflight.probe(folder, reserve_mb=0, confinement=0)
+    facts = preflight.probe(folder, reserve_mb=0, confinement=Level.NONE)
     return verify(folder, Judging(trust, Circumstances()), facts)
 
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from nondum.sdk.description import DeviceNeed
 from nondum.sdk.errors import PayloadRefused, Problem
 from nondum.wheelhouse import manifest
+from nondum.wheelhouse.confinement import Level
 from nondum.wheelhouse.manifest import UnitMount
 
 PLAIN = """\
@@ -72,6 +73,27 @@ def test_a_plain_manifest_is_read() -> None:
     )
     assert (blinker.permissions, blinker.settings) == (("devices",), {"rate_hz": 2})
     assert (buzzer.devices, buzzer.units, buzzer.settings) == ((), (), {})
+
+
+@pytest.mark.parametrize(
+    ("value", "level"),
+    [
+        ('"sandboxed"', Level.SANDBOXED),
+        ("3", Level.SANDBOXED),
+        ("2", Level.SANDBOXED),
+        ('"restricted"', Level.RESTRICTED),
+        ("1", Level.RESTRICTED),
+        ('"none"', Level.NONE),
+        ("0", Level.NONE),
+    ],
+)
+def test_a_level_of_confinement_is_demanded_by_name_or_number(value: str, level: Level) -> None:
+    text = PLAIN.replace("memory_mb = 50", f"confinement = {value}")
+    assert manifest.parse(text, "payload.toml").requires.confinement is level
+
+
+def test_without_a_demand_any_confinement_will_do() -> None:
+    assert manifest.parse(PLAIN, "payload.toml").requires.confinement is Level.NONE
 
 
 WRONG = {
@@ -144,10 +166,29 @@ WRONG = {
     "memory-negative": ("MANIFEST_VALUE", ":10", PLAIN.replace("= 50", "= -50")),
     "memory-text": ("MANIFEST_VALUE", ":10", PLAIN.replace("= 50", '= "50 MB"')),
     "memory-true": ("MANIFEST_VALUE", ":10", PLAIN.replace("= 50", "= true")),
-    "confinement-level": (
+    **{
+        f"confinement-{name}": (
+            "MANIFEST_VALUE",
+            ":10",
+            PLAIN.replace("memory_mb = 50", f"confinement = {value}"),
+        )
+        for name, value in {
+            "level": "9",
+            "word": '"high"',
+            "true": "true",
+            "list": '["none"]',
+            "huge": f"0x{'f' * 5000}",
+        }.items()
+    },
+    "alone-is-huge": (
         "MANIFEST_VALUE",
         ":10",
-        PLAIN.replace("memory_mb = 50", "confinement = 9"),
+        PLAIN.replace("memory_mb = 50", f"alone = 0x{'f' * 5000}"),
+    ),
+    "permissions-are-huge": (
+        "MANIFEST_VALUE",
+        ":15",
+        PLAIN.replace('["devices"]', f"[0x{'f' * 5000}]"),
     ),
     "permission-unknown": ("MANIFEST_VALUE", ":15", PLAIN.replace('["devices"]', '["root"]')),
     "settings-is-list": ("MANIFEST_VALUE", ":16", PLAIN.replace("{ rate_hz = 2 }", "[2]")),

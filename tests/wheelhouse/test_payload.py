@@ -17,6 +17,7 @@ from tests.wheelhouse.hostile_wheels import WheelBuilder
 
 from nondum.sdk.errors import PayloadRefused, Problem
 from nondum.wheelhouse import contents, drive, payload, preflight
+from nondum.wheelhouse.confinement import Level
 from nondum.wheelhouse.payload import (
     StagedPayload,
     check_wheels,
@@ -38,7 +39,7 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def facts(tmp_path: Path) -> HostFacts:
-    return preflight.probe(tmp_path, reserve_mb=0, confinement=0)
+    return preflight.probe(tmp_path, reserve_mb=0, confinement=Level.NONE)
 
 
 def check(folder: Path, facts: HostFacts | None = None) -> tuple[Problem, ...]:

@@ -13,6 +13,7 @@ from tests.wheelhouse.locks import HEAD, host, package, wheel
 
 from nondum.sdk.errors import PayloadRefused
 from nondum.wheelhouse import lock, manifest
+from nondum.wheelhouse.confinement import Level
 from nondum.wheelhouse.lock import Lock
 from nondum.wheelhouse.memory import Memory
 from nondum.wheelhouse.preflight import HostFacts, preflight, probe, select, unmet
@@ -25,7 +26,7 @@ FACTS = HostFacts(
     tags=tuple(TAGS),
     free_disk_mb=1000,
     memory=Memory(1000),
-    confinement=1,
+    confinement=Level.RESTRICTED,
     nondum="0.1.0",
 )
 
@@ -65,7 +66,12 @@ REFUSED = {
     "memory": ("NO_MEMORY", "memory_mb = 4000", "4000 MB", "1000 MB"),
     "gpu": ("NO_GPU_MEMORY", "gpu_memory_mb = 1", "1 MB", "0 MB"),
     "disk": ("DISK_FULL", "disk_mb = 1001", "1001 MB", "1000 MB"),
-    "confinement": ("CONFINEMENT", "confinement = 3", "level 3", "level 1"),
+    "confinement": (
+        "CONFINEMENT",
+        'confinement = "sandboxed"',
+        "level sandboxed",
+        "level restricted",
+    ),
 }
 
 
@@ -174,7 +180,7 @@ def test_an_unreadable_dependency_is_told() -> None:
 
 
 def test_probing_looks_at_this_machine(tmp_path: Path) -> None:
-    facts = probe(tmp_path / "not/yet/there", reserve_mb=64, confinement=1)
+    facts = probe(tmp_path / "not/yet/there", reserve_mb=64, confinement=Level.RESTRICTED)
     assert facts.architecture == platform.machine()
     assert facts.python == platform.python_version()
     assert (
@@ -187,4 +193,4 @@ def test_probing_looks_at_this_machine(tmp_path: Path) -> None:
 
 
 def test_the_reserve_is_never_negative(tmp_path: Path) -> None:
-    assert probe(tmp_path, reserve_mb=10**9, confinement=0).free_disk_mb == 0
+    assert probe(tmp_path, reserve_mb=10**9, confinement=Level.NONE).free_disk_mb == 0

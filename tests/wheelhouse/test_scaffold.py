@@ -12,6 +12,7 @@ from tests.kit.payloads import SDK
 
 from nondum.sdk.errors import ConfigRefused
 from nondum.wheelhouse import build, manifest, preflight
+from nondum.wheelhouse.confinement import Level
 from nondum.wheelhouse.scaffold import NewPackage, new_package
 from nondum.wheelhouse.signatures import UnsignedAllowed
 from nondum.wheelhouse.target import Target
@@ -96,7 +97,7 @@ def test_it_becomes_a_payload_that_hosts_take(made: NewPackage, tmp_path: Path) 
     options = build.Options(targets=(Target.here(),), libraries=(SDK,))
     told: list[tuple[str, int, int]] = []
     folder = build.build(made.folder, tmp_path / "drive", options, lambda *s: told.append(s))
-    facts = preflight.probe(tmp_path, reserve_mb=0, confinement=0)
+    facts = preflight.probe(tmp_path, reserve_mb=0, confinement=Level.NONE)
     assert folder == tmp_path / "drive/nondum/org.example.window-opener"
     assert verify(folder, UnsignedAllowed(), facts).problems == ()
     assert [done for _, done, _ in told] == sorted(done for _, done, _ in told)

@@ -11,6 +11,7 @@ from tests.wheelhouse.hostile import WHEELS, HostileWheel
 from tests.wheelhouse.hostile_wheels import WheelBuilder
 
 from nondum.wheelhouse import preflight
+from nondum.wheelhouse.confinement import Level
 from nondum.wheelhouse.signatures import UnsignedAllowed
 from nondum.wheelhouse.target import Target, targets
 from nondum.wheelhouse.trust.judging import Circumstances, Judging
@@ -84,7 +85,7 @@ def test_every_changed_file_is_told(folder: Path) -> None:
 def test_everything_is_told_once_and_with_what_to_do(tmp_path: Path) -> None:
     bad = WheelBuilder(files={"evil/__init__.py": b"", "json.py": b""}).write(tmp_path)
     folder = make_payload(tmp_path / "drive", Part("blinker", "X = 1\n", wheels=(bad,)))
-    facts = preflight.probe(tmp_path, reserve_mb=0, confinement=0)
+    facts = preflight.probe(tmp_path, reserve_mb=0, confinement=Level.NONE)
     found = verify(folder, UnsignedAllowed(), facts)
     assert codes(found) == ["WHEEL_SHADOWS"]
     assert all(problem.fix and problem.where for problem in found.problems)

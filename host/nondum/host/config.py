@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import os
 import re
@@ -14,12 +15,14 @@ from types import GenericAlias
 from typing import Any, get_args, get_type_hints
 
 from nondum.host.configuration.places import Places
+from nondum.host.confinement.level import Wanted, parse_wanted
 from nondum.host.feedback import section as feedback_section
 from nondum.host.feedback.section import FeedbackSection
 from nondum.sdk.errors import ConfigRefused, Problem
+from nondum.wheelhouse import confinement
+from nondum.wheelhouse.confinement import Level
 
 SYSTEM_FILE = Path("/etc/nondum/host.toml")
-_LEVELS = ("auto", "3", "2", "1", "0")
 _REFERENCE = re.compile(r"[\w.]+:\w+")
 _AT_LINE = re.compile(r"at line (\d+)")
 HOST_NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
@@ -126,12 +129,13 @@ class WorkersSection:
     settle_beats: int = 2
     """Signs of life, two seconds apart, that each worker of a newer release gives before it takes
     over."""
-    confinement: str = "auto"
-    """Level at which workers are confined: `3` bubblewrap, `2` a systemd service, `1` Landlock and
-    filtered system calls, `0` resource limits only; `auto`: the highest that the machine has."""
-    minimum_confinement: int = 1
+    confinement: Wanted = "auto"
+    """Level at which workers are confined: `sandboxed` (bubblewrap), `restricted` (Landlock and
+    filtered system calls), `none` (resource limits only); `auto`: the highest that the machine has.
+    """
+    minimum_confinement: Level = Level.RESTRICTED
     """Level below which this host does not start, where `auto` finds no better one; with `--user`
-    it is 0, and every status says so."""
+    it is `none`, and every status says so."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,7 +241,7 @@ def user_config() -> HostConfig:
         trust=TrustSection(file=None),
         devices=DevicesSection(slots=(state / "device-slots",)),
         peers=PeersSection(enabled=False),
-        workers=WorkersSection(minimum_confinement=0),
+        workers=WorkersSection(minimum_confinement=Level.NONE),
     )
 
 
@@ -322,11 +326,19 @@ KINDS: Mapping[Any, str] = {
     Path | None: "a path as a string",
     tuple[Path, ...]: "a list of paths",
     tuple[str, ...]: "a list of strings",
+    Level: confinement.EXPECTED,
+    Wanted: f'"auto", {confinement.EXPECTED}',
 }
+_PARSERS: Mapping[Any, Callable[[object], Any]] = {Level: confinement.parse, Wanted: parse_wanted}
+"""Kinds of values that are read from text or numbers; each raises `ValueError`."""
 
 
 def _typed(hint: Any, value: Any) -> Any:
     """The value as `hint` wants it, or None when it is of another kind."""
+    if hint in _PARSERS:
+        with contextlib.suppress(ValueError):
+            return _PARSERS[hint](value)
+        return None
     if isinstance(hint, GenericAlias):
         (item, _) = get_args(hint)
         typed = [_typed(item, v) for v in value] if isinstance(value, list) else [None]
@@ -348,8 +360,6 @@ def _contradictions(config: HostConfig, places: Places) -> Iterator[Problem]:
     for section, key, is_right, expected in (
         ("trust", "on_revoke", _one_of("stop", "flag"), '"stop" or "flag"'),
         ("install", "method", _one_of("store", "pip"), '"store" or "pip"'),
-        ("workers", "confinement", _one_of(*_LEVELS), '"auto", "3", "2", "1" or "0"'),
-        ("workers", "minimum_confinement", range(4).__contains__, "a level from 0 to 3"),
         ("host", "system_tree", _REFERENCE.fullmatch, '"package:function"'),
     ):
         value = getattr(getattr(config, section), key)

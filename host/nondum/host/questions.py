@@ -9,7 +9,7 @@ from typing import cast
 
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import PayloadRecord, Step
-from nondum.host.confinement.level import SCRATCH, Level, Standing
+from nondum.host.confinement.level import Standing
 from nondum.host.control.arguments import Arguments
 from nondum.host.devices import view
 from nondum.host.feedback.state import NOTHING
@@ -104,9 +104,7 @@ class Questions:
             for c in snapshot.components
         ]
         for row in own:
-            level = self.workers.launcher.level if row["pid"] else None
-            row["confinement"] = level
-            row["scratch"] = SCRATCH[Level(level)] if level is not None else None
+            row["confinement"] = str(self.workers.launcher.level) if row["pid"] else None
         return own + [
             offered_row(offered, peer.name)
             for peer in snapshot.peers

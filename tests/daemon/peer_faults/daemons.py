@@ -20,7 +20,7 @@ from nondum.transport.peers.keys import load_or_create
 
 OVER = {"reached", "failed", "halted"}
 """States of goals that are pursued no more."""
-SECTION = '[workers]\nconfinement = "0"\nminimum_confinement = 0\n[peers]\nenabled = true\n'
+SECTION = '[workers]\nconfinement = "none"\n[peers]\nenabled = true\n'
 
 
 class WiredHost(RunningHost):

@@ -16,7 +16,6 @@ from nondum.host.cgroups import CageLimits, Cages
 from nondum.host.cgroups.cages import NoTree, known, problems_of, tree
 from nondum.host.cgroups.legacy import Legacy
 from nondum.host.cgroups.mounts import Mounted, mounted
-from nondum.host.cgroups.services import ServiceGroup, services
 from nondum.host.cgroups.unified import Unified
 
 REAL = pytest.mark.skipif(os.geteuid() != 0, reason="making cgroups needs root")
@@ -234,37 +233,3 @@ def test_controllers_that_share_a_hierarchy_are_one() -> None:
         ["name=systemd"],
         [],
     ]
-
-
-def test_services_are_found_where_systemd_has_them(tmp_path: Path) -> None:
-    unified(tmp_path / "system.slice", "memory pids cpu")
-    found = services([Mounted(tmp_path, tmp_path, frozenset())])
-    group = ServiceGroup("lamp.service", found)
-    assert group.pids() == ()
-    folder = tmp_path / "system.slice/lamp.service"
-    folder.mkdir()
-    (folder / "cgroup.procs").write_text("41\n42\n")
-    (folder / "pids.events").write_text("max 7\n")
-    (folder / "memory.events").write_text("oom 1\noom_kill 2\n")
-    assert group.pids() == (41, 42)
-    assert (group.usage().refused_tasks, group.usage().oom_kills) == (7, 2)
-
-
-def test_what_a_service_used_is_known_when_it_has_ended(tmp_path: Path) -> None:
-    """systemd removes its cgroup with it."""
-    folder = tmp_path / "pids/system.slice/lamp.service"
-    folder.mkdir(parents=True)
-    (folder / "cgroup.procs").write_text("41\n")
-    (folder / "pids.events").write_text("max 7\n")
-    at = Mounted(tmp_path / "pids", tmp_path / "pids", frozenset({"pids"}))
-    group = ServiceGroup("lamp.service", services([at]))
-    assert group.usage().refused_tasks == 7
-    for file in folder.iterdir():
-        file.unlink()
-    folder.rmdir()
-    assert group.pids() == ()
-    assert group.usage().refused_tasks == 7
-
-
-def test_where_nothing_counts_nothing_is_known_of_services() -> None:
-    assert isinstance(services([]), NoTree)

@@ -60,12 +60,17 @@ def test_file_that_is_right_is_said_to_be(tmp_path: Path) -> None:
 
 
 def test_every_key_is_shown_with_who_says_it(tmp_path: Path) -> None:
-    file = written(tmp_path, '[host]\nname = "spot"\n[planning]\n\ndeadline_s = 3\n')
+    file = written(
+        tmp_path,
+        '[host]\nname = "spot"\n[planning]\n\ndeadline_s = 3\n[workers]\nconfinement = 2\n',
+    )
     arguments = ("--user", "--config", file, "--name", "rex", "--peer", "10.0.0.7")
     shown = nondum("config", "show", *arguments, "--json", XDG_STATE_HOME="/there").ok().json
     found = {row["key"]: (row["value"], row["from"]) for row in shown["settings"]}
     assert found["host.name"] == ("rex", "--name")
     assert found["planning.deadline_s"] == (3.0, f"{file}:5")
+    assert found["workers.confinement"] == ("sandboxed", f"{file}:7")
+    assert found["workers.minimum_confinement"] == ("none", "default with --user")
     assert found["peers.static"] == (["10.0.0.7"], "--peer")
     assert found["host.state"] == ("/there/nondum", "default with --user")
     assert found["install.method"] == ("store", "default")

@@ -40,11 +40,12 @@ def test_what_workers_are_limited_in_is_told() -> None:
 
 def test_every_level_of_confinement_is_tried() -> None:
     done = nondum("doctor", "confinement").ok()
-    assert done.out.splitlines()[0].split() == ["LEVEL", "NAME", "AVAILABLE", "REASON"]
+    assert done.out.splitlines()[0].split() == ["LEVEL", "MECHANISM", "AVAILABLE", "REASON"]
     told = json.loads(nondum("doctor", "confinement", "--json").ok().out)
     available = {row["level"]: row["available"] for row in told["levels"]}
     assert told["ok"]
-    assert (available[3], available[1]) == (True, True), "tests need bubblewrap and Landlock"
+    need = "tests need bubblewrap and Landlock"
+    assert available == {"sandboxed": True, "restricted": True}, need
     assert all(row["available"] or (row["reason"] and row["fix"]) for row in told["levels"])
 
 

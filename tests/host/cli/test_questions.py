@@ -28,7 +28,6 @@ ROWS: dict[str, set[str]] = {
         "pid",
         "problem",
         "confinement",
-        "scratch",
         "release",
         "was",
         "built",
@@ -94,7 +93,7 @@ PAYLOAD_KEYS = {
 STATUS = """\
 host panther  revision N  ready
 warning: payloads without a signature are accepted (allow_unsigned)
-workers are confined at level N: WALLS
+confinement of workers: LEVEL
 
 PAYLOAD             VERSION  AGE  STATE   DRIVE   COMPONENTS
 org.example.beacon  1.0      AGE  active  beacon  beacon
@@ -103,7 +102,7 @@ org.example.beacon  1.0      AGE  active  beacon  beacon
 """
 COMPONENTS = """\
 COMPONENT  STATE  PLUGIN       VERSION  PAYLOAD             AGE  UNITS  CONFINEMENT  PROBLEM
-beacon     ready  test-beacon  1.0      org.example.beacon  AGE  lamp   N            -
+beacon     ready  test-beacon  1.0      org.example.beacon  AGE  lamp   LEVEL        -
 """
 BEHAVIOURS = """\
 BEHAVIOUR  COMPONENT  KIND       RUNNING  PHRASES
@@ -170,9 +169,10 @@ def normalised(text: str) -> str:
     text = re.sub(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d", "WHEN", text)
     text = re.sub(r"(?<=  )\d+ (?:s|min)(?= )", lambda age: "AGE".ljust(len(age[0])), text)
     text = re.sub(r"AGE +(?=STATE|UNITS)|(?<=  )\d+ d +", "AGE  ", text)
-    text = re.sub(r"(confined at level) \d: .*", r"\1 N: WALLS", text)
+    text = re.sub(r"(confinement of workers:) .*", r"\1 LEVEL", text)
     text = re.sub(r"^shown: .*\n", "", text, flags=re.MULTILINE)  # it is another one soon
-    text = re.sub(r"(lamp   )\d( +-)", r"\1N\2", text)
+    levels = "sandboxed|restricted|none"
+    text = re.sub(rf"(?<=lamp   )(?:{levels}) +", "LEVEL        ", text)
     return re.sub(r"(revision|world model  —|people  —) \d+", r"\1 N", text)
 
 

@@ -32,7 +32,7 @@ def hand_over(folder: Path, target: Path, **more: Any) -> dict[str, Any]:
 
 
 def judge(folder: Path, state: Path, **more: Any) -> dict[str, Any]:
-    rules = {"confinement": 0, "method": "store", "reserve_mb": 0, "allow_unsigned": True}
+    rules = {"confinement": "none", "method": "store", "reserve_mb": 0, "allow_unsigned": True}
     room = {"promised": asdict(Promised()), "freed_mb": 0, "freed_gpu_mb": 0}
     given = {"folder": str(folder), "store": str(state / "store"), "room": room, **rules}
     return parcel.judge(given | more, told)

@@ -26,7 +26,7 @@ def rules(tmp_path: Path) -> dict[str, Any]:
     return {
         "store": str(tmp_path / "store"),
         "staging": str(tmp_path / "staging"),
-        "confinement": 0,
+        "confinement": "none",
         "method": "store",
         "reserve_mb": 0,
         "allow_unsigned": True,

@@ -256,4 +256,4 @@ def staged_fifo(root: Path) -> dict[str, Any]:
 
 
 def host_facts(root: Path) -> dict[str, Any]:
-    return {"store": str(root / "store"), "reserve_mb": 0, "confinement": 0, "method": "store"}
+    return {"store": str(root / "store"), "reserve_mb": 0, "confinement": "none", "method": "store"}

@@ -23,7 +23,7 @@ def test_what_was_damaged_in_the_store_is_not_installed(tmp_path: Path) -> None:
         "python": sys.executable,
         "method": "store",
         "reserve_mb": 0,
-        "confinement": 0,
+        "confinement": "none",
         "allow_unsigned": True,
         "room": None,
     }

@@ -123,7 +123,7 @@ def test_what_was_promised_while_it_was_copied_counts(tmp_path: Path) -> None:
         "python": sys.executable,
         "method": "store",
         "reserve_mb": 0,
-        "confinement": 0,
+        "confinement": "none",
         "allow_unsigned": True,
         "room": {"promised": asdict(promised), "freed_mb": 0, "freed_gpu_mb": 0},
     }

@@ -8,11 +8,11 @@ import signal
 import pytest
 from tests.kit.workers import HOST, WorkersUnderTest
 
-from nondum.host.confinement import Level
 from nondum.host.events import FactKnown
 from nondum.planning.running import RunState
 from nondum.sdk.description import Behaviour, Unit
 from nondum.sdk.messages import Bearing, Header, value_to_wire
+from nondum.wheelhouse.confinement import Level
 
 pytestmark = pytest.mark.anyio
 
@@ -58,7 +58,7 @@ async def node(tested: WorkersUnderTest) -> str:
 
 def seen(tested: WorkersUnderTest) -> str:
     """Where a worker finds the device for its need `line`."""
-    return "/dev/nondum/line" if tested.workers.launcher.level == Level.BOX else "/dev/zero"
+    return "/dev/nondum/line" if tested.workers.launcher.level == Level.SANDBOXED else "/dev/zero"
 
 
 async def test_device_is_granted_and_withdrawn(tested: WorkersUnderTest) -> None:
@@ -140,7 +140,7 @@ async def test_device_of_several_nodes_is_granted_as_a_group(tested: WorkersUnde
     others = (("/dev/full", {"SUBSYSTEM": "b"}),)
     await tested.workers.attach("guest", "line", "/dev/zero", {"SUBSYSTEM": "a"}, others)
     await tested.start("guest", GROUP, behaviours=(LOOK,), units=(Unit("port", "sensor"),))
-    in_box = tested.workers.launcher.level == Level.BOX
+    in_box = tested.workers.launcher.level == Level.SANDBOXED
     zero = "/dev/nondum/line" if in_box else "/dev/zero"
     null = "/dev/nondum/line.null" if in_box else "/dev/null"
     call = tested.behave("guest", "look", u=UNIT)
@@ -169,7 +169,7 @@ async def look(ctx, u):
 
 
 async def test_node_is_found_by_its_own_name_in_a_room(tested: WorkersUnderTest) -> None:
-    if tested.workers.launcher.level != Level.BOX:
+    if tested.workers.launcher.level != Level.SANDBOXED:
         pytest.skip("only a room has a /dev of its own")
     await tested.start("guest", NAMED, behaviours=(LOOK,), units=(Unit("port", "sensor"),))
     await tested.workers.attach("guest", "line", "/dev/kmsg", {})

@@ -144,6 +144,23 @@ async def test_what_cannot_be_deleted_is_told_and_holds_nothing_up(
         await anyio.run_process(["umount", str(held)])
 
 
+async def test_worker_that_ends_by_its_limit_of_tasks_says_so(caged: WorkersUnderTest) -> None:
+    body = (
+        "threading.stack_size(1 << 18)  # memory is not to end first\n"
+        "try:\n"
+        "    for _ in range(1000):\n"
+        "        threading.Thread(target=time.sleep, args=(60,), daemon=True).start()\n"
+        "except RuntimeError as refused:\n"
+        "    print(f'RuntimeError: {refused}', file=sys.stderr, flush=True)\n"
+        "    os._exit(1)"
+    )
+    await begin(caged, "guest", body)
+    caged.behave("guest", "do", u=f"{HOST}__guest__it")
+    exited = await caged.until(WorkerExited)
+    assert exited.reason.startswith("WORKER_TASKS"), exited.reason
+    await caged.until_ready(3)
+
+
 async def test_worker_that_nobody_asks_and_spins_is_told_once(
     caged: WorkersUnderTest, clock: VirtualClock
 ) -> None:

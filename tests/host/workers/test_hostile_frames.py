@@ -25,6 +25,7 @@ from nondum.planning.running import RunState
 from nondum.sdk.description import Behaviour, Unit
 from nondum.sdk.errors import WorkerFailed
 from nondum.sdk.wire import PROTOCOL_VERSIONS
+from nondum.wheelhouse.confinement import Level
 
 pytestmark = pytest.mark.anyio
 
@@ -48,7 +49,7 @@ EVERY = "while True: send(EVENT, 'log', None, {'level': 'info', 'message': "
 class RawLauncher:
     """Launches what was never a plugin."""
 
-    level, name = 0, "raw"
+    level = Level.NONE
 
     def __init__(self, script: str) -> None:
         self._script = script

@@ -9,7 +9,7 @@ from tests.lab.lab import Lab
 from tests.lab.machine import Machine
 
 PAYLOAD = "org.example.talker"
-UNITS = ("nondum.service", "nondum-helper.socket", "nondum-warden.socket")
+UNITS = ("nondum.service", "nondum-helper.socket")
 INSTALLING_S = 1500.0
 """All modules are compiled, by an emulated processor."""
 LEFT = """

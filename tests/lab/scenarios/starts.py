@@ -1,4 +1,4 @@
-"""A host starts as a service of systemd, and says how it confines its workers."""
+"""A host starts as a service of systemd, and has its workers sandboxed."""
 
 from __future__ import annotations
 
@@ -17,4 +17,6 @@ def see(host: Installed) -> str:
     assert shown == "active", shown
     view = host.until("a status", lambda view: view)
     assert view["host"] == "spot"
-    return f"{view['state']}, {view.get('confinement')}"
+    level = view["confinement"]["level"]
+    assert level == "sandboxed", view["confinement"]
+    return f"{view['state']}, {level}"

@@ -10,7 +10,8 @@ from typing import Any
 from packaging.specifiers import InvalidSpecifier, SpecifierSet
 
 from nondum.sdk.description import DeviceNeed
-from nondum.wheelhouse import names, tables
+from nondum.wheelhouse import confinement, names, tables
+from nondum.wheelhouse.confinement import Level
 from nondum.wheelhouse.device_rules import wrong_rules
 from nondum.wheelhouse.tables import Form, Report, Table
 
@@ -21,7 +22,6 @@ GOALS = "goals"
 """The permission to give a host goals, which a payload asks for by having a goal.txt."""
 GRANTABLE = (*PERMISSIONS, GOALS)
 """What a role may give."""
-MAX_CONFINEMENT = 3
 
 _PAYLOAD_ID = Form(names.PAYLOAD_ID, "a reverse domain name like org.example.blinker")
 _COMPONENT_ID = Form(
@@ -44,7 +44,7 @@ class Requires:
     disk_mb: int = 0
     memory_mb: int = 0
     gpu_memory_mb: int = 0
-    confinement: int = 0
+    confinement: Level = Level.NONE
     """The least level that its workers may run at."""
     alone: bool = False
     """Whether no other release of it may run beside it: an upgrade stops the old one first."""
@@ -124,15 +124,13 @@ def _requires(table: Table) -> Requires:
         disk_mb=table.integer("disk_mb", 0),
         memory_mb=table.integer("memory_mb", 0),
         gpu_memory_mb=table.integer("gpu_memory_mb", 0),
-        confinement=table.integer("confinement", 0),
+        confinement=table.parsed("confinement", confinement.parse, Level.NONE),
         alone=table.flag("alone"),
     )
     try:
         SpecifierSet(requires.python)
     except InvalidSpecifier:
         table.wrong("python", f"{requires.python!r} is not a version specifier like '>=3.11'")
-    if requires.confinement > MAX_CONFINEMENT:
-        table.wrong("confinement", f"levels go from 0 to {MAX_CONFINEMENT}")
     table.close()
     return requires
 

@@ -25,9 +25,10 @@ from packaging.version import Version
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem
 from nondum.wheelhouse import lock as locks_module
 from nondum.wheelhouse import memory, wheel
+from nondum.wheelhouse.confinement import Level
 from nondum.wheelhouse.gpu import Gpu
 from nondum.wheelhouse.lock import Lock, LockedWheel
-from nondum.wheelhouse.manifest import MAX_CONFINEMENT, Manifest
+from nondum.wheelhouse.manifest import Manifest
 from nondum.wheelhouse.memory import Memory
 from nondum.wheelhouse.target import Target
 from nondum.wheelhouse.wheel import Layout
@@ -53,13 +54,13 @@ class HostFacts:
     free_disk_mb: int
     """On the store's file system, less the reserve."""
     memory: Memory
-    confinement: int
+    confinement: Level
     """Level at which workers run here."""
     nondum: str
     """Version of nondum."""
 
 
-def probe(state: Path, *, reserve_mb: int, confinement: int) -> HostFacts:
+def probe(state: Path, *, reserve_mb: int, confinement: Level) -> HostFacts:
     """Look at this machine. `state` is where the store is, or will be."""
     there = next(folder for folder in (state, *state.parents) if folder.exists())
     return HostFacts(
@@ -100,7 +101,7 @@ def of_target(target: Target) -> HostFacts:
         ),
         free_disk_mb=_PLENTY_MB,
         memory=Memory(_PLENTY_MB, Gpu(_PLENTY_MB, _PLENTY_MB)),
-        confinement=MAX_CONFINEMENT,
+        confinement=Level.SANDBOXED,
         nondum=nondum_version(),
     )
 

@@ -7,9 +7,9 @@ import math
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 from nondum.sdk.errors import PayloadRefused, Problem
 
@@ -21,6 +21,8 @@ MAX_DOTS = 8
 _MANY_DOTS = re.compile(r"(?<![\w\"'-])(?:[\w\"'-]+\s*\.\s*){" + str(MAX_DOTS) + "}")
 _HEADER = re.compile(r"\s*(\[\[?)\s*([\w.-]+)\s*\]")
 _ASSIGNMENT = re.compile(r"\s*[\"']?([\w-]+)[\"']?\s*=")
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +116,17 @@ class Table:
             self.wrong(key, f"expected true or false, found {_shown(value)}")
             return False
         return value
+
+    def parsed(self, key: str, parse: Callable[[object], T], default: T) -> T:
+        """What `parse` reads; it raises `ValueError` with what it expects."""
+        value = self._take(key, default)
+        if value is default:
+            return default
+        try:
+            return parse(value)
+        except ValueError as error:
+            self.wrong(key, f"{error}, found {_shown(value)}")
+            return default
 
     def texts(self, key: str) -> tuple[str, ...]:
         """A list of strings; empty when it is left out."""
@@ -240,4 +253,9 @@ def _kind(value: Any) -> str:
 
 
 def _shown(value: Any) -> str:
-    return f"{_kind(value)} {str(value)[:40]!r}" if not isinstance(value, dict) else "a table"
+    if isinstance(value, dict):
+        return "a table"
+    try:
+        return f"{_kind(value)} {str(value)[:40]!r}"
+    except ValueError:  # of a number with thousands of digits (sys.set_int_max_str_digits)
+        return f"{_kind(value)} too long to be shown"

@@ -107,10 +107,10 @@ def confinement(session: Session) -> int:
     if session.as_json:
         render.as_json({"ok": is_well, "levels": rows})
     else:
-        table(rows, ["level", "name", "available", "reason"], empty="")
+        table(rows, ["level", "mechanism", "available", "reason"], empty="")
         for row in rows:
             if row["fix"]:
-                render.sentence(row["fix"], mark=f"→ level {row['level']}: ")
+                render.sentence(row["fix"], mark=f"→ {row['level']}: ")
     return 0 if is_well else EXIT_PROBLEMS
 
 

@@ -9,6 +9,7 @@ from nondum.host.cli.connection import Session
 from nondum.sdk.errors import HostUnreachable
 
 if TYPE_CHECKING:
+    from nondum.wheelhouse.confinement import Level
     from nondum.wheelhouse.preflight import HostFacts
 
 
@@ -22,11 +23,12 @@ def this_machine(session: Session) -> HostFacts:
     return preflight.probe(Path.cwd(), reserve_mb=0, confinement=_level(session))
 
 
-def _level(session: Session) -> int:
+def _level(session: Session) -> Level:
     from nondum.host.confinement import choice
+    from nondum.wheelhouse import confinement
 
     try:
-        level: int = session.ask("status")["confinement"]["level"]
+        view = session.ask("status")
     except HostUnreachable:
         return choice.best()
-    return level
+    return confinement.parse(view["confinement"]["level"])

@@ -73,9 +73,9 @@ def _show_feedback(shown: dict[str, Any]) -> None:
 
 
 def _show_confinement(confinement: dict[str, Any]) -> None:
-    click.echo(f"workers are confined at level {confinement['level']}: {confinement['name']}")
+    click.echo(f"confinement of workers: {confinement['level']} ({confinement['mechanism']})")
     for finding in confinement["missing"]:
-        mark = f"level {finding['level']} ({finding['name']}): "
+        mark = f"{finding['level']} ({finding['mechanism']}): "
         why = "it is to be had, and not asked for" if finding["available"] else finding["reason"]
         render.sentence("; ".join(filter(None, (why, finding["fix"]))), mark=mark)
 

@@ -12,6 +12,7 @@ from typing import Any
 from nondum.host import config as host_config
 from nondum.host.config import HostConfig
 from nondum.host.configuration.places import Places
+from nondum.wheelhouse.confinement import Level
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +82,7 @@ def settings(asked: Asked) -> Iterator[Setting]:
 
 def plain(value: Any) -> Any:
     """A value as JSON and TOML have it."""
-    if isinstance(value, Path):
+    if isinstance(value, Path | Level):
         return str(value)
     return [plain(item) for item in value] if isinstance(value, tuple) else value
 

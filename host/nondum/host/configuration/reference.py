@@ -20,6 +20,7 @@ EXAMPLES = {
     "host.name": '"panther"',
     "drives.slots": '["/srv/slots"]',
     "devices.slots": '["/srv/devices"]',
+    "workers.confinement": '"sandboxed"',
     "peers.static": '["10.0.0.7", "mule.local:7410"]',
     "peers.offer_actuators": '["gripper"]',
     "router.endpoints": '["tls/router.example:7447"]',

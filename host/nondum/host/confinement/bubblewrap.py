@@ -1,4 +1,4 @@
-"""The walls of a room of level 3: how bubblewrap is called for an interpreter that waits.
+"""The walls of a sandboxed worker's room: how bubblewrap is called for an interpreter that waits.
 
 Source: bwrap(1). What only the worker needs is brought in once it is known whose room it is (see
 `nondum.host.inside.room`); until then the interpreter, which runs nothing but the host's own code,
@@ -124,12 +124,11 @@ def _system(permissions: Collection[str]) -> Iterator[str]:
             yield from ("--symlink", os.readlink(path), name)  # noqa: PTH115
         elif path.is_dir():
             yield from ("--ro-bind", name, name)
-    for name in settings(permissions):
+    for name in _settings(permissions):
         yield from ("--ro-bind-try", name, name)
 
 
-def settings(permissions: Collection[str]) -> Iterator[str]:
-    """Files of the system that libraries look for, where they are there."""
+def _settings(permissions: Collection[str]) -> Iterator[str]:
     yield from _SETTINGS
     yield from _OF_THE_NETWORK if "network" in permissions else ()
     yield from _OF_THE_GPU if "gpu" in permissions else ()

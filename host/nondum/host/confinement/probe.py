@@ -16,13 +16,14 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from nondum.host.confinement import bubblewrap, landlock, refusals, sight, systemd_service
-from nondum.host.confinement.level import Finding, Level
+from nondum.host.confinement import bubblewrap, landlock, refusals, sight
+from nondum.host.confinement.level import Finding
 from nondum.host.workers.confinements import Boxed, Confinement, Held
 from nondum.host.workers.launcher import parameters
 from nondum.host.workers.spare import Spare
 from nondum.host.workers.spec import WorkerSpec, base_interpreter
 from nondum.sdk.description import PluginDescription
+from nondum.wheelhouse.confinement import Level
 
 ANSWER_S = 30.0
 """How long a process is waited for that is to look around."""
@@ -62,12 +63,8 @@ def _each() -> Iterator[Finding]:
         log.warning("system calls cannot be filtered on %s", refusals.machine())
     bwrap = bubblewrap.program()
     yield sight.MISSING if bwrap is None else _tried(Boxed(bwrap))
-    if why := systemd_service.missing():
-        yield sight.failed(Level.SERVICE, why)
-    else:
-        yield _tried(systemd_service.Served())
     if not landlock.version():
-        yield sight.failed(Level.KERNEL, "the kernel has no Landlock")
+        yield sight.failed(Level.RESTRICTED, "the kernel has no Landlock")
     else:
         yield _tried(Held())
 
@@ -122,8 +119,7 @@ def _conditions() -> list[str]:
     bwrap = bubblewrap.program()
     files = [Path(p) for p in (bwrap, base_interpreter(), *_own_code()) if p is not None]
     stamps = [f"{file}:{file.stat().st_mtime_ns}" for file in files]
-    without_systemd = systemd_service.missing()
-    return [boot, platform.release(), sys.version, str(os.getuid()), without_systemd, *stamps]
+    return [boot, platform.release(), sys.version, str(os.getuid()), *stamps]
 
 
 def _own_code() -> Sequence[Path]:

@@ -64,7 +64,7 @@ GROUPS: Mapping[str, tuple[Rule, ...]] = {
     # Rather exotic ones have more holes, and some (vsock) know nothing of network namespaces.
     "sockets": _sockets(_AF_UNIX, _AF_INET, _AF_INET6, _AF_NETLINK),
 }
-"""What every worker is refused from level 1 on."""
+"""What every worker is refused, but at level `none`."""
 
 WITHOUT_NAMESPACES: Mapping[str, tuple[Rule, ...]] = {
     "messages": _all("shmget", "shmat", "shmctl", "semget", "msgget", "mq_open"),

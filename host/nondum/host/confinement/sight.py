@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from nondum.host.confinement.level import Finding, Level
+from nondum.host.confinement.level import Finding
+from nondum.wheelhouse.confinement import Level
 
 MOST_PROCESSES = 3
 """In a room of its own: its keeper, itself, and no more."""
 _FIXES: Mapping[Level, str] = {
-    Level.BOX: "allow bubblewrap user namespaces (`sysctl kernel.unprivileged_userns_clone=1`; with"
-    " AppArmor, a profile for bwrap), or run the service as nondum's package sets it up",
-    Level.SERVICE: "run nondum as the service that its package sets up, on a system with systemd",
-    Level.KERNEL: "use a kernel with Landlock (5.13, `lsm=landlock,…` among its parameters)",
+    Level.SANDBOXED: "allow bubblewrap user namespaces (`sysctl"
+    " kernel.unprivileged_userns_clone=1`; with AppArmor, a profile for bwrap), or run the service"
+    " as nondum's package sets it up",
+    Level.RESTRICTED: "use a kernel with Landlock (5.13, `lsm=landlock,…` among its parameters)",
 }
 MISSING = Finding(
-    Level.BOX,
+    Level.SANDBOXED,
     is_available=False,
     reason="bubblewrap is not installed",
     fix="apt install bubblewrap",
@@ -26,7 +27,7 @@ MISSING = Finding(
 def judged(level: Level, seen: Mapping[str, Any]) -> Finding:
     """Whether what was seen from within is what the level promises.
 
-    >>> judged(Level.KERNEL, {"capabilities": 1, "sees_state": True}).reason.partition(",")[0]
+    >>> judged(Level.RESTRICTED, {"capabilities": 1, "sees_state": True}).reason.partition(",")[0]
     'in it a process still holds capabilities'
     """
     holes = [hole for hole, is_open in _holes(level, seen) if is_open]
@@ -49,6 +50,6 @@ def _holes(level: Level, seen: Mapping[str, Any]) -> Iterator[tuple[str, bool]]:
     yield "reads the host's files", bool(seen.get("sees_state", True))
     yield "writes to the system", bool(seen.get("writes_system", True))
     yield "makes namespaces", bool(seen.get("makes_namespaces", True))
-    if level is Level.BOX:
+    if level is Level.SANDBOXED:
         yield "sees other processes", seen.get("processes", MOST_PROCESSES + 1) > MOST_PROCESSES
         yield "has a network", bool(set(seen.get("interfaces", ["?"])) - {"lo"})

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from nondum.host.config import HostConfig
 from nondum.host.configuration.effective import Asked, effective, file_of
-from nondum.host.confinement import choice, probe
+from nondum.host.confinement import choice
 from nondum.host.doctor import account, beliefs, clock, daemon, drives, machine, space
 from nondum.host.doctor.finding import Finding, bad, ok
 from nondum.sdk.errors import ConfigRefused
@@ -42,9 +42,7 @@ def confinement(config: HostConfig) -> Iterator[Finding]:
         for problem in refused.problems:
             yield bad("confinement", str(problem), "see `nondum doctor confinement`")
         return
-    found = {finding.level: finding for finding in probe.all_findings()}
-    name = found[standing.level].to_dict()["name"] if standing.level in found else ""
-    yield ok("confinement", f"level {int(standing.level)}: {name}")
+    yield ok("confinement", f"{standing.level} ({standing.mechanism})")
 
 
 def others(config: HostConfig) -> Iterator[Finding]:

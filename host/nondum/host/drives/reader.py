@@ -24,7 +24,7 @@ from nondum.host.trust.chain import packed
 from nondum.host.trust.on_drives import trust_files_on
 from nondum.host.trust.rules import Rules
 from nondum.sdk.errors import PayloadRefused, Problem
-from nondum.wheelhouse import contents, drive, payload, preflight
+from nondum.wheelhouse import confinement, contents, drive, payload, preflight
 from nondum.wheelhouse.contents import Contents
 from nondum.wheelhouse.dist_info import Needs
 from nondum.wheelhouse.lock import LockedWheel
@@ -151,7 +151,7 @@ def facts_of(arguments: Arguments) -> HostFacts:
     return preflight.probe(
         Path(arguments["store"]),
         reserve_mb=arguments["reserve_mb"],
-        confinement=arguments["confinement"],
+        confinement=confinement.parse(arguments["confinement"]),
     )
 
 

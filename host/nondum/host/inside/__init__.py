@@ -1,4 +1,4 @@
 """What runs in a worker's process before the plugin does. Nothing here needs more than Python.
 
-Workers of level 3 see this folder and nothing else of the host, so it imports nothing else of it.
+Sandboxed workers see this folder and nothing else of the host, so it imports nothing else of it.
 """

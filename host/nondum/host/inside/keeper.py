@@ -1,4 +1,4 @@
-"""Process 1 of a worker of level 3: reaps what the worker leaves behind, hands in devices, and ends
+"""Process 1 of a sandboxed worker: reaps what the worker leaves behind, hands in devices, and ends
 the whole namespace once the worker or the host has ended.
 
 The worker, in a user namespace of its own, can neither look into it nor signal it.

@@ -1,4 +1,4 @@
-"""The room of a worker of level 3: what is seen in it, and what is no more.
+"""The room of a sandboxed worker: what is seen in it, and what is no more.
 
 Bubblewrap has made the namespaces and the bare walls. Two mount namespaces follow: the *keeper's*
 (process 1), which still sees the devices of the machine so that one can be handed in while the

@@ -26,6 +26,7 @@ from nondum.host.lifecycle import fork_server, jobs
 from nondum.host.lifecycle.allowance import allowed, confine_process
 from nondum.sdk.errors import NondumError, Problem
 from nondum.wheelhouse import disk
+from nondum.wheelhouse.confinement import Level
 
 PROGRESS_S = 0.1
 """Between two reports of one phase."""
@@ -67,7 +68,7 @@ def _ahead() -> Iterator[None]:
         _import(job)
         yield
     preflight = import_module("nondum.wheelhouse.preflight")
-    preflight.probe(Path.cwd(), reserve_mb=0, confinement=0)
+    preflight.probe(Path.cwd(), reserve_mb=0, confinement=Level.NONE)
 
 
 def _import(job: str) -> None:

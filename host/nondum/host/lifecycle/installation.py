@@ -331,7 +331,7 @@ class Installation:
         return {
             "store": str(self._folders.store),
             "reserve_mb": self._options.reserve_mb,
-            "confinement": self._workers.launcher.level,
+            "confinement": str(self._workers.launcher.level),
             "method": self._options.method,
             **self._trust.arguments,
             **more,

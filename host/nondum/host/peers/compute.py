@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from nondum.wheelhouse import preflight
+from nondum.wheelhouse.confinement import Level
 
 Compute = dict[str, Any]
 
@@ -16,7 +17,7 @@ def probed(state: Path, *, reserve_mb: int) -> Compute:
 
     `machine`, `python`, `processors`, `memory_mb` and `disk_mb` that are free, `nondum`.
     """
-    facts = preflight.probe(state, reserve_mb=reserve_mb, confinement=0)
+    facts = preflight.probe(state, reserve_mb=reserve_mb, confinement=Level.NONE)
     gpu = facts.memory.gpu
     return {
         "machine": facts.architecture,

@@ -1,5 +1,5 @@
-"""What holds a worker at each level that needs no service manager: how its interpreter is started,
-and what it is told to give up before it becomes a worker.
+"""What holds a worker at each level: how its interpreter is started, and what it is told to give up
+before it becomes a worker.
 """
 
 from __future__ import annotations
@@ -9,19 +9,18 @@ import contextlib
 import os
 import stat
 import zlib
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from nondum.host.cgroups.services import ServiceGroup
 from nondum.host.confinement import bubblewrap, landlock, refusals
 from nondum.host.confinement.bubblewrap import Ground
 from nondum.host.confinement.filters import Rule
-from nondum.host.confinement.level import Level
 from nondum.host.inside import room
 from nondum.host.workers.spec import WorkerSpec, base_interpreter
+from nondum.wheelhouse.confinement import Level
 
 BOOTSTRAP = bubblewrap.INSIDE / "bootstrap.py"
 _ALL = (Path("/"),)
@@ -55,8 +54,6 @@ class Entry:
     """See `nondum.host.inside.room`; None: it stays where it is."""
     ruleset: int | None = None
     """Landlock's, by descriptor."""
-    service: Callable[[int], ServiceGroup] | None = None
-    """The service for which the process of that id will only stand in; None: it is the worker."""
 
 
 class Confinement(Protocol):
@@ -82,9 +79,9 @@ class Confinement(Protocol):
 
 
 class Unconfined:
-    """Level 0: resource limits and no new privileges, which all levels have."""
+    """Level `none`: resource limits and no new privileges, which all levels have."""
 
-    level = Level.LIMITS
+    level = Level.NONE
     has_keeper = False
     without: frozenset[str] = frozenset()
 
@@ -104,9 +101,9 @@ class Unconfined:
 
 
 class Held:
-    """Level 1: the worker stays on the host and gives up what it can of it."""
+    """Level `restricted`: the worker stays on the host and gives up what it can of it."""
 
-    level = Level.KERNEL
+    level = Level.RESTRICTED
     has_keeper = False
 
     def __init__(self, *, without: Collection[str] = ()) -> None:
@@ -139,7 +136,7 @@ class Held:
             "groups": sorted(_groups_of(nodes)),
             "keeps_capabilities": "capabilities" in self.without,
             "may_gain_privileges": "new privileges" in self.without,
-            "filter": calls_refused(groups, self.without),
+            "filter": _calls_refused(groups, self.without),
         }
         if "landlock" in self.without or not self._abi:
             yield Entry(walls)
@@ -155,9 +152,9 @@ class Held:
 
 
 class Boxed:
-    """Level 3: a room of its own, made by bubblewrap."""
+    """Level `sandboxed`: a room of its own, made by bubblewrap."""
 
-    level = Level.BOX
+    level = Level.SANDBOXED
     has_keeper = True
 
     def __init__(
@@ -205,13 +202,13 @@ class Boxed:
             "protected": [] if "system" in kept else ["/", "/dev", room.DEVICES],
             "is_last": "user namespaces" not in kept,
             "changes_user": "user" not in kept,
-            "keeper_filter": calls_refused(refusals.GROUPS, mounts_too),
+            "keeper_filter": _calls_refused(refusals.GROUPS, mounts_too),
         }
         walls = {
             "user": None,
             "keeps_capabilities": "capabilities" in kept,
             "may_gain_privileges": "new privileges" in kept,
-            "filter": calls_refused(groups, kept),
+            "filter": _calls_refused(groups, kept),
         }
         yield Entry(walls, room=given)
 
@@ -254,7 +251,7 @@ def _interpreter(ground: Ground, orders: int) -> list[str]:
     return [python, "-I", "-S", "-B", "-u", str(BOOTSTRAP), str(orders), str(os.getpid())]
 
 
-def calls_refused(groups: Mapping[str, tuple[Rule, ...]], without: Collection[str]) -> str | None:
+def _calls_refused(groups: Mapping[str, tuple[Rule, ...]], without: Collection[str]) -> str | None:
     """The filter for `walls`; None where there is none to be had, or it is left out."""
     machine = refusals.machine()
     if "filter" in without or not refusals.is_known(machine):

@@ -6,41 +6,28 @@ import contextlib
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Protocol
 
-from nondum.host.cgroups import Usage
+from nondum.host.cgroups import Cage, Usage
 
 TICKS_HZ = os.sysconf("SC_CLK_TCK")
 
 
-class Holder(Protocol):
-    """What all processes of a worker are in: a cage, or the cgroup of a service."""
-
-    def pids(self) -> tuple[int, ...]:
-        """The processes in it."""
-        ...
-
-    def usage(self) -> Usage:
-        """What they use."""
-        ...
-
-
 class Gauge:
-    """One worker's: of all its processes, where something holds them."""
+    """One worker's: of all its processes, where a cage holds them."""
 
-    def __init__(self, first: Callable[[], int], holder: Holder | None) -> None:
+    def __init__(self, first: Callable[[], int], cage: Cage | None) -> None:
         """`first` tells its first process, as far as that is known by then."""
-        self._first, self._holder = first, holder
+        self._first, self._cage = first, cage
 
     def pids(self) -> tuple[int, ...]:
         """Its processes, as far as they are known."""
-        held = self._holder.pids() if self._holder is not None else ()
+        held = self._cage.pids() if self._cage is not None else ()
         return held or (self._first(),)
 
     def usage(self) -> Usage:
-        """What it uses; where nothing holds it, the processor time of its first process only."""
-        if self._holder is not None and self._holder.pids():
-            return self._holder.usage()
+        """What it uses; without a cage, the processor time of its first process only."""
+        if self._cage is not None and self._cage.pids():
+            return self._cage.usage()
         return Usage(cpu_s=_cpu_s(self._first()))
 
     def wanted_s(self) -> dict[int, float]:

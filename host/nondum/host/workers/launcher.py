@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from nondum.host.cgroups import Cages
-from nondum.host.confinement.level import NAMES
 from nondum.host.workers.confinements import Confinement, Entry, Unconfined
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spare import ROOM, ROOM_BYTES, Spare
 from nondum.host.workers.spec import WorkerSpec
 from nondum.sdk.errors import Problem, WorkerFailed
+from nondum.wheelhouse.confinement import Level
 
 MARK = "NONDUM_WORKER"
 """Environment variable of every worker: its scratch folder. It tells whose a process is."""
@@ -31,10 +31,8 @@ _NUMERIC_LIBRARIES = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR", "VECLIB_MAXIM
 class Launcher(Protocol):
     """Starts worker processes."""
 
-    level: int
-    """Confinement level, as payloads ask for it."""
-    name: str
-    """What it is called in status."""
+    level: Level
+    """How its workers are confined."""
 
     def launch(self, spec: WorkerSpec, sock: socket.socket) -> WorkerProcess:
         """Start a worker on its end of the link; the caller closes `sock`.
@@ -67,8 +65,7 @@ class WorkerLauncher:
         self._cages = cages
         self._owner = owner_mark(scratches) if scratches is not None else ""
         self._spare: Spare | None = None
-        self.level = int(self._confinement.level)
-        self.name = NAMES[self._confinement.level]
+        self.level = self._confinement.level
 
     @property
     def spare_pid(self) -> int | None:
@@ -91,7 +88,7 @@ class WorkerLauncher:
                     try:
                         spare.limit(spec.limits)
                         if spare.become(told, sock, entry.ruleset):
-                            return spare.process(entry.service)
+                            return spare.process()
                     except OSError:
                         spare.close()
                         raise

@@ -38,20 +38,13 @@ def exhausted(
     usage: Usage,
     status: int,
     said: Sequence[str],
-    *,
-    scratch_is_memory: bool = False,
 ) -> Problem | None:
-    """What it had no more of when its process ended, where that is known.
-
-    A scratch folder that is memory has a size of its own; any other may be full with the disk.
-    """
+    """What it had no more of when its process ended, where that is known."""
     last = next((line for line in reversed(said) if line.strip()), "")
     if (status == -signal.SIGKILL and usage.oom_kills) or "MemoryError" in last:
         return out_of_memory(component, limits.memory_mb)
     if "[Errno 24]" in last:  # EMFILE
         return too_many_descriptors(component, limits.descriptors)
-    if scratch_is_memory and "[Errno 28]" in last:  # ENOSPC
-        return scratch_full(component, limits.scratch_mb)
     if usage.refused_tasks and ("[Errno 11]" in last or "can't start new thread" in last):
         return too_many_tasks(component, limits.tasks)
     return None

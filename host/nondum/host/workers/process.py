@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import IO, Any
 
 from nondum.host.cgroups import Cage
-from nondum.host.cgroups.services import ServiceGroup
 from nondum.host.workers.keeper import Keeper, node_of
 
 DETACH_S = 2.0
@@ -27,15 +26,12 @@ class WorkerProcess:
         popen: subprocess.Popen[bytes],
         cage: Cage | None = None,
         keeper: Keeper | None = None,
-        service: ServiceGroup | None = None,
     ) -> None:
-        """`keeper`, which it takes over, is that of a worker in a room of its own; `service` is the
-        worker itself, where the process only stands in for it."""
+        """`keeper`, which it takes over, is that of a worker in a room of its own."""
         self._popen = popen
         self._keeper = keeper
         self.cage = cage
         """What holds it and all that it starts; whoever ends the process ends the cage."""
-        self.service = service
         self.exited: asyncio.Future[int] = asyncio.get_running_loop().create_future()
         """Its exit status, negative for the signal that ended it."""
         self._pidfd = os.pidfd_open(popen.pid)

@@ -12,11 +12,10 @@ import os
 import signal
 import socket
 import subprocess
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from typing import IO, Any
 
 from nondum.host.cgroups import Cage, CageLimits, Cages
-from nondum.host.cgroups.services import ServiceGroup
 from nondum.host.confinement.bubblewrap import Ground
 from nondum.host.printable import printable
 from nondum.host.workers.confinements import Confinement
@@ -85,8 +84,8 @@ class Spare:
             return False
         return True
 
-    def process(self, service: Callable[[int], ServiceGroup] | None = None) -> WorkerProcess:
-        """The worker that it has become, or the one for which it stands in (see `Entry`).
+    def process(self) -> WorkerProcess:
+        """The worker that it has become.
 
         Call it once, on the loop. Raises `OSError`; then it is still to be closed.
         """
@@ -98,8 +97,7 @@ class Spare:
                 keeper.close()
                 raise
         self._orders.close()
-        found = service(self.popen.pid) if service is not None else None
-        return WorkerProcess(self.popen, self.cage, service=found)
+        return WorkerProcess(self.popen, self.cage)
 
     def close(self) -> None:
         """End it unused."""

@@ -69,7 +69,7 @@ class Worker:
         except WorkerFailed:
             ours.close()
             raise
-        self._gauge = Gauge(lambda: self.pid, self._process.service or self._process.cage)
+        self._gauge = Gauge(lambda: self.pid, self._process.cage)
         self._outputs = [
             Output(source, pipe, self._on_line)
             for source, pipe in zip(("stdout", "stderr"), self._process.outputs, strict=True)
@@ -236,10 +236,9 @@ class Worker:
 
     async def _open_up(self, need: str, name: str, device: Mapping[str, Any]) -> str:
         """Have one node where the worker can open it; where that is."""
-        node = own = device["node"]
-        if self._process.service is None:  # a service has a user of its own, and the node's group
-            self._reached.add(name)
-            node = await asyncio.to_thread(reachable, self.spec.component, name, own)
+        own = device["node"]
+        self._reached.add(name)
+        node = await asyncio.to_thread(reachable, self.spec.component, name, own)
         if self._granted.setdefault(need, {}).get(name) != own:
             self._granted[need][name] = own
             try:
@@ -271,12 +270,9 @@ class Worker:
         return await asyncio.to_thread(read)  # hundreds of its threads are as many files to read
 
     def _why_exited(self, status: int) -> Problem:
-        holder, said = self._process.service or self._process.cage, tuple(self._tail)
-        usage = holder.usage() if holder is not None else Usage()
-        exhausted = problems.exhausted(
-            *(self.spec.component, self.spec.limits, usage, status, said),
-            scratch_is_memory=self._process.service is not None,
-        )
+        cage, said = self._process.cage, tuple(self._tail)
+        usage = cage.usage() if cage is not None else Usage()
+        exhausted = problems.exhausted(self.spec.component, self.spec.limits, usage, status, said)
         return exhausted or problems.exited(self.spec.component, status, said)
 
     def _close_outputs(self) -> None:

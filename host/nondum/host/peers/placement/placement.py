@@ -19,6 +19,7 @@ from nondum.host.peers.placement.pins import Pins
 from nondum.host.peers.placement.placing import Placing
 from nondum.host.peers.placement.taking import Taking
 from nondum.transport.fleet.seam import Fleet
+from nondum.wheelhouse.confinement import Level
 
 
 class Placement:
@@ -35,7 +36,7 @@ class Placement:
         *,
         pins: Pins,
         compute: Compute,
-        confinement: int,
+        confinement: Level,
         judged_by: Callable[[str], Awaitable[Mapping[str, Any]]],
         known: Callable[[], Iterable[str]],
     ) -> None:
@@ -66,7 +67,7 @@ class Placement:
             rules={
                 "store": str(folders.store),
                 "reserve_mb": reserve_mb,
-                "confinement": confinement,
+                "confinement": str(confinement),
                 "method": config.install.method,
             },
             judged_by=judged_by,
