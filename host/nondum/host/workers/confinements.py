@@ -82,11 +82,13 @@ class Confinement(Protocol):
 
 
 class Unconfined:
-    """Level 0: resource limits and no new privileges, which all levels have."""
+    """Level 0: resource limits, no new privileges and no special files, which all levels have."""
 
     level = Level.LIMITS
     has_keeper = False
-    without: frozenset[str] = frozenset()
+
+    def __init__(self, *, without: Collection[str] = ()) -> None:
+        self.without = frozenset(without)
 
     def ground(self, spec: WorkerSpec | None) -> Ground:
         """The interpreter, wherever it is."""
@@ -98,8 +100,9 @@ class Unconfined:
 
     @contextlib.contextmanager
     def entry(self, spec: WorkerSpec, ground: Ground) -> Iterator[Entry]:
-        """Nothing is given up."""
-        walls = {"user": None, "keeps_capabilities": True, "filter": None}
+        """Only making what other users would run or open is given up, where the kernel has that."""
+        refused = calls_refused(refusals.AT_LEAST, self.without) if refusals.has_filters() else None
+        walls = {"user": None, "keeps_capabilities": True, "filter": refused}
         yield Entry({**walls, "may_gain_privileges": False})
 
 
@@ -109,9 +112,10 @@ class Held:
     level = Level.KERNEL
     has_keeper = False
 
-    def __init__(self, *, without: Collection[str] = ()) -> None:
+    def __init__(self, *, without: Collection[str] = (), abi: int | None = None) -> None:
+        """`abi` is what is used of Landlock, if not all that the kernel has."""
         self.without = frozenset(without)
-        self._abi = landlock.version()
+        self._abi = landlock.version() if abi is None else abi
 
     def ground(self, spec: WorkerSpec | None) -> Ground:
         """The interpreter, wherever it is."""
@@ -131,6 +135,9 @@ class Held:
             "sockets": refusals.SOCKETS_OF_THE_HOST[has_network],
         }
         user = None if "user" in self.without else user_for(spec)
+        if user is None:
+            groups |= refusals.WITH_THE_HOSTS_USER
+            groups |= refusals.TRUNCATION if self._abi < landlock.TRUNCATES else {}
         nodes = (*(_instruments() if spec.index.devices else ()), *_nodes(spec))
         if user is not None:
             os.chown(spec.scratch, user, user)
