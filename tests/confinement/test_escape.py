@@ -30,6 +30,24 @@ async def test_little_is_reached_at_level_1(tmp_path: Path, bait: dict[str, Any]
     assert await reached(tmp_path, bait, Held()) <= LEFT_AT_1
 
 
+async def test_as_little_is_reached_where_landlock_is_older(
+    tmp_path: Path, bait: dict[str, Any]
+) -> None:
+    """Linux 5.19 to 6.1, as Debian 12 has it: before Landlock knew truncating, and signals."""
+    assert await reached(tmp_path, bait, Held(abi=2)) <= LEFT_AT_1 | {"signal the host"}
+
+
+async def test_nobody_is_left_a_special_file_at_level_0(
+    tmp_path: Path, bait: dict[str, Any]
+) -> None:
+    names = ["leave a set id file", "make a device node"]
+    results = await attempted(tmp_path / "held", bait, Unconfined(), names)
+    assert [results[name].could for name in names] == [False, False]
+    free = Unconfined(without=["special files"])
+    results = await attempted(tmp_path / "free", bait, free, names)
+    assert [results[name].could for name in names] == [True, True], results
+
+
 async def test_baits_are_there_to_be_reached(tmp_path: Path, bait: dict[str, Any]) -> None:
     """Else the others would prove nothing."""
     found = await reached(tmp_path, bait, Unconfined())

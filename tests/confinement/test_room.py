@@ -8,6 +8,8 @@ import os
 import pty
 import shutil
 import socket
+import subprocess
+import sys
 import tempfile
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import replace
@@ -195,6 +197,49 @@ async def test_room_ends_with_its_worker(tested: WorkersUnderTest) -> None:
         await until_gone(pid)
 
 
+IN_A_NAMESPACE = """
+import os, shutil, subprocess, sys
+from nondum.host.inside import kernel, room
+
+folder, place = sys.argv[1:]
+kernel.unshare(kernel.CLONE_NEWNS)
+kernel.mount(None, "/", None, kernel.MS_SLAVE | 1 << 14)  # MS_REC
+kernel.mount("tmpfs", folder, "tmpfs", 0, "mode=755")  # neither nosuid nor nodev
+shutil.copy(shutil.which("id"), f"{folder}/id")
+os.chmod(f"{folder}/id", 0o4755)
+os.mknod(f"{folder}/zero", 0o20666, os.makedev(1, 5))
+room.bind(folder, place)
+for at in (folder, place):
+    said = subprocess.run([f"{at}/id", "-u"], user=65534, group=65534, capture_output=True)
+    try:
+        os.close(os.open(f"{at}/zero", os.O_RDONLY))
+        opened = "opens"
+    except PermissionError:
+        opened = "does not open"
+    print(said.stdout.decode().strip(), opened)
+"""
+
+
+def test_what_lies_in_its_folders_is_no_device_and_has_no_set_id_bits() -> None:
+    """However it came to lie there. Of a folder for which bubblewrap has done nothing yet."""
+    with open_folder() as folder, open_folder() as place:
+        told = subprocess.run(
+            [sys.executable, "-c", IN_A_NAMESPACE, str(folder), str(place)],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    before, in_the_room = told.stdout.splitlines()
+    assert before == "0 opens"
+    assert in_the_room == "65534 does not open"
+
+
+async def test_keeper_has_its_system_calls_filtered(tested: WorkersUnderTest) -> None:
+    await guest(tested, "pass")
+    keeper = parent(tested.workers.pids()["guest"])
+    assert status(keeper)["Seccomp"] == "2"
+
+
 async def test_outside_is_not_told_by_what_a_worker_is(tested: WorkersUnderTest) -> None:
     body = (
         "assert os.getuid() == os.getgid() == 65534\n"
@@ -217,6 +262,11 @@ def open_folder() -> Iterator[Path]:
         folder = Path(name)
         folder.chmod(0o755)
         yield folder
+
+
+def status(pid: int) -> dict[str, str]:
+    lines = Path(f"/proc/{pid}/status").read_text(encoding="ascii").splitlines()
+    return dict(line.split(":\t", 1) for line in lines)
 
 
 def parent(pid: int) -> int:
