@@ -37,6 +37,9 @@ LEFT_AT_1 = {
 hold. It is root where the host is, and the interpreter is root's alone. It can make no device node
 in its folders, but open one that lies there already."""
 
+SHARED_MEMORY = {"take all memory as shared memory", "take all memory as files in memory"}
+"""What only a memory cgroup limits."""
+
 
 @dataclass(frozen=True)
 class Result:
@@ -44,6 +47,11 @@ class Result:
 
     could: bool
     what: str
+
+
+def unlimited(folder: Path) -> set[str]:
+    """What this machine does not limit, at any level."""
+    return set() if "memory" in Cages.open(folder).holds else SHARED_MEMORY
 
 
 @contextmanager
@@ -151,10 +159,12 @@ async def attempted(
     confinement: Confinement,
     attempts: Sequence[str] = (),
     limits: Limits = SMALL,
+    cages: Cages | None = None,
 ) -> dict[str, Result]:
-    """What the hostile plugin can do, or some of it, so confined."""
+    """What the hostile plugin can do, or some of it, so confined; `cages` are the machine's, if
+    none are given."""
     tested = WorkersUnderTest(folder, confinement=confinement)
-    cages = Cages.open(folder)
+    cages = cages or Cages.open(folder)
     tested.workers.launcher = WorkerLauncher(confinement, cages)
     tested.workers.timing = replace(tested.timing, startup_s=120.0)
     source = ESCAPE.read_text(encoding="utf-8")

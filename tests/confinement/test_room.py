@@ -11,7 +11,7 @@ import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,6 +29,7 @@ from nondum.host.workers.confinements import (
     Boxed,
     Confinement,
     Held,
+    Unconfined,
     user_for,
 )
 from nondum.planning.running import RunState
@@ -195,6 +196,62 @@ async def test_room_ends_with_its_worker(tested: WorkersUnderTest) -> None:
     await tested.workers.stop("guest")
     for pid in (keeper, *others):
         await until_gone(pid)
+
+
+PLAIN_FILES = """
+import dbm.dumb, pathlib, shutil, sqlite3, tarfile, tempfile, zipfile
+here = pathlib.Path.cwd()
+one = here / 'one'
+one.write_text('text')
+for copy in (shutil.copy, shutil.copy2, shutil.copyfile):
+    assert pathlib.Path(copy(one, here / copy.__name__)).read_text() == 'text'
+shutil.copy2(os.__file__, here / 'of the system')
+one.chmod(0o600)
+one.touch()
+os.utime(one)
+(here / 'tree/inner').mkdir(parents=True)
+shutil.copy(one, here / 'tree/inner')
+shutil.copytree(here / 'tree', here / 'copied')
+shutil.move(here / 'copied', here / 'moved')
+with tempfile.TemporaryDirectory() as folder, tempfile.NamedTemporaryFile() as file:
+    shutil.make_archive(folder + '/packed', 'gztar', here / 'tree')
+    shutil.unpack_archive(folder + '/packed.tar.gz', here / 'unpacked')
+    with tarfile.open(folder + '/packed.tar.gz') as archive:
+        archive.extractall(here / 'extracted', filter='fully_trusted')
+    with zipfile.ZipFile(file, 'w') as archive:
+        archive.write(one, 'one')
+    shutil.unpack_archive(file.name, here / 'unzipped', 'zip')
+assert (here / 'unpacked/inner/one').read_text() == 'text'
+with sqlite3.connect(here / 'base') as base:
+    base.execute('pragma journal_mode=wal')
+    base.execute('create table t (x)')
+with dbm.dumb.open(str(here / 'dumb'), 'c') as base:
+    base['x'] = 'y'
+with open(one, 'r+') as file:
+    file.truncate(1)
+os.nice(1)
+os.sched_setaffinity(0, os.sched_getaffinity(0))
+shutil.rmtree(here / 'moved')
+assert not (here / 'moved').exists()
+"""
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        pytest.param(lambda: Boxed(shutil.which("bwrap") or "bwrap"), id="level 3"),
+        pytest.param(lambda: Held(without=["user"]), id="level 1, the host's user"),
+        pytest.param(lambda: Held(without=["user"], abi=2), id="the same, Landlock of Linux 5.19"),
+        pytest.param(Unconfined, id="level 0"),
+    ],
+)
+async def test_plain_files_can_be_worked_with(
+    tmp_path: Path, make: Callable[[], Confinement]
+) -> None:
+    tested = WorkersUnderTest(tmp_path, confinement=make())
+    await guest(tested, PLAIN_FILES)
+    assert await does(tested) == ""
+    await tested.workers.close()
 
 
 IN_A_NAMESPACE = """
