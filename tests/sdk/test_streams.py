@@ -239,9 +239,12 @@ def header(side: int = SIDE) -> dict[str, Any]:
     return image(1, side).to_wire()[0]
 
 
-def memory(size: int, seals: int = SEALS) -> int:
+def memory(size: int, seals: int = SEALS, *, holes: int = 0) -> int:
+    """Sealed memory, but for its last bytes really there."""
     descriptor = os.memfd_create("test", os.MFD_ALLOW_SEALING)
     os.ftruncate(descriptor, size)
+    if size > holes:
+        os.posix_fallocate(descriptor, 0, size - holes)
     fcntl.fcntl(descriptor, fcntl.F_ADD_SEALS, seals)
     return descriptor
 
@@ -261,6 +264,12 @@ LIES: dict[str, tuple[Any, Callable[[], int] | None, str]] = {
     "no seals": ([1, 1, 5, 10, {}], lambda: memory(4096, 0), "SLOT_SEALS"),
     "may shrink": ([1, 1, 5, 10, {}], lambda: memory(4096, fcntl.F_SEAL_GROW), "SLOT_SEALS"),
     "empty memory": ([1, 1, 5, 0, {}], lambda: memory(0), "SLOT_SIZE"),
+    "all holes": ([1, 1, 5, 10, {}], lambda: memory(1 << 20, holes=1 << 20), "SLOT_HOLES"),
+    "one page is not there": (
+        [1, 1, 5, 10, {}],
+        lambda: memory(1 << 20, holes=mmap.PAGESIZE),
+        "SLOT_HOLES",
+    ),
     "a pipe": ([1, 1, 5, 10, {}], a_pipe, "SLOT_SEALS"),
     "a file": ([1, 1, 5, 10, {}], lambda: os.open(__file__, os.O_RDONLY), "SLOT_SEALS"),
     "memory with inline": ([0, 1, {}, b"x"], lambda: memory(4096), "PACKET_DESCRIPTORS"),
@@ -277,6 +286,16 @@ async def test_lying_producer_is_cut_off(
     for descriptor in descriptors:
         os.close(descriptor)
     assert await listener.verdict() == code
+
+
+@pytest.mark.parametrize("length", [1, mmap.PAGESIZE, mmap.PAGESIZE + 1, 1_000_003])
+def test_slot_is_there_whole_once_it_was_written_to(length: int) -> None:
+    ring = SlotRing()
+    slot = ring.write(bytes(length), length)
+    assert slot is not None
+    found = os.fstat(slot.descriptor)
+    assert found.st_blocks * 512 >= found.st_size == slot.size
+    ring.close()
 
 
 async def test_too_many_slots_are_cut_off() -> None:
