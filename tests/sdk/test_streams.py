@@ -421,3 +421,46 @@ def test_ring_uses_no_slot_that_is_read() -> None:
     first.readers = 0
     assert list(ring.retire(keep=1)) == [first.id]
     ring.close()
+
+
+CROWDED = """
+import asyncio, os, resource, socket
+from nondum.host.inside import kernel
+from nondum.sdk import Header, Image
+from nondum.sdk.packets import SocketPackets
+from nondum.sdk.streams import Consumer, Producer
+
+kernel.keep_capabilities()  # root's are not held to it
+resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
+full, unread = socket.socketpair()
+socket.send_fds(full, [b"x"], [0] * 250)
+
+async def main():
+    refused, arrived = [], asyncio.Event()
+    one, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    producer = Producer("image", on_lost=lambda name: print("lost", flush=True))
+    crowded = asyncio.Event()
+    def on_crowded():
+        refused.append(1)
+        crowded.set()
+    producer.connect("eye", SocketPackets(one, 65536, on_crowded=on_crowded))
+    consumer = Consumer("image", SocketPackets(other, 65536), arrived.set, lambda _: None)
+    producer.send(Image(Header(frame_id="c", seq=7), 300, 300, "mono8", 300, bytes(90_000)))
+    await crowded.wait()
+    print("is fed" if producer.consumers == ("eye",) else "is not fed", flush=True)
+    for descriptor in socket.recv_fds(unread, 1, 250)[1]:
+        os.close(descriptor)
+    await arrived.wait()
+    print("got", consumer.take().header.seq, flush=True)
+    producer.close()
+
+asyncio.run(main())
+"""
+
+
+async def test_frame_waits_while_too_many_descriptors_are_under_way() -> None:
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-c", CROWDED), stdout=asyncio.subprocess.PIPE
+    )
+    told, _ = await asyncio.wait_for(process.communicate(), 60)
+    assert told.decode().splitlines() == ["is fed", "got 7"]
