@@ -14,14 +14,12 @@ from asyncio.subprocess import DEVNULL, Process
 from collections.abc import Callable, Iterator
 
 from nondum.host.lifecycle import fork_server
+from nondum.sdk.packets import CROWDED_S, CROWDED_TRIES
 
 LINE_LIMIT = 16 * 1024 * 1024
 """Bytes of one line from a process."""
 END_S = 1.0
 """How long a killed server is waited for."""
-
-CROWDED_S, CROWDED_TRIES = 0.02, 250
-"""Between attempts to send descriptors while too many are under way, and how many."""
 
 log = logging.getLogger(__name__)
 

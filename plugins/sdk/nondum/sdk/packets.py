@@ -22,6 +22,8 @@ BATCH = 64
 """Packets read before the loop gets its turn: a flood cannot starve the rest."""
 CROWDED_S = 0.02
 """Before another attempt where too many descriptors of this user are under way."""
+CROWDED_TRIES = 250
+"""Attempts of those that can wait for only so long."""
 
 # Plain numbers: on every packet, the socket module's enums would cost as much as the system call.
 _CUT_SHORT = int(socket.MSG_TRUNC | socket.MSG_CTRUNC)
