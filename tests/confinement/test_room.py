@@ -22,6 +22,7 @@ from tests.kit.workers import HOST, LIBRARIES, SDK, WorkersUnderTest
 
 from nondum.host.confinement import bubblewrap
 from nondum.host.events import WorkerLogged
+from nondum.host.lifecycle.folders import Folders, let_pass, make_private
 from nondum.host.workers import confinements
 from nondum.host.workers.confinements import (
     FIRST_USER,
@@ -334,7 +335,10 @@ def parent(pid: int) -> int:
 async def test_worker_of_root_gets_a_user_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where all may read what it needs: Debian's interpreter, unlike one in root's home."""
     monkeypatch.setattr(bubblewrap, "prefixes", lambda: (Path("/usr/lib"),))
-    with open_folder() as folder:
+    with open_folder() as root:
+        make_private(folders := Folders(root))
+        let_pass(folders)
+        folder = folders.scratches
         tested = WorkersUnderTest(folder, confinement=Held())
         source = "import os; print('users', os.getuid(), os.getgroups(), os.stat('.').st_uid)"
         spec = tested.spec("guest", source)

@@ -223,6 +223,11 @@ class Boxed:
         yield Entry(walls, room=given)
 
 
+def changes_user(confinement: Confinement) -> bool:
+    """Whether workers may be other users of this machine than the host."""
+    return isinstance(confinement, Held) and os.geteuid() == 0
+
+
 def user_for(spec: WorkerSpec) -> int | None:
     """The user that a worker of root runs as, the same each time; None where there is none to be
     had: the host is not root, or what the worker must read is root's alone.
