@@ -8,10 +8,11 @@ import os
 import pty
 import secrets
 import socket
+import stat
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -28,9 +29,16 @@ ESCAPE = Path(__file__).with_name("escape.py")
 SMALL = Limits(memory_mb=256, tasks=100, descriptors=64, file_mb=16)
 TOKEN = "nondum-bait"  # a word to look for
 IPC_CREAT, IPC_EXCL = 0o1000, 0o2000  # sys/ipc.h
-LEFT_WHEN_RESTRICTED = {"be root", "know the host name", "see a process of the host"}
-"""What is not hidden from restricted workers: other processes' names are to be seen, though nothing
-of what they hold. It is root where the host is, and the interpreter is root's alone."""
+LEFT_WHEN_RESTRICTED = {
+    *("be root", "know the host name", "see a process of the host"),
+    "open a device node that lies there",
+}
+"""What is not hidden from restricted workers: names of processes can be seen, but nothing of what they
+hold. It is root where the host is, and the interpreter is root's alone. It can make no device node
+in its folders, but open one that lies there already."""
+
+SHARED_MEMORY = {"take all memory as shared memory", "take all memory as files in memory"}
+"""What only a memory cgroup limits."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +47,11 @@ class Result:
 
     could: bool
     what: str
+
+
+def unlimited(folder: Path) -> set[str]:
+    """What this machine does not limit, at any level."""
+    return set() if "memory" in Cages.open(folder).holds else SHARED_MEMORY
 
 
 @contextmanager
@@ -59,12 +72,9 @@ def laid(folder: Path, cgroup: str = "") -> Iterator[dict[str, Any]]:
         by_name = stack.enter_context(socket.socket(socket.AF_UNIX))
         by_name.bind(f"\0{TOKEN}-{os.getpid()}")
         by_name.listen(16)
-        process = subprocess.Popen(
-            [sys.executable, "-c", "import time; time.sleep(600)", TOKEN],
-            env={"TOKEN": TOKEN},
-        )
-        stack.callback(process.wait)
-        stack.callback(process.kill)
+        for name in (str(folder / "datagrams"), f"\0{TOKEN}-{os.getpid()}-datagrams"):
+            stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)).bind(name)
+        process = stack.enter_context(_process())
         master, terminal = pty.openpty()
         stack.callback(os.close, master)
         stack.callback(os.close, terminal)
@@ -73,12 +83,15 @@ def laid(folder: Path, cgroup: str = "") -> Iterator[dict[str, Any]]:
         tmp = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="nondum-bait-")))
         yield {
             "secret": str(secret),
+            "victim": str(_victim(folder)),
             "folder": str(folder),
             "other_code": str(code),
             "other_scratch": str(scratch),
             "port": listener.getsockname()[1],
             "path_socket": str(folder / "socket"),
             "abstract_socket": f"{TOKEN}-{os.getpid()}",
+            "path_datagrams": str(folder / "datagrams"),
+            "abstract_datagrams": f"{TOKEN}-{os.getpid()}-datagrams",
             "pid": process.pid,
             "token": TOKEN,
             "session": os.getsid(0),
@@ -88,6 +101,30 @@ def laid(folder: Path, cgroup: str = "") -> Iterator[dict[str, Any]]:
             "tmp": str(tmp),
             "cgroup": cgroup,
         }
+
+
+@contextmanager
+def _process() -> Iterator[subprocess.Popen[str]]:
+    """A process of the host's user. It holds no capabilities, as the service does not: those of
+    root protect it from other processes of root."""
+    program = (
+        "import time\n"
+        "from nondum.host.inside import kernel\n"
+        "kernel.keep_capabilities()\n"
+        "print('ready', flush=True)\n"
+        "time.sleep(600)"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program, TOKEN],
+        env={"TOKEN": TOKEN, "PYTHONPATH": os.pathsep.join(sys.path)},
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            assert process.stdout is not None and process.stdout.readline() == "ready\n"
+            yield process
+        finally:
+            process.kill()
 
 
 @contextmanager
@@ -122,15 +159,19 @@ async def attempted(
     confinement: Confinement,
     attempts: Sequence[str] = (),
     limits: Limits = SMALL,
+    cages: Cages | None = None,
 ) -> dict[str, Result]:
-    """What the hostile plugin can do, or some of it, so confined."""
+    """What the hostile plugin can do, or some of it, so confined; `cages` are the machine's, if
+    none are given."""
     tested = WorkersUnderTest(folder, confinement=confinement)
-    cages = Cages.open(folder)
+    cages = cages or Cages.open(folder)
     tested.workers.launcher = WorkerLauncher(confinement, cages)
     tested.workers.timing = replace(tested.timing, startup_s=120.0)
     source = ESCAPE.read_text(encoding="utf-8")
     summary = source.removeprefix('"""').partition("\n")[0]
-    settings = {"bait": json.dumps({**bait, "attempts": list(attempts)})}
+    victim = _victim(folder)
+    settings = {"bait": json.dumps({**bait, "victim": str(victim), "attempts": list(attempts)})}
+    _lay_node(folder / "escape/scratch")
     try:
         await tested.start("escape", source, summary=summary, settings=settings, limits=limits)
         await tested.until(WorkerLogged, lambda line: line.message == "tried all", timeout_s=120)
@@ -139,10 +180,44 @@ async def attempted(
         cages.close()
     said = [line.message for line in tested.told(WorkerLogged)]
     rows = [json.loads(s.removeprefix("tried ")) for s in said if s.startswith("tried {")]
-    return {row["name"]: _result(row) for row in rows}
+    return {row["name"]: judged(row) for row in rows}
 
 
-def _result(row: dict[str, Any]) -> Result:
-    if "must exist" in row and not Path(row["must exist"]).exists():
-        return Result(could=False, what="written where nobody but the worker sees it")
+def _victim(folder: Path) -> Path:
+    """A file to be changed, as long as nobody has."""
+    folder.mkdir(parents=True, exist_ok=True)
+    victim = folder / "victim"
+    victim.write_text("of the host, as it was")
+    return victim
+
+
+def _lay_node(scratch: Path) -> None:
+    """A device node that any user may open, in the worker's own folder; where root runs the test.
+
+    Nothing of the product would make one there.
+    """
+    scratch.mkdir(parents=True, mode=0o700)
+    if os.geteuid() == 0:
+        node = scratch / "node-of-before"
+        os.mknod(node, stat.S_IFCHR, os.makedev(1, 5))  # /dev/zero
+        node.chmod(0o666)
+
+
+JUDGES: Mapping[str, Callable[..., bool]] = {
+    "exists": lambda path: Path(path).exists(),
+    "is set-id": lambda path: Path(path).stat().st_mode & 0o6000 != 0,
+    "is empty": lambda path: Path(path).stat().st_size == 0,
+    "has mode": lambda path, mode: stat.S_IMODE(Path(path).stat().st_mode) == mode,
+    "was read": lambda path, at_s: Path(path).stat().st_atime == at_s,
+    "has attribute": lambda path, name: name in os.listxattr(path),
+}
+"""What the host looks at, where a worker's own word does not count."""
+
+
+def judged(row: dict[str, Any]) -> Result:
+    """What an attempt came to, by its own word or, where that does not count, by looking."""
+    if "judge" in row:
+        judge, path, *more = row["judge"]
+        if not (Path(path).exists() and JUDGES[judge](path, *more)):
+            return Result(could=False, what="the host sees nothing of it")
     return Result(row["could"], row["what"])

@@ -1,8 +1,9 @@
 """A hostile plugin: tries what a worker must not be able to do, and reports what it could.
 
 Each attempt is made by a child of its own, and succeeded if it returns anything but None: what was
-reached. `bait` (a setting) says what there is to be reached on the host. It stands by itself: its
-text is the only module of a wheel.
+reached. One that returns `judge` succeeded if the test, on the host, finds it so (`baits.JUDGES`).
+`bait` (a setting) says what there is to be reached on the host. It stands by itself: its text is
+the only module of a wheel.
 """
 
 from __future__ import annotations
@@ -10,15 +11,17 @@ from __future__ import annotations
 import ctypes
 import fcntl
 import json
+import mmap
 import os
 import pty
 import resource
 import signal
 import socket
+import stat
 import struct
 import termios
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from nondum.sdk import Context, hookimpl
@@ -67,7 +70,7 @@ def read_a_file_of_the_host(bait: Bait) -> Any:
 def write_a_file_of_the_host(bait: Bait) -> Any:
     path = os.path.join(bait["folder"], "written")
     open(path, "w").close()
-    return {"must exist": path}
+    return {"judge": ["exists", path]}
 
 
 @attempt
@@ -114,7 +117,7 @@ def change_its_own_code(bait: Bait) -> Any:
 def leave_something_in_tmp(bait: Bait) -> Any:
     path = os.path.join(bait["tmp"], "left")
     open(path, "w").close()
-    return {"must exist": path}
+    return {"judge": ["exists", path]}
 
 
 @attempt
@@ -124,6 +127,109 @@ def make_a_device_node(bait: Bait) -> Any:
     os.close(os.open(path, os.O_RDWR))
     os.unlink(path)
     return "a node of its own that opens"
+
+
+@attempt
+def open_a_device_node_that_lies_there(bait: Bait) -> Any:
+    os.close(os.open("node-of-before", os.O_RDONLY))
+    return "a node in its scratch folder"
+
+
+@attempt
+def leave_a_set_id_file(bait: Bait) -> Any:
+    """For any user of the host to run, in any of the ways to make one."""
+    path = os.path.join(os.getcwd(), "set-id")
+    for way in (_by_chmod, _by_open, _without_a_name, _by_mknod, _by_newer_calls):
+        try:
+            way(path, 0o6755)
+            return {"judge": ["is set-id", path]}
+        except OSError as error:
+            last = error
+            if os.path.exists(path):
+                os.unlink(path)
+    raise last
+
+
+def _by_chmod(path: str, mode: int) -> None:
+    os.close(os.open(path, os.O_CREAT | os.O_WRONLY, 0o600))
+    os.chmod(path, mode)
+
+
+def _by_open(path: str, mode: int) -> None:
+    os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
+
+
+def _without_a_name(path: str, mode: int) -> None:
+    nameless = os.open(".", os.O_TMPFILE | os.O_WRONLY, mode)
+    os.link(f"/proc/self/fd/{nameless}", path, follow_symlinks=True)
+
+
+def _by_mknod(path: str, mode: int) -> None:
+    os.mknod(path, stat.S_IFREG | mode)
+
+
+def _by_newer_calls(path: str, mode: int) -> None:
+    how = struct.pack("=QQQ", os.O_CREAT | os.O_WRONLY, mode, 0)
+    call(437, 437, -100, path.encode(), how, len(how))
+
+
+@attempt
+def change_the_mode_of_a_file_of_the_host(bait: Bait) -> Any:
+    os.chmod(bait["victim"], 0o666)
+    return {"judge": ["has mode", bait["victim"], 0o666]}
+
+
+@attempt
+def change_the_mode_of_its_own_code(bait: Bait) -> Any:
+    os.fchmod(os.open(os.path.abspath(__file__), os.O_RDONLY), 0o666)
+    return {"judge": ["has mode", os.path.abspath(__file__), 0o666]}
+
+
+@attempt
+def change_the_time_of_a_file_of_the_host(bait: Bait) -> Any:
+    os.utime(bait["victim"], (1, 1))
+    return {"judge": ["was read", bait["victim"], 1]}
+
+
+@attempt
+def set_an_attribute_of_a_file_of_the_host(bait: Bait) -> Any:
+    os.setxattr(bait["victim"], "user.nondum", b"escape")
+    return {"judge": ["has attribute", bait["victim"], "user.nondum"]}
+
+
+@attempt
+def open_a_file_of_the_host_neither_to_read_nor_to_write(bait: Bait) -> Any:
+    os.close(os.open(bait["victim"], os.O_ACCMODE))
+    return bait["victim"]
+
+
+@attempt
+def truncate_a_file_of_the_host(bait: Bait) -> Any:
+    try:
+        os.truncate(bait["victim"], 0)
+    except OSError:
+        os.close(os.open(bait["victim"], os.O_ACCMODE | os.O_TRUNC))
+    return {"judge": ["is empty", bait["victim"]]}
+
+
+@attempt
+def slow_a_process_of_the_host_down(bait: Bait) -> Any:
+    if not is_bait(bait):
+        return None
+    pid = bait["pid"]
+    for way in (
+        lambda: os.sched_setscheduler(pid, os.SCHED_IDLE, os.sched_param(0)),
+        lambda: os.sched_setaffinity(pid, {min(os.sched_getaffinity(pid))}),
+        lambda: os.setpriority(os.PRIO_PROCESS, pid, 19),
+        lambda: os.setpriority(os.PRIO_USER, 0, os.getpriority(os.PRIO_USER, 0)),
+        lambda: call(251, 30, 1, pid, 3 << 13),  # ioprio_set: idle
+    ):
+        try:
+            way()
+            return f"process {pid}"
+        except OSError as error:
+            last = error
+    raise last
 
 
 def written(path: str) -> str:
@@ -156,6 +262,33 @@ def connect_to_an_abstract_name(bait: Bait) -> Any:
     with socket.socket(socket.AF_UNIX) as s:
         s.connect("\0" + bait["abstract_socket"])
     return bait["abstract_socket"]
+
+
+@attempt
+def send_a_datagram_to_a_path(bait: Bait) -> Any:
+    socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)[0].sendto(b"x", bait["path_datagrams"])
+    return bait["path_datagrams"]
+
+
+@attempt
+def send_a_datagram_to_an_abstract_name(bait: Bait) -> Any:
+    pair = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    pair[0].sendto(b"x", "\0" + bait["abstract_datagrams"])
+    return bait["abstract_datagrams"]
+
+
+@attempt
+def make_an_exotic_pair(bait: Bait) -> Any:
+    """A family's own code, and a module that it is in, is reached even if it makes no pairs."""
+    for family in (2, 17, 29, 30, 38, 40, 41, 43):  # internet, packet, can, tipc, …
+        try:
+            socket.socketpair(family, socket.SOCK_DGRAM)
+            return f"family {family}"
+        except OSError as error:
+            last = error
+            if error.errno not in (1, 97):  # EPERM, EAFNOSUPPORT
+                return f"family {family}: {error.strerror}"
+    raise last
 
 
 @attempt
@@ -432,6 +565,36 @@ def take_all_memory(bait: Bait) -> Any:
 
 
 @attempt
+def take_all_memory_as_shared_memory(bait: Bait) -> Any:
+    return f"{held(mmap.mmap(-1, MEGABYTE) for _ in range(512))} MB"
+
+
+@attempt
+def take_all_memory_as_files_in_memory(bait: Bait) -> Any:
+    """Smaller than the largest file, and so many that the largest number of files is not met."""
+    return f"{held(in_memory(16 * MEGABYTE) for _ in range(32))} MB"
+
+
+def held(maps: Iterator[mmap.mmap]) -> int:
+    """Megabytes, once each page was written to."""
+    kept = []
+    for each in maps:
+        kept.append(each)
+        for at in range(0, len(each), MEGABYTE):
+            each[at : at + MEGABYTE] = bytes(MEGABYTE)
+    return sum(map(len, kept)) // MEGABYTE
+
+
+def in_memory(size: int) -> mmap.mmap:
+    descriptor = os.memfd_create("escape")
+    os.ftruncate(descriptor, size)
+    try:
+        return mmap.mmap(descriptor, size)
+    finally:
+        os.close(descriptor)
+
+
+@attempt
 def open_files_without_end(bait: Bait) -> Any:
     kept = [os.open("/dev/null", os.O_RDONLY) for _ in range(200)]
     return f"{len(kept)} descriptors"
@@ -470,6 +633,13 @@ def filled(path: str, megabytes: int, per_file: int = 8) -> str:
     finally:
         for each in filter(os.path.exists, paths):
             os.unlink(each)
+
+
+@attempt
+def truncate_its_own_code(bait: Bait) -> Any:
+    """The last attempt: there is no more of it, then."""
+    os.close(os.open(os.path.abspath(__file__), os.O_RDONLY | os.O_TRUNC))
+    return {"judge": ["is empty", os.path.abspath(__file__)]}
 
 
 def tried(name: str, bait: Bait) -> dict[str, Any]:

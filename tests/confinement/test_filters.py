@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import stat
 import struct
 
 import pytest
@@ -9,11 +11,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nondum.host.confinement.filters import ALLOW, ERROR, KILL, Rule, encoded, program
-from nondum.host.confinement.refusals import GROUPS, SOCKETS_OF_THE_HOST, filter_of
+from nondum.host.confinement.refusals import (
+    GROUPS,
+    SOCKETS_OF_THE_HOST,
+    TRUNCATION,
+    WITH_THE_HOSTS_USER,
+    WITHOUT_NAMESPACES,
+    filter_of,
+)
 from nondum.host.confinement.system_calls import ARCHITECTURES, Architecture
 
 X86, ARM = ARCHITECTURES["x86_64"], ARCHITECTURES["aarch64"]
-ALL = tuple(rule for group in GROUPS.values() for rule in group)
+EVERY = {**GROUPS, **WITHOUT_NAMESPACES, **WITH_THE_HOSTS_USER, **TRUNCATION}
+ALL = tuple(rule for group in EVERY.values() for rule in group)
 WORDS = st.integers(0, 2**32 - 1)
 
 
@@ -31,6 +41,9 @@ def run(code: bytes, number: int, audit: int, *arguments: int) -> int:
         if operation == 0x20:
             accumulator = struct.unpack_from("<I", data, value)[0]
             continue
+        if operation == 0x54:
+            accumulator &= value
+            continue
         holds = {
             0x15: accumulator == value,
             0x35: accumulator >= value,
@@ -39,9 +52,12 @@ def run(code: bytes, number: int, audit: int, *arguments: int) -> int:
         at += if_true if holds else if_false
 
 
-def refused(rule: Rule, argument: int) -> bool:
+def refused(rule: Rule, arguments: list[int]) -> bool:
     if rule.is_always:
         return True
+    if rule.only_with is not None and not arguments[rule.only_with[0]] & rule.only_with[1]:
+        return False
+    argument = arguments[rule.argument] & rule.mask
     if rule.other_than:
         return argument not in rule.other_than
     return argument in rule.equal or bool(argument & rule.any_bit)
@@ -54,7 +70,7 @@ def test_filter_says_what_its_rules_say(
 ) -> None:
     code = encoded(program(ALL, architecture))
     rules = [r for r in ALL if architecture.numbers.get(r.call) == number]
-    wanted = next((ERROR | r.error for r in rules if refused(r, arguments[r.argument])), ALLOW)
+    wanted = next((ERROR | r.error for r in rules if refused(r, arguments)), ALLOW)
     assert run(code, number, architecture.audit, *arguments) == wanted
 
 
@@ -92,6 +108,88 @@ def test_arguments_decide(
         filter_of(GROUPS, machine), architecture.numbers[call], architecture.audit, *arguments
     )
     assert (said != ALLOW) is is_refused
+
+
+SPECIAL = {
+    "set-user-id": ("chmod", (0, 0o4755), True),
+    "set-group-id": ("fchmod", (0, 0o2755), True),
+    "so, with bits that the kernel does not look at": ("fchmodat", (0, 0, 0xFFFF_0001_4755), True),
+    "sticky": ("chmod", (0, 0o1777), False),
+    "private": ("fchmodat", (0, 0, 0o600), False),
+    "a new one": ("openat", (0, 0, os.O_CREAT | os.O_WRONLY, 0o4755), True),
+    "a new one without a name": ("openat", (0, 0, os.O_TMPFILE | os.O_RDWR, 0o4755), True),
+    "a new one, in the old way": ("open", (0, os.O_CREAT, 0o2755), True),
+    "a new one, in the oldest way": ("creat", (0, 0o4755), True),
+    "a plain new one": ("openat", (0, 0, os.O_CREAT | os.O_WRONLY, 0o644), False),
+    "a folder, without a mode": ("openat", (0, 0, os.O_DIRECTORY, 0o4755), False),
+    "one that is there, and no mode": ("open", (0, os.O_RDWR, 0o7777), False),
+    "a file by mknod": ("mknodat", (0, 0, stat.S_IFREG | 0o4755), True),
+    "a plain file by mknod": ("mknodat", (0, 0, stat.S_IFREG | 0o644), False),
+    "a named pipe": ("mknodat", (0, 0, stat.S_IFIFO | 0o600), False),
+    "a socket": ("mknod", (0, stat.S_IFSOCK | 0o600), False),
+    "a character device": ("mknodat", (0, 0, stat.S_IFCHR | 0o600), True),
+    "a block device": ("mknod", (0, stat.S_IFBLK | 0o600), True),
+    "a mode in memory": ("openat2", (), True),
+    "a mode with flags": ("fchmodat2", (0, 0, 0o600), True),
+    "a pair of streams": ("socketpair", (1, 1), False),
+    "a pair of datagram sockets": ("socketpair", (1, 2), False),
+    "a pair of tipc": ("socketpair", (30, 1), True),
+    "a pair of packets": ("socketpair", (17, 3), True),
+}
+AT_LEVEL_1 = {
+    "neither to read nor to write": ("openat", (0, 0, 3), True),
+    "the same, and truncate": ("open", (0, 3 | os.O_TRUNC), True),
+    "to read and write": ("openat", (0, 0, os.O_RDWR | os.O_TRUNC | os.O_CLOEXEC), False),
+    "to read, and truncate": ("openat", (0, 0, os.O_RDONLY | os.O_TRUNC), True),
+    "truncate by path": ("truncate", (0, 0), True),
+    "its own priority": ("setpriority", (0, 0, 19), False),
+    "that of another": ("setpriority", (0, 1, 19), True),
+    "that of all of its user": ("setpriority", (2, 0, 19), True),
+    "its own affinity": ("sched_setaffinity", (0,), False),
+    "its own affinity, with more bits": ("sched_setaffinity", (1 << 32,), False),
+    "that of others": ("sched_setaffinity", (1,), True),
+    "policy of another": ("sched_setscheduler", (1,), True),
+    "parameters of another": ("sched_setparam", (1,), True),
+    "attributes of another": ("sched_setattr", (1,), True),
+    "its own disk priority": ("ioprio_set", (1, 0), False),
+    "disk priority of another": ("ioprio_set", (1, 1), True),
+    "disk priority of all of its user": ("ioprio_set", (3, 0), True),
+}
+
+
+TOGETHER = [
+    (machine, case)
+    for machine, architecture in ARCHITECTURES.items()
+    for case, (call, *_) in {**SPECIAL, **AT_LEVEL_1}.items()
+    if call in architecture.numbers
+]
+
+
+@pytest.mark.parametrize(("machine", "case"), TOGETHER)
+def test_several_arguments_decide_together(machine: str, case: str) -> None:
+    call, arguments, is_refused = {**SPECIAL, **AT_LEVEL_1}[case]
+    architecture = ARCHITECTURES[machine]
+    code = filter_of(GROUPS if case in SPECIAL else EVERY, machine)
+    said = run(code, architecture.numbers[call], architecture.audit, *arguments)
+    assert (said != ALLOW) is is_refused
+
+
+@pytest.mark.parametrize("call", ["chmod", "fchmod", "fchmodat", "utimensat"])
+def test_what_copying_a_file_calls_does_nothing_where_the_user_is_the_hosts(call: str) -> None:
+    code = filter_of({**GROUPS, **WITH_THE_HOSTS_USER}, "x86_64")
+    assert run(code, X86.numbers[call], X86.audit, 0, 0, 0) == ERROR | 0
+    assert run(filter_of(GROUPS, "x86_64"), X86.numbers[call], X86.audit, 0, 0, 0) == ALLOW
+
+
+@pytest.mark.parametrize("has_network", [False, True])
+def test_no_pair_sends_datagrams_where_others_sockets_are_near(has_network: bool) -> None:
+    code = filter_of({"sockets": SOCKETS_OF_THE_HOST[has_network]}, "x86_64")
+    more = 0o2004000  # SOCK_NONBLOCK, SOCK_CLOEXEC
+
+    def is_refused(kind: int) -> bool:
+        return run(code, X86.numbers["socketpair"], X86.audit, 1, kind | more) != ALLOW
+
+    assert [kind for kind in range(1, 6) if is_refused(kind)] == [2, 3]
 
 
 def test_without_a_network_of_its_own_no_socket_is_to_be_had() -> None:

@@ -8,8 +8,10 @@ import os
 import pty
 import shutil
 import socket
+import subprocess
+import sys
 import tempfile
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,6 +22,7 @@ from tests.kit.workers import HOST, LIBRARIES, SDK, WorkersUnderTest
 
 from nondum.host.confinement import bubblewrap
 from nondum.host.events import WorkerLogged
+from nondum.host.lifecycle.folders import Folders, let_pass, make_private
 from nondum.host.workers import confinements
 from nondum.host.workers.confinements import (
     FIRST_USER,
@@ -27,6 +30,7 @@ from nondum.host.workers.confinements import (
     Boxed,
     Confinement,
     Held,
+    Unconfined,
     user_for,
 )
 from nondum.planning.running import RunState
@@ -195,6 +199,105 @@ async def test_room_ends_with_its_worker(tested: WorkersUnderTest) -> None:
         await until_gone(pid)
 
 
+PLAIN_FILES = """
+import dbm.dumb, pathlib, shutil, sqlite3, tarfile, tempfile, zipfile
+here = pathlib.Path.cwd()
+one = here / 'one'
+one.write_text('text')
+for copy in (shutil.copy, shutil.copy2, shutil.copyfile):
+    assert pathlib.Path(copy(one, here / copy.__name__)).read_text() == 'text'
+shutil.copy2(os.__file__, here / 'of the system')
+one.chmod(0o600)
+one.touch()
+os.utime(one)
+(here / 'tree/inner').mkdir(parents=True)
+shutil.copy(one, here / 'tree/inner')
+shutil.copytree(here / 'tree', here / 'copied')
+shutil.move(here / 'copied', here / 'moved')
+with tempfile.TemporaryDirectory() as folder, tempfile.NamedTemporaryFile() as file:
+    shutil.make_archive(folder + '/packed', 'gztar', here / 'tree')
+    shutil.unpack_archive(folder + '/packed.tar.gz', here / 'unpacked')
+    with tarfile.open(folder + '/packed.tar.gz') as archive:
+        archive.extractall(here / 'extracted', filter='fully_trusted')
+    with zipfile.ZipFile(file, 'w') as archive:
+        archive.write(one, 'one')
+    shutil.unpack_archive(file.name, here / 'unzipped', 'zip')
+assert (here / 'unpacked/inner/one').read_text() == 'text'
+with sqlite3.connect(here / 'base') as base:
+    base.execute('pragma journal_mode=wal')
+    base.execute('create table t (x)')
+with dbm.dumb.open(str(here / 'dumb'), 'c') as base:
+    base['x'] = 'y'
+with open(one, 'r+') as file:
+    file.truncate(1)
+os.nice(1)
+os.sched_setaffinity(0, os.sched_getaffinity(0))
+shutil.rmtree(here / 'moved')
+assert not (here / 'moved').exists()
+"""
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        pytest.param(lambda: Boxed(shutil.which("bwrap") or "bwrap"), id="sandboxed"),
+        pytest.param(lambda: Held(without=["user"]), id="restricted, the host's user"),
+        pytest.param(lambda: Held(without=["user"], abi=2), id="the same, Landlock of Linux 5.19"),
+        pytest.param(Unconfined, id="none"),
+    ],
+)
+async def test_plain_files_can_be_worked_with(
+    tmp_path: Path, make: Callable[[], Confinement]
+) -> None:
+    tested = WorkersUnderTest(tmp_path, confinement=make())
+    await guest(tested, PLAIN_FILES)
+    assert await does(tested) == ""
+    await tested.workers.close()
+
+
+IN_A_NAMESPACE = """
+import os, shutil, subprocess, sys
+from nondum.host.inside import kernel, room
+
+folder, place = sys.argv[1:]
+kernel.unshare(kernel.CLONE_NEWNS)
+kernel.mount(None, "/", None, kernel.MS_SLAVE | 1 << 14)  # MS_REC
+kernel.mount("tmpfs", folder, "tmpfs", 0, "mode=755")  # neither nosuid nor nodev
+shutil.copy(shutil.which("id"), f"{folder}/id")
+os.chmod(f"{folder}/id", 0o4755)
+os.mknod(f"{folder}/zero", 0o20666, os.makedev(1, 5))
+room.bind(folder, place)
+for at in (folder, place):
+    said = subprocess.run([f"{at}/id", "-u"], user=65534, group=65534, capture_output=True)
+    try:
+        os.close(os.open(f"{at}/zero", os.O_RDONLY))
+        opened = "opens"
+    except PermissionError:
+        opened = "does not open"
+    print(said.stdout.decode().strip(), opened)
+"""
+
+
+def test_what_lies_in_its_folders_is_no_device_and_has_no_set_id_bits() -> None:
+    """However it came to lie there. Of a folder for which bubblewrap has done nothing yet."""
+    with open_folder() as folder, open_folder() as place:
+        told = subprocess.run(
+            [sys.executable, "-c", IN_A_NAMESPACE, str(folder), str(place)],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    before, in_the_room = told.stdout.splitlines()
+    assert before == "0 opens"
+    assert in_the_room == "65534 does not open"
+
+
+async def test_keeper_has_its_system_calls_filtered(tested: WorkersUnderTest) -> None:
+    await guest(tested, "pass")
+    keeper = parent(tested.workers.pids()["guest"])
+    assert status(keeper)["Seccomp"] == "2"
+
+
 async def test_outside_is_not_told_by_what_a_worker_is(tested: WorkersUnderTest) -> None:
     body = (
         "assert os.getuid() == os.getgid() == 65534\n"
@@ -219,6 +322,11 @@ def open_folder() -> Iterator[Path]:
         yield folder
 
 
+def status(pid: int) -> dict[str, str]:
+    lines = Path(f"/proc/{pid}/status").read_text(encoding="ascii").splitlines()
+    return dict(line.split(":\t", 1) for line in lines)
+
+
 def parent(pid: int) -> int:
     fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
     return int(fields[1])
@@ -227,7 +335,10 @@ def parent(pid: int) -> int:
 async def test_worker_of_root_gets_a_user_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where all may read what it needs: Debian's interpreter, unlike one in root's home."""
     monkeypatch.setattr(bubblewrap, "prefixes", lambda: (Path("/usr/lib"),))
-    with open_folder() as folder:
+    with open_folder() as root:
+        make_private(folders := Folders(root))
+        let_pass(folders)
+        folder = folders.scratches
         tested = WorkersUnderTest(folder, confinement=Held())
         source = "import os; print('users', os.getuid(), os.getgroups(), os.stat('.').st_uid)"
         spec = tested.spec("guest", source)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.confinement.baits import SMALL, attempted, laid
+from tests.confinement.baits import SMALL, attempted, laid, unlimited
 from tests.confinement.processes import children
 from tests.kit.processes import is_alive, until_gone
 from tests.kit.until import until
@@ -54,7 +54,8 @@ IN_A_ROOM = {
     "handles": ("name files by handle", ()),
     "kernel": ("change personality", ()),
     "terminal": ("type into a terminal", ()),
-    "sockets": ("make an exotic socket", ()),
+    "sockets": ("make an exotic pair", ()),
+    "special files": ("leave a set id file", ()),
 }
 """Wall → what succeeds without it, and walls that must be away too, being in front of it."""
 
@@ -68,17 +69,29 @@ ON_THE_HOST = {
     "messages": ("attach to shared memory", ("user",)),
     "sockets": ("connect to a path", ("user",)),
     "spying": ("trace a child", ("user",)),
+    "bare opens": ("open a file of the host neither to read nor to write", ("user",)),
+    "metadata": ("change the mode of a file of the host", ("user",)),
+    "scheduling": ("slow a process of the host down", ("user",)),
+    "special files": ("leave a set id file", ("user", "metadata")),
 }
 """Likewise of restricted workers. Landlock and filters need one that may gain no privileges."""
 
-LIMITS = {
-    "memory_mb": ("take all memory", 2048),
-    "tasks": ("fork without end", 1000),
-    "descriptors": ("open files without end", 1024),
-    "file_mb": ("write a huge file", 100),
-    "core_mb": ("dump core", 1),
+OF_OLD_LANDLOCK = {
+    "truncation": ("truncate a file of the host", "truncate its own code"),
+    "bare opens": ("open a file of the host neither to read nor to write",),
 }
-"""Limit → what succeeds with more of it."""
+"""The same where Landlock does not know truncating."""
+
+LIMITS = {
+    "take all memory": ("memory_mb", 2048),
+    "take all memory as shared memory": ("memory_mb", 2048),
+    "take all memory as files in memory": ("memory_mb", 2048),
+    "fork without end": ("tasks", 1000),
+    "open files without end": ("descriptors", 1024),
+    "write a huge file": ("file_mb", 100),
+    "dump core": ("core_mb", 1),
+}
+"""What succeeds → of which limit it needs more."""
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +129,7 @@ def moved() -> Iterator[str]:
 async def test_nothing_of_that_is_possible_in_a_whole_room(
     tmp_path: Path, bait: dict[str, Any]
 ) -> None:
-    names = [*(name for name, _ in IN_A_ROOM.values()), *(name for name, _ in LIMITS.values())]
+    names = [*(name for name, _ in IN_A_ROOM.values()), *LIMITS]
     assert not await possible(tmp_path, bait, Boxed(BWRAP), names)
 
 
@@ -134,7 +147,7 @@ async def possible(
     """What of these attempts succeeds."""
     results = await attempted(folder, bait, confinement, list(dict.fromkeys(names)))
     assert set(results) == set(names)
-    return {name for name, result in results.items() if result.could}
+    return {name for name, result in results.items() if result.could} - unlimited(folder)
 
 
 @pytest.mark.parametrize("wall", IN_A_ROOM)
@@ -159,9 +172,20 @@ async def test_wall_of_a_restricted_worker_matters(
     assert result.could, f"without {wall}: {result.what}"
 
 
-@pytest.mark.parametrize("limit", LIMITS)
-async def test_limit_matters(tmp_path: Path, bait: dict[str, Any], limit: str) -> None:
-    name, more = LIMITS[limit]
+@pytest.mark.parametrize("wall", OF_OLD_LANDLOCK)
+async def test_wall_matters_where_landlock_is_older(
+    tmp_path: Path, bait: dict[str, Any], wall: str
+) -> None:
+    names = OF_OLD_LANDLOCK[wall]
+    whole = Held(without=["user"], abi=2)
+    assert not await possible(tmp_path / "whole", bait, whole, names)
+    broken = Held(without=["user", wall], abi=2)
+    assert await possible(tmp_path / "broken", bait, broken, names) == set(names)
+
+
+@pytest.mark.parametrize("name", LIMITS)
+async def test_limit_matters(tmp_path: Path, bait: dict[str, Any], name: str) -> None:
+    limit, more = LIMITS[name]
     much = replace(SMALL, **{"memory_mb": 1024, limit: more})  # forks need some, too
     result = (await attempted(tmp_path / "much", bait, Boxed(BWRAP), [name], much))[name]
     assert result.could, result.what
@@ -171,6 +195,8 @@ def test_every_wall_is_shown_to_matter() -> None:
     assert set(bubblewrap.NAMESPACES) - {"daemon's end"} <= set(IN_A_ROOM)
     assert set(refusals.GROUPS) <= set(IN_A_ROOM)
     assert set(refusals.WITHOUT_NAMESPACES) <= set(ON_THE_HOST)
+    assert set(refusals.WITH_THE_HOSTS_USER) <= set(ON_THE_HOST)
+    assert set(refusals.TRUNCATION) <= set(OF_OLD_LANDLOCK)
 
 
 DAEMON = """

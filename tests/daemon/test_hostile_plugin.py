@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from tests.confinement.baits import ESCAPE, LEFT_WHEN_RESTRICTED, laid
+from tests.confinement.baits import ESCAPE, LEFT_WHEN_RESTRICTED, judged, laid
 from tests.confinement.escape import ATTEMPTS
 from tests.daemon.plugins import talker
 from tests.kit.payloads import Part
@@ -16,6 +16,7 @@ pytestmark = pytest.mark.daemon
 
 FLOODS = {
     *("fill tmp", "fill shared memory", "fork without end", "take all memory"),
+    *("take all memory as shared memory", "take all memory as files in memory"),
     *("open files without end", "write a huge file"),
 }
 """Held, too, but by limits that other tests are about."""
@@ -32,7 +33,7 @@ def test_hostile_payload_gets_nowhere(host: RunningHost, tmp_path: Path) -> None
         said = [row["message"] for row in host.ask("logs", component="escape")]
     rows = [json.loads(s.removeprefix("tried ")) for s in said if s.startswith("tried {")]
     assert {row["name"] for row in rows} == set(attempts)
-    could = {r["name"] for r in rows if r["could"] and Path(r.get("must exist", "/")).exists()}
+    could = {row["name"] for row in rows if judged(row).could}
     level = host.ask("status")["confinement"]["level"]
     assert could <= (set() if level == "sandboxed" else LEFT_WHEN_RESTRICTED)
     assert host.until_component("escape", "ready")["confinement"] == level

@@ -62,8 +62,9 @@ class WorkersUnderTest:
     _arrived: asyncio.Event = field(default_factory=asyncio.Event)
 
     def __post_init__(self) -> None:
-        places = (self.folder, SDK, LIBRARIES)
-        launcher = WorkerLauncher(self.confinement or choice.confinement(level(), places))
+        if self.confinement is None:
+            self.confinement = choice.confinement(level(), (self.folder, SDK, LIBRARIES))
+        launcher = WorkerLauncher(self.confinement)
         self.workers = Workers(HOST, self._on_event, launcher=launcher, timing=self.timing)
 
     def spec(

@@ -239,9 +239,12 @@ def header(side: int = SIDE) -> dict[str, Any]:
     return image(1, side).to_wire()[0]
 
 
-def memory(size: int, seals: int = SEALS) -> int:
+def memory(size: int, seals: int = SEALS, *, holes: int = 0) -> int:
+    """Sealed memory, but for its last bytes really there."""
     descriptor = os.memfd_create("test", os.MFD_ALLOW_SEALING)
     os.ftruncate(descriptor, size)
+    if size > holes:
+        os.posix_fallocate(descriptor, 0, size - holes)
     fcntl.fcntl(descriptor, fcntl.F_ADD_SEALS, seals)
     return descriptor
 
@@ -261,6 +264,12 @@ LIES: dict[str, tuple[Any, Callable[[], int] | None, str]] = {
     "no seals": ([1, 1, 5, 10, {}], lambda: memory(4096, 0), "SLOT_SEALS"),
     "may shrink": ([1, 1, 5, 10, {}], lambda: memory(4096, fcntl.F_SEAL_GROW), "SLOT_SEALS"),
     "empty memory": ([1, 1, 5, 0, {}], lambda: memory(0), "SLOT_SIZE"),
+    "all holes": ([1, 1, 5, 10, {}], lambda: memory(1 << 20, holes=1 << 20), "SLOT_HOLES"),
+    "one page is not there": (
+        [1, 1, 5, 10, {}],
+        lambda: memory(1 << 20, holes=mmap.PAGESIZE),
+        "SLOT_HOLES",
+    ),
     "a pipe": ([1, 1, 5, 10, {}], a_pipe, "SLOT_SEALS"),
     "a file": ([1, 1, 5, 10, {}], lambda: os.open(__file__, os.O_RDONLY), "SLOT_SEALS"),
     "memory with inline": ([0, 1, {}, b"x"], lambda: memory(4096), "PACKET_DESCRIPTORS"),
@@ -277,6 +286,16 @@ async def test_lying_producer_is_cut_off(
     for descriptor in descriptors:
         os.close(descriptor)
     assert await listener.verdict() == code
+
+
+@pytest.mark.parametrize("length", [1, mmap.PAGESIZE, mmap.PAGESIZE + 1, 1_000_003])
+def test_slot_is_there_whole_once_it_was_written_to(length: int) -> None:
+    ring = SlotRing()
+    slot = ring.write(bytes(length), length)
+    assert slot is not None
+    found = os.fstat(slot.descriptor)
+    assert found.st_blocks * 512 >= found.st_size == slot.size
+    ring.close()
 
 
 async def test_too_many_slots_are_cut_off() -> None:
@@ -402,3 +421,46 @@ def test_ring_uses_no_slot_that_is_read() -> None:
     first.readers = 0
     assert list(ring.retire(keep=1)) == [first.id]
     ring.close()
+
+
+CROWDED = """
+import asyncio, os, resource, socket
+from nondum.host.inside import kernel
+from nondum.sdk import Header, Image
+from nondum.sdk.packets import SocketPackets
+from nondum.sdk.streams import Consumer, Producer
+
+kernel.keep_capabilities()  # root's are not held to it
+resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
+full, unread = socket.socketpair()
+socket.send_fds(full, [b"x"], [0] * 250)
+
+async def main():
+    refused, arrived = [], asyncio.Event()
+    one, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    producer = Producer("image", on_lost=lambda name: print("lost", flush=True))
+    crowded = asyncio.Event()
+    def on_crowded():
+        refused.append(1)
+        crowded.set()
+    producer.connect("eye", SocketPackets(one, 65536, on_crowded=on_crowded))
+    consumer = Consumer("image", SocketPackets(other, 65536), arrived.set, lambda _: None)
+    producer.send(Image(Header(frame_id="c", seq=7), 300, 300, "mono8", 300, bytes(90_000)))
+    await crowded.wait()
+    print("is fed" if producer.consumers == ("eye",) else "is not fed", flush=True)
+    for descriptor in socket.recv_fds(unread, 1, 250)[1]:
+        os.close(descriptor)
+    await arrived.wait()
+    print("got", consumer.take().header.seq, flush=True)
+    producer.close()
+
+asyncio.run(main())
+"""
+
+
+async def test_frame_waits_while_too_many_descriptors_are_under_way() -> None:
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-c", CROWDED), stdout=asyncio.subprocess.PIPE
+    )
+    told, _ = await asyncio.wait_for(process.communicate(), 60)
+    assert told.decode().splitlines() == ["is fed", "got 7"]

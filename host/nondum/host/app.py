@@ -40,7 +40,7 @@ from nondum.host.lifecycle.bus import Bus
 from nondum.host.lifecycle.children import watched_without_threads
 from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
-from nondum.host.lifecycle.folders import Folders
+from nondum.host.lifecycle.folders import Folders, let_pass, make_private
 from nondum.host.lifecycle.installation import InstallOptions
 from nondum.host.lifecycle.lanes import in_thread
 from nondum.host.lifecycle.tally import Tally
@@ -59,6 +59,7 @@ from nondum.host.service.telling import Telling
 from nondum.host.service.words import words
 from nondum.host.trust.orders import TrustOrders
 from nondum.host.trust.payload_trust import TrustOptions
+from nondum.host.workers.confinements import changes_user
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import Limits, Timing
 from nondum.host.workers.workers import Workers
@@ -102,6 +103,7 @@ async def _run_as(
     held = await state_lock.lock(folders.root, service.waits)
     ending = asyncio.create_task(_when(stop, held.will_end))
     try:
+        await in_thread(make_private, folders)
         tally = Tally(folders.root)
         safety = await in_thread(tally.begin, asked)
         keep = config.journal.keep
@@ -136,6 +138,8 @@ async def _run(
         folders.confinement,
     )
     confinement = choice.confinement(standing.level, folders.of_workers)
+    if changes_user(confinement):
+        await in_thread(let_pass, folders)
     launcher = WorkerLauncher(confinement, cages, folders.scratches)
     workers = Workers(config.host.name, bus.emit, launcher=launcher, timing=timing)
     executor = Executor(config.host.name, folders, workers, bus.emit, _install_options(config))

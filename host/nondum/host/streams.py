@@ -169,6 +169,14 @@ class Streams:
             for source in (*self._sources(), *sorted(remote.values()))
         )
 
+    def senders(self) -> dict[int, str]:
+        """Inode of each socket that a worker was given for a stream → who sends to it."""
+        return self._broker.senders
+
+    def ends(self) -> Counter[str]:
+        """Component → how many ends of streams it has."""
+        return Counter(name for wire in self._wires for name in (wire.producer, wire.consumer))
+
     def kind(self, stream: str) -> str:
         """The type of a running component's stream. Raises `WorkerFailed` (STREAM_UNKNOWN)."""
         return self._source(stream).type

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import stat
 from pathlib import Path
 
 import pytest
 
 from nondum.host.catalogue.records import PayloadRecord, Step
 from nondum.host.catalogue.state import HostState
-from nondum.host.lifecycle.folders import Folders, remove, sweep
+from nondum.host.lifecycle.folders import Folders, let_pass, make_private, remove, sweep
 
 NOTE = "installed/known.json"
 
@@ -53,6 +54,35 @@ def test_sweep_keeps_what_a_step_needs(tmp_path: Path, step: Step, kept: set[str
     sweep(folders, state(step))
     left = {path.relative_to(tmp_path).as_posix() for path in tmp_path.glob("*/*")}
     assert left == kept
+
+
+def modes(folder: Path) -> dict[str, int]:
+    every = (folder, *folder.iterdir())
+    return {p.relative_to(folder).as_posix(): stat.S_IMODE(p.lstat().st_mode) for p in every}
+
+
+def test_state_folder_that_an_older_version_left_open_is_closed(tmp_path: Path) -> None:
+    tmp_path.chmod(0o755)
+    for name in ("venvs", "scratch", "store"):
+        (tmp_path / name).mkdir(mode=0o755)
+    for name in ("catalogue.sqlite", "catalogue.sqlite-wal", "deaths"):
+        (tmp_path / name).touch(mode=0o644)
+    (tmp_path / "slots").symlink_to("/nowhere")
+    make_private(Folders(tmp_path))
+    found = modes(tmp_path)
+    del found["slots"]
+    assert found == {
+        **dict.fromkeys((".", "venvs", "scratch", "store"), 0o700),
+        **dict.fromkeys(("catalogue.sqlite", "catalogue.sqlite-wal", "deaths"), 0o600),
+    }
+
+
+def test_workers_that_are_other_users_pass_to_their_own(tmp_path: Path) -> None:
+    folders = Folders(tmp_path)
+    (tmp_path / "store").mkdir()
+    make_private(folders)
+    let_pass(folders)
+    assert modes(tmp_path) == {".": 0o711, "venvs": 0o711, "scratch": 0o711, "store": 0o700}
 
 
 def test_removal_goes_through_locked_folders_and_not_through_links(tmp_path: Path) -> None:

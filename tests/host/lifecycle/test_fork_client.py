@@ -28,8 +28,10 @@ WithPython = Callable[[str], None]
 
 
 @contextlib.asynccontextmanager
-async def fork_client(module: str = "nondum.host.lifecycle.child") -> AsyncIterator[ForkClient]:
-    client = ForkClient(module)
+async def fork_client(
+    module: str = "nondum.host.lifecycle.child", on_crowded: Callable[[], None] = lambda: None
+) -> AsyncIterator[ForkClient]:
+    client = ForkClient(module, on_crowded)
     try:
         yield client
     finally:
@@ -151,6 +153,18 @@ async def test_server_that_cannot_fork_says_why_and_goes_on() -> None:
             await client.fork(JOB, START_S)
         assert second.value.errno == errno.EAGAIN
         assert server_of(client) == server
+
+
+async def test_server_that_may_not_send_yet_is_asked_again() -> None:
+    refusals: list[None] = []
+    module = "tests.host.lifecycle.server_that_may_not_send"
+    async with fork_client(module, lambda: refusals.append(None)) as client:
+        forked = await client.fork(JOB, START_S)
+        assert len(refusals) == 1
+        await until_async("it only", lambda: forked_by(server_of(client)) == [forked.pid])
+        forked.kill()
+        assert await forked.wait() == -signal.SIGKILL
+        forked.close()
 
 
 async def test_server_that_ends_as_it_starts_is_told(with_python: WithPython) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from socket import socket as Connection
@@ -42,6 +43,14 @@ class Wire:
 class StreamBroker:
     """Connects and disconnects the ends of streams, by the links of their workers."""
 
+    def __init__(self) -> None:
+        self._ends: dict[Wire, dict[int, str]] = {}
+
+    @property
+    def senders(self) -> dict[int, str]:
+        """Inode of each socket that was given to a worker → the component that sends to it."""
+        return {inode: name for ends in self._ends.values() for inode, name in ends.items()}
+
     async def connect(self, wire: Wire, producer: WorkerLink, consumer: WorkerLink) -> None:
         """Give each end one half of a new connection, and wait until both have taken it.
 
@@ -50,6 +59,10 @@ class StreamBroker:
         """
         ours, theirs = link_sockets()
         with ours, theirs:
+            self._ends[wire] = {
+                os.fstat(ours.fileno()).st_ino: wire.consumer,
+                os.fstat(theirs.fileno()).st_ino: wire.producer,
+            }
             answers = await asyncio.gather(
                 consumer.request("consume", wire._input(), (theirs.fileno(),)),
                 producer.request(
@@ -79,6 +92,7 @@ class StreamBroker:
         self, wire: Wire, producer: WorkerLink | None, consumer: WorkerLink | None
     ) -> None:
         """Take both ends back. An end that is gone, or None, has let go by itself."""
+        self._ends.pop(wire, None)
         requests = []
         if consumer is not None:
             requests.append(consumer.request("unconsume", wire._input()))

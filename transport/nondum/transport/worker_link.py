@@ -32,15 +32,16 @@ class WorkerLink:
         on_event: OnEvent,
         on_closed: Callable[[], None],
         on_violation: Callable[[ProtocolViolation], None],
+        on_crowded: Callable[[], None] = lambda: None,
     ) -> None:
         """Own `sock` and begin to read, on the running loop.
 
         `on_event(name, body, call_id)` may raise `ProtocolViolation`. `on_closed` is called once
         when the worker is gone, and after `on_violation` when it broke the protocol; not after
-        `close`.
+        `close`. `on_crowded`: see `SocketPackets`.
         """
         self._on_closed, self._on_violation = on_closed, on_violation
-        packets = MeteredPackets(SocketPackets(sock, MAX_PACKET))
+        packets = MeteredPackets(SocketPackets(sock, MAX_PACKET, on_crowded=on_crowded))
         self._link = Link(packets, self._refuse, on_event, on_closed, on_violation)
 
     @property

@@ -5,6 +5,8 @@ WAL and FULL synchronous: what was committed survives power loss (sqlite.org/wal
 
 from __future__ import annotations
 
+import contextlib
+import os
 import sqlite3
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import resources
@@ -63,11 +65,18 @@ _PRAGMAS = (
 )
 
 
+MODE = 0o600
+"""Of the file: it holds the journal, goals and serial numbers, for no other user to read."""
+
+
 def connect(path: Path) -> sqlite3.Connection:
     """Open the file, made if it is not there.
 
     Raises `sqlite3.DatabaseError` (see `is_damaged`) and `ConfigRefused` (CATALOGUE_VERSION).
     """
+    with contextlib.suppress(FileExistsError):  # SQLite gives its other files the mode of this one
+        os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_CLOEXEC, MODE))
+    path.chmod(MODE)
     connection = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
     try:
         connection.row_factory = sqlite3.Row

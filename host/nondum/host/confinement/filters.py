@@ -17,6 +17,7 @@ _LOAD = 0x20  # BPF_LD | BPF_W | BPF_ABS
 _IF_EQUAL = 0x15  # BPF_JMP | BPF_JEQ | BPF_K
 _IF_GREATER_OR_EQUAL = 0x35  # BPF_JMP | BPF_JGE | BPF_K
 _IF_ANY_BIT = 0x45  # BPF_JMP | BPF_JSET | BPF_K
+_AND = 0x54  # BPF_ALU | BPF_AND | BPF_K
 _RETURN = 0x06  # BPF_RET | BPF_K
 
 ALLOW = 0x7FFF0000  # SECCOMP_RET_ALLOW
@@ -35,15 +36,19 @@ class Rule:
 
     call: str
     error: int
-    """What it fails with (errno)."""
+    """What it fails with (errno); 0: it does nothing, and answers that it did."""
     argument: int = 0
     """Which argument decides."""
+    mask: int = 0xFFFFFFFF
+    """The bits of it that are compared."""
     equal: tuple[int, ...] = ()
     """Refused for these values."""
     any_bit: int = 0
     """Refused when any of these bits is set."""
     other_than: tuple[int, ...] = ()
     """Refused for all values but these."""
+    only_with: tuple[int, int] | None = None
+    """An argument, and bits: refused only if one of these bits is set in it."""
 
     @property
     def is_always(self) -> bool:
@@ -104,11 +109,24 @@ def _refusal(rule: Rule, architecture: Architecture) -> Iterator[Instruction]:
         yield Instruction(_IF_EQUAL, number, if_false=1)
         yield refuse
         return
-    body = (Instruction(_LOAD, _ARGUMENTS + 8 * rule.argument), *_judged(rule, refuse))
+    judged = (_load(rule.argument), Instruction(_AND, rule.mask), *_judged(rule, refuse))
+    body = (*_condition(rule, len(judged)), *judged)
     reload = Instruction(_LOAD, _NUMBER)
     yield Instruction(_IF_EQUAL, number, if_false=len(body) + 1)
     yield from body
     yield reload
+
+
+def _load(argument: int) -> Instruction:
+    return Instruction(_LOAD, _ARGUMENTS + 8 * argument)
+
+
+def _condition(rule: Rule, length: int) -> Iterator[Instruction]:
+    """Leads past the next instructions, so many, where a rule does not count."""
+    if rule.only_with is not None:
+        argument, bits = rule.only_with
+        yield _load(argument)
+        yield Instruction(_IF_ANY_BIT, bits, if_false=length)
 
 
 def _judged(rule: Rule, refuse: Instruction) -> Iterator[Instruction]:

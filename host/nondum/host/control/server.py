@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import difflib
+import errno
 import logging
 import socket
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
@@ -14,6 +15,7 @@ from typing import Any
 
 from nondum.host.control import protocol
 from nondum.sdk.errors import ConfigRefused, NondumError, Problem, ProtocolViolation
+from nondum.sdk.packets import CROWDED_S, CROWDED_TRIES
 
 Verb = Callable[[Mapping[str, Any]], Awaitable[Any]]
 """Answers once."""
@@ -140,11 +142,23 @@ async def _hand(handing: Handing, writer: asyncio.StreamWriter) -> None:
         await writer.drain()  # what was written before goes first
         with writer.get_extra_info("socket").dup() as client:
             try:
-                sent = socket.send_fds(client, [line], [handing.connection.fileno()])
+                sent = await _sent(client, line, handing.connection.fileno())
             except BlockingIOError as error:
                 raise ConnectionError("the client does not read what it asked for") from error
     writer.write(line[sent:])
     await writer.drain()
+
+
+async def _sent(client: socket.socket, line: bytes, descriptor: int) -> int:
+    """Send a line with a descriptor; what stands in the way only for now is waited for."""
+    for _ in range(CROWDED_TRIES):
+        try:
+            return socket.send_fds(client, [line], [descriptor])
+        except OSError as error:
+            if error.errno != errno.ETOOMANYREFS:  # too many of this user's are under way (unix(7))
+                raise
+        await asyncio.sleep(CROWDED_S)
+    return socket.send_fds(client, [line], [descriptor])
 
 
 async def _follow(

@@ -31,8 +31,8 @@ def furnish(room: Mapping[str, Any]) -> None:
     """
     outside = room["outside"]
     for folder in room["code"]:
-        _bind(outside + folder, folder, kernel.MS_RDONLY if room["protects_code"] else 0)
-    _bind(outside + room["scratch"], room["scratch"], 0)
+        bind(outside + folder, folder, kernel.MS_RDONLY if room["protects_code"] else 0)
+    bind(outside + room["scratch"], room["scratch"], 0)
     _mount_memory("/dev/shm", room["shared_mb"] * 1024)  # of this namespace only
     _mount_memory(DEVICES, 64)
     kernel.mount(None, DEVICES, None, kernel.MS_SHARED)
@@ -98,7 +98,11 @@ _links: dict[str, str] = {}
 """Of process 1 of the room: need → where a link to its node is."""
 
 
-def _bind(source: str, target: str, more: int) -> None:
+def bind(source: str, target: str, more: int = 0) -> None:
+    """Have a folder seen in another place, without devices and set-id bits, whatever was before.
+
+    Bubblewrap's own mounts leave them out, too. Raises `OSError`.
+    """
     os.makedirs(target, exist_ok=True)  # noqa: PTH103
     kernel.mount(source, target, None, kernel.MS_BIND)
     flags = _flags_of(target) | kernel.MS_NOSUID | kernel.MS_NODEV | more

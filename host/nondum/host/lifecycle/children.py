@@ -50,9 +50,12 @@ log = logging.getLogger(__name__)
 class Children:
     """A pool that grows as jobs need it, and shrinks to nothing. `close` it."""
 
-    def __init__(self, *, quiet_s: float = QUIET_S) -> None:
+    def __init__(
+        self, *, quiet_s: float = QUIET_S, on_crowded: Callable[[], None] = lambda: None
+    ) -> None:
+        """`on_crowded`: see `ForkClient`."""
         self._quiet_s = quiet_s
-        self._forks = ForkClient("nondum.host.lifecycle.child")
+        self._forks = ForkClient("nondum.host.lifecycle.child", on_crowded)
         self._kept: dict[str, Forked] = {}
         """Owner → the child that worked for it, and for nobody else; the last ones last."""
         self._busy: set[Forked] = set()

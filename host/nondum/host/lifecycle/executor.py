@@ -65,7 +65,7 @@ class Executor:
     ) -> None:
         options = options or InstallOptions()
         self._workers, self._emit = workers, emit
-        self.children = Children()
+        self.children = Children(on_crowded=workers.search.begin)
         self.trust = PayloadTrust(
             host, folders, self.children, options.trust, allow_unsigned=options.allow_unsigned
         )

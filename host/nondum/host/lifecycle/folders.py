@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import os
+import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +17,10 @@ from nondum.host.workers import scratch
 _KEEPS_VENVS = frozenset({Step.STORED, Step.PROBED, Step.ACTIVE, Step.SUPERSEDED})
 KEEPS_FOLDER = _KEEPS_VENVS | {Step.STAGED, Step.QUARANTINED}
 """Steps at which a payload's checked files are there."""
+
+PRIVATE, PASSABLE = 0o700, 0o711
+PRIVATE_FILE = 0o600
+"""Modes of the state folder, and of what is in it."""
 
 log = logging.getLogger(__name__)
 
@@ -123,6 +129,36 @@ class Folders:
         scratches = self.scratches_of(payload)
         kept = self.payload(payload), self.note(payload)
         return self.staging(payload), *kept, self.venvs(payload), scratches
+
+
+def make_private(folders: Folders) -> None:
+    """Let no other user of this machine see what is in the state folder: journal, goals, keys.
+
+    What lies there already is closed as well: older versions left it open. Blocks.
+    """
+    for path in (folders.root, *folders.root.iterdir()):
+        found = path.lstat()
+        is_ours = found.st_uid == os.geteuid() or path == folders.root
+        for is_kind, mode in ((stat.S_ISDIR, PRIVATE), (stat.S_ISREG, PRIVATE_FILE)):
+            if is_ours and is_kind(found.st_mode) and found.st_mode & ~mode & 0o777:
+                _change_mode(path, mode)
+
+
+def let_pass(folders: Folders) -> None:
+    """Let workers that are other users than this daemon reach their own code and scratch folders.
+
+    They, and others who know a path, may go through; nobody may list what is there. Blocks.
+    """
+    for folder in (folders.root, *folders.of_workers):
+        folder.mkdir(exist_ok=True)
+        _change_mode(folder, PASSABLE)
+
+
+def _change_mode(path: Path, mode: int) -> None:
+    try:
+        path.chmod(mode)
+    except OSError as error:  # of a file system without modes, or another user's
+        log.warning("%s is open to other users: %s", path, error)
 
 
 def sweep(folders: Folders, state: HostState) -> tuple[Path, ...]:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import logging
 import os
 import signal
 import socket
 import sys
 from asyncio.subprocess import DEVNULL, Process
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from nondum.host.lifecycle import fork_server
+from nondum.sdk.packets import CROWDED_S, CROWDED_TRIES
 
 LINE_LIMIT = 16 * 1024 * 1024
 """Bytes of one line from a process."""
@@ -108,10 +110,11 @@ class Forked:
 class ForkClient:
     """Starts the fork server when it is first wanted, and anew when it has ended. `close` it."""
 
-    def __init__(self, module: str) -> None:
+    def __init__(self, module: str, on_crowded: Callable[[], None] = lambda: None) -> None:
         """`module` is run as a program with this process's id and the descriptor of its end of the
-        channel (`fork_server.serve`)."""
-        self._module = module
+        channel (`fork_server.serve`). `on_crowded` is called when descriptors cannot be sent yet
+        since too many of this user's are under way (ETOOMANYREFS, unix(7)): that is tried again."""
+        self._module, self._on_crowded = module, on_crowded
         self._server: Process | None = None
         self._channel: socket.socket | None = None
         self._turn = asyncio.Lock()
@@ -179,6 +182,17 @@ class ForkClient:
         return channel
 
     async def _fork(self, channel: socket.socket, message: str) -> Forked:
+        for _ in range(CROWDED_TRIES):
+            try:
+                return await self._forked(channel, message)
+            except OSError as error:
+                if error.errno != errno.ETOOMANYREFS:
+                    raise
+            self._on_crowded()
+            await asyncio.sleep(CROWDED_S)
+        return await self._forked(channel, message)
+
+    async def _forked(self, channel: socket.socket, message: str) -> Forked:
         ours, theirs = socket.socketpair()
         reader, writer = await asyncio.open_unix_connection(sock=ours, limit=LINE_LIMIT)
         status, of_server = os.pipe()

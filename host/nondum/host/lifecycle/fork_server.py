@@ -10,6 +10,7 @@ tracks resources, and imports the main program again in each process.)
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import os
 import select
@@ -141,7 +142,13 @@ class _Children:
         child = os.pidfd_open(pid)
         self._running[child] = _Child(pid, status)
         self._poll.register(child, select.POLLIN)
-        self._answer(str(pid), (child,))
+        try:
+            self._answer(str(pid), (child,))
+        except OSError as error:
+            if error.errno != errno.ETOOMANYREFS:  # too many of this user's are under way (unix(7))
+                raise
+            signal.pidfd_send_signal(child, signal.SIGKILL)  # it was never handed over
+            self._answer(f"-{error.errno}", ())
         return pid
 
     def see_end(self, descriptor: int) -> None:

@@ -79,11 +79,14 @@ class Confinement(Protocol):
 
 
 class Unconfined:
-    """Level `none`: resource limits and no new privileges, which all levels have."""
+    """Level `none`: resource limits, no new privileges and no special files, which all levels
+    have."""
 
     level = Level.NONE
     has_keeper = False
-    without: frozenset[str] = frozenset()
+
+    def __init__(self, *, without: Collection[str] = ()) -> None:
+        self.without = frozenset(without)
 
     def ground(self, spec: WorkerSpec | None) -> Ground:
         """The interpreter, wherever it is."""
@@ -95,8 +98,9 @@ class Unconfined:
 
     @contextlib.contextmanager
     def entry(self, spec: WorkerSpec, ground: Ground) -> Iterator[Entry]:
-        """Nothing is given up."""
-        walls = {"user": None, "keeps_capabilities": True, "filter": None}
+        """Only making what other users would run or open is given up, where the kernel has that."""
+        refused = calls_refused(refusals.AT_LEAST, self.without) if refusals.has_filters() else None
+        walls = {"user": None, "keeps_capabilities": True, "filter": refused}
         yield Entry({**walls, "may_gain_privileges": False})
 
 
@@ -106,9 +110,10 @@ class Held:
     level = Level.RESTRICTED
     has_keeper = False
 
-    def __init__(self, *, without: Collection[str] = ()) -> None:
+    def __init__(self, *, without: Collection[str] = (), abi: int | None = None) -> None:
+        """`abi` is what is used of Landlock, if not all that the kernel has."""
         self.without = frozenset(without)
-        self._abi = landlock.version()
+        self._abi = landlock.version() if abi is None else abi
 
     def ground(self, spec: WorkerSpec | None) -> Ground:
         """The interpreter, wherever it is."""
@@ -128,6 +133,9 @@ class Held:
             "sockets": refusals.SOCKETS_OF_THE_HOST[has_network],
         }
         user = None if "user" in self.without else user_for(spec)
+        if user is None:
+            groups |= refusals.WITH_THE_HOSTS_USER
+            groups |= refusals.TRUNCATION if self._abi < landlock.TRUNCATES else {}
         nodes = (*(_instruments() if spec.index.devices else ()), *_nodes(spec))
         if user is not None:
             os.chown(spec.scratch, user, user)
@@ -136,7 +144,7 @@ class Held:
             "groups": sorted(_groups_of(nodes)),
             "keeps_capabilities": "capabilities" in self.without,
             "may_gain_privileges": "new privileges" in self.without,
-            "filter": _calls_refused(groups, self.without),
+            "filter": calls_refused(groups, self.without),
         }
         if "landlock" in self.without or not self._abi:
             yield Entry(walls)
@@ -202,15 +210,20 @@ class Boxed:
             "protected": [] if "system" in kept else ["/", "/dev", room.DEVICES],
             "is_last": "user namespaces" not in kept,
             "changes_user": "user" not in kept,
-            "keeper_filter": _calls_refused(refusals.GROUPS, mounts_too),
+            "keeper_filter": calls_refused(refusals.GROUPS, mounts_too),
         }
         walls = {
             "user": None,
             "keeps_capabilities": "capabilities" in kept,
             "may_gain_privileges": "new privileges" in kept,
-            "filter": _calls_refused(groups, kept),
+            "filter": calls_refused(groups, kept),
         }
         yield Entry(walls, room=given)
+
+
+def changes_user(confinement: Confinement) -> bool:
+    """Whether workers may be other users of this machine than the host."""
+    return isinstance(confinement, Held) and os.geteuid() == 0
 
 
 def user_for(spec: WorkerSpec) -> int | None:
@@ -251,7 +264,7 @@ def _interpreter(ground: Ground, orders: int) -> list[str]:
     return [python, "-I", "-S", "-B", "-u", str(BOOTSTRAP), str(orders), str(os.getpid())]
 
 
-def _calls_refused(groups: Mapping[str, tuple[Rule, ...]], without: Collection[str]) -> str | None:
+def calls_refused(groups: Mapping[str, tuple[Rule, ...]], without: Collection[str]) -> str | None:
     """The filter for `walls`; None where there is none to be had, or it is left out."""
     machine = refusals.machine()
     if "filter" in without or not refusals.is_known(machine):

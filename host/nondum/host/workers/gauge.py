@@ -24,6 +24,11 @@ class Gauge:
         held = self._cage.pids() if self._cage is not None else ()
         return held or (self._first(),)
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether these are all of them."""
+        return self._holder is not None and bool(self._holder.pids())
+
     def usage(self) -> Usage:
         """What it uses; without a cage, the processor time of its first process only."""
         if self._cage is not None and self._cage.pids():

@@ -6,6 +6,7 @@ own, resource limits, no new privileges, and nothing inherited but the link.
 
 from __future__ import annotations
 
+import errno
 import logging
 import os
 import socket
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from nondum.host.cgroups import Cages
+from nondum.host.workers import problems
 from nondum.host.workers.confinements import Confinement, Entry, Unconfined
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spare import ROOM, ROOM_BYTES, Spare
@@ -38,7 +40,7 @@ class Launcher(Protocol):
         """Start a worker on its end of the link; the caller closes `sock`.
 
         Call it on the thread of the loop: the worker ends when that thread does. Raises
-        `WorkerFailed` (LAUNCH_FAILED).
+        `WorkerFailed` (LAUNCH_FAILED, LAUNCH_CROWDED).
         """
         ...
 
@@ -95,6 +97,8 @@ class WorkerLauncher:
                     said = spare.said
         except OSError as error:
             problem = Problem("LAUNCH_FAILED", str(error), where=spec.component)
+            if error.errno == errno.ETOOMANYREFS:
+                problem = problems.launch_crowded(spec.component)
             raise WorkerFailed(problem) from error
         text = f"{spec.python} ends at once{f': {said}' if said else ''}"
         raise WorkerFailed(Problem("LAUNCH_FAILED", text, where=spec.component))

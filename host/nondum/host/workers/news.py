@@ -14,7 +14,7 @@ from nondum.sdk.wire import pack
 MAX_WORD = 256
 """Characters in a predicate, an object or a log level."""
 
-
+MAX_COUNT = 2**31
 MAX_TEXT = 16 * 1024
 """Characters of one message that are kept."""
 MAX_CLAIMS = 4096
@@ -98,6 +98,14 @@ def parse_progress(body: Mapping[str, Any]) -> tuple[float, str]:
         case {"fraction": (float() | int()) as fraction, "text": str(text)}:
             return min(max(float(fraction), 0.0), 1.0), printable(text)
     raise _violation("EVENT_INVALID", "event 'progress' lacks what it tells")
+
+
+def parse_count(body: Mapping[str, Any]) -> int:
+    """How often something was so. Raises `ProtocolViolation`."""
+    match body:
+        case {"count": int(count)} if 0 < count <= MAX_COUNT and count is not True:
+            return count
+    raise _violation("EVENT_INVALID", "event 'crowded' lacks what it tells")
 
 
 def _word(value: object) -> str:

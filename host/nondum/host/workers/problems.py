@@ -80,6 +80,27 @@ def too_many_descriptors(component: str, descriptors: int) -> Problem:
     )
 
 
+def in_flight(component: str, count: int) -> Problem:
+    """It sends descriptors that nothing reads, until no process of its user can send any."""
+    return Problem(
+        "WORKER_IN_FLIGHT",
+        f"the worker has sent {count} descriptors that nothing reads, and held up other workers",
+        where=component,
+        fix=_author(component),
+    )
+
+
+def launch_crowded(component: str) -> Problem:
+    """No descriptor could be handed to its process yet."""
+    return Problem(
+        "LAUNCH_CROWDED",
+        "the worker cannot be started now: too many descriptors are under way between processes of"
+        " this user",
+        where=component,
+        fix="it is tried again; see `nondum logs` for the worker that is ended for it",
+    )
+
+
 def scratch_full(component: str, scratch_mb: int) -> Problem:
     """It writes and writes."""
     return Problem(

@@ -7,6 +7,7 @@ the same for all workers: it is done before anybody waits for it.
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
 import signal
@@ -75,11 +76,15 @@ class Spare:
         """Have it become a worker on its end of a link; answer whether it could be told.
 
         From then on it is the caller's, see `process`. See `bootstrap.py` for the parameters.
+        Raises `OSError` (ETOOMANYREFS) when no descriptor can be sent now; then it is still to be
+        closed.
         """
         descriptors = [link.fileno(), *([] if ruleset is None else [ruleset])]
         try:
             socket.send_fds(self._orders, [json.dumps(parameters).encode()], descriptors)
-        except OSError:
+        except OSError as error:
+            if error.errno == errno.ETOOMANYREFS:
+                raise
             self.close()
             return False
         return True

@@ -11,6 +11,7 @@ from nondum.host import events
 from nondum.host.events import Event
 from nondum.host.waiting import until_done
 from nondum.host.workers import problems, supervision
+from nondum.host.workers.in_flight import Search
 from nondum.host.workers.launcher import Launcher
 from nondum.host.workers.spec import Timing, WorkerSpec
 from nondum.host.workers.standing import HEARD, Standing
@@ -33,6 +34,11 @@ class Household(Protocol):
 
     def emit(self, event: Event) -> None:
         """Hand on what has happened."""
+        ...
+
+    @property
+    def search(self) -> Search:
+        """Finds the worker that keeps descriptors of others from being sent."""
         ...
 
     def on_ready(self, worker: Worker) -> None:
@@ -172,6 +178,8 @@ class Supervisor:
             launcher=household.launcher,
             timing=household.timing,
             emit=self._emit,
+            on_crowded=household.search.begin,
+            on_launched=household.search.watch,
         )
         if self.standing is Standing.IN_FORCE:
             household.on_ready(self._worker)

@@ -6,7 +6,7 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from nondum.host.cgroups import Usage
 from nondum.host.events import BehaviourProgressed, Event, StreamFlowing, WorkerLogged
@@ -20,7 +20,7 @@ from nondum.host.workers.gauge import Gauge
 from nondum.host.workers.index import mismatches
 from nondum.host.workers.launcher import Launcher
 from nondum.host.workers.leftovers import end_leftovers
-from nondum.host.workers.news import Claims, parse_news, parse_progress
+from nondum.host.workers.news import Claims, parse_count, parse_news, parse_progress
 from nondum.host.workers.output import Output, Valve
 from nondum.host.workers.process import WorkerProcess, names_of
 from nondum.host.workers.spec import Timing, WorkerSpec
@@ -30,6 +30,9 @@ from nondum.sdk.errors import LinkClosed, NondumError, Problem, ProtocolViolatio
 from nondum.sdk.link import Pending
 from nondum.transport import WorkerLink, link_sockets
 
+OnCrowded: TypeAlias = Callable[[int], None]
+CROWDED_S, CROWDED_TRIES = 0.1, 50
+"""Between attempts to start a worker while no descriptor can be handed to it, and how many."""
 TAIL_LINES = 12
 """Lines of standard error that are told with an exit."""
 LINE_COST = 64
@@ -40,9 +43,18 @@ class Worker:
     """A launched worker. `start_worker` sees it through its start."""
 
     def __init__(
-        self, spec: WorkerSpec, launcher: Launcher, timing: Timing, emit: Callable[[Event], None]
+        self,
+        spec: WorkerSpec,
+        launcher: Launcher,
+        timing: Timing,
+        emit: Callable[[Event], None],
+        on_crowded: OnCrowded = lambda count: None,
     ) -> None:
-        """Launch the process. Raises `WorkerFailed` (LAUNCH_FAILED)."""
+        """Launch the process. Raises `WorkerFailed` (LAUNCH_FAILED, LAUNCH_CROWDED).
+
+        `on_crowded` is called with how often descriptors could not be sent to it, or by it.
+        """
+        self._on_crowded = on_crowded
         self.spec, self._timing, self._emit = spec, timing, emit
         self.claims = Claims()
         """What it says is so."""
@@ -75,7 +87,11 @@ class Worker:
             for source, pipe in zip(("stdout", "stderr"), self._process.outputs, strict=True)
         ]
         self.link = WorkerLink(
-            ours, on_event=self._on_event, on_closed=self._on_hang_up, on_violation=self._on_foul
+            ours,
+            on_event=self._on_event,
+            on_closed=self._on_hang_up,
+            on_violation=self._on_foul,
+            on_crowded=lambda: on_crowded(1),
         )
         self._process.exited.add_done_callback(lambda _: self._on_hang_up())
 
@@ -87,6 +103,11 @@ class Worker:
     def pids(self) -> tuple[int, ...]:
         """All its processes, as far as they are known."""
         return self._gauge.pids()
+
+    @property
+    def is_caged(self) -> bool:
+        """Whether all its processes are known."""
+        return self._gauge.is_whole
 
     async def introduce(self, welcome: Mapping[str, Any]) -> None:
         """Greet it, hear what it is, compare that with the index, and have the plugin start.
@@ -321,6 +342,8 @@ class Worker:
             case "established":
                 if call is not None:  # it may come from a thread whose call has just ended
                     call.establish()
+            case "crowded":
+                self._on_crowded(parse_count(body))
             case "progress":
                 progress = parse_progress(body)
                 if call is not None:
@@ -361,13 +384,16 @@ async def start_worker(
     launcher: Launcher,
     timing: Timing,
     emit: Callable[[Event], None],
+    on_crowded: OnCrowded = lambda count: None,
+    on_launched: Callable[[Worker], None] = lambda worker: None,
 ) -> Worker:
     """Launch a worker and see it through its start.
 
     Raises `WorkerFailed` with what went wrong; then, or when cancelled, however often, nothing of
     it is left.
     """
-    worker = Worker(spec, launcher, timing, emit)
+    worker = await _launched(spec, launcher, timing, emit, on_crowded)
+    on_launched(worker)
     try:
         async with asyncio.timeout(timing.startup_s):
             await worker.introduce(welcome)
@@ -385,6 +411,25 @@ async def start_worker(
                 raise WorkerFailed(*problems.located(spec.component, error)) from error
         raise
     return worker
+
+
+async def _launched(
+    spec: WorkerSpec,
+    launcher: Launcher,
+    timing: Timing,
+    emit: Callable[[Event], None],
+    on_crowded: OnCrowded,
+) -> Worker:
+    """A launched worker; what stands in the way only for now is waited for."""
+    for _ in range(CROWDED_TRIES):
+        try:
+            return Worker(spec, launcher, timing, emit, on_crowded)
+        except WorkerFailed as error:
+            if error.code != "LAUNCH_CROWDED":
+                raise
+        on_crowded(1)
+        await asyncio.sleep(CROWDED_S)
+    return Worker(spec, launcher, timing, emit, on_crowded)
 
 
 def _is_there(device: Mapping[str, Any]) -> bool:

@@ -16,6 +16,7 @@ from nondum.host.events import Emit, Event, FactKnown, StreamFlowing, WorkerFail
 from nondum.host.streams import Streams
 from nondum.host.workers import problems
 from nondum.host.workers.call import Call
+from nondum.host.workers.in_flight import Search
 from nondum.host.workers.launcher import Launcher, WorkerLauncher
 from nondum.host.workers.logs import LogLine, Logs
 from nondum.host.workers.others import Granted, Others
@@ -58,6 +59,7 @@ class Workers:
         self._rounds = Rounds(self._running, self.emit, self.timing.look_s)
         self._going_round: asyncio.Task[None] | None = None
         self.streams = Streams(host)
+        self.search = Search(self.streams.senders, self.streams.ends)
         self.logs = Logs()
         self._host, self._emit = host, emit
         self._manager = plugin_manager()
@@ -174,6 +176,7 @@ class Workers:
         stopping = (self.stop(s.spec.component, grace_s, s.spec.payload) for s in every)
         await asyncio.gather(*stopping)
         await asyncio.gather(*self._calls, return_exceptions=True)
+        await self.search.close()
         await self.streams.close()
         if self._warming is not None:
             self._warming.cancel()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import array
 import asyncio
+import errno
 import os
 import socket
 from collections.abc import Callable, Sequence
@@ -19,6 +20,10 @@ MAX_HANDLES = 4
 """Descriptors in one packet."""
 BATCH = 64
 """Packets read before the loop gets its turn: a flood cannot starve the rest."""
+CROWDED_S = 0.02
+"""Before another attempt where too many descriptors of this user are under way."""
+CROWDED_TRIES = 250
+"""Attempts of those that can wait for only so long."""
 
 # Plain numbers: on every packet, the socket module's enums would cost as much as the system call.
 _CUT_SHORT = int(socket.MSG_TRUNC | socket.MSG_CTRUNC)
@@ -65,13 +70,24 @@ class SocketPackets:
 
     shares_memory = True
 
-    def __init__(self, sock: socket.socket, limit: int, max_handles: int = MAX_HANDLES) -> None:
+    def __init__(
+        self,
+        sock: socket.socket,
+        limit: int,
+        max_handles: int = MAX_HANDLES,
+        on_crowded: Callable[[], None] = lambda: None,
+    ) -> None:
+        """`on_crowded` is called for each packet that cannot be sent yet since too many descriptors
+        of this user, by whichever process, were sent and not read (ETOOMANYREFS, unix(7))."""
         sock.settimeout(0)
         self._sock = sock
         self._limit = limit
         self._max_handles = max_handles
         self._ancillary = socket.CMSG_SPACE(MAX_HANDLES * array.array("i").itemsize)
         self._loop: asyncio.AbstractEventLoop | None = None
+        self._on_crowded = on_crowded
+        self._is_crowded = False
+        self._retry: asyncio.TimerHandle | None = None
 
     def open(self, on_packet: OnPacket, on_closed: OnClosed) -> None:
         """Begin to read (see `Packets`)."""
@@ -90,7 +106,12 @@ class SocketPackets:
                 self._sock.send(data)
         except (BlockingIOError, InterruptedError):
             return False
-        except OSError:  # EPIPE, ECONNRESET: told by the reader, on a turn of its own
+        except OSError as error:
+            if error.errno == errno.ETOOMANYREFS:  # nothing is wrong with either end
+                self._is_crowded = True
+                self._on_crowded()
+                return False
+            # EPIPE, ECONNRESET: told by the reader, on a turn of its own.
             if self._loop is not None:
                 self._loop.call_soon(self._lose, None)
         return True
@@ -100,6 +121,11 @@ class SocketPackets:
         if self._loop is None or self._sock.fileno() < 0:
             return
         loop, descriptor = self._loop, self._sock.fileno()
+        self._forget_retry()
+        if self._is_crowded:  # the socket is writable, and will not tell
+            self._is_crowded = False
+            self._retry = loop.call_later(CROWDED_S, callback)
+            return
 
         def writable() -> None:
             loop.remove_writer(descriptor)
@@ -114,7 +140,13 @@ class SocketPackets:
         if self._loop is not None:
             self._loop.remove_reader(self._sock.fileno())
             self._loop.remove_writer(self._sock.fileno())
+        self._forget_retry()
         self._sock.close()
+
+    def _forget_retry(self) -> None:
+        if self._retry is not None:
+            self._retry.cancel()
+            self._retry = None
 
     def _on_readable(self) -> None:
         for _ in range(BATCH):
@@ -214,10 +246,10 @@ class MemoryPackets:
             on_closed(None)
 
 
-def adopt(handle: Handle, limit: int) -> Packets:
+def adopt(handle: Handle, limit: int, on_crowded: Callable[[], None] = lambda: None) -> Packets:
     """Make an end of a handle that arrived, and own it."""
     if isinstance(handle, int):
-        return SocketPackets(socket.socket(fileno=handle), limit)
+        return SocketPackets(socket.socket(fileno=handle), limit, on_crowded=on_crowded)
     return handle
 
 

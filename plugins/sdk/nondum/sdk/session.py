@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 import os
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
@@ -21,6 +22,8 @@ from nondum.sdk.wire import MAX_PACKET, PROTOCOL_VERSIONS, Hello
 from nondum.sdk.workplace import Device, Place, Workplace
 
 HEARTBEAT_S = 2.0
+CROWDED_EVERY_S = 0.5
+"""Between two times that the host is told that descriptors cannot be sent."""
 STOP_S = 1.5
 """What the plugin has to leave everything safe when the host is gone."""
 
@@ -38,6 +41,10 @@ class Session:
         self._welcomed = asyncio.Event()
         self._early: list[tuple[str, Body]] = []
         self._over = asyncio.Event()
+        self._crowded = 0
+        """Packets that could not be sent yet, since the host was last told: too many descriptors of
+        this user were under way."""
+        self._crowded_told_s = -math.inf
         self.log = logging.getLogger("nondum.plugin")
         self._link = Link(
             packets,
@@ -165,7 +172,9 @@ class Session:
             if verb == "produce":
                 port = self._place.output(body["stream"])
                 _same_type(port.producer.kind, body["type"])
-                port.producer.connect(body["consumer"], adopt(handles[0], MAX_PACKET))
+                port.producer.connect(
+                    body["consumer"], adopt(handles[0], MAX_PACKET, self._on_crowded)
+                )
             else:
                 target = self._place.input_for(body)
                 target.connect(body["stream"], body["type"], adopt(handles[0], MAX_PACKET))
@@ -176,6 +185,15 @@ class Session:
             discard(handles)
             raise
         return {}
+
+    def _on_crowded(self) -> None:
+        """A frame's memory could not be handed over yet: the host finds out why."""
+        self._crowded += 1
+        now_s = asyncio.get_running_loop().time()
+        if now_s >= self._crowded_told_s + CROWDED_EVERY_S:
+            self._crowded_told_s = now_s
+            self.tell("crowded", {"count": self._crowded})
+            self._crowded = 0
 
     def _rewire(self, verb: str, body: Body) -> None:
         """Disconnect a stream, or grant or withdraw a device."""

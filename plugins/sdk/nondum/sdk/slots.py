@@ -23,10 +23,15 @@ SEALS = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | F_SEAL_FUTURE_WRITE
 MAX_SLOTS = 64
 """Slots of one stream that live at once."""
 MAX_SLOT_BYTES = 256 * 1024 * 1024
+BLOCK = 512
+"""st_blocks, in bytes (stat(3type))."""
 
 
 class Slot:
-    """A place for one frame, as its producer has it."""
+    """A place for one frame, as its producer has it.
+
+    It is handed over once a frame was written to it: then all of its pages are there.
+    """
 
     __slots__ = ("descriptor", "id", "memory", "readers", "size")
 
@@ -120,7 +125,7 @@ class MappedSlots:
     def add(self, slot_id: int, handle: Handle) -> None:
         """Map a slot whose descriptor was handed over, and close that.
 
-        Raises `ProtocolViolation` (SLOT_SEALS, SLOT_SIZE, SLOT_UNKNOWN).
+        Raises `ProtocolViolation` (SLOT_SEALS, SLOT_SIZE, SLOT_HOLES, SLOT_UNKNOWN).
         """
         try:
             if slot_id in self._slots or len(self._slots) >= MAX_SLOTS:
@@ -176,11 +181,14 @@ class MappedSlots:
 def _map_sealed(descriptor: int) -> mmap.mmap:
     try:
         seals = fcntl.fcntl(descriptor, fcntl.F_GET_SEALS)
-        size = os.fstat(descriptor).st_size
+        found = os.fstat(descriptor)
+        size, allocated = found.st_size, found.st_blocks * BLOCK
         if seals & SEALS != SEALS:  # without them the producer could shrink it under the reader
             raise _violation("SLOT_SEALS", f"a slot has the seals {seals:#x}, not {SEALS:#x}")
         if not 0 < size <= MAX_SLOT_BYTES:
             raise _violation("SLOT_SIZE", f"a slot has {size} bytes")
+        if allocated < size:  # the memory for the rest would be the reader's; its seals keep it so
+            raise _violation("SLOT_HOLES", f"{allocated} bytes are there of a slot of {size}")
         # Private, so that it may be mapped for writing, which ctypes asks for; nobody ever writes,
         # and pages that are only read are the producer's own.
         return mmap.mmap(descriptor, size, access=mmap.ACCESS_COPY)

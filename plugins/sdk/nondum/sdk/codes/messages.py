@@ -101,6 +101,11 @@ CODES = (
         "tell whoever made the program at the other end",
     ),
     Code(
+        "SLOT_HOLES",
+        "Memory that is handed over is not there yet: its reader would have to provide it.",
+        "tell the plugin's author; build the payload again with the nondum-sdk of the host",
+    ),
+    Code(
         "SLOT_LENGTH",
         "A frame is longer than the memory that it is in.",
         "tell the plugin's author",

@@ -123,6 +123,11 @@ CODES = (
         "build the payload again from the plugin that it carries",
     ),
     Code(
+        "LAUNCH_CROWDED",
+        "A worker cannot be started yet: too many descriptors are under way between processes.",
+        "wait; it is tried again. See `nondum logs` for the worker that is ended for it",
+    ),
+    Code(
         "LAUNCH_FAILED",
         "The process that starts workers ends at once.",
         "run `nondum doctor`; see the daemon's log",
@@ -216,6 +221,11 @@ CODES = (
         "WORKER_HUNG",
         "The worker gives no sign of life, and was ended.",
         "see `nondum logs`; a slow plugin needs a longer `startup_s` in [workers]",
+    ),
+    Code(
+        "WORKER_IN_FLIGHT",
+        "The worker sends descriptors that nothing reads, which held up other workers.",
+        "see `nondum logs`; tell the plugin's author",
     ),
     Code(
         "WORKER_START_FAILED",

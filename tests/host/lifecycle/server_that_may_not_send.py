@@ -1,0 +1,31 @@
+"""A fork server that can send no descriptor until it is asked a second time: too many of its user's
+are under way (ETOOMANYREFS, unix(7))."""
+
+from __future__ import annotations
+
+import os
+import resource
+import socket
+import sys
+
+from nondum.host.lifecycle import fork_server
+
+NOBODY = 65534
+MANY = 250
+
+if __name__ == "__main__":
+    if os.geteuid() == 0:  # root is not held to it
+        os.setgid(NOBODY)
+        os.setuid(NOBODY)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
+    full, unread = socket.socketpair()
+    socket.send_fds(full, [b"x"], [0] * MANY)
+    asked: list[bytes] = []
+
+    def prepare(message: bytes) -> None:
+        """Have them read by the second time."""
+        asked.append(message)
+        if len(asked) == 2:
+            unread.close()
+
+    fork_server.serve(socket.socket(fileno=int(sys.argv[2])), prepare=prepare)

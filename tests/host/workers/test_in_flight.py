@@ -1,0 +1,165 @@
+"""A worker that sends descriptors which nothing reads: the kernel then refuses all processes of the
+user to send any. Others wait, the one is found and ended."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import AsyncIterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tests.host.workers.streaming import CAMERA, STREAM, WATCH, WATCHER, sees
+from tests.kit.workers import HOST, TIMING, WorkersUnderTest, camera
+
+from nondum.host.cgroups import Cages
+from nondum.host.events import WorkerExited, WorkerLogged, WorkerReady
+from nondum.host.workers import WorkerSpec
+from nondum.host.workers.in_flight import culprit, sent
+from nondum.host.workers.launcher import WorkerLauncher
+from nondum.host.workers.process import WorkerProcess
+from nondum.sdk.description import Behaviour, Unit
+from nondum.sdk.errors import Problem, WorkerFailed
+
+pytestmark = pytest.mark.anyio
+
+HOSTILE = """
+import array, os, socket, time
+from nondum.sdk import Unit, behaviour, hookimpl
+
+kept = []
+
+@hookimpl
+def units():
+    return (Unit("it", "sensor"),)
+
+def fill(one, count=250):
+    for _ in range(8):
+        try:
+            socket.send_fds(one, [b"x"], [0] * count)
+        except OSError as error:
+            print("filled", error.errno, flush=True)
+            return False
+    return True
+
+def openly():
+    while True:
+        pair = socket.socketpair()
+        kept.append(pair)
+        if not fill(pair[0]):
+            return
+
+def in_sockets_that_are_under_way():
+    outer = socket.socketpair()
+    kept.append(outer)
+    while True:
+        one, other = socket.socketpair()
+        goes_on = fill(one)
+        try:
+            socket.send_fds(outer[0], [b"x"], [other.fileno()])
+        except OSError:
+            kept.append(other)  # the last one: what was sent before is enough
+        kept.append(one)
+        other.close() if other not in kept else None
+        if not goes_on:
+            return
+
+def by_a_child():
+    if os.fork() == 0:
+        openly()
+        time.sleep(600)
+
+@behaviour("do", action="(do ?u - sensor)")
+async def do(ctx, u):
+    {way}()
+    await ctx.sleep(600)
+"""
+DO = Behaviour("do", "(do ?u - sensor)")
+
+
+@pytest.fixture
+async def tested(tmp_path: Path) -> AsyncIterator[WorkersUnderTest]:
+    tested = WorkersUnderTest(tmp_path)
+    cages = Cages.open(tmp_path)
+    tested.workers.launcher = WorkerLauncher(tested.confinement, cages)
+    yield tested
+    await tested.workers.close(grace_s=1.0)
+    cages.close()
+
+
+@pytest.mark.parametrize("way", ["openly", "in_sockets_that_are_under_way", "by_a_child"])
+async def test_streams_of_others_wait_until_the_worker_is_found_and_ended(
+    tested: WorkersUnderTest, way: str
+) -> None:
+    units = (Unit("it", "sensor"),)
+    source = HOSTILE.replace("{way}", way)
+    await tested.start("hostile", source, behaviours=(DO,), units=units)
+    await tested.start("cam", CAMERA, behaviours=(STREAM,), units=(camera(),))
+    eye = (Unit("eye", "detector"),)
+    await tested.start("watcher", WATCHER, behaviours=(WATCH,), units=eye)
+    tested.behave("hostile", "do", u=f"{HOST}__hostile__it")
+    await tested.until(WorkerLogged, lambda event: event.message == "filled 109")
+    frames = f"{HOST}__cam__frames"
+    tested.behave("cam", "stream", u=f"{HOST}__cam__camera", o=frames)
+    tested.behave("watcher", "watch", u=f"{HOST}__watcher__eye", i=frames)
+    exited = await tested.until(WorkerExited)
+    assert exited.component == "hostile"
+    assert exited.reason.startswith("WORKER_IN_FLIGHT")
+    await sees(tested, "watcher")
+    assert tested.workers.search.refusals > 0
+    assert {event.component for event in tested.told(WorkerExited)} == {"hostile"}
+    assert len([e for e in tested.told(WorkerReady) if e.component == "cam"]) == 1
+
+
+def test_what_waits_with_a_reader_counts_for_its_sender() -> None:
+    one, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with one, other:
+        for _ in range(10):
+            socket.send_fds(one, [b"x"], [0] * 10)
+        inode = os.fstat(other.fileno()).st_ino
+        found = sent({os.getpid()}, "reader", {inode: "sender"}, is_whole=False)
+    assert found["sender"] == 100
+    assert culprit(found, {}) == "sender"
+
+
+@pytest.mark.parametrize(
+    ("counts", "ends", "ended"),
+    [
+        pytest.param({}, {}, None, id="nobody"),
+        pytest.param({"a": 64}, {}, None, id="few"),
+        pytest.param({"a": 65}, {}, "a", id="many"),
+        pytest.param({"a": 94}, {"a": 10}, None, id="its streams explain them"),
+        pytest.param({"a": 900, "b": 300}, {"a": 250}, "b", id="more than its streams explain"),
+        pytest.param({"b": 70, "a": 70}, {}, "a", id="as many"),
+    ],
+)
+def test_most_beyond_its_streams_is_the_culprit(
+    counts: dict[str, int], ends: dict[str, int], ended: str | None
+) -> None:
+    assert culprit(counts, ends) == ended
+
+
+class Crowded:
+    """Can hand nothing to the first workers, as a daemon without privileges for a while."""
+
+    def __init__(self, launcher: WorkerLauncher, refusals: int) -> None:
+        self.level, self.name = launcher.level, launcher.name
+        self.warm, self.close = launcher.warm, launcher.close
+        self._launcher, self.refusals = launcher, refusals
+
+    def launch(self, spec: WorkerSpec, sock: socket.socket) -> WorkerProcess:
+        if self.refusals:
+            self.refusals -= 1
+            raise WorkerFailed(Problem("LAUNCH_CROWDED", "as if", where=spec.component))
+        return self._launcher.launch(spec, sock)
+
+
+async def test_worker_that_cannot_be_started_yet_is_tried_again(tmp_path: Path) -> None:
+    tested = WorkersUnderTest(tmp_path, replace(TIMING, startup_s=60.0))
+    launcher = tested.workers.launcher
+    assert isinstance(launcher, WorkerLauncher)
+    tested.workers.launcher = Crowded(launcher, refusals=2)
+    await tested.start("good", "")
+    assert tested.workers.search.refusals == 2
+    await tested.workers.close()
