@@ -33,9 +33,9 @@ LEFT_WHEN_RESTRICTED = {
     *("be root", "know the host name", "see a process of the host"),
     "open a device node that lies there",
 }
-"""What is not hidden from restricted workers: names of processes can be seen, but nothing of what they
-hold. It is root where the host is, and the interpreter is root's alone. It can make no device node
-in its folders, but open one that lies there already."""
+"""What is not hidden from restricted workers: names of processes can be seen, but nothing of what
+they hold. It is root where the host is, and the interpreter is root's alone. It can make no device
+node in its folders, but open one that lies there already."""
 
 SHARED_MEMORY = {"take all memory as shared memory", "take all memory as files in memory"}
 """What only a memory cgroup limits."""

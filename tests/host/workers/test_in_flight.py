@@ -144,7 +144,7 @@ class Crowded:
     """Can hand nothing to the first workers, as a daemon without privileges for a while."""
 
     def __init__(self, launcher: WorkerLauncher, refusals: int) -> None:
-        self.level, self.name = launcher.level, launcher.name
+        self.level = launcher.level
         self.warm, self.close = launcher.warm, launcher.close
         self._launcher, self.refusals = launcher, refusals
 

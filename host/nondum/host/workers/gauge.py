@@ -27,7 +27,7 @@ class Gauge:
     @property
     def is_whole(self) -> bool:
         """Whether these are all of them."""
-        return self._holder is not None and bool(self._holder.pids())
+        return self._cage is not None and bool(self._cage.pids())
 
     def usage(self) -> Usage:
         """What it uses; without a cage, the processor time of its first process only."""
