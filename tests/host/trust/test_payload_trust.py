@@ -48,7 +48,7 @@ async def test_what_a_trusted_key_signed_runs(tmp_path: Path) -> None:
         record = host.payload(LAMP_ID)
         assert record is not None
         assert host.executor.trust.vouched(record.key).signers == ("alice",)
-        assert host.catalogue.state.highwater["", LAMP_ID].owner == "maker"
+        assert host.catalogue.state.highwater[LAMP_ID].owner == "maker"
 
 
 async def test_what_nobody_trusted_signed_is_refused(tmp_path: Path) -> None:
@@ -138,7 +138,7 @@ async def test_the_owner_undoes_a_release_that_went_too_far(tmp_path: Path) -> N
         await host.until_gone(LAMP_ID)
         host.plug(resealed(drive, ALICE, release=7))
         await host.until_step(LAMP_ID, Step.ACTIVE)
-        assert host.catalogue.state.highwater["", LAMP_ID].release == 7
+        assert host.catalogue.state.highwater[LAMP_ID].release == 7
 
 
 async def test_an_id_stays_with_the_role_that_brought_it_first(tmp_path: Path) -> None:
