@@ -260,7 +260,7 @@ def parse(text: str, where: str, defaults: HostConfig) -> HostConfig:
     """Parse TOML over the defaults. Raises `ConfigRefused` with everything wrong in it."""
     try:
         data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError, or a number without end
         at = _AT_LINE.search(str(error))
         place = f"{where}:{at[1] if at else len(text.splitlines())}"
         raise ConfigRefused(Problem("CONFIG_TOML", str(error), where=place)) from error
