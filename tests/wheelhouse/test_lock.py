@@ -172,7 +172,10 @@ REFUSED = {
         HEAD + package("a", "1.0", wheel("a-2.0-py3-none-any.whl")),
     ),
     "no-wheel-name": ("LOCK_INVALID", HEAD + package("a", "1.0", wheel("a-1.0.zip"))),
-    "python-without-end": ("LOCK_INVALID", PLAIN.replace("[[", f'requires-python = ">={DIGITS}"\n[[', 1)),
+    "python-without-end": (
+        "LOCK_INVALID",
+        PLAIN.replace("[[", f'requires-python = ">={DIGITS}"\n[[', 1),
+    ),
     "package-python-without-end": (
         "LOCK_INVALID",
         HEAD + package("a", "1.0", wheel(A), more=f'requires-python = ">={DIGITS}"\n'),
