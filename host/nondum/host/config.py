@@ -61,8 +61,8 @@ class TrustSection:
     """Whose payloads are run."""
 
     file: Path | None = Path("/etc/nondum/trust.toml")
-    """The first trust file: whoever may write it vouches for it; with `--user`, `trust.toml` in the
-    state folder."""
+    """The first trust file, which `nondum keys trust` writes with its signatures. Without them,
+    who may write there vouches for it. With `--user`: `trust.toml` in the state folder."""
     on_revoke: str = "stop"
     """What becomes of payloads that are here and not trusted any more. `stop`: they are withdrawn.
     `flag`: it is told only."""
@@ -209,6 +209,11 @@ class HostConfig:
     peers: PeersSection = field(default_factory=PeersSection)
     router: RouterSection = field(default_factory=RouterSection)
     feedback: FeedbackSection = field(default_factory=FeedbackSection)
+
+    @property
+    def first_trust_file(self) -> Path:
+        """Where this host's trust begins."""
+        return self.trust.file or self.host.state / "trust.toml"
 
 
 def default_name(hostname: str) -> str:

@@ -60,6 +60,7 @@ VIEWS: dict[str, set[str]] = {
         "state",
         "safe_mode",
         "warnings",
+        "trust",
         "feedback",
         "peers",
         "payloads",
