@@ -30,7 +30,14 @@ class Maker:
             public = maker.key.with_name("key.pub")
             nondum("keys", "init", maker.trust, "--owner", NAME, "--root", public)
             maker.trust.chmod(0o644)  # whatever the umask: others must not be able to write it
+        if not maker.trust_signature.exists():
+            nondum("keys", "sign", maker.trust, "--key", maker.key)
         return maker
+
+    @property
+    def trust_signature(self) -> Path:
+        """The signature of the trust file."""
+        return self.trust.with_name("trust.toml.sig")
 
     @property
     def public(self) -> bytes:

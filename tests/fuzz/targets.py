@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 import tempfile
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
@@ -45,6 +46,8 @@ from nondum.wheelhouse.trust.wire import string
 PLUGINS = Path(__file__).parents[2] / "plugins"
 SHA256 = "0123456789abcdef" * 4
 WHERE = "fuzzed"
+ENDLESS_NUMBER = b"9" * 5_000
+"""Python makes an `int` of 4,300 digits at most, and raises `ValueError` on more."""
 TOUCHED = b"\1\0\0\0\7"
 """What a FIDO token adds to a signature: that a person was there, and its counter."""
 
@@ -60,6 +63,15 @@ def of_text(read: Callable[[str], object]) -> Callable[[bytes], object]:
         return read(text)
 
     return read_bytes
+
+
+def with_endless_numbers(seeds: list[bytes]) -> list[bytes]:
+    """Each seed with one of its numbers after the other made longer than Python reads them."""
+    return [
+        seed[: number.start()] + ENDLESS_NUMBER + seed[number.end() :]
+        for seed in seeds
+        for number in re.finditer(rb"[0-9]+", seed)
+    ]
 
 
 def _contents() -> list[bytes]:
@@ -169,7 +181,11 @@ TOML = (b"[[", b"]]", b'"""', b"'''", b"1e999", b"inf", b"2026-01-01", b"a.b.c",
 def _locks() -> list[bytes]:
     with tempfile.TemporaryDirectory() as folder:
         made = [make_wheel(Path(folder), name, "1.0", {f"{name}.py": ""}) for name in ("a", "b")]
-        return [lock_text(made).encode()]
+        plain = lock_text(made)
+    head, _, packages = plain.partition("[[packages]]")
+    bounds = 'requires-python = ">=3.9"\nenvironments = ["python_version >= \'3.9\'"]\n\n'
+    marker = "marker = \"python_full_version >= '3.9'\""
+    return [plain.encode(), f"{head}{bounds}[[packages]]\n{marker}{packages}".encode()]
 
 
 def _read_lock(text: str) -> object:
@@ -406,8 +422,10 @@ TARGETS = (
         "contents list",
         lambda data: contents.parse(data, WHERE),
         _contents,
+        lambda: with_endless_numbers(_contents()),
         tokens=(b"release: ", b"../", b"\n\n", b"  ", SHA256.encode()),
         cases=1_000_000,
+        longest=4 * LONGEST,
     ),
     Target(
         "manifest", of_text(lambda t: manifest.parse(t, WHERE)), lambda: [MANIFEST], tokens=TOML

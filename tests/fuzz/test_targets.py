@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.fuzz.mutation import mutated
 from tests.fuzz.target import Target
-from tests.fuzz.targets import TARGETS
+from tests.fuzz.targets import TARGETS, with_endless_numbers
 from tests.fuzz.trial import tried
 
 each = pytest.mark.parametrize("target", TARGETS, ids=[target.name for target in TARGETS])
@@ -27,6 +27,12 @@ def seeds_of(target: Target) -> list[bytes]:
 def test_its_seeds_are_read(target: Target) -> None:
     """Else all that is mutated from them would be turned away at the door."""
     assert [tried(target, seed).refused for seed in target.seeds()] == [""] * len(target.seeds())
+
+
+@each
+def test_numbers_without_end_are_read_or_refused(target: Target) -> None:
+    for data in with_endless_numbers(target.seeds()):
+        assert tried(target, data).is_within_bounds
 
 
 @each

@@ -90,6 +90,11 @@ def test_all_mistakes_are_told_at_once() -> None:
     ("text", "words"),
     [
         ("[host", "CONFIG_TOML host.toml:1: Expected ']'"),
+        pytest.param(
+            f"[planning]\ndeadline_s = {'9' * 5_000}",
+            "CONFIG_TOML host.toml:2: Exceeds the limit",
+            id="number without end",
+        ),
         ("\na = 1\na = 2", "CONFIG_TOML host.toml:3: Cannot overwrite"),
         ("host = 3", "CONFIG_VALUE host.toml:1: [host] = 3: expected a table"),
         ('[host]\nsystem_tree = "tree"', 'expected "package:function"'),

@@ -56,8 +56,9 @@ class MachineRobot(Robot):
 
     def trust(self, file: Path) -> None:
         """Have it go by a trust file, its first one."""
-        self.machine.put("/run/lab/trust.toml", file.read_bytes())
-        self.nondum("keys", "trust", "--yes", "/run/lab/trust.toml")
+        for name in (file.name, f"{file.name}.sig"):
+            self.machine.put(f"/run/lab/{name}", file.with_name(name).read_bytes())
+        self.nondum("keys", "trust", "--yes", f"/run/lab/{file.name}")
 
     def install(self, drive: Path) -> None:
         """Have its payload for good."""

@@ -43,6 +43,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_W}/trust/owners_folder.py": (f"{_TW}/trust/test_editing.py",),
     f"{_W}/trust/signing.py": (f"{_TW}/trust/test_signing.py",),
     f"{_W}/signatures.py": (f"{_TW}/trust/test_judging.py", f"{_TW}/test_goal_payload.py"),
+    f"{_H}/trust/anchors.py": (f"{_TH}/trust/test_anchors.py",),
     f"{_H}/trust/chain.py": (f"{_TH}/trust/test_chain.py",),
     f"{_H}/trust/payload_trust.py": _BROUGHT,
     # What drives are, and what is read of them.

@@ -14,6 +14,8 @@ from nondum.wheelhouse import contents
 from nondum.wheelhouse.contents import Contents, Entry
 
 SHA = "a" * 64
+DIGITS = "9" * 5_000
+"""More than Python makes a number of."""
 PLAIN = (
     "nondum-payload 1\nid: org.example.blinker\nversion: 1.0\nrelease: 7\nfleet:\n"
     "minimum-nondum: 0.1\nbuilt: 2026-01-01T00:00:00Z\n\n"
@@ -37,6 +39,7 @@ LISTS = st.builds(
     fleet=st.text(f"{string.ascii_lowercase}{string.digits}.-", max_size=64),
     minimum_nondum=st.just("0.1"),
     built=st.just("2026-01-01T00:00:00Z"),
+    hosts=st.lists(st.from_regex(r"[a-z0-9]{1,9}", fullmatch=True), max_size=3).map(tuple),
     entries=st.lists(
         st.builds(
             Entry,
@@ -63,6 +66,18 @@ def test_noise_is_refused_and_nothing_else_raised(noise: bytes) -> None:
         except PayloadRefused:
             continue
         assert contents.parse(listed.to_bytes(), "again") == listed
+
+
+@given(LISTS, st.data())
+def test_one_list_has_one_form(listed: Contents, data: st.DataObject) -> None:
+    lines = listed.to_bytes().decode().split("\n")
+    end = lines.index("")
+    headers = data.draw(st.permutations(lines[1:end]))
+    other = "\n".join([lines[0], *headers, *lines[end:]]).encode()
+    if other == listed.to_bytes():
+        assert contents.parse(other, "CONTENTS") == listed
+    else:
+        assert {*codes(other)} == {"CONTENTS_HEADER"}
 
 
 @given(st.integers(0, len(PLAIN) - 1), st.characters(codec="latin-1"))
@@ -95,6 +110,11 @@ REFUSED = {
     "id-upper-case": ("CONTENTS_HEADER", PLAIN.replace("blinker\n", "Blinker\n")),
     "id-not-reverse-dns": ("CONTENTS_HEADER", PLAIN.replace("org.example.", "")),
     "version": ("CONTENTS_HEADER", PLAIN.replace("version: 1.0", "version: newest")),
+    "version-long": ("CONTENTS_HEADER", PLAIN.replace("version: 1.0", f"version: 1.{'0' * 249}")),
+    "version-without-end": ("CONTENTS_HEADER", PLAIN.replace("version: 1.0", f"version: {DIGITS}")),
+    "nondum-without-end": ("CONTENTS_HEADER", PLAIN.replace("0.1", DIGITS)),
+    "order": ("CONTENTS_HEADER", PLAIN.replace("release: 7\nfleet:\n", "fleet:\nrelease: 7\n")),
+    "hosts-at-the-end": ("CONTENTS_HEADER", PLAIN.replace("00Z\n", "00Z\nhosts: spot\n")),
     "release-negative": ("CONTENTS_HEADER", PLAIN.replace("release: 7", "release: -7")),
     "release-jump": ("CONTENTS_HEADER", PLAIN.replace("release: 7", f"release: {2**53 + 1}")),
     "release-without-end": ("CONTENTS_HEADER", PLAIN.replace("release: 7", f"release: {2**62}")),

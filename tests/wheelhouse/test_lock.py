@@ -95,6 +95,8 @@ def test_two_entries_for_one_host_are_refused() -> None:
 
 
 A = "a-1.0-py3-none-any.whl"
+DIGITS = "9" * 5_000
+"""More than Python makes a number of."""
 REFUSED = {
     "not-toml": ("LOCK_TOML", "a = = b"),
     "depth-bomb": ("LOCK_TOML", HEAD + "x = " + "[" * 100_000),
@@ -170,6 +172,22 @@ REFUSED = {
         HEAD + package("a", "1.0", wheel("a-2.0-py3-none-any.whl")),
     ),
     "no-wheel-name": ("LOCK_INVALID", HEAD + package("a", "1.0", wheel("a-1.0.zip"))),
+    "python-without-end": (
+        "LOCK_INVALID",
+        PLAIN.replace("[[", f'requires-python = ">={DIGITS}"\n[[', 1),
+    ),
+    "package-python-without-end": (
+        "LOCK_INVALID",
+        HEAD + package("a", "1.0", wheel(A), more=f'requires-python = ">={DIGITS}"\n'),
+    ),
+    "marker-without-end": (
+        "LOCK_INVALID",
+        HEAD + package("a", "1.0", wheel(A), more=f"marker = \"python_version > '{DIGITS}'\"\n"),
+    ),
+    "environment-without-end": (
+        "LOCK_INVALID",
+        PLAIN.replace("[[", f"environments = [\"python_version > '{DIGITS}'\"]\n[[", 1),
+    ),
     "no-package-version": ("LOCK_INVALID", PLAIN.replace('version = "1.0"\n[[', "[[")),
 }
 

@@ -12,7 +12,7 @@ from tests.wheelhouse.hostile_wheels import WheelBuilder
 
 from nondum.wheelhouse import preflight
 from nondum.wheelhouse.confinement import Level
-from nondum.wheelhouse.signatures import UnsignedAllowed
+from nondum.wheelhouse.signatures import UnsignedAllowed, Verdict
 from nondum.wheelhouse.target import Target, targets
 from nondum.wheelhouse.trust.judging import Circumstances, Judging
 from nondum.wheelhouse.verification import Verified, verify
@@ -40,6 +40,16 @@ def test_a_whole_payload_passes(folder: Path) -> None:
 
 def test_a_folder_without_contents_list_is_told(tmp_path: Path) -> None:
     assert codes(verify(tmp_path, UnsignedAllowed())) == ["CONTENTS_MISSING"]
+
+
+def test_what_nobody_foresaw_is_told_of_that_payload(folder: Path) -> None:
+    class Breaking(UnsignedAllowed):
+        def verify(self, contents: bytes, signature: bytes | None) -> Verdict:
+            raise RuntimeError("unforeseen")
+
+    found = verify(folder, Breaking())
+    assert codes(found) == ["INTERNAL"]
+    assert found.problems[0].where == folder.name
 
 
 def test_missing_signatures_are_told_first(folder: Path) -> None:

@@ -151,7 +151,7 @@ def _in_force(key: str, snapshot: Snapshot) -> PayloadRecord | None:
             other
             for other in snapshot.payloads
             if payload is not None
-            and (other.fleet, other.payload_id) == (payload.fleet, payload.payload_id)
+            and other.payload_id == payload.payload_id
             and other.step is Step.ACTIVE
             and other.key != key
         ),

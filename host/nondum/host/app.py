@@ -208,6 +208,7 @@ async def _run(
         places,
         vouched,
         feedback.to_dict,
+        executor.trust.summary,
     )
     trust = TrustOrders(executor.trust, bus.emit)
     orders = Orders(catalogue, mind, workers, news, bus, config.planning.translate_s)
@@ -367,7 +368,7 @@ def _install_options(config: HostConfig) -> InstallOptions:
     return InstallOptions(
         allow_unsigned=config.drives.allow_unsigned,
         look_s=config.drives.look_s,
-        trust=TrustOptions(config.trust.file, stop=config.trust.on_revoke == "stop"),
+        trust=TrustOptions(config.first_trust_file, stop=config.trust.on_revoke == "stop"),
         method=config.install.method,
         reserve_mb=config.install.reserve_mb,
         quota_mb=config.install.quota_mb,

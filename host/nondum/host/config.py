@@ -64,8 +64,8 @@ class TrustSection:
     """Whose payloads are run."""
 
     file: Path | None = Path("/etc/nondum/trust.toml")
-    """The first trust file: whoever may write it vouches for it; with `--user`, `trust.toml` in the
-    state folder."""
+    """The first trust file, which `nondum keys trust` writes with its signatures. Without them,
+    who may write there vouches for it. With `--user`: `trust.toml` in the state folder."""
     on_revoke: str = "stop"
     """What becomes of payloads that are here and not trusted any more. `stop`: they are withdrawn.
     `flag`: it is told only."""
@@ -214,6 +214,11 @@ class HostConfig:
     router: RouterSection = field(default_factory=RouterSection)
     feedback: FeedbackSection = field(default_factory=FeedbackSection)
 
+    @property
+    def first_trust_file(self) -> Path:
+        """Where this host's trust begins."""
+        return self.trust.file or self.host.state / "trust.toml"
+
 
 def default_name(hostname: str) -> str:
     """A host name made of the machine's.
@@ -264,7 +269,7 @@ def parse(text: str, where: str, defaults: HostConfig) -> HostConfig:
     """Parse TOML over the defaults. Raises `ConfigRefused` with everything wrong in it."""
     try:
         data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError, or a number without end
         at = _AT_LINE.search(str(error))
         place = f"{where}:{at[1] if at else len(text.splitlines())}"
         raise ConfigRefused(Problem("CONFIG_TOML", str(error), where=place)) from error

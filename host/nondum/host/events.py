@@ -283,6 +283,16 @@ class PayloadDoubted(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class TrustRead(Event):
+    """A daemon that starts has read and verified the trust file that it goes by."""
+
+    owner: str
+    version: int
+    first: str
+    """Who vouches for the first one, in words: `nondum.host.trust.anchors.Origin`."""
+
+
+@dataclass(frozen=True, slots=True)
 class TrustChanged(Event):
     """Another version of the trust file is in force, and safe on disk."""
 

@@ -60,6 +60,8 @@ class Questions:
     """Payload key → who vouches for it."""
     shown: Callable[[], Row] = NOTHING.to_dict
     """What people without a screen are shown."""
+    trusted: Callable[[], Row | None] = lambda: None
+    """The trust file in force, in a few words."""
 
     async def status(self, arguments: Arguments) -> Row:
         """The host, its payloads and its goals at a glance."""
@@ -74,6 +76,7 @@ class Questions:
                 *map(_kept_out, self.mind.views.kept_out()),
                 *map(_gone_back, gone_back(snapshot)),
             ],
+            "trust": self.trusted(),
             "feedback": self.shown(),
             "confinement": self.standing.to_dict(),
             "payloads": [

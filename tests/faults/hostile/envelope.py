@@ -56,6 +56,14 @@ def after_header(line: bytes) -> Callable[[bytes], bytes]:
     return lambda data: data.replace(b"\n\n", b"\n" + line + b"\n\n", 1)
 
 
+def release_last(data: bytes) -> bytes:
+    lines = data.split(b"\n")
+    at = next(n for n, line in enumerate(lines) if line.startswith(b"release: "))
+    line = lines.pop(at)
+    end = lines.index(b"")
+    return b"\n".join([*lines[:end], line, *lines[end:]])
+
+
 def many_files(made: Draft) -> Draft:
     return replace(made, files={**made.files, **{f"notes/{n}.txt": b"" for n in range(512)}})
 
@@ -79,6 +87,7 @@ DRIVES: tuple[HostileDrive, ...] = (
     entries("blank-line-between", ENTRY, lambda lines: [lines[0], "", *lines[1:]]),
     rewritten("unknown-header", HEADER, after_header(b"run: install.sh")),
     rewritten("header-twice", HEADER, after_header(b"release: 9")),
+    rewritten("headers-in-another-order", HEADER, release_last),
     rewritten("header-without-colon", HEADER, after_header(b"release 9")),
     *(
         header(f"no-{key}", key, LEFT_OUT)
@@ -92,6 +101,7 @@ DRIVES: tuple[HostileDrive, ...] = (
     header("id-with-blanks", "id", "org.example lamp"),
     header("version-in-words", "version", "latest"),
     header("version-empty", "version", ""),
+    header("version-of-many-digits", "version", "9" * 5000),
     header("release-negative", "release", "-1"),
     header("release-huge", "release", str(2**62)),
     header("release-of-many-digits", "release", "9" * 5000),
@@ -102,6 +112,7 @@ DRIVES: tuple[HostileDrive, ...] = (
     header("built-in-words", "built", "yesterday"),
     header("nondum-of-tomorrow", "minimum-nondum", "99.0", "NONDUM_VERSION"),
     header("nondum-in-words", "minimum-nondum", "newest"),
+    header("nondum-of-many-digits", "minimum-nondum", "9" * 5000),
     spoilt("too-many-files", "TOO_MANY_FILES", many_files),
     entries("not-sorted", ENTRY, lambda lines: lines[::-1]),
     entries("file-twice", "PATH_UNSAFE", lambda lines: [lines[0], *lines]),

@@ -32,6 +32,7 @@ from nondum.host.catalogue.records import (
     Moment,
     MountPose,
     PayloadRecord,
+    Rollback,
     Step,
 )
 from nondum.host.catalogue.rows import as_json
@@ -155,7 +156,8 @@ FULL = HostState(
             "spot__eye__camera", (0.1, 0.0, 1.0), (0.0, 0.2, 0.0), "person"
         )
     },
-    highwater={("red", "org.example.eye"): Highwater(7, "digest-k1")},
+    highwater={"org.example.eye": Highwater(7, "digest-k1")},
+    rollbacks={"org.example.eye": Rollback("digest-k1", 7, 9)},
     goals={"3": GoalRecord("3", "look at the lamp", "(seen lamp)", "achieve", -2)},
     former={"org.example.arm": former()},
     tries={"k1": 2, "block:sdb1-7": 4},
@@ -380,8 +382,19 @@ async def test_file_of_another_version_is_left_alone(tmp_path: Path) -> None:
 OF_5 = replace(
     FULL, devices={}, known_devices={}, components={"eye": component(device=None, nodes=())}
 )
+THE_6 = (
+    "ALTER TABLE highwater RENAME TO highest; CREATE TABLE highwater (fleet TEXT NOT NULL,"
+    " payload_id TEXT NOT NULL, release INTEGER NOT NULL, digest TEXT NOT NULL,"
+    " owner TEXT NOT NULL, PRIMARY KEY (fleet, payload_id)) STRICT;"
+    "INSERT INTO highwater SELECT 'red', payload_id, release, digest, owner FROM highest;"
+    "ALTER TABLE rollbacks RENAME TO latest; CREATE TABLE rollbacks (fleet TEXT NOT NULL,"
+    " payload_id TEXT NOT NULL, digest TEXT NOT NULL, release INTEGER NOT NULL,"
+    " below INTEGER NOT NULL, PRIMARY KEY (fleet, payload_id)) STRICT;"
+    "INSERT INTO rollbacks SELECT 'red', payload_id, digest, release, below FROM latest;"
+    "DROP TABLE highest; DROP TABLE latest;"
+)
 THE_5 = (
-    "DROP TABLE device_nodes; DROP TABLE device_interfaces; DROP TABLE known_devices;"
+    f"{THE_6} DROP TABLE device_nodes; DROP TABLE device_interfaces; DROP TABLE known_devices;"
     "ALTER TABLE claims DROP COLUMN nodes; DROP TABLE devices;"
     "CREATE TABLE devices (id TEXT PRIMARY KEY, node TEXT NOT NULL, properties TEXT NOT NULL)"
     " STRICT; INSERT INTO devices VALUES ('usb1', '/dev/ttyUSB0', '{}');"
@@ -400,6 +413,7 @@ OLDER = {
     2: (f"{THE_4} DROP TABLE former;", replace(OF_4, former={})),
     3: (THE_4, OF_4),
     4: (THE_5, OF_5),
+    5: (THE_6, FULL),
 }
 """Schema → what makes it of the present one, and what it can hold of `FULL`."""
 
@@ -418,6 +432,33 @@ async def test_file_of_a_version_before_is_taken_over(tmp_path: Path, schema: in
         await catalogue.commit(FULL, ())
     async with opened(tmp_path) as catalogue:
         assert catalogue.state == FULL
+
+
+@pytest.mark.anyio
+async def test_highest_release_of_any_fleet_is_taken_over(tmp_path: Path) -> None:
+    """Schema 5 kept the newest release of each fleet."""
+    async with opened(tmp_path):
+        pass
+    connection = sqlite3.connect(tmp_path / "catalogue.sqlite")
+    connection.executescript(f"{THE_6} PRAGMA user_version = 5;")
+    known = (
+        ("", "org.example.eye", 3, "old", ""),
+        ("survey", "org.example.eye", 9, "new", "maker"),
+        ("rescue", "org.example.eye", 9, "twin", "other"),
+        ("", "org.example.arm", 5, "arm", ""),
+        ("survey", "org.example.arm", 2, "arm-2", ""),
+    )
+    with connection:
+        connection.executemany("INSERT INTO highwater VALUES (?, ?, ?, ?, ?)", known)
+        back = (("", "org.example.eye", "a", 1, 3), ("survey", "org.example.eye", "b", 8, 9))
+        connection.executemany("INSERT INTO rollbacks VALUES (?, ?, ?, ?, ?)", back)
+    connection.close()
+    async with opened(tmp_path) as catalogue:
+        assert catalogue.state.highwater == {
+            "org.example.eye": Highwater(9, "new", "maker"),
+            "org.example.arm": Highwater(5, "arm", ""),
+        }
+        assert catalogue.state.rollbacks == {"org.example.eye": Rollback("b", 8, 9)}
 
 
 @pytest.mark.anyio

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 from tests.kit.beacon import BEACON, BEACON_ID
-from tests.kit.command_line import nondum
+from tests.kit.command_line import at_terminal, nondum
 from tests.kit.payloads import Part, make_payload
 from tests.kit.running_host import running
 from tests.kit.signing import MADE, Key
 
+from nondum.host.trust.anchors import Origin
 from nondum.wheelhouse.trust import editing, owners_folder, trust_file
 from nondum.wheelhouse.trust.succession import successor
 
@@ -137,21 +138,69 @@ def test_a_host_is_given_its_trust_and_keeps_to_it(owner: Path) -> None:
     trust, alice = owner / "trust.toml", owner / "alice"
     drive = owner / "drive"
     make_payload(drive, Part("beacon", BEACON), payload_id=BEACON_ID)
-    with running(owner / "host", trust=owner / "host/trust.toml") as host:
+    with running(owner / "host", trust=owner / "etc/trust.toml") as host:
+        begin = ("keys", "trust", trust, "--config", host.config)
         assert "trusts nobody" in host.run("status").ok().out
         host.run("payload", "install", drive).refused(1, "SIG_MISSING")
         nondum("payload", "sign", drive, "--key", alice).ok()
         host.run("payload", "install", drive).refused(1, "SIG_UNTRUSTED")
-        assert "version 1" in host.run("keys", "trust", trust, "--yes").ok().out
+        host.run(*begin, "--yes").refused(1, "TRUST_SIGNATURE")
+        nondum("keys", "sign", trust, "--key", alice).ok()
+        assert "version 1" in host.run(*begin, "--yes").ok().out
         host.run("payload", "install", drive).ok()
-        (row,) = host.run("status", "--json").ok().json["payloads"]
+        view = host.run("status", "--json").ok().json
+        assert view["trust"] == {"owner": "survey", "version": 1, "first": Origin.SIGNED.value}
+        (row,) = view["payloads"]
         assert row["signers"] == ["alice"]
         assert row["built"]
-        nondum("keys", "sign", trust, "--key", alice).ok()
         nondum("keys", "rotate", trust, "alice", owner / "carol.pub").ok()
         host.run("keys", "trust", trust).refused(1, "TRUST_SIGNATURE")
         nondum("keys", "sign", trust, "--key", alice).ok()
         nondum("keys", "sign", trust, "--key", owner / "carol").ok()
         assert "version 2" in host.run("keys", "trust", trust).ok().out
-        assert "carol" not in host.run("keys", "list").ok().out
-        assert CAROL.public.fingerprint in host.run("keys", "list").ok().out
+        shown = host.run("keys", "list").ok().out
+        assert "carol" not in shown
+        assert CAROL.public.fingerprint in shown
+        assert Origin.SIGNED.value in shown
+        assert host.run("keys", "list", "--json").ok().json["first"] == Origin.SIGNED.value
+
+
+@pytest.mark.daemon
+def test_a_carrier_of_the_first_trust_file_adds_nobody(owner: Path) -> None:
+    """The genuine roots stay in it, so their fingerprints are the genuine ones."""
+    trust, anchor = owner / "trust.toml", owner / "etc/trust.toml"
+    nondum("keys", "sign", trust, "--key", owner / "alice").ok()
+    carried = owner / "carried.toml"
+    carried.write_bytes(trust.read_bytes())
+    nondum("keys", "allow", carried, owner / "bob.pub", "--payloads", "org.example").ok()
+    with running(owner / "host", trust=anchor) as host:
+        begin = ("keys", "trust", carried, "--config", host.config, "--yes")
+        host.run(*begin).refused(1, "TRUST_SIGNATURE")
+        carried.with_name("carried.toml.sig").write_bytes((owner / "trust.toml.sig").read_bytes())
+        host.run(*begin).refused(1, "TRUST_SIGNATURE")
+        assert not anchor.exists()
+        code, shown = at_terminal(
+            "--control", host.control, "keys", "trust", trust, "--config", host.config, typed="n\n"
+        )
+        before, _, _ = shown.partition("?")
+        assert code == 130
+        for told in (ALICE.public.fingerprint, "role owner: * by 1 of alice; may have *"):
+            assert told in before
+        assert not anchor.exists()
+
+
+@pytest.mark.daemon
+def test_a_trust_file_is_written_where_the_callers_configuration_says(owner: Path) -> None:
+    """Never where the daemon says, which may be an attacker's by now."""
+    trust, theirs, ours = owner / "trust.toml", owner / "theirs/trust.toml", owner / "ours.toml"
+    nondum("keys", "sign", trust, "--key", owner / "alice").ok()
+    ours.write_text(f'[trust]\nfile = "{owner}/etc/trust.toml"\n')
+    with running(owner / "host", trust=theirs) as host:
+        host.run("keys", "trust", trust, "--config", ours, "--yes").refused(1, "TRUST_ELSEWHERE")
+        assert not theirs.exists()
+        assert not (owner / "etc").exists()
+        theirs.parent.mkdir()
+        theirs.parent.chmod(0o777)
+        begin = ("keys", "trust", trust, "--config", host.config, "--yes")
+        host.run(*begin).refused(1, "TRUST_OPEN_TO_OTHERS")
+        assert not theirs.exists()

@@ -59,6 +59,7 @@ VIEWS: dict[str, set[str]] = {
         "state",
         "safe_mode",
         "warnings",
+        "trust",
         "feedback",
         "peers",
         "payloads",

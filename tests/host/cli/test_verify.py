@@ -55,6 +55,17 @@ def test_every_problem_has_its_four_keys(drive: Path) -> None:
         assert row["message"] and row["fix"]
 
 
+@pytest.mark.parametrize("verb", ["verify", "check", "inspect"])
+def test_versions_without_end_are_refused_as_others_are(drive: Path, verb: str) -> None:
+    listed = drive / "nondum" / ID / "CONTENTS"
+    text = listed.read_text()
+    assert "version: 1.0\n" in text
+    listed.write_text(text.replace("version: 1.0\n", f"version: {'9' * 5_000}\n"))
+    ran = nondum("payload", verb, drive, "--json")
+    assert "CONTENTS_HEADER" in {row["code"] for row in ran.json["problems"]}
+    assert not ran.err
+
+
 def test_a_folder_that_is_none_has_problems_too(tmp_path: Path) -> None:
     ran = nondum("payload", "verify", tmp_path, "--json")
     assert (ran.code, [row["code"] for row in ran.json["problems"]]) == (3, ["DRIVE_NOT_PAYLOAD"])

@@ -109,6 +109,7 @@ async def test_two_folders_keep_their_devices_apart(tmp_path: Path) -> None:
         pytest.param('[device]\nnode = "/dev/a"\n[other]', id="unknown table"),
         pytest.param('[device]\nnode = "/dev/a"\nproperties = 1', id="properties are no table"),
         pytest.param('[device]\nnode = "/dev/a"\nproperties = { A = 1 }', id="no string"),
+        pytest.param(f"[device]\nnode = {'9' * 5_000}", id="number without end"),
     ],
 )
 def test_slot_file_is_refused(text: str) -> None:

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+from tests.kit.signing import Key, signed, trust_of
 
 from nondum.host.config import HostConfig, InstallSection, parse
 from nondum.host.configuration.effective import Asked
@@ -15,6 +16,7 @@ from nondum.host.doctor.examination import examine
 from nondum.host.doctor.finding import Finding, Result
 from nondum.host.drives.whose import Disk, Owner
 
+ROOT, MALLORY = Key("root"), Key("mallory")
 FULL = ("cpuset", "cpu", "io", "memory", "pids")
 TODAY_S = datetime(2026, 6, 1, tzinfo=UTC).timestamp()
 CARDS = " 0 [Loopback       ]: Loopback - Loopback\n                      Loopback 1\n"
@@ -71,6 +73,28 @@ def test_trust_file_is_looked_into(tmp_path: Path) -> None:
     file.write_text("nonsense", encoding="utf-8")
     found = beliefs.trust(file, allow_unsigned=False)
     assert (found.result, "TRUST_TOML" in found.detail) == (Result.BAD, True)
+
+
+@pytest.mark.parametrize(
+    ("signer", "result", "told"),
+    [
+        (None, Result.OK, "unsigned, placed by"),
+        (ROOT, Result.OK, "signed by its roots"),
+        (MALLORY, Result.BAD, "TRUST_SIGNATURE"),
+    ],
+)
+def test_who_vouches_for_the_trust_file_is_told(
+    tmp_path: Path, signer: Key | None, result: Result, told: str
+) -> None:
+    file = tmp_path / "trust.toml"
+    given = signed(trust_of(roots=[ROOT]), *([signer] if signer is not None else []))
+    file.write_bytes(given.data)
+    file.chmod(0o644)
+    if given.signature is not None:
+        file.with_name("trust.toml.sig").write_bytes(given.signature)
+    found = beliefs.trust(file, allow_unsigned=False)
+    assert found.result is result
+    assert told in found.detail
 
 
 def test_service_that_is_not_started_at_boot_is_told(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from tests.wheelhouse.hostile_wheels import WheelBuilder
 from nondum.host.drives import reader
 from nondum.wheelhouse import payload
 from nondum.wheelhouse.memory import Promised
+from nondum.wheelhouse.signatures import UnsignedAllowed, Verdict
 from nondum.wheelhouse.trust import trust_text
 
 ALICE = Key("alice")
@@ -65,6 +66,35 @@ def test_payload_for_a_newer_nondum_is_told_as_it_is_found(tmp_path: Path) -> No
     said = contents.read_text()
     contents.write_text(said.replace("minimum-nondum: 0.1", "minimum-nondum: 99"))
     assert found_on(tmp_path / "drive") == ["NONDUM_VERSION"]
+
+
+def test_payload_that_breaks_its_reader_takes_no_other_along(tmp_path: Path) -> None:
+    class Breaking(UnsignedAllowed):
+        def verify(self, contents: bytes, signature: bytes | None) -> Verdict:
+            if contents == b"breaks it":
+                raise RuntimeError("unforeseen")
+            return super().verify(contents, signature)
+
+    good = lamp(tmp_path / "drive")
+    bad = good.with_name("org.example.alarm")
+    bad.mkdir()
+    (bad / "CONTENTS").write_bytes(b"breaks it")
+    found = reader.found([bad, good], Breaking())
+    codes = [[problem["code"] for problem in one["problems"]] for one in found]
+    assert codes == [["INTERNAL"], []]
+    assert [one["payload_id"] for one in found] == ["org.example.alarm", PAYLOAD]
+
+
+def test_version_without_end_takes_no_other_payload_of_the_drive_along(tmp_path: Path) -> None:
+    good = lamp(tmp_path / "drive")
+    listed = (good / "CONTENTS").read_text()
+    bad = good.with_name("org.example.alarm")
+    bad.mkdir()
+    (bad / "CONTENTS").write_text(listed.replace("version: 1.0", f"version: {'9' * 5_000}"))
+    given = {"root": str(tmp_path / "drive"), "node": None, "kind": "slot", "allow_unsigned": True}
+    found = reader.look(given, told)["payloads"]
+    codes = [[problem["code"] for problem in one["problems"]] for one in found]
+    assert codes == [["CONTENTS_HEADER"], []]
 
 
 def test_payload_that_nobody_signed_is_neither_parsed_nor_copied(tmp_path: Path) -> None:

@@ -94,7 +94,7 @@ def test_activation_enters_components_in_one_turn() -> None:
     state = active()
     assert list(state.components) == ["eye"]
     assert state.revision == 1
-    assert state.highwater["", "org.x"].release == 1
+    assert state.highwater["org.x"].release == 1
     assert "spot__eye__camera" in state.mounts
     assert set(state.payloads["k1"].phases) == {"seen", "verified", "installed", "ready"}
 

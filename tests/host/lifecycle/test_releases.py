@@ -218,6 +218,46 @@ def test_same_release_with_other_content_never_waits_beside() -> None:
     assert codes(state, "k2") == ["RELEASE_CONFLICT"]
 
 
+# For which fleet: that is the signer's word in each release
+
+
+FLEETS = pytest.mark.parametrize(("one", "other"), [("", "survey"), ("survey", ""), ("a", "b")])
+
+
+def for_fleet(fleet: str, key: str, drive: str, release: int) -> events.PayloadFound:
+    return replace(found(key, drive, release=release), fleet=fleet)
+
+
+@FLEETS
+def test_older_release_does_not_come_in_by_naming_another_fleet(one: str, other: str) -> None:
+    entered = drive("a"), for_fleet(one, "k9", "a", 9), *way_to_active("k9")[1:]
+    gone = events.DriveRemoved("a"), events.PayloadCleared("k9")
+    state, _ = after(*entered, *gone, drive("b"), for_fleet(other, "k3", "b", 3))
+    assert codes(state, "k3") == ["ROLLBACK"]
+    assert state.highwater["org.x"].release == 9
+
+
+@FLEETS
+def test_releases_of_one_payload_for_several_fleets_take_over_from_each_other(
+    one: str, other: str
+) -> None:
+    entered = drive("a"), for_fleet(one, "k1", "a", 1), *way_to_active()[1:]
+    newer = drive("b"), for_fleet(other, "k2", "b", 2), *upgrade()[1:]
+    state, done = after(*entered, *newer)
+    assert effects.ProbeComponents("k2", beside="k1") in done
+    assert steps(state) == {"k1": Step.SUPERSEDED, "k2": Step.ACTIVE}
+    back, _ = after(events.RollbackAsked("k1", 1, 2), *way_to_active()[5:], state=state)
+    assert steps(back) == {"k1": Step.ACTIVE, "k2": Step.SUPERSEDED}
+    assert back.highwater["org.x"].release == 2
+
+
+@FLEETS
+def test_one_release_for_two_fleets_has_one_content(one: str, other: str) -> None:
+    both = drive("a"), drive("b"), for_fleet(one, "k1", "a", 1), for_fleet(other, "k2", "b", 1)
+    state, _ = after(*both)
+    assert codes(state, "k2") == ["RELEASE_CONFLICT"]
+
+
 # Going back
 
 
@@ -228,7 +268,7 @@ def test_person_goes_back_and_the_newer_one_waits() -> None:
     back, _ = after(*way_to_active()[5:], state=state)
     assert steps(back) == {"k1": Step.ACTIVE, "k2": Step.SUPERSEDED}
     assert back.payloads["k1"].was == 2
-    assert back.highwater["", "org.x"].release == 2, "one is as protected as before"
+    assert back.highwater["org.x"].release == 2, "one is as protected as before"
 
 
 def gone_back() -> HostState:

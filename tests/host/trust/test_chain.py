@@ -12,6 +12,7 @@ from tests.kit.lamp_drive import lamp, told
 from tests.kit.signing import Key, sign_payload, signed, trust_of
 
 from nondum.host.trust import chain
+from nondum.host.trust.anchors import Origin
 from nondum.sdk.errors import PayloadRefused
 from nondum.wheelhouse import manifest
 from nondum.wheelhouse.trust import sshsig, trust_file, trust_text
@@ -37,34 +38,34 @@ def codes(said: dict[str, Any]) -> list[str]:
     return [problem["code"] for problem in said["problems"]]
 
 
-def test_file_that_root_wrote_is_believed(anchor: Path) -> None:
+def test_chain_begins_with_the_first_file_and_says_who_vouches_for_it(anchor: Path) -> None:
     said = load(anchor)
     assert (said["text"], codes(said)) == (TEXT, [])
+    assert said["origin"] == (Origin.ROOT if os.geteuid() == 0 else Origin.USER).value
+    (anchor.parent / "trust.toml.sig").write_bytes(signed(TRUST, ROOT).signature or b"")
+    assert load(anchor)["origin"] == Origin.SIGNED.value
 
 
-@pytest.mark.parametrize("mode", [0o664, 0o646])
-def test_file_that_others_can_write_to_is_not_believed(anchor: Path, mode: int) -> None:
-    anchor.chmod(mode)
+def test_chain_does_not_begin_with_a_file_that_is_signed_falsely(anchor: Path) -> None:
+    (anchor.parent / "trust.toml.sig").write_bytes(signed(TRUST, BOB).signature or b"")
     said = load(anchor)
-    assert (said["text"], codes(said)) == (None, ["TRUST_OPEN_TO_OTHERS"])
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="giving files away needs root")
-def test_file_of_another_user_is_not_believed(anchor: Path) -> None:
-    os.chown(anchor, 65534, -1)
-    said = load(anchor)
-    assert (said["text"], codes(said)) == (None, ["TRUST_OPEN_TO_OTHERS"])
+    assert (said["text"], said["origin"], codes(said)) == (None, "", ["TRUST_SIGNATURE"])
 
 
 @pytest.mark.parametrize(
     ("suffix", "size"), [("", trust_file.MAX_BYTES), (".sig", sshsig.MAX_BYTES)]
 )
-def test_file_that_is_too_long_is_not_parsed(anchor: Path, suffix: str, size: int) -> None:
+def test_kept_file_that_is_too_long_is_not_parsed(anchor: Path, suffix: str, size: int) -> None:
     """Whoever replaced it has done so on purpose."""
-    path = anchor.with_name(anchor.name + suffix)
-    path.write_bytes(b"\n" * (size + 1) + (path.read_bytes() if path.exists() else b""))
+    kept = anchor.parent / "kept"
+    kept.mkdir()
+    following = signed(replace(TRUST, version=2), ROOT)
+    (kept / "00000002.toml").write_bytes(following.data)
+    (kept / "00000002.toml.sig").write_bytes(following.signature or b"")
+    path = kept / f"00000002.toml{suffix}"
+    path.write_bytes(b"\n" * (size + 1) + path.read_bytes())
     said = load(anchor)
-    assert (said["text"], codes(said)) == (None, ["TOO_LARGE"])
+    assert (said["text"], codes(said)) == (TEXT, ["TOO_LARGE"])
     assert said["problems"][0]["fix"] == "put the genuine file there"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -25,7 +26,8 @@ from tests.host.trust.trusted import (
 from tests.kit.signing import Key, sign_payload, signed
 
 from nondum.host.catalogue.records import Step
-from nondum.host.events import PayloadFound, TrustChanged, TrustFileRefused
+from nondum.host.events import PayloadFound, TrustChanged, TrustFileRefused, TrustRead
+from nondum.host.trust.anchors import Origin
 from nondum.sdk.errors import TrustRefused
 from nondum.wheelhouse.trust import trust_file
 from nondum.wheelhouse.trust.succession import SignedFile
@@ -48,7 +50,7 @@ async def test_what_a_trusted_key_signed_runs(tmp_path: Path) -> None:
         record = host.payload(LAMP_ID)
         assert record is not None
         assert host.executor.trust.vouched(record.key).signers == ("alice",)
-        assert host.catalogue.state.highwater["", LAMP_ID].owner == "maker"
+        assert host.catalogue.state.highwater[LAMP_ID].owner == "maker"
 
 
 async def test_what_nobody_trusted_signed_is_refused(tmp_path: Path) -> None:
@@ -138,7 +140,7 @@ async def test_the_owner_undoes_a_release_that_went_too_far(tmp_path: Path) -> N
         await host.until_gone(LAMP_ID)
         host.plug(resealed(drive, ALICE, release=7))
         await host.until_step(LAMP_ID, Step.ACTIVE)
-        assert host.catalogue.state.highwater["", LAMP_ID].release == 7
+        assert host.catalogue.state.highwater[LAMP_ID].release == 7
 
 
 async def test_an_id_stays_with_the_role_that_brought_it_first(tmp_path: Path) -> None:
@@ -280,6 +282,38 @@ async def test_a_first_file_that_others_can_write_is_not_believed(tmp_path: Path
         assert any("TRUST_OPEN_TO_OTHERS" in w for w in host.executor.trust.warnings)
         host.plug(lamp(tmp_path / "drive", ALICE))
         assert await refusal(host) == ["SIG_UNTRUSTED"]
+
+
+@pytest.mark.parametrize("signers", [(), (ROOT,)])
+async def test_it_is_told_whether_the_first_file_is_signed(
+    tmp_path: Path, signers: tuple[Key, ...]
+) -> None:
+    anchor = enrol(tmp_path, SECOND)
+    if (signature := signed(SECOND, *signers).signature) is not None:
+        anchor.with_name("trust.toml.sig").write_bytes(signature)
+    placed = Origin.ROOT if os.geteuid() == 0 else Origin.USER
+    first = (Origin.SIGNED if signers else placed).value
+    async with trusting(tmp_path) as host:
+        trust = host.executor.trust
+        assert trust.row()["first"] == first
+        assert trust.summary() == {"owner": "survey", "version": 2, "first": first}
+        assert not trust.warnings
+        await host.until(lambda: TrustRead("survey", 2, first) in host.heard)
+        third = signed(replace(SECOND, version=3), ROOT)
+        assert await trust.give(third) == (TrustChanged("survey", 3, "a person"),)
+        assert trust.summary() == {"owner": "survey", "version": 3, "first": first}
+
+
+async def test_a_first_file_that_is_signed_falsely_is_not_believed(tmp_path: Path) -> None:
+    anchor = enrol(tmp_path)
+    anchor.with_name("trust.toml.sig").write_bytes(signed(FIRST, MALLORY).signature or b"")
+    async with trusting(tmp_path) as host:
+        trust = host.executor.trust
+        assert (trust.trust, trust.summary(), trust.row()["first"]) == (None, None, "")
+        assert any("TRUST_SIGNATURE" in warning for warning in trust.warnings)
+        host.plug(lamp(tmp_path / "drive", ALICE))
+        assert await refusal(host) == ["SIG_UNTRUSTED"]
+        assert not [event for event in host.heard if isinstance(event, TrustRead)]
 
 
 async def test_a_first_file_that_is_none_is_told(tmp_path: Path) -> None:

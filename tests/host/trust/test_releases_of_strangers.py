@@ -37,8 +37,8 @@ def codes(found: PayloadFound, state: HostState = BARE, wall_s: float = NOW_S) -
     return [problem.code for problem in problems]
 
 
-def here(release: int, *, digest: str = "d", owner: str = "one", fleet: str = "") -> HostState:
-    return replace(BARE, highwater={(fleet, LAMP): Highwater(release, digest, owner)})
+def here(release: int, *, digest: str = "d", owner: str = "one") -> HostState:
+    return replace(BARE, highwater={LAMP: Highwater(release, digest, owner)})
 
 
 @pytest.mark.parametrize(
@@ -94,8 +94,9 @@ def test_what_the_owner_declares_void_is_forgotten() -> None:
 
 @pytest.mark.parametrize("fleet", ["", "survey"])
 def test_an_id_stays_with_whoever_brought_it_first_for_any_fleet(fleet: str) -> None:
-    assert codes(FOUND, here(7, fleet=fleet)) == []
-    assert codes(FOUND, here(7, owner="two", fleet=fleet)) == ["ID_OWNED_BY"]
+    found = replace(FOUND, fleet=fleet)
+    assert codes(found, here(7)) == []
+    assert codes(found, here(7, owner="two")) == ["ID_OWNED_BY"]
 
 
 def test_an_id_is_free_once_the_trust_file_gives_it_to_others() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import timedelta
 
@@ -10,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.kit.signing import MADE, Key, signed, trust_of
 
-from nondum.sdk.errors import NondumError
+from nondum.sdk.errors import NondumError, TrustRefused
 from nondum.wheelhouse.trust import sshsig, succession
 from nondum.wheelhouse.trust.succession import SignedFile
 from nondum.wheelhouse.trust.trust import Revocation, Trust
@@ -168,11 +169,47 @@ def test_a_gap_ends_it() -> None:
 # The first one
 
 
-def test_the_first_file_need_not_be_signed_but_not_falsely() -> None:
-    assert succession.check_first(signed(FIRST)) == FIRST
-    assert succession.check_first(signed(FIRST, ALICE, BOB)) == FIRST
-    with pytest.raises(NondumError, match="TRUST_SIGNATURE"):
-        succession.check_first(signed(FIRST, MALLORY))
+def first_refusal(begin: Callable[[SignedFile], Trust], file: SignedFile) -> list[str]:
+    with pytest.raises(TrustRefused) as refused:
+        begin(file)
+    assert all(problem.fix for problem in refused.value.problems)
+    return [problem.code for problem in refused.value.problems]
+
+
+FALSELY = {
+    "too few": signed(FIRST, ALICE),
+    "one twice": signed(FIRST, ALICE, ALICE),
+    "strangers": signed(FIRST, MALLORY, DAVE),
+    "one changed since": replace(
+        signed(FIRST, ALICE, BOB), data=signed(replace(FIRST, fleets=("other",))).data
+    ),
+    "payloads' namespace": signed(FIRST, ALICE, BOB, namespace=sshsig.PAYLOAD),
+    "none at all": SignedFile(signed(FIRST).data, b"signed"),
+    "nothing": SignedFile(signed(FIRST).data, b""),
+}
+
+
+@pytest.mark.parametrize("file", FALSELY.values(), ids=FALSELY)
+def test_the_first_file_is_signed_by_enough_of_its_own_roots(file: SignedFile) -> None:
+    assert succession.first(signed(FIRST, ALICE, BOB)) == FIRST
+    assert first_refusal(succession.first, file) == ["TRUST_SIGNATURE"]
+    assert first_refusal(succession.first, signed(FIRST)) == ["TRUST_SIGNATURE"]
+
+
+def test_what_a_carrier_adds_to_the_first_file_is_found_out() -> None:
+    """The roots, and so their fingerprints, stay as they are."""
+    added = trust_of(roots=[ALICE, BOB], root_threshold=2, roles={"all": (["*"], [MALLORY])})
+    genuine = replace(added, keys=(), roles=())
+    carried = replace(signed(genuine, ALICE, BOB), data=signed(added).data)
+    for file in (carried, replace(carried, signature=None), signed(added, MALLORY)):
+        assert first_refusal(succession.first, file) == ["TRUST_SIGNATURE"]
+
+
+@pytest.mark.parametrize("file", FALSELY.values(), ids=FALSELY)
+def test_a_placed_file_need_not_be_signed_but_not_falsely(file: SignedFile) -> None:
+    assert succession.placed(signed(FIRST)) == FIRST
+    assert succession.placed(signed(FIRST, ALICE, BOB)) == FIRST
+    assert first_refusal(succession.placed, file) == ["TRUST_SIGNATURE"]
 
 
 @given(st.binary(max_size=200), st.none() | st.binary(max_size=200))

@@ -11,8 +11,10 @@
     <sha256>  <size>  <path>
     …
 
-ASCII; entries sorted by path; every file but this one and its signature. A reader takes at most
-`MAX_BYTES`, once, and believes nothing else on the drive before this is parsed.
+ASCII; headers in this order (`hosts`, which may be left out, after `fleet`); entries sorted by
+path; every file but this one and its signature. So a list has one form: what is read is written as
+the same bytes. A reader takes at most `MAX_BYTES`, once, and believes nothing else on the drive
+before this is parsed.
 """
 
 from __future__ import annotations
@@ -36,9 +38,12 @@ MAX_FILES = 512
 MAX_FILE_BYTES = 8 * 1024**3
 MAX_RELEASE = 2**53
 FORMAT = "nondum-payload 1"
-HEADER_KEYS = ("id", "version", "release", "fleet", "minimum-nondum", "built")
+HEADER_KEYS = ("id", "version", "release", "fleet", "hosts", "minimum-nondum", "built")
+"""In the order in which they stand."""
 OPTIONAL_KEYS = ("hosts",)
 MAX_HOSTS = 64
+MAX_VERSION = 250
+"""Characters of a version. Python makes no number of more than 4,300 digits (`int`)."""
 
 _ENTRY = re.compile(r"([0-9a-f]{64})  (0|[1-9][0-9]{0,15})  (\S+)")
 _BUILT = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ")
@@ -140,18 +145,22 @@ def _header(lines: list[str], where: str, problems: list[Problem]) -> tuple[dict
         if not line:
             break
         key, colon, value = line.partition(":")
-        if not colon or key not in (*HEADER_KEYS, *OPTIONAL_KEYS) or key in header:
+        if not colon or key not in HEADER_KEYS or key in header:
             problems.append(
                 _flaw("CONTENTS_HEADER", f"unexpected header {line[:60]!r}", f"{where}:{number}")
             )
             continue
+        last = next(reversed(header), key)
+        if HEADER_KEYS.index(key) < HEADER_KEYS.index(last):
+            told = f"header {key!r} stands after {last!r}; the order is {', '.join(HEADER_KEYS)}"
+            problems.append(_flaw("CONTENTS_HEADER", told, f"{where}:{number}"))
         header[key] = " ".join(value.split())
         wanted = f" {header[key]}".rstrip()
         flaw = _header_flaw(key, header[key]) if value == wanted else "is not set off by one space"
         if flaw:
             problems.append(_flaw("CONTENTS_HEADER", f"{key}: {flaw}", f"{where}:{number}"))
     for key in HEADER_KEYS:
-        if key not in header:
+        if key not in (*header, *OPTIONAL_KEYS):
             problems.append(_flaw("CONTENTS_HEADER", f"header {key!r} is missing", where))
     return header, number
 
@@ -162,7 +171,7 @@ def _header_flaw(key: str, value: str) -> str | None:
         case "id" if not names.PAYLOAD_ID.fullmatch(value):
             return f"{value[:60]!r} is not a reverse domain name like org.example.blinker"
         case "version" | "minimum-nondum" if not _is_version(value):
-            return f"{value[:60]!r} is not a version (PEP 440)"
+            return f"{value[:60]!r} is not a version (PEP 440) of at most {MAX_VERSION} characters"
         case "release" if (
             not re.fullmatch(r"0|[1-9][0-9]{0,15}", value) or int(value) > MAX_RELEASE
         ):
@@ -224,6 +233,8 @@ def _is_moment(value: str) -> bool:
 
 
 def _is_version(value: str) -> bool:
+    if len(value) > MAX_VERSION:
+        return False
     try:
         Version(value)
     except InvalidVersion:

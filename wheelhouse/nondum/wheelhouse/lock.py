@@ -21,6 +21,10 @@ from nondum.sdk.errors import PayloadRefused, Problem
 from nondum.wheelhouse import names
 
 MAX_BYTES = 1024 * 1024
+MAX_DIGITS = 250
+"""Digits in a row. Python makes no number of more than 4,300 (`int`), wherever one is compared."""
+
+_ENDLESS = re.compile(f"[0-9]{{{MAX_DIGITS + 1}}}")
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 
 Environment = Mapping[str, str]
@@ -78,6 +82,9 @@ def parse(text: str, where: str) -> Lock:
     """Check and parse a lock. Raises `PayloadRefused` with everything wrong in it."""
     if len(text.encode()) > MAX_BYTES:
         _refuse(Problem("TOO_LARGE", f"is longer than {MAX_BYTES} bytes", where=where))
+    if _ENDLESS.search(text):
+        told = f"a number has more than {MAX_DIGITS} digits"
+        _refuse(Problem("LOCK_INVALID", told, where=where, fix="build the payload again"))
     try:
         parsed = Pylock.from_dict(tomllib.loads(text))
     except (tomllib.TOMLDecodeError, RecursionError) as error:

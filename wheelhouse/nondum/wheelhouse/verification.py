@@ -7,6 +7,7 @@ whoever asks here wants to know everything, so what can still be judged is.
 from __future__ import annotations
 
 import tempfile
+import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,7 +41,29 @@ def verify(
     facts: HostFacts | None = None,
     progress: Progress | None = None,
 ) -> Verified:
-    """Judge a payload folder; with `facts`, also whether it fits that host."""
+    """Judge a payload folder; with `facts`, also whether it fits that host.
+
+    Raises `OSError` of this host's own disk.
+    """
+    try:
+        return _verified(folder, verifier, facts, progress)
+    except (OSError, MemoryError):
+        raise
+    except Exception as error:
+        return Verified((unforeseen(error, folder),))
+
+
+def unforeseen(error: Exception, folder: Path) -> Problem:
+    """What is told of a payload whose reading failed in a way that no refusal is made for."""
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    told = f"{type(error).__name__}: {str(error)[:200]} ({Path(last.filename).name}:{last.lineno})"
+    fix = "report it with what it says, and build the payload again"
+    return Problem("INTERNAL", told, where=folder.name, fix=fix)
+
+
+def _verified(
+    folder: Path, verifier: Verifier, facts: HostFacts | None, progress: Progress | None
+) -> Verified:
     try:
         data = drive.read_contents(folder)
         verdict = verifier.verify(data, drive.read_signature(folder))

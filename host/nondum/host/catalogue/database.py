@@ -18,7 +18,7 @@ from nondum.host.catalogue.records import ComponentRecord, JournalEntry, Rollbac
 from nondum.host.catalogue.state import HostState
 from nondum.sdk.errors import ConfigRefused, Problem
 
-SCHEMA = 5
+SCHEMA = 6
 
 _UPGRADES = {
     1: "CREATE TABLE goals (id TEXT PRIMARY KEY, text TEXT NOT NULL, pddl TEXT NOT NULL,"
@@ -53,6 +53,19 @@ _UPGRADES = {
     " properties TEXT NOT NULL, PRIMARY KEY (device, position)) STRICT;"
     "CREATE TABLE known_devices (identity TEXT PRIMARY KEY, name TEXT NOT NULL,"
     " device TEXT NOT NULL, first_s REAL NOT NULL, last_s REAL NOT NULL) STRICT;",
+    # Releases of one payload were told apart by fleets: now the highest counts for all of them.
+    5: "CREATE TABLE highest (payload_id TEXT PRIMARY KEY, release INTEGER NOT NULL,"
+    " digest TEXT NOT NULL, owner TEXT NOT NULL) STRICT;"
+    "INSERT INTO highest SELECT payload_id, release, digest, coalesce((SELECT first.owner"
+    " FROM highwater AS first WHERE first.payload_id = known.payload_id AND first.owner <> ''"
+    " ORDER BY first.rowid LIMIT 1), '') FROM (SELECT *, row_number() OVER (PARTITION BY payload_id"
+    " ORDER BY release DESC, rowid) AS place FROM highwater) AS known WHERE place = 1;"
+    "DROP TABLE highwater; ALTER TABLE highest RENAME TO highwater;"
+    "CREATE TABLE latest (payload_id TEXT PRIMARY KEY, digest TEXT NOT NULL,"
+    " release INTEGER NOT NULL, below INTEGER NOT NULL) STRICT;"
+    "INSERT OR REPLACE INTO latest SELECT payload_id, digest, release, below FROM rollbacks"
+    " ORDER BY rowid;"
+    "DROP TABLE rollbacks; ALTER TABLE latest RENAME TO rollbacks;",
 }
 """Schema → what makes the next one of it."""
 
@@ -164,11 +177,9 @@ def load(connection: sqlite3.Connection, host: str) -> HostState:
         mounts={m.unit: m for m in map(rows.mount, every("mounts"))},
         goals={g.id: g for g in map(rows.goal, every("goals"))},
         former={f.key: f for f in map(rows.former, every("former")) if f is not None},
-        highwater={
-            (row["fleet"], row["payload_id"]): rows.highwater(row) for row in every("highwater")
-        },
+        highwater={row["payload_id"]: rows.highwater(row) for row in every("highwater")},
         rollbacks={
-            (row["fleet"], row["payload_id"]): Rollback(row["digest"], row["release"], row["below"])
+            row["payload_id"]: Rollback(row["digest"], row["release"], row["below"])
             for row in every("rollbacks")
         },
         tries={row["subject"]: row["deaths"] for row in every("tries")},
@@ -223,10 +234,11 @@ def _write_state(connection: sqlite3.Connection, before: HostState, after: HostS
     )
     for table, key, old, new, as_row in simple:
         _difference(connection, table, key, old, new, as_row)
-    for (fleet, payload_id), newest in after.highwater.items():
-        if before.highwater.get((fleet, payload_id)) != newest:
-            known = {"fleet": fleet, "payload_id": payload_id}
-            _insert(connection, "highwater", {**known, **rows.highwater_row(newest)})
+    for payload_id, newest in after.highwater.items():
+        if before.highwater.get(payload_id) != newest:
+            _insert(
+                connection, "highwater", {"payload_id": payload_id, **rows.highwater_row(newest)}
+            )
     _write_rollbacks(connection, before, after)
     _difference(connection, "payloads", "key", before.payloads, after.payloads, rows.payload_row)
     for payload in _changed(before.payloads, after.payloads):
@@ -239,9 +251,9 @@ def _write_rollbacks(connection: sqlite3.Connection, before: HostState, after: H
     if before.rollbacks == after.rollbacks:
         return
     connection.execute("DELETE FROM rollbacks")
-    for (fleet, payload_id), back in after.rollbacks.items():
+    for payload_id, back in after.rollbacks.items():
         row = {"digest": back.digest, "release": back.release, "below": back.below}
-        _insert(connection, "rollbacks", {"fleet": fleet, "payload_id": payload_id, **row})
+        _insert(connection, "rollbacks", {"payload_id": payload_id, **row})
 
 
 def _host_row(state: HostState) -> rows.Row:

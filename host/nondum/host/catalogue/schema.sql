@@ -119,21 +119,17 @@ CREATE TABLE mounts (
 ) STRICT;
 
 CREATE TABLE highwater (                 -- never pruned
-    fleet       TEXT NOT NULL,
-    payload_id  TEXT NOT NULL,
-    release     INTEGER NOT NULL,
+    payload_id  TEXT PRIMARY KEY,
+    release     INTEGER NOT NULL,        -- the newest, for whatever fleet
     digest      TEXT NOT NULL,
-    owner       TEXT NOT NULL,           -- role by which it was the first to come in
-    PRIMARY KEY (fleet, payload_id)
+    owner       TEXT NOT NULL            -- role by which it was the first to come in
 ) STRICT;
 
 CREATE TABLE rollbacks (                 -- earlier releases that people went back to
-    fleet       TEXT NOT NULL,
-    payload_id  TEXT NOT NULL,
+    payload_id  TEXT PRIMARY KEY,
     digest      TEXT NOT NULL,
     release     INTEGER NOT NULL,
-    below       INTEGER NOT NULL,
-    PRIMARY KEY (fleet, payload_id)
+    below       INTEGER NOT NULL
 ) STRICT;
 
 CREATE TABLE goals (                     -- those that are not over

@@ -44,10 +44,10 @@ class HostState:
     known_devices: Mapping[str, KnownDevice] = field(default_factory=dict)
     """Identity → a device that was ever here, as far as is remembered; last seen last."""
     mounts: Mapping[str, MountPose] = field(default_factory=dict)
-    highwater: Mapping[tuple[str, str], Highwater] = field(default_factory=dict)
-    """(fleet, payload id) → newest release."""
-    rollbacks: Mapping[tuple[str, str], Rollback] = field(default_factory=dict)
-    """(fleet, payload id) → the earlier release that a person went back to."""
+    highwater: Mapping[str, Highwater] = field(default_factory=dict)
+    """Payload id → newest release, for whatever fleet it was."""
+    rollbacks: Mapping[str, Rollback] = field(default_factory=dict)
+    """Payload id → the earlier release that a person went back to."""
     goals: Mapping[str, GoalRecord] = field(default_factory=dict)
     """Those that are not over."""
     former: Mapping[str, FormerPayload] = field(default_factory=dict)

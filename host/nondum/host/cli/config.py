@@ -23,13 +23,22 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 def asked_options(command: _F) -> _F:
     """Add the options that a daemon is configured with; hands on one `asked`."""
+    return _with(_WHICH + _MORE, command)
+
+
+def which_options(command: _F) -> _F:
+    """Add the options that say which configuration is meant."""
+    return _with(_WHICH, command)
+
+
+def _with(options: tuple[Callable[[_F], _F], ...], command: _F) -> _F:
     # click lists options in the order in which they are added last.
-    for option in reversed(_OPTIONS):
+    for option in reversed(options):
         command = option(command)
     return command
 
 
-_OPTIONS = (
+_WHICH = (
     click.option("--user", is_flag=True, help="As this user: no root, no systemd, own state."),
     click.option(
         "--config",
@@ -37,6 +46,8 @@ _OPTIONS = (
         type=click.Path(path_type=Path),
         help=f"Configuration file [default: {host_config.SYSTEM_FILE}, none with --user].",
     ),
+)
+_MORE = (
     click.option("--name", help="The host's name, over the configuration's."),
     click.option(
         "--peer",

@@ -9,7 +9,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nondum.host.cli import render
+from nondum.host.cli.config import which_options
 from nondum.host.cli.connection import Session, json_option
+from nondum.host.configuration.effective import Asked, effective
+from nondum.host.printable import printable
+from nondum.sdk.errors import Problem, TrustRefused
 
 if TYPE_CHECKING:
     from nondum.wheelhouse.trust.succession import SignedFile
@@ -40,28 +44,36 @@ def list_keys(session: Session, file: Path | None) -> None:
         render.sentence(warning, colour="yellow", mark="warning: ")
     if trust is None:
         click.echo("nobody is trusted: nondum keys trust FILE")
-    else:
-        _show(trust)
+        return
+    if row:
+        render.sentence(f"the first trust file, {row['anchor']}, is {row['first']}")
+    _show(trust)
 
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
+@which_options
 @click.option("--yes", is_flag=True, help="Do not ask.")
 @json_option
 @click.pass_obj
-def trust(session: Session, file: Path, yes: bool) -> None:
+def trust(session: Session, file: Path, user: bool, config_file: Path | None, yes: bool) -> None:
     """Have the host go by a trust file: its first one, or the next versions.
 
-    For the first one, compare the fingerprints with the owner's; to write it may need root. Later
-    ones are taken as their roots have signed them; those between lie beside FILE.
+    The first one must be signed by its own roots: compare their fingerprints with what the owner
+    says, and see whom they have let do what. It is written where this host's configuration says
+    (`file` under [trust]), which needs root. Later ones are taken as their roots have signed them;
+    those between lie beside FILE.
 
-    Example: sudo nondum keys trust /media/usb/nondum-trust/trust.toml
+    \b
+    Examples: sudo nondum keys trust /media/usb/nondum-trust/trust.toml
+              nondum keys trust --user trust.toml
     """
     from nondum.wheelhouse.trust import owners_folder
 
     row = session.ask("trust")
     if not row["version"]:
-        row = _begin(session, owners_folder.read(file), Path(row["anchor"]), is_sure=yes)
+        anchor = _anchor(Asked(user, config_file), row["anchor"])
+        row = _begin(session, owners_folder.read(file), anchor, is_sure=yes)
     else:
         version = row["version"]
         for signed in owners_folder.versions(file):
@@ -73,19 +85,39 @@ def trust(session: Session, file: Path, yes: bool) -> None:
         click.echo(f"trusted: version {row['version']}")
 
 
+def _anchor(asked: Asked, told: str) -> Path:
+    """Where the host reads its first trust file, by a configuration that belongs to the caller. The
+    daemon, which may be an attacker's by now, only says whether it is the same place.
+
+    Raises `TrustRefused` (TRUST_ELSEWHERE), `ConfigRefused`.
+    """
+    anchor = effective(asked).first_trust_file
+    if str(anchor) != told:
+        raise TrustRefused(
+            Problem(
+                "TRUST_ELSEWHERE",
+                "the host that answers reads its first trust file at another place",
+                where=str(anchor),
+                need=str(anchor),
+                have=told,
+                fix="name the configuration that it runs with: --config FILE, or --user",
+            )
+        )
+    return anchor
+
+
 def _begin(session: Session, file: SignedFile, anchor: Path, *, is_sure: bool) -> Any:
     """Write the first trust file where the host reads it."""
-    from nondum.wheelhouse import disk
+    from nondum.host.trust import anchors
     from nondum.wheelhouse.trust import succession
 
-    first = succession.check_first(file)
+    first = succession.first(file)
     if not (is_sure or session.as_json):
-        for root in first.roots.keys:
-            click.echo(f"root {root.name}  {root.key.fingerprint}")
-        click.confirm(f"Are these the keys of {first.owner}?", abort=True)
-    anchor.parent.mkdir(parents=True, exist_ok=True)
-    disk.write(anchor, file.data)
-    anchor.chmod(0o644)
+        _show(first)
+        click.confirm(
+            f"Are the roots above the keys of {first.owner}, all of them and no others?", abort=True
+        )
+    anchors.place(anchor, file)
     return session.ask("trust_reload")
 
 
@@ -152,7 +184,7 @@ def _show(trust: Trust) -> None:
         who = f"{role.threshold} of {', '.join(role.keys)}"
         click.echo(f"role {role.name}: {', '.join(role.payloads)} by {who}; may have {may}")
     for revocation in trust.revoked:
-        render.sentence(f"revoked {revocation.fingerprint}  {revocation.why}".rstrip())
+        click.echo(printable(f"revoked {revocation.fingerprint}  {revocation.why}".rstrip()))
 
 
 def _day(moment: datetime | None) -> str:

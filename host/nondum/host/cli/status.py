@@ -47,6 +47,7 @@ def show(view: dict[str, Any]) -> None:
     _show_feedback(view["feedback"])
     for warning in view["warnings"]:
         render.sentence(warning, colour="yellow", mark="warning: ")
+    _show_trust(view["trust"])
     _show_confinement(view["confinement"])
     click.echo()
     _show_payloads(view["payloads"])
@@ -70,6 +71,12 @@ def _show_feedback(shown: dict[str, Any]) -> None:
     if shown["state"] != "ready":
         code = f" ({shown['code']})" if shown["code"] else ""
         render.sentence(shown["sentence"], mark=f"shown: {shown['state']}{code}: ")
+
+
+def _show_trust(trust: dict[str, Any] | None) -> None:
+    if trust is not None:
+        told = f"trust file of {trust['owner']}: version {trust['version']}"
+        render.sentence(f"{told}; the first one is {trust['first']}")
 
 
 def _show_confinement(confinement: dict[str, Any]) -> None:

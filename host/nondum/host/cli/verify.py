@@ -152,7 +152,8 @@ def _facts(session: Session, arch: str | None, python: str | None) -> HostFacts:
 
 def _trusted(session: Session, file: Path | None) -> Trust | None:
     """The trust file that is named, the running host's, or the one that one would begin with."""
-    from nondum.host.config import TrustSection
+    from nondum.host.config import HostConfig
+    from nondum.host.trust import anchors
     from nondum.wheelhouse.trust import owners_folder, trust_file
 
     if file is not None:
@@ -160,8 +161,8 @@ def _trusted(session: Session, file: Path | None) -> Trust | None:
     try:
         row: dict[str, Any] = session.ask("trust")
     except HostUnreachable:
-        anchor = TrustSection().file
-        return owners_folder.parsed(anchor) if anchor is not None and anchor.exists() else None
+        anchor = HostConfig().first_trust_file
+        return anchors.load(anchor).trust if anchor.exists() else None
     return trust_file.parse(row["file"], trust_file.NAME) if row["version"] else None
 
 

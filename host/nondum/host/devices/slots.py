@@ -83,7 +83,7 @@ def parse_slot(text: str, where: str) -> tuple[DeviceNode, ...]:
     """
     try:
         data: dict[str, Any] = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError, or a number without end
         raise _refused(where, str(error)) from error
     match data:
         case {"device": {"nodes": [_, *_] as nodes, **rest}, **others} if not others:

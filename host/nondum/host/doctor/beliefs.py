@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterator
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -9,14 +10,14 @@ from pathlib import Path
 from nondum.host.config import HostConfig
 from nondum.host.doctor.finding import Finding, bad, ok, warn
 from nondum.host.mind.planners import GROUP
+from nondum.host.trust import anchors
 from nondum.sdk.errors import NondumError
-from nondum.wheelhouse.trust.trust_file import parse_bytes
 
 
 def examine(config: HostConfig) -> Iterator[Finding]:
     """Look at trust, keys and planners."""
     allows = config.drives.allow_unsigned
-    yield trust(config.trust.file or config.host.state / "trust.toml", allow_unsigned=allows)
+    yield trust(config.first_trust_file, allow_unsigned=allows)
     if config.peers.enabled:
         yield judge_key(config.host.state / "peers")
     yield judge_planners(sorted(entry.name for entry in entry_points(group=GROUP)))
@@ -27,18 +28,28 @@ def trust(path: Path, *, allow_unsigned: bool) -> Finding:
     if allow_unsigned:
         told = "payloads without a signature are taken (`drives.allow_unsigned`)"
         return warn("trust", told, "for development only: make keys with `nondum keys`")
-    try:
-        parse_bytes(path.read_bytes(), str(path))
-    except FileNotFoundError:
-        told = f"there is no {path}: no payload is taken"
-        return bad("trust", told, "make one with `nondum keys`, see docs/trust.md")
-    except PermissionError:
+    if _is_closed(path):
         return ok("trust", f"{path} is there, and not for this user to read")
-    except OSError as error:
-        return bad("trust", f"{path} cannot be read ({error.strerror})", "look at its permissions")
+    try:
+        anchor = anchors.load(path)
     except NondumError as error:
-        return bad("trust", str(error), "correct it, or make another with `nondum keys`")
-    return ok("trust", f"{path} says whose payloads are taken")
+        if error.code == "TRUST_MISSING":
+            told = f"there is no {path}: no payload is taken"
+            return bad("trust", told, "make one with `nondum keys`, see docs/trust.md")
+        fix = error.problems[0].fix or "correct it, or make another with `nondum keys`"
+        return bad("trust", str(error), fix)
+    return ok("trust", f"{path} says whose payloads are taken ({anchor.origin.value})")
+
+
+def _is_closed(path: Path) -> bool:
+    """Whether this user may not read the file, or not look into its folder."""
+    try:
+        path.stat()
+    except PermissionError:
+        return True
+    except OSError:
+        return False
+    return not os.access(path, os.R_OK)
 
 
 def judge_key(folder: Path) -> Finding:

@@ -7,7 +7,8 @@ is not copied again.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import distributions
 from pathlib import Path
@@ -23,8 +24,8 @@ from nondum.host.helper import privileged
 from nondum.host.trust.chain import packed
 from nondum.host.trust.on_drives import trust_files_on
 from nondum.host.trust.rules import Rules
-from nondum.sdk.errors import PayloadRefused, Problem
-from nondum.wheelhouse import confinement, contents, drive, payload, preflight
+from nondum.sdk.errors import NondumError, PayloadRefused, Problem
+from nondum.wheelhouse import confinement, contents, drive, payload, preflight, verification
 from nondum.wheelhouse.contents import Contents
 from nondum.wheelhouse.dist_info import Needs
 from nondum.wheelhouse.lock import LockedWheel
@@ -66,9 +67,18 @@ def look(arguments: Arguments, report: Report) -> dict[str, list[Any]]:
         "trust": packed(offered),
         "trust_problems": [problem.to_dict() for problem in brief(flaws)],
         "flaws": [] if is_payload else [problem.to_dict() for problem in loose_goals(root)],
-        "payloads": [_found(folder, verifier) for folder in folders],
+        "payloads": found(folders, verifier),
         "certificates": [] if is_payload else list(_certificates(root)),
     }
+
+
+def found(folders: Sequence[Path], verifier: Verifier) -> list[dict[str, Any]]:
+    """What a `PayloadFound` says of each folder. One that is read otherwise than anybody foresaw is
+    refused (INTERNAL), and the others are judged all the same.
+
+    Raises `DriveGone`.
+    """
+    return [_found(folder, verifier) for folder in folders]
 
 
 def _certificates(root: Path) -> Iterator[str]:
@@ -181,7 +191,6 @@ def known_wheels(
 
 
 def _found(folder: Path, verifier: Verifier) -> dict[str, Any]:
-    """What a `PayloadFound` says of a folder."""
     digest = ""
     listed: Contents | None = None
     problems: tuple[Problem, ...] = ()
@@ -196,6 +205,11 @@ def _found(folder: Path, verifier: Verifier) -> dict[str, Any]:
             problems = tuple(_version_problems(listed))
     except PayloadRefused as error:
         problems = error.problems
+    except (NondumError, OSError, MemoryError):
+        raise  # that is the drive's, or this host's
+    except Exception as error:
+        traceback.print_exc()
+        problems = (verification.unforeseen(error, folder),)
     # Two folders without a readable list are two payloads, wherever they are.
     name = digest or hashlib.sha256(str(folder).encode()).hexdigest()
     return {

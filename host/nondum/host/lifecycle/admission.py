@@ -33,7 +33,7 @@ def release_problems(state: HostState, found: PayloadFound, at: Moment) -> Itera
         return
     where, newest = found.payload_id, _newest(state, found)
     limit = max(newest.release, int(at.wall_s), _date_s(found)) + RELEASE_JUMP
-    owner = _owner(state, found.payload_id)
+    owner = newest.owner
     if owner in found.grant.owners and found.grant.role != owner:
         yield Problem(
             "ID_OWNED_BY",
@@ -80,23 +80,17 @@ def release_problems(state: HostState, found: PayloadFound, at: Moment) -> Itera
 
 def reached(state: HostState, payload: PayloadRecord, event: PayloadActivated) -> Highwater:
     """The newest release of a payload that is active, now that this one is."""
-    newest = state.highwater.get((payload.fleet, payload.payload_id), _NOTHING)
-    before = _owner(state, payload.payload_id)
-    owner = before if before in event.grant.owners else event.grant.role
+    newest = state.highwater.get(payload.payload_id, _NOTHING)
+    owner = newest.owner if newest.owner in event.grant.owners else event.grant.role
     if newest.release > payload.release and not _is_void(newest, event.grant):
         return replace(newest, owner=owner)
     return Highwater(payload.release, payload.digest, owner)
 
 
-def _owner(state: HostState, payload_id: str) -> str:
-    """The role that was the first to bring a payload, for whatever fleet; empty: none."""
-    marks = (mark for (_, id), mark in state.highwater.items() if id == payload_id)
-    return next((mark.owner for mark in marks if mark.owner), "")
-
-
 def _newest(state: HostState, found: PayloadFound) -> Highwater:
-    """The newest release known. The owner of this host may have declared it void."""
-    newest = state.highwater.get((found.fleet, found.payload_id), _NOTHING)
+    """The newest release known, for whatever fleet: which one is its signer's word. The owner of
+    this host may have declared it void."""
+    newest = state.highwater.get(found.payload_id, _NOTHING)
     if _is_void(newest, found.grant):
         return replace(_NOTHING, owner=newest.owner)
     return newest
@@ -131,7 +125,7 @@ def rivals(state: HostState, payload: str, components: tuple[str, ...]) -> list[
 def _is_same_payload(state: HostState, other: PayloadRecord, payload: str) -> bool:
     """Whether it is another release of the same one: one of them is in force at a time."""
     known = state.payloads.get(payload)
-    return known is not None and releases.key_of(known) == releases.key_of(other)
+    return known is not None and known.payload_id == other.payload_id
 
 
 def taken(rival: PayloadRecord, components: tuple[str, ...]) -> Problem:

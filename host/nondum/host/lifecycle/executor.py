@@ -106,7 +106,9 @@ class Executor:
 
     async def prepare(self, state: HostState) -> None:
         """Clear away what a recovered state does not account for; start a spare child."""
-        await asyncio.gather(self.trust.open(), self.installation.prepare(state))
+        read, _ = await asyncio.gather(self.trust.open(), self.installation.prepare(state))
+        for event in read:
+            self._emit(event)
         if payloads := payload_rules.kept(state):
             self.start(effects.JudgePayloads(payloads))
 

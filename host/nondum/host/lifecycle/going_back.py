@@ -45,7 +45,7 @@ async def go_back(payload_id: str, catalogue: Catalogue, bus: Bus) -> PayloadRec
 
 
 def _is_wanted(state: HostState, target: PayloadRecord) -> bool:
-    back = state.rollbacks.get(releases.key_of(target))
+    back = state.rollbacks.get(target.payload_id)
     return back is not None and back.digest == target.digest
 
 

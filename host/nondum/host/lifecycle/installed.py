@@ -37,7 +37,7 @@ async def install(folder: Path, catalogue: Catalogue, bus: Bus) -> PayloadRecord
                 _drop_older(catalogue.state, payload, bus)
                 return payload
             _go_forward(catalogue.state, found, bus)
-            group = releases.key_of(found)
+            group = found.payload_id
             await watch.until(lambda state: group not in state.rollbacks or None)
         except BaseException:
             bus.emit(DriveRemoved(drive))
@@ -105,7 +105,7 @@ def _settled(state: HostState, key: str) -> PayloadRecord | None:
 
 def _go_forward(state: HostState, payload: PayloadRecord, bus: Bus) -> None:
     """Install again what a person had gone back from. Raises `PayloadRefused`."""
-    if releases.key_of(payload) in state.rollbacks and payload.step is Step.SUPERSEDED:
+    if payload.payload_id in state.rollbacks and payload.step is Step.SUPERSEDED:
         bus.emit(RetryAsked(payload.key))
         return
     fix = f"`nondum payload uninstall {payload.payload_id}` first, or install a newer release"

@@ -236,7 +236,7 @@ def _activate(turn: Turn, payload: PayloadRecord, event: PayloadActivated) -> No
     turn.forget(payload.payload_id)
     turn.change(mounts={**_by_unit(event.mounts), **turn.state.mounts})
     reached = admission.reached(turn.state, payload, event)
-    turn.change(highwater={**turn.state.highwater, releases.key_of(payload): reached})
+    turn.change(highwater={**turn.state.highwater, payload.payload_id: reached})
 
 
 def _entering(

@@ -124,8 +124,7 @@ def _with(state: HostState, one: Mapping[str, Any], at: Moment) -> HostState:
         phases={"seen": at},
         components=tuple(one["components"]),
     )
-    name = record.fleet, record.payload_id
-    newest = state.highwater.get(name)
+    newest = state.highwater.get(record.payload_id)
     reached = Highwater(record.release, record.digest)
     if newest is not None and newest.release >= record.release:
         reached = newest
@@ -133,5 +132,5 @@ def _with(state: HostState, one: Mapping[str, Any], at: Moment) -> HostState:
         state,
         drives={**state.drives, drive.id: drive},
         payloads={**state.payloads, record.key: record},
-        highwater={**state.highwater, name: reached},
+        highwater={**state.highwater, record.payload_id: reached},
     )

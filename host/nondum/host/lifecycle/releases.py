@@ -1,5 +1,5 @@
 """Which release of a payload is in force: the highest that is here and healthy, unless a person
-went back to an earlier one.
+went back to an earlier one. Releases of one payload have one id, whatever fleets they are for.
 
 A newer release is brought up beside the one in force and takes over in one commit; the others wait,
 superseded, and come back when it goes or fails. One release of a payload is brought up at a time.
@@ -40,19 +40,12 @@ STARTING = frozenset({Step.STORED, Step.PROBED})
 _INSTALLED = STARTING | {Step.ACTIVE, Step.SUPERSEDED}
 
 
-def key_of(payload: PayloadRecord | PayloadFound) -> tuple[str, str]:
-    """What releases of one payload have in common."""
-    return payload.fleet, payload.payload_id
-
-
 def others(state: HostState, payload: PayloadRecord) -> Iterator[PayloadRecord]:
     """The other releases of a payload that are here, at whatever step."""
     return (
         other
         for other in state.payloads.values()
-        if other.payload_id == payload.payload_id
-        and other.fleet == payload.fleet
-        and other.key != payload.key
+        if other.payload_id == payload.payload_id and other.key != payload.key
     )
 
 
@@ -63,7 +56,7 @@ def in_force(state: HostState, payload: PayloadRecord) -> PayloadRecord | None:
 
 def standing(state: HostState, payload: PayloadRecord) -> tuple[int, bool]:
     """What releases are ordered by: the number, but for one that a person went back to."""
-    back = state.rollbacks.get(key_of(payload))
+    back = state.rollbacks.get(payload.payload_id)
     if back is not None and back.digest == payload.digest:
         return back.below, True
     return payload.release, False
@@ -98,7 +91,7 @@ def twin(state: HostState, found: PayloadFound) -> PayloadRecord | None:
         (
             other
             for other in state.payloads.values()
-            if key_of(other) == key_of(found)
+            if other.payload_id == found.payload_id
             and other.release == found.release
             and other.digest != found.digest
             and other.step not in (Step.REFUSED, Step.REMOVING)
@@ -120,10 +113,10 @@ def can_go_back_to(state: HostState, payload: PayloadRecord) -> PayloadRecord | 
 def settle(turn: Turn) -> Iterable[PayloadResumed]:
     """Call for releases that wait and have nobody to wait for any more: the highest of each payload
     whose others are not being brought up."""
-    groups: dict[tuple[str, str], list[PayloadRecord]] = {}
+    groups: dict[str, list[PayloadRecord]] = {}
     for payload in turn.state.payloads.values():
         if payload.step in _INSTALLED:
-            groups.setdefault(key_of(payload), []).append(payload)
+            groups.setdefault(payload.payload_id, []).append(payload)
     for group in groups.values():
         best = max(group, key=lambda payload: standing(turn.state, payload))
         is_starting = any(payload.step in STARTING for payload in group)
@@ -179,7 +172,7 @@ def on_rollback_asked(turn: Turn, event: RollbackAsked) -> bool:
     installed = [o.release for o in others(turn.state, payload) if o.step in _INSTALLED]
     below = max(payload.release, event.from_release, *installed)
     back = Rollback(payload.digest, payload.release, below)
-    turn.change(rollbacks={**turn.state.rollbacks, key_of(payload): back})
+    turn.change(rollbacks={**turn.state.rollbacks, payload.payload_id: back})
     if payload.step is Step.REFUSED:
         return True
     turn.events.append(event)
@@ -188,7 +181,7 @@ def on_rollback_asked(turn: Turn, event: RollbackAsked) -> bool:
 
 def on_retry_asked(turn: Turn, payload: PayloadRecord, event: RetryAsked) -> None:
     """Go forward again to a release that a person had gone back from."""
-    if key_of(payload) in turn.state.rollbacks:
+    if payload.payload_id in turn.state.rollbacks:
         turn.events.append(event)
         forget_rollback(turn, payload)
 
@@ -196,27 +189,27 @@ def on_retry_asked(turn: Turn, payload: PayloadRecord, event: RetryAsked) -> Non
 def on_found(turn: Turn, found: PayloadFound) -> None:
     """A release that is plugged in anew overrules an earlier going back from it; one that is still
     newer comes before both."""
-    back = turn.state.rollbacks.get(key_of(found))
+    back = turn.state.rollbacks.get(found.payload_id)
     if back is not None and back.release < found.release <= back.below:
         forget_rollback(turn, found)
 
 
 def on_withdrawn(turn: Turn, payload: PayloadRecord) -> None:
     """Going back to a release ends with it."""
-    back = turn.state.rollbacks.get(key_of(payload))
+    back = turn.state.rollbacks.get(payload.payload_id)
     if back is not None and back.digest == payload.digest:
         forget_rollback(turn, payload)
 
 
 def forget_rollback(turn: Turn, payload: PayloadRecord | PayloadFound) -> None:
     """From now on the highest release counts again."""
-    kept = {key: one for key, one in turn.state.rollbacks.items() if key != key_of(payload)}
+    kept = {id: one for id, one in turn.state.rollbacks.items() if id != payload.payload_id}
     turn.change(rollbacks=kept)
 
 
 def is_overruled(state: HostState, found: PayloadFound) -> bool:
     """Whether a person went back to this release, so that it may be older than others were."""
-    back = state.rollbacks.get(key_of(found))
+    back = state.rollbacks.get(found.payload_id)
     return back is not None and back.digest == found.digest
 
 

@@ -1,53 +1,49 @@
 """The trust files of a host, from the first one to the one that is in force, as they lie on its
 disk; what child processes do with them.
 
-    /etc/nondum/trust.toml            the first one: whoever may write there vouches for it
+    /etc/nondum/trust.toml            the first one, and its signatures: see `anchors`
     <state>/trust/00000004.toml       each that followed, by its version
     <state>/trust/00000004.toml.sig   what its roots have signed it with
 
-Nothing on disk is believed for lying there but the first one: the chain is verified at each start.
+Nothing in `<state>/trust` is believed for lying there: the chain is verified at each start.
 """
 
 from __future__ import annotations
 
 import base64
-import os
-import stat
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from nondum.host.trust import anchors
 from nondum.host.trust.rules import Rules, parsed
-from nondum.sdk.errors import NondumError, PayloadRefused, Problem, TrustRefused
+from nondum.sdk.errors import NondumError, PayloadRefused, Problem
 from nondum.wheelhouse import contents, disk
 from nondum.wheelhouse.manifest import Manifest
 from nondum.wheelhouse.signatures import Grant, Verdict
-from nondum.wheelhouse.trust import sshsig, succession, trust_file
+from nondum.wheelhouse.trust import succession
 from nondum.wheelhouse.trust.succession import SignedFile
 
 Report = Callable[[str, int, int], None]
 Arguments = Mapping[str, Any]
 
-SIGNATURE_SUFFIX = ".sig"
-_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
-
 
 def load(arguments: Arguments, report: Report) -> dict[str, Any]:
     """Follow the chain in `folder` from its first file, `anchor`: the `text` in force (None: nobody
-    is trusted), the digests `known` and the `problems` on the way."""
-    folder, anchor = Path(arguments["folder"]), Path(arguments["anchor"])
-    known: list[SignedFile] = []
+    is trusted), the `origin` of the first file, the digests `known` and the `problems` on the way.
+    """
+    folder = Path(arguments["folder"])
     try:
-        if not anchor.exists():
-            return _told([], ())
-        _check_own(anchor)
-        first = _read(anchor)
-        trust = succession.check_first(first)
-        known.append(first)
-        extended = succession.extend(trust, (first.digest,), tuple(_updates(folder, trust.version)))
+        anchor = anchors.load(Path(arguments["anchor"]))
     except NondumError as refused:
-        return _told(known, refused.problems)
-    return _told([first, *extended.accepted], extended.problems)
+        return _told([], () if refused.code == "TRUST_MISSING" else refused.problems)
+    first, trust, origin = anchor.file, anchor.trust, anchor.origin.value
+    try:
+        updates = tuple(_updates(folder, trust.version))
+    except NondumError as refused:
+        return _told([first], refused.problems, origin)
+    extended = succession.extend(trust, (first.digest,), updates)
+    return _told([first, *extended.accepted], extended.problems, origin)
 
 
 def extend(arguments: Arguments, report: Report) -> dict[str, Any]:
@@ -138,9 +134,12 @@ def _base64(data: bytes | None) -> str | None:
     return base64.b64encode(data).decode("ascii") if data is not None else None
 
 
-def _told(known: Sequence[SignedFile], problems: Sequence[Problem]) -> dict[str, Any]:
+def _told(
+    known: Sequence[SignedFile], problems: Sequence[Problem], origin: str = ""
+) -> dict[str, Any]:
     return {
         "text": known[-1].data.decode() if known else None,
+        "origin": origin,
         "known": [file.digest for file in known],
         "problems": [problem.to_dict() for problem in problems],
     }
@@ -150,40 +149,7 @@ def _updates(folder: Path, after: int) -> Iterator[SignedFile]:
     names = sorted(path.name for path in folder.glob("????????.toml")) if folder.is_dir() else []
     for name in names:
         if name > _name(after):
-            yield _read(folder / name)
-
-
-def _read(path: Path) -> SignedFile:
-    """A trust file on this host's disk. Raises `TrustRefused` (TOO_LARGE, IO_ERROR)."""
-    signature = path.with_name(path.name + SIGNATURE_SUFFIX)
-    try:
-        data = path.read_bytes()
-        signed = signature.read_bytes() if signature.exists() else None
-    except OSError as error:
-        raise TrustRefused(disk.problem_of(error, "cannot be read", path)) from error
-    if len(data) > trust_file.MAX_BYTES or len(signed or b"") > sshsig.MAX_BYTES:
-        told, fix = f"is longer than {trust_file.MAX_BYTES} bytes", "put the genuine file there"
-        raise TrustRefused(Problem("TOO_LARGE", told, where=str(path), fix=fix))
-    return SignedFile(data, signed, str(path))
-
-
-def _check_own(path: Path) -> None:
-    """See that only root, or whom this host runs as, can have written a file.
-
-    Raises `TrustRefused` (TRUST_OPEN_TO_OTHERS).
-    """
-    status = path.stat()
-    if status.st_mode & _OTHERS_WRITE or status.st_uid not in (0, os.geteuid()):
-        raise TrustRefused(
-            Problem(
-                "TRUST_OPEN_TO_OTHERS",
-                "others can change this file, so it says nothing about whom to trust",
-                where=str(path),
-                need="owner root, mode 0644",
-                have=f"user {status.st_uid}, mode {stat.S_IMODE(status.st_mode):04o}",
-                fix="put the genuine file there, then `chown root` and `chmod 644` it",
-            )
-        )
+            yield anchors.read(folder / name)
 
 
 def _keep(folder: Path, name: str, file: SignedFile) -> None:
@@ -194,7 +160,7 @@ def _keep(folder: Path, name: str, file: SignedFile) -> None:
     try:
         disk.make_folder(folder)
         if file.signature is not None:
-            disk.write(folder / (name + SIGNATURE_SUFFIX), file.signature)
+            disk.write(folder / (name + anchors.SIGNATURE_SUFFIX), file.signature)
         disk.write(folder / name, file.data)
     except OSError as error:
         raise disk.failed(error, "the trust file cannot be kept", folder / name) from error

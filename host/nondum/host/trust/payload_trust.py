@@ -20,10 +20,11 @@ from nondum.host.events import (
     PayloadDoubted,
     TrustChanged,
     TrustFileRefused,
+    TrustRead,
 )
 from nondum.host.lifecycle.children import Children
 from nondum.host.lifecycle.folders import Folders
-from nondum.host.trust import chain
+from nondum.host.trust import anchors, chain
 from nondum.host.trust.rules import Rules, parsed
 from nondum.host.trust.vouched import NOBODY, Vouched
 from nondum.sdk.errors import NondumError, Problem, TrustRefused
@@ -67,6 +68,7 @@ class PayloadTrust:
         self._anchor = options.anchor or folders.root / "trust.toml"
         self._stop, self._allow_unsigned = options.stop, allow_unsigned
         self._text: str | None = None
+        self._origin = ""
         self._known: list[str] = []
         self._problems: tuple[Problem, ...] = ()
         self._changing = asyncio.Lock()
@@ -91,12 +93,14 @@ class PayloadTrust:
         nobody = "no payload is accepted: this host trusts nobody yet; see `nondum keys trust`"
         return (*unsigned, *map(str, self._problems), *((nobody,) if is_closed else ()))
 
-    async def open(self) -> None:
+    async def open(self) -> tuple[Event, ...]:
         """Read and verify what is on disk. What is wrong with it is told by `warnings`."""
         try:
-            self._take(await self._loaded())
+            self._begin(await self._loaded())
         except NondumError as error:
             self._problems = error.problems
+        trust = self.trust
+        return (TrustRead(trust.owner, trust.version, self._origin),) if trust is not None else ()
 
     async def reload(self) -> tuple[Event, ...]:
         """Read it again, since a person has changed the first file.
@@ -106,8 +110,8 @@ class PayloadTrust:
         async with self._changing:
             told, before = await self._loaded(), self._text
             if told["text"] is None:
-                raise TrustRefused(*(_problems(told) or (self._missing(),)))
-            self._take(told)
+                raise TrustRefused(*(_problems(told) or (anchors.missing(self._anchor),)))
+            self._begin(told)
             return self._changed(PERSON) if self._text != before else ()
 
     async def offer(
@@ -174,11 +178,19 @@ class PayloadTrust:
             "version": trust.version if trust is not None else 0,
             "file": self._text or "",
             "anchor": str(self._anchor),
+            "first": self._origin,
             "clock_floor": f"{clock_floor(trust):%Y-%m-%dT%H:%M:%SZ}",
             "allow_unsigned": self._allow_unsigned,
             "on_revoke": "stop" if self._stop else "flag",
             "warnings": list(self.warnings),
         }
+
+    def summary(self) -> dict[str, Any] | None:
+        """The trust file in force, in a few words; None: nobody is trusted."""
+        trust = self.trust
+        if trust is None:
+            return None
+        return {"owner": trust.owner, "version": trust.version, "first": self._origin}
 
     async def _judged(self, payloads: Sequence[str]) -> dict[str, tuple[Problem, ...]]:
         """What is wrong with each, but for those of which nothing is kept. Raises `NondumError`."""
@@ -192,6 +204,10 @@ class PayloadTrust:
     async def _loaded(self) -> dict[str, Any]:
         told: dict[str, Any] = await self._children.run("trust_load", self._places())
         return told
+
+    def _begin(self, told: Mapping[str, Any]) -> None:
+        self._take(told)
+        self._origin = told["origin"]
 
     def _take(self, told: Mapping[str, Any]) -> None:
         self._text, self._known = told["text"], list(told["known"])
@@ -210,10 +226,6 @@ class PayloadTrust:
         in_force = {"trust": self._text, "known": self._known}
         return {**self._places(), **in_force, "offered": chain.packed(files)}
 
-    def _missing(self) -> Problem:
-        fix = "put the first trust file there: `nondum keys trust FILE`"
-        return Problem("TRUST_MISSING", "there is no trust file", str(self._anchor), fix=fix)
-
 
 def _problems(told: Mapping[str, Any]) -> tuple[Problem, ...]:
     return tuple(Problem(**problem) for problem in told["problems"])
@@ -225,5 +237,5 @@ def _nobody_vouches() -> Problem:
         "there is a trust file on it, and this host trusts nobody yet who could vouch for it",
         need="a first trust file, put here by a person",
         have="none",
-        fix="compare its fingerprints with its owner's, then `nondum keys trust FILE`",
+        fix="compare the fingerprints of its roots with its owner's, then `nondum keys trust FILE`",
     )

@@ -3,19 +3,30 @@
 As TUF has it for its root (theupdateframework/specification, section 5.3): the roots in force sign,
 so that nobody else can change them; the new ones sign too, so that none is named who could not go
 on. A file is parsed once enough roots in force have signed it, not before.
+
+A chain begins with a file that its own roots have signed: a person who compares their fingerprints
+has then seen to everything in it. What root has written to the host's own disk needs no signature.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem, TrustRefused
 from nondum.wheelhouse.trust import sshsig, trust_file
 from nondum.wheelhouse.trust.trust import Roots, Trust
 
 _SIGN = "`nondum keys sign FILE --key KEY`, once for each root, adds signatures"
+_FIRST = (
+    "get the file and its .sig again from its owner; or, as the owner, sign it: `nondum keys sign "
+    "FILE --key KEY`"
+)
+_PLACED = (
+    "put the genuine file and its .sig there; delete the .sig only if you vouch for the file "
+    "yourself"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +96,27 @@ def successor(trust: Trust, file: SignedFile) -> Trust:
     return new
 
 
-def check_first(file: SignedFile) -> Trust:
-    """A trust file that begins a chain: whoever puts it there vouches for it; its own roots must
-    have signed it if anybody has. Raises as `successor`."""
+def first(file: SignedFile) -> Trust:
+    """The trust that begins with a file that a person brings: enough of its own roots have signed
+    it. Raises `TrustRefused` (TRUST_SIGNATURE, TRUST_…)."""
+    return _begun(file, _FIRST)
+
+
+def placed(file: SignedFile) -> Trust:
+    """The trust that begins with a file on the host's own disk: without a signature, who may write
+    there vouches for it; one that is there holds. Raises as `first`."""
+    if file.signature is None:
+        return trust_file.parse_bytes(file.data, file.where)
+    return _begun(file, _PLACED)
+
+
+def _begun(file: SignedFile, fix: str) -> Trust:
     trust = trust_file.parse_bytes(file.data, file.where)
-    if file.signature is not None:
+    try:
         _check_signed(trust.roots, f"version {trust.version}", file)
+    except NondumError as refused:
+        told = (replace(problem, code="TRUST_SIGNATURE", fix=fix) for problem in refused.problems)
+        raise TrustRefused(*told) from refused
     return trust
 
 

@@ -111,6 +111,12 @@ CODES = (
         "find out which is genuine before any is used: a root key may be in wrong hands",
     ),
     Code(
+        "TRUST_ELSEWHERE",
+        "The host that answers reads its first trust file at another place than the configuration "
+        "says.",
+        "name the configuration that it runs with: `nondum keys trust --config FILE`, or `--user`",
+    ),
+    Code(
         "TRUST_KEY",
         "The trust file has an unknown key, or lacks one.",
         "correct the key that is named; docs/trust.md lists them",
@@ -122,8 +128,9 @@ CODES = (
     ),
     Code(
         "TRUST_OPEN_TO_OTHERS",
-        "Others can change the trust file, so it says nothing about whom to trust.",
-        "put the genuine file there, then `chown root` and `chmod 644` it",
+        "Others can change the trust file, or a folder that leads to it, so it says nothing about "
+        "whom to trust.",
+        "put the genuine file there, then `chown root` and `chmod go-w` it and its folders",
     ),
     Code(
         "TRUST_OWNER",
@@ -132,8 +139,9 @@ CODES = (
     ),
     Code(
         "TRUST_SIGNATURE",
-        "Too few of its owner's root keys have signed the trust file.",
-        "have the trust file signed by as many root keys as the present one demands",
+        "Too few of its owner's root keys have signed the trust file, or it was changed since.",
+        "have the trust file signed by as many root keys as the present one demands; a first one "
+        "by as many of its own",
     ),
     Code(
         "TRUST_TOML",
@@ -148,7 +156,7 @@ CODES = (
     Code(
         "TRUST_UNANCHORED",
         "There is a trust file on a drive, and this host trusts nobody yet who could vouch for it.",
-        "compare its fingerprints with its owner's, then `nondum keys trust FILE`",
+        "compare the fingerprints of its roots with its owner's, then `nondum keys trust FILE`",
     ),
     Code(
         "TRUST_VALUE",
