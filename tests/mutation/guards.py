@@ -7,6 +7,7 @@ from collections.abc import Mapping
 _W, _TW = "wheelhouse/nondum/wheelhouse", "tests/wheelhouse"
 _H, _TH = "host/nondum/host", "tests/host"
 _S, _TS = "plugins/sdk/nondum/sdk", "tests/sdk"
+_T, _TT = "transport/nondum/transport", "tests/transport"
 _WHEELS = (f"{_TW}/test_wheel.py",)
 _MOUNTED = tuple(
     f"{_TH}/drives/test_blocks.py::{test}"
@@ -30,6 +31,11 @@ _BROUGHT = tuple(
 _RELEASES = (f"{_TH}/lifecycle/test_releases.py", f"{_TH}/trust/test_releases_of_strangers.py")
 _CONTROL = (f"{_TH}/control/test_arguments.py", f"{_TH}/control/test_control.py")
 _HELPER = (f"{_TH}/helper/test_server.py",)
+_GRANTS = (f"{_TT}/bridge/test_packets.py", f"{_TT}/bridge/test_grants.py")
+_TELLERS = tuple(f"{_TT}/fleet/test_{each}.py" for each in ("bad_tellers", "meeting", "fleets"))
+_ZENOH = (f"{_TT}/fleet/test_zenoh.py",)
+_OWNERS = (f"{_TH}/bridge/test_hostile_owner.py", f"{_TH}/bridge/test_bridge.py")
+_STREAMS = (f"{_TH}/bridge/test_remote_streams.py",)
 
 GUARDS: Mapping[str, tuple[str, ...]] = {
     # Who is believed.
@@ -135,6 +141,37 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/helper/service.py": (f"{_TH}/helper/test_service.py", *_HELPER),
     f"{_H}/helper/server.py": _HELPER,
     f"{_H}/helper/client.py": _HELPER,
+    # What other hosts say of themselves, and send.
+    f"{_T}/discovery/announcement.py": (f"{_TT}/discovery/test_discovery.py",),
+    f"{_T}/discovery/asking.py": (f"{_TT}/discovery/test_asking.py",),
+    f"{_T}/discovery/book.py": (f"{_TT}/discovery/test_book.py",),
+    f"{_T}/discovery/ears.py": (
+        f"{_TT}/discovery/test_discovery.py",
+        f"{_TT}/discovery/test_networks.py",
+    ),
+    f"{_T}/discovery/hint.py": (f"{_TT}/discovery/test_hint.py",),
+    f"{_T}/discovery/packets.py": (f"{_TT}/discovery/test_packets.py",),
+    f"{_T}/discovery/static_host.py": (f"{_TT}/discovery/test_static_host.py",),
+    f"{_T}/fleet/catalogues.py": _TELLERS,
+    f"{_T}/fleet/chunk.py": (f"{_TT}/fleet/test_ledger.py", f"{_TT}/fleet/test_replica.py"),
+    f"{_T}/fleet/ledger.py": (f"{_TT}/fleet/test_ledger.py",),
+    f"{_T}/fleet/mesh.py": (f"{_TT}/fleet/test_meeting.py",),
+    f"{_T}/fleet/replica.py": (f"{_TT}/fleet/test_replica.py",),
+    f"{_T}/fleet/zenoh_line.py": _ZENOH,
+    f"{_T}/fleet/zenoh_node.py": _ZENOH,
+    f"{_T}/bridge/exporter.py": _GRANTS,
+    f"{_T}/bridge/incoming.py": (*_GRANTS, _OWNERS[0]),
+    f"{_T}/bridge/outgoing.py": _GRANTS,
+    f"{_T}/bridge/packets.py": _GRANTS,
+    f"{_T}/bridge/sockets.py": _GRANTS,
+    f"{_T}/bridge/window.py": (f"{_TT}/bridge/test_window.py",),
+    f"{_H}/bridge/bridge.py": (_OWNERS[1], *_STREAMS),
+    f"{_H}/bridge/inbound.py": _OWNERS,
+    f"{_H}/bridge/jpeg.py": _OWNERS,
+    f"{_H}/bridge/outbound.py": _OWNERS,
+    f"{_H}/bridge/remote_streams.py": _STREAMS,
+    f"{_H}/bridge/service.py": (*_STREAMS, _OWNERS[1]),
+    f"{_H}/bridge/shared_streams.py": _STREAMS,
     # What people and programs of this machine ask for.
     f"{_H}/control/arguments.py": _CONTROL,
     f"{_H}/control/protocol.py": _CONTROL,
@@ -151,6 +188,10 @@ ROOMS = (
     f"{_H}/control",
     f"{_H}/lifecycle",
     f"{_H}/workers",
+    f"{_T}/discovery",
+    f"{_T}/fleet",
+    f"{_T}/bridge",
+    f"{_H}/bridge",
 )
 """Folders in which every module that refuses something is guarded, or stands aside."""
 

@@ -16,6 +16,7 @@ from nondum.transport.peers import (
     PeerRefused,
     Trust,
     fingerprint,
+    keys,
     load_or_create,
     private_file,
     trust_file,
@@ -104,6 +105,21 @@ def test_key_beyond_its_range_is_refused() -> None:
         parse_key("#" * 40)
 
 
+def test_longer_text_than_a_key_is_refused() -> None:
+    with pytest.raises(PeerRefused, match="KEY_MALFORMED"):
+        parse_key(KEYS.public + "00000")
+
+
+def test_key_has_one_text_whatever_the_reader_of_z85_takes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Some readers let groups beyond 2**32 wrap around: another text for the same key."""
+    decode = keys.z85.decode
+    monkeypatch.setattr(keys.z85, "decode", lambda text: decode(text.replace("#", "0")))
+    with pytest.raises(PeerRefused, match="KEY_MALFORMED"):
+        parse_key("#" * 40)
+
+
 def test_fingerprints_differ_and_have_a_hundred_bits() -> None:
     assert fingerprint(KEYS.public) != fingerprint(OTHERS.public)
     assert len(fingerprint(KEYS.public).replace("-", "")) * 5 == 100
@@ -132,9 +148,21 @@ def test_any_bytes_are_a_certificate_or_refused(data: bytes) -> None:
 
 def test_certificate_has_one_form() -> None:
     form = issued().to_bytes()
-    for other in (form + b"\n", form.replace(b"\n", b"\r\n"), form[:-1], b" " + form):
+    padded = _other_base64(form.removesuffix(b"\n")) + b"\n"
+    short = form.replace(b"not-before: 2026-05-31T00", b"not-before: 2026-5-31T0")
+    assert short != form
+    others = (form + b"\n", form.replace(b"\n", b"\r\n"), form[:-1], b" " + form, padded, short)
+    for other in others:
         with pytest.raises(PeerRefused, match="CERTIFICATE_MALFORMED"):
             parse(other)
+
+
+def _other_base64(text: bytes) -> bytes:
+    """The same bytes, written otherwise: bits that fill the last letter are not looked at."""
+    letters = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
+    assert text.endswith(b"==")
+    last = letters[letters.index(text[-3]) + 1]
+    return text[:-3] + bytes([last]) + b"=="
 
 
 def test_fleet_that_is_not_trusted_is_named() -> None:

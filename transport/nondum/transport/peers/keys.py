@@ -48,13 +48,15 @@ def parse_key(text: str) -> PeerKey:
     >>> parse_key("rq:rM>}U?@Lns47E1%kR.o@n%FcmmsL/@{H8]yf7")
     'rq:rM>}U?@Lns47E1%kR.o@n%FcmmsL/@{H8]yf7'
     """
+    if len(text) != 40:
+        raise PeerRefused(_malformed(text))
     try:
-        # One text a key: otherwise a revoked key could come back in other clothes.
-        if len(text) == 40 and z85.encode(z85.decode(text)) == text.encode("ascii"):
-            return PeerKey(text)
+        known = z85.encode(z85.decode(text)).decode("ascii")
     except Exception as error:  # z85 raises KeyError, struct.error, ValueError …
         raise PeerRefused(_malformed(text)) from error
-    raise PeerRefused(_malformed(text))
+    if known != text:  # one text a key: otherwise a revoked key could come back in another one
+        raise PeerRefused(_malformed(text))
+    return PeerKey(text)
 
 
 def fingerprint(key: str) -> str:

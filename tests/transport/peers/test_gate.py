@@ -1,0 +1,109 @@
+"""What is asked at the handshake, and at every message of a link."""
+
+from __future__ import annotations
+
+import asyncio
+from datetime import UTC, datetime
+
+import pytest
+from tests.transport.peers.hosts import PATIENCE_S, host, identity, trusting, two_hosts
+from tests.transport.peers.test_admission import hello_of, raw_dealer
+
+from nondum.transport.peers import (
+    HostKeys,
+    Identity,
+    Loss,
+    PeerKey,
+    PeerLost,
+    PeerUp,
+    Reason,
+    Trust,
+    node,
+)
+from nondum.transport.peers.certificate import new_fleet
+from nondum.transport.peers.gate import Gate
+from nondum.transport.peers.messages import Notice, encode
+from nondum.transport.peers.zap import DOMAIN, Knock
+
+ME, PAIRED, REVOKED, OTHER = (HostKeys.generate() for _ in range(4))
+TRUST = Trust(paired={PAIRED.public: "rover"}).with_revoked(REVOKED.public, "stolen")
+FLEET, _ = new_fleet()
+
+
+def judged(knock: Knock, trust: Trust = TRUST, keys: HostKeys | None = ME) -> Reason | None:
+    return Gate(Identity("base", keys), trust, lambda: datetime.now(UTC)).judge(knock)
+
+
+def knock(
+    key: PeerKey | str, *, domain: bytes = DOMAIN, mechanism: str = "CURVE", at: str = "10.0.0.7"
+) -> Knock:
+    return Knock(at, domain, mechanism, key)
+
+
+@pytest.mark.parametrize(
+    ("asked", "reason"),
+    [
+        (knock(PAIRED.public), None),
+        (knock(PAIRED.public, domain=b"another"), Reason.WRONG_DOMAIN),
+        (knock(PAIRED.public, domain=b""), Reason.WRONG_DOMAIN),
+        (knock(PAIRED.public, mechanism="PLAIN"), Reason.MISMATCH),
+        (knock("", mechanism="NULL"), Reason.MISMATCH),
+        (knock(ME.public), Reason.DUPLICATE),
+        (knock(REVOKED.public), Reason.REVOKED),
+        (knock(OTHER.public), Reason.UNKNOWN_KEY),
+    ],
+)
+def test_handshake_is_judged_by_domain_mechanism_and_key(
+    asked: Knock, reason: Reason | None
+) -> None:
+    assert judged(asked) is reason
+
+
+def test_own_key_is_turned_away_even_if_it_is_paired() -> None:
+    assert judged(knock(ME.public), Trust(paired={ME.public: "base"})) is Reason.DUPLICATE
+
+
+def test_unknown_key_may_greet_a_host_of_a_fleet() -> None:
+    assert judged(knock(OTHER.public), TRUST.with_fleet(FLEET, "survey")) is None
+    assert judged(knock(REVOKED.public), TRUST.with_fleet(FLEET, "survey")) is Reason.REVOKED
+
+
+@pytest.mark.parametrize(
+    ("asked", "reason"),
+    [
+        (knock("", mechanism="NULL", at="127.0.0.1"), None),
+        (knock("", mechanism="NULL", at="10.0.0.7"), Reason.MISMATCH),
+        (knock(PAIRED.public, at="127.0.0.1"), Reason.MISMATCH),
+        (knock("", mechanism="NULL", at="127.0.0.1", domain=b""), Reason.WRONG_DOMAIN),
+    ],
+)
+def test_host_without_keys_is_met_on_this_machine_only(asked: Knock, reason: Reason | None) -> None:
+    assert judged(asked, keys=None) is reason
+
+
+@pytest.mark.anyio
+async def test_message_under_a_key_that_was_revoked_meanwhile_is_not_read() -> None:
+    """Also if the link was not cut yet."""
+    async with two_hosts() as (rover, base):
+        base.node._gate.trust = trusting(rover.node.identity).with_revoked(rover.key, "stolen")
+        rover.node.notify(base.key, "hear", {})
+        assert (await base.told(PeerLost)).reason is Loss.REVOKED
+        assert base.servant.notices.empty()
+
+
+@pytest.mark.anyio
+async def test_message_under_another_key_than_the_links_is_not_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two peers may choose one routing id: the second takes the place of the first as it goes."""
+    monkeypatch.setattr(node, "BEAT_S", 3600.0)  # what is over is looked for no more
+    base, rover, other = identity("base"), identity("rover"), identity("other")
+    async with host(base, trusting(rover, other)) as there, asyncio.timeout(PATIENCE_S):
+        with raw_dealer(there, rover, routing_id=b"chosen") as first:
+            first.send(hello_of(rover))
+            await there.told(PeerUp, rover.key)
+        with raw_dealer(there, other, routing_id=b"chosen") as second:
+            while not there.node.refusals.counts.get(Reason.NOT_PROVED):
+                second.send(encode(Notice("hear", {})))
+                await asyncio.sleep(0)
+        assert there.servant.notices.empty()
