@@ -133,7 +133,9 @@ class _Finder:
                 yield from _necessities(test)
             case ast.IfExp(test=test, body=body) if self._makes_problem(body):
                 yield from _alternatives(test)
-            case ast.IfExp(test=test, orelse=orelse) if self._makes_problem(orelse):
+            case ast.IfExp(test=test, orelse=orelse) if self._makes_problem(orelse) or _is_reason(
+                orelse
+            ):
                 yield from _necessities(test)
             case ast.match_case(guard=ast.expr() as guard, body=body) if self._refuses(body):
                 yield from _alternatives(guard)
@@ -194,7 +196,8 @@ class _Finder:
             case ast.Raise(exc=ast.expr() as raised):
                 return not (isinstance(raised, ast.Call) and _name(raised) in _MACHINE)
             case ast.Return(value=ast.expr() as value):
-                return self._makes_problem(value) or _tells_some(value) or self._is_judge(value)
+                is_told = _tells_some(value) or _is_reason(value)
+                return is_told or self._makes_problem(value) or self._is_judge(value)
             case ast.Expr(value=ast.Yield(value=ast.expr() as value)):
                 return self._makes_problem(value) or self._is_judge(value)
             case ast.Expr(value=ast.Call() as value):
@@ -321,6 +324,11 @@ def _tells_some(value: ast.expr) -> bool:
         and (node.id if isinstance(node, ast.Name) else node.attr) in _TOLD
         for node in ast.walk(value)
     )
+
+
+def _is_reason(value: ast.expr) -> bool:
+    """Whether a value is why a peer is turned away."""
+    return isinstance(value, ast.Attribute) and ast.unparse(value.value) == "Reason"
 
 
 def _name(call: ast.Call) -> str:

@@ -23,7 +23,7 @@ from nondum.transport.peers import (
 from nondum.transport.peers.certificate import new_fleet
 from nondum.transport.peers.gate import Gate
 from nondum.transport.peers.messages import Notice, encode
-from nondum.transport.peers.zap import DOMAIN, Knock
+from nondum.transport.peers.zap import DOMAIN, Knock, parse
 
 ME, PAIRED, REVOKED, OTHER = (HostKeys.generate() for _ in range(4))
 TRUST = Trust(paired={PAIRED.public: "rover"}).with_revoked(REVOKED.public, "stolen")
@@ -89,6 +89,28 @@ async def test_message_under_a_key_that_was_revoked_meanwhile_is_not_read() -> N
         rover.node.notify(base.key, "hear", {})
         assert (await base.told(PeerLost)).reason is Loss.REVOKED
         assert base.servant.notices.empty()
+
+
+@pytest.mark.anyio
+async def test_peer_that_is_no_longer_trusted_is_cut_at_once() -> None:
+    async with two_hosts() as (rover, base):
+        base.node.set_trust(Trust())
+        assert (await base.told(PeerLost)).reason is Loss.REVOKED
+        assert rover.key not in base.node.peers
+
+
+@pytest.mark.parametrize(
+    "frames",
+    [
+        [b"2.0", b"1", DOMAIN, b"10.0.0.7", b"", b"NULL"],
+        [b"1.0", b"1", DOMAIN, b"10.0.0.7"],
+        [b"1.0", b"1", DOMAIN, b"10.0.0.7", b"", b"CURVE"],
+    ],
+    ids=["version", "short", "no key"],
+)
+def test_question_that_zeromq_does_not_ask_is_malformed(frames: list[bytes]) -> None:
+    with pytest.raises(ValueError):
+        parse(frames)
 
 
 @pytest.mark.anyio

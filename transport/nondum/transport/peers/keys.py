@@ -48,9 +48,9 @@ def parse_key(text: str) -> PeerKey:
     >>> parse_key("rq:rM>}U?@Lns47E1%kR.o@n%FcmmsL/@{H8]yf7")
     'rq:rM>}U?@Lns47E1%kR.o@n%FcmmsL/@{H8]yf7'
     """
-    if len(text) != 40:
-        raise PeerRefused(_malformed(text))
     try:
+        if len(text) != 40:
+            raise ValueError("it has another length")
         known = z85.encode(z85.decode(text)).decode("ascii")
     except Exception as error:  # z85 raises KeyError, struct.error, ValueError …
         raise PeerRefused(_malformed(text)) from error
