@@ -1,6 +1,6 @@
 """The power fails, at whatever write of the disk: what was acknowledged is there.
 
-The long form, `python -m tests.faults`, does so a thousand times.
+The long form, `python -m tests.faults`, draws up to a thousand of them.
 """
 
 from __future__ import annotations

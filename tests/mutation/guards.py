@@ -146,7 +146,10 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/helper/server.py": _HELPER,
     f"{_H}/helper/client.py": _HELPER,
     # What other hosts say of themselves, and send.
-    f"{_T}/discovery/announcement.py": (f"{_TT}/discovery/test_discovery.py",),
+    f"{_T}/discovery/announcement.py": (
+        f"{_TT}/discovery/test_hint.py",
+        f"{_TT}/discovery/test_discovery.py",
+    ),
     f"{_T}/discovery/asking.py": (f"{_TT}/discovery/test_asking.py",),
     f"{_T}/discovery/book.py": (f"{_TT}/discovery/test_book.py",),
     f"{_T}/discovery/ears.py": (

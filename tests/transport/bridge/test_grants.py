@@ -6,11 +6,13 @@ import asyncio
 import contextlib
 
 import pytest
+import zmq
 from tests.transport.bridge.ends import PATIENCE_S, Owner, owner, stalling, within
 
 from nondum.sdk.errors import Problem
-from nondum.transport.bridge import outgoing, packets
+from nondum.transport.bridge import Exporter, outgoing, packets
 from nondum.transport.bridge.packets import Claim, Handled, Opened, Over, Pong
+from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import HostKeys
 from nondum.transport.peers.refusals import Reason
 
@@ -241,6 +243,15 @@ async def test_stranger_without_keys_gets_nothing() -> None:
         writer.close()
         await within(host.read(READER, granted).opened)
         assert host.exporter.refusals.counts[Reason.GARBAGE] == 1
+
+
+async def test_bridge_listens_at_addresses_of_this_machine_only() -> None:
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    exporter = Exporter(context, READER)
+    with pytest.raises(PeerRefused, match="ADDRESS_UNUSABLE"):
+        await exporter.start(("203.0.113.9",))
+    exporter.close()
+    context.term()
 
 
 async def test_signs_of_life_tell_the_owners_clock() -> None:
