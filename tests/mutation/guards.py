@@ -137,6 +137,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     # How they are confined.
     f"{_H}/confinement/choice.py": ("tests/confinement/test_level.py",),
     f"{_H}/confinement/level.py": ("tests/confinement/test_level.py",),
+    f"{_H}/confinement/refusals.py": ("tests/confinement/test_refused_calls.py",),
     f"{_H}/confinement/systemd.py": ("tests/confinement/test_systemd.py",),
     f"{_H}/confinement/systemd_warden.py": ("tests/confinement/test_systemd.py",),
     f"{_H}/helper/requests.py": (f"{_TH}/helper/test_requests.py",),
@@ -177,6 +178,13 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/bridge/jpeg.py": (f"{_TH}/bridge/test_jpeg.py",),
     f"{_H}/bridge/remote_streams.py": _STREAMS,
     f"{_H}/bridge/shared_streams.py": _STREAMS,
+    f"{_H}/peers/heard.py": (f"{_TH}/peers/test_shared.py",),
+    f"{_H}/peers/serving.py": (f"{_TH}/peers/test_serving.py",),
+    f"{_H}/peers/goals.py": (f"{_TH}/peers/test_goals.py",),
+    f"{_H}/peers/pairing_desk.py": (f"{_TH}/peers/test_pairing_desk.py",),
+    f"{_H}/peers/trust_keeper.py": (f"{_TH}/peers/test_trust_keeper.py",),
+    f"{_H}/peers/placement/fetching.py": (f"{_TH}/peers/placement/test_fetching.py",),
+    f"{_H}/peers/placement/taking.py": ("tests/daemon/test_placed_by_strangers.py",),
     # Which other hosts are let in, and what they may say.
     f"{_T}/peers/allowance.py": (f"{_TT}/peers/test_allowance.py",),
     f"{_T}/peers/certificate.py": _PEER_KEYS,

@@ -6,7 +6,8 @@ Refusing is raising, telling a problem, or returning what is wrong. A step is wh
   `a or b` each is a step of its own, and of `not (a and b)` and `not 0 < a <= 9`, too;
 - the condition that must hold if the refusal that follows, or stands in `else`, is not to come;
 - a `case` or `except` that does nothing but refuse, and the loop that finds what to tell;
-- the call by which the flaws that another function finds are told with the others.
+- the call by which the flaws that another function finds are told with the others;
+- a row of a table of what workers are refused (`TABLES`).
 
 Without the step, the refusal never comes; what its condition reads on the way is still read.
 """
@@ -36,6 +37,9 @@ _MACHINE = frozenset(
 """What these tell went wrong in this machine, and not with what was plugged in."""
 _JUDGES = re.compile(r"(flaw|overlap|use|excess|contradiction|twice)s?$")
 """What functions are called that return what is wrong as text."""
+
+TABLES = frozenset({"host/nondum/host/confinement/refusals.py"})
+"""Modules whose tables say what is refused, row by row."""
 
 _Function = ast.FunctionDef | ast.AsyncFunctionDef
 _Branch = ast.If | ast.match_case | ast.ExceptHandler
@@ -85,7 +89,9 @@ def steps_of(module: str, text: str) -> tuple[Step, ...]:
     """
     starts = _line_starts(text)
     steps: dict[tuple[int, int], Step] = {}
-    for from_, to, instead, told in _Finder().found(ast.parse(text)):
+    tree = ast.parse(text)
+    rows = _rows(tree) if module in TABLES else ()
+    for from_, to, instead, told in (*_Finder().found(tree), *rows):
         start, end = _offset(*from_, starts, text), _offset(*to, starts, text)
         source = text[start:end]
         condition = " ".join(told.replace("{}", source).split())
@@ -284,6 +290,30 @@ def _necessities(test: ast.expr) -> Iterator[_Found]:
             yield from _bounds(test)
         case _:
             yield _whole(test, "(({}) or True)", "not ({})")
+
+
+def _rows(module: ast.Module) -> Iterator[_Found]:
+    """The rows of a module's tables: groups, rules, and calls by their names. In the place of one
+    stands nothing."""
+    for statement in module.body:
+        if isinstance(statement, ast.Assign | ast.AnnAssign) and statement.value is not None:
+            for node in ast.walk(statement.value):
+                match node:
+                    case ast.Dict(keys=keys, values=values):
+                        for key, value in zip(keys, values, strict=True):
+                            if isinstance(key, ast.Constant) and isinstance(key.value, str):
+                                yield _Found(_start(key), _end(value), "**dict()", ast.unparse(key))
+                    case ast.Tuple(elts=parts) | ast.Call(func=ast.Name(id="_all"), args=parts):
+                        yield from (_whole(one, "*()") for one in parts if _is_row(one))
+
+
+def _is_row(part: ast.expr) -> bool:
+    match part:
+        case ast.Constant(value=str()):
+            return True
+        case ast.Call(func=ast.Name(id="Rule")):
+            return True
+    return False
 
 
 def _bounds(between: ast.Compare) -> Iterator[_Found]:

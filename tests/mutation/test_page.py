@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tests.mutation import page
 from tests.mutation.guards import ASIDE, GUARDS, ROOMS, SPARED
 from tests.mutation.page import Key
-from tests.mutation.steps import steps_in, steps_of
+from tests.mutation.steps import TABLES, steps_in, steps_of
 
 ROOT = Path(__file__).parents[2]
 
@@ -84,6 +84,17 @@ def test_a_step_is_what_leads_to_a_refusal(source: str, conditions: list[str]) -
         assert without[: step.start] == source[: step.start]
         assert without.endswith(source[step.end :])
         assert without != source
+
+
+def test_each_row_of_a_table_of_refusals_is_a_step() -> None:
+    source = 'GROUPS = {"a": _all("x", *("y", "z")), "b": (Rule("w", 1, equal=(5,)),)}'
+    (module,) = TABLES
+    assert [step.condition for step in steps_of(module, source)] == [
+        *("'a'", '"x"', '"y"', '"z"', "'b'", 'Rule("w", 1, equal=(5,))')
+    ]
+    for step in steps_of(module, source):
+        ast.parse(step.removed(source))
+    assert steps_of("m.py", source) == ()
 
 
 def test_steps_are_found_behind_letters_of_many_bytes() -> None:

@@ -18,6 +18,7 @@ from nondum.host.catalogue.records import (
     Snapshot,
 )
 from nondum.host.events import FactForgotten, FactKnown, StreamFlowing
+from nondum.host.peers import heard
 from nondum.host.peers.heard import (
     BELOW_OWN,
     Introduced,
@@ -165,7 +166,12 @@ def test_peer_speaks_of_its_own_streams_only() -> None:
     [
         ("component/Bad Id", {}, "its id is no id of a component"),
         ("component/a", {}, "readiness or rank is missing"),
+        ("component/a", {"ready": 1, "rank": 1}, "readiness or rank is missing"),
+        ("component/a", {"ready": True, "rank": True}, "readiness or rank is missing"),
         ("component/a", {"ready": True, "rank": 1}, "the list of what is withheld is missing"),
+        ("component/a", {"ready": True, "rank": 1, "withheld": "a"}, "the list of what is"),
+        ("component/a", {"ready": True, "rank": 1, "withheld": [7]}, "the list of what is"),
+        ("component/a", {"ready": True, "rank": 1, "withheld": []}, "DESCRIPTION_INVALID"),
         ("mount/rover__a__b", {"xyz": [0, 0, 0], "rpy": [0, 0, 0]}, "the unit is not its own"),
         ("mount/mule__a__b", {"xyz": [0, 0], "rpy": [0, 0, 0]}, "xyz is not three numbers"),
         ("device/usb1", {}, "component is missing"),
@@ -180,6 +186,22 @@ def test_entry_that_is_wrong_costs_itself_and_is_told(
     (problem,) = record.problems
     assert problem.code == "PEER_ENTRY"
     assert told in problem.message
+
+
+def test_only_so_many_components_are_taken_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(heard, "MOST_COMPONENTS", 1)
+    (key, body), *_ = standing(snapshot(component()), Policy()).items()
+    assert key == "component/watcher"
+    record = record_of(ME, {key: body, "component/watcher-2": body})
+    assert len(record.components) == 1
+    assert [problem.code for problem in record.problems] == ["PEER_ENTRY"]
+
+
+@pytest.mark.parametrize("value", [{"type": "nothing"}, 7, "text"])
+def test_fact_with_a_value_that_is_no_message_says_nothing(value: object) -> None:
+    said: dict[str, Any] = {"predicate": "sees", "arguments": ["mule__watcher__eye", "mule"]}
+    assert len(list(claims_of("mule", {"fact/watcher/1": said}))) == 1
+    assert list(claims_of("mule", {"fact/watcher/1": {**said, "value": value}})) == []
 
 
 KEYS = st.builds(
