@@ -185,6 +185,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/peers/trust_keeper.py": (f"{_TH}/peers/test_trust_keeper.py",),
     f"{_H}/peers/placement/fetching.py": (f"{_TH}/peers/placement/test_fetching.py",),
     f"{_H}/peers/placement/taking.py": ("tests/daemon/test_placed_by_strangers.py",),
+    f"{_H}/peers/placement/handover.py": ("tests/daemon/test_placed_by_strangers.py",),
     # Which other hosts are let in, and what they may say.
     f"{_T}/peers/allowance.py": (f"{_TT}/peers/test_allowance.py",),
     f"{_T}/peers/certificate.py": _PEER_KEYS,
@@ -203,9 +204,9 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_T}/peers/public_file.py": (f"{_TT}/peers/test_public_file.py",),
     f"{_T}/peers/roster.py": (
         *_ADMISSION,
-        *(f"{_TT}/peers/test_{t}.py" for t in ("allowance", "death")),
+        *(f"{_TT}/peers/test_{each}.py" for each in ("allowance", "calls", "death")),
     ),
-    f"{_T}/peers/session.py": _PEER_CALLS,
+    f"{_T}/peers/session.py": (_ADMISSION[0], *_PEER_CALLS),
     f"{_T}/peers/trust.py": (*_PEER_KEYS, *_ADMISSION),
     f"{_T}/peers/trust_file.py": _PEER_KEYS,
     f"{_T}/peers/zap.py": _ADMISSION,
@@ -282,6 +283,7 @@ ASIDE: Mapping[str, str] = {
 
 _FORM = "what it refuses is not in the one form of a certificate, either"
 _LIMIT = "tells of a limit of this host"
+_EITHER = "where there is no code, there is no try either, and each is refused"
 _MONITOR = "the socket's monitor tells of the same end"
 SPARED: Mapping[tuple[str, str], str] = {
     (f"{_T}/bridge/outgoing.py", "case Sent.GONE"): _MONITOR,
@@ -300,6 +302,8 @@ SPARED: Mapping[tuple[str, str], str] = {
         f"{_T}/peers/node.py",
         "self._roster.session(peer).notify(Notice(method, args)) is Sent.FULL",
     ): _LIMIT,
+    (f"{_T}/peers/pairing_channel.py", "not isinstance(shown, Comparing)"): _EITHER,
+    (f"{_T}/peers/pairing_channel.py", "self._try is None"): _EITHER,
     (f"{_T}/peers/certificate.py", "len(data) > MAX_BYTES"): _FORM,
     (f"{_T}/peers/certificate.py", "header != _HEADER"): _FORM,
     (f"{_T}/peers/certificate.py", 'names != (*_FIELDS, "")'): _FORM,

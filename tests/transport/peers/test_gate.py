@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from datetime import UTC, datetime
 
 import pytest
+import zmq
 from tests.transport.peers.hosts import PATIENCE_S, host, identity, trusting, two_hosts
 from tests.transport.peers.test_admission import hello_of, raw_dealer
 
@@ -15,14 +17,15 @@ from nondum.transport.peers import (
     Loss,
     PeerKey,
     PeerLost,
+    PeerRefused,
     PeerUp,
     Reason,
     Trust,
     node,
 )
 from nondum.transport.peers.certificate import new_fleet
-from nondum.transport.peers.gate import Gate
-from nondum.transport.peers.messages import Notice, encode
+from nondum.transport.peers.gate import Acquaintance, Gate, TurnedAway
+from nondum.transport.peers.messages import Hello, Notice, Ping, encode
 from nondum.transport.peers.zap import DOMAIN, Knock, parse
 
 ME, PAIRED, REVOKED, OTHER = (HostKeys.generate() for _ in range(4))
@@ -81,6 +84,77 @@ def test_host_without_keys_is_met_on_this_machine_only(asked: Knock, reason: Rea
     assert judged(asked, keys=None) is reason
 
 
+def hello(key: PeerKey, *, epoch: int = 7, term: int = 1) -> Hello:
+    return Hello((1,), "rover", key, epoch, term, b"")
+
+
+def test_life_of_a_peer_that_is_over_does_not_come_back() -> None:
+    known = Acquaintance()
+    assert known.meet(hello(PAIRED.public, epoch=1))
+    assert not known.meet(hello(PAIRED.public, epoch=1))
+    assert known.meet(hello(PAIRED.public, epoch=2, term=3))
+    for old in (hello(PAIRED.public, epoch=1), hello(PAIRED.public, epoch=2, term=2)):
+        with pytest.raises(TurnedAway) as away:
+            known.meet(old)
+        assert away.value.reason is Reason.DUPLICATE
+
+
+@pytest.mark.parametrize(
+    ("key", "proved", "reason"),
+    [
+        (ME, ME, Reason.DUPLICATE),
+        (PAIRED, OTHER, Reason.NOT_PROVED),
+        (PAIRED, None, Reason.NOT_PROVED),
+        (REVOKED, REVOKED, Reason.REVOKED),
+        (OTHER, OTHER, Reason.UNKNOWN_KEY),
+    ],
+)
+def test_greeting_is_turned_away_for_its_key(
+    key: HostKeys, proved: HostKeys | None, reason: Reason
+) -> None:
+    trust = Trust(paired={**TRUST.paired, ME.public: "base"}, revoked=TRUST.revoked)
+    gate = Gate(Identity("base", ME), trust, lambda: datetime.now(UTC))
+    assert gate.admit(hello(PAIRED.public), PAIRED.public).name == "rover"
+    with pytest.raises(TurnedAway) as away:
+        gate.admit(hello(key.public), proved.public if proved else None)
+    assert away.value.reason is reason
+
+
+@pytest.mark.anyio
+async def test_host_listens_at_addresses_of_this_machine_only() -> None:
+    with pytest.raises(PeerRefused, match="ADDRESS_UNUSABLE"):
+        async with host(identity("base"), address="tcp://203.0.113.9:0"):
+            pass
+
+
+@pytest.mark.anyio
+async def test_link_begins_with_a_greeting_and_has_no_other() -> None:
+    base, rover = identity("base"), identity("rover")
+    async with host(base, trusting(rover)) as there:
+        with raw_dealer(there, rover) as rude:
+            rude.send(encode(Ping(1)))
+            await there.counted(Reason.GARBAGE)
+            assert not there.node.peers
+        with raw_dealer(there, rover) as twice:
+            twice.send(hello_of(rover))
+            await there.told(PeerUp, rover.key)
+            twice.send(hello_of(rover))
+            assert (await there.told(PeerLost)).reason is Loss.VIOLATED
+            await there.counted(Reason.GARBAGE, 2)
+
+
+@pytest.mark.anyio
+async def test_two_peers_of_one_name_are_not_both_let_in() -> None:
+    base, rover, other = identity("base"), identity("rover"), identity("rover")
+    async with host(base, trusting(rover, other)) as there:
+        with raw_dealer(there, rover) as first, raw_dealer(there, other) as second:
+            first.send(hello_of(rover))
+            await there.told(PeerUp, rover.key)
+            second.send(hello_of(other))
+            await there.counted(Reason.DUPLICATE)
+            assert list(there.node.peers) == [rover.key]
+
+
 @pytest.mark.anyio
 async def test_message_under_a_key_that_was_revoked_meanwhile_is_not_read() -> None:
     """Also if the link was not cut yet."""
@@ -126,6 +200,7 @@ async def test_message_under_another_key_than_the_links_is_not_read(
             await there.told(PeerUp, rover.key)
         with raw_dealer(there, other, routing_id=b"chosen") as second:
             while not there.node.refusals.counts.get(Reason.NOT_PROVED):
-                second.send(encode(Notice("hear", {})))
+                with contextlib.suppress(zmq.Again):  # as many wait as may
+                    second.send(encode(Notice("hear", {})), zmq.NOBLOCK)
                 await asyncio.sleep(0)
         assert there.servant.notices.empty()
