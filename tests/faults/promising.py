@@ -19,6 +19,7 @@ from tests.kit.payloads import sha256
 from tests.kit.signing import Key, signed, trust_of
 
 from nondum.host.catalogue import opening
+from nondum.host.catalogue.backups import Backups
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import Safety
 from nondum.host.lifecycle import installation, installing, rebuilding
@@ -69,7 +70,7 @@ def lose_catalogue(folders: Folders) -> None:
     assert aside is not None
     promise(Kind.SAFE, aside)
     promise(Kind.GONE, folders.catalogue)
-    opening.Backups(folders.catalogue).restore(opening.Backups(folders.catalogue).newest)
+    Backups(folders.catalogue).restore(Backups(folders.catalogue).newest)
     promise(Kind.SAFE, folders.catalogue)
 
 

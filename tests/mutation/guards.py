@@ -178,6 +178,8 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/bridge/jpeg.py": (f"{_TH}/bridge/test_jpeg.py",),
     f"{_H}/bridge/remote_streams.py": _STREAMS,
     f"{_H}/bridge/shared_streams.py": _STREAMS,
+    f"{_H}/peers/desk.py": (f"{_TH}/peers/test_desk.py",),
+    f"{_H}/peers/stream_desk.py": (f"{_TH}/peers/test_desk.py",),
     f"{_H}/peers/heard.py": (f"{_TH}/peers/test_shared.py",),
     f"{_H}/peers/serving.py": (f"{_TH}/peers/test_serving.py",),
     f"{_H}/peers/goals.py": (f"{_TH}/peers/test_goals.py",),
@@ -231,6 +233,7 @@ ROOMS = (
     f"{_T}/bridge",
     f"{_T}/peers",
     f"{_H}/bridge",
+    f"{_H}/peers",
 )
 """Folders in which every module that refuses something is guarded, or stands aside."""
 
@@ -275,6 +278,11 @@ ASIDE: Mapping[str, str] = {
     f"{_T}/peers/dial.py": "tells why a peer is not reached",
     f"{_T}/peers/errands.py": "answers with what work of this host's own has failed by",
     f"{_T}/peers/pairing_door.py": "tells that this machine cannot listen there",
+    f"{_H}/peers/finder.py": "hands on the addresses that the mesh takes",
+    f"{_H}/peers/peering.py": "says that a peer is not there",
+    f"{_H}/peers/trust_orders.py": "asks a person of this host which peer is meant",
+    f"{_H}/peers/placement/decide.py": "decides where payloads of this host go",
+    f"{_H}/peers/placement/orders.py": "tells a person of this host what cannot be placed",
     f"{_H}/bridge/outbound.py": "sends what workers of this host made; `transport/bridge` judges"
     " its reader",
     f"{_H}/bridge/service.py": "does what its own daemon says",
@@ -313,6 +321,8 @@ SPARED: Mapping[tuple[str, str], str] = {
     (f"{_T}/fleet/zenoh_node.py", "link.session is None and not link.is_over"): (
         "tells of a host that does not answer, which is let in by nothing"
     ),
+    (f"{_H}/peers/goals.py", "able"): "asks a person which of two hosts is meant",
+    (f"{_H}/peers/goals.py", "except NondumError"): "passes on why a peer has refused",
     (f"{_H}/bridge/remote_streams.py", "wanted.kind != kind"): (
         "both readers are workers of this host, whose plan has matched the types"
     ),

@@ -90,8 +90,10 @@ def steps_of(module: str, text: str) -> tuple[Step, ...]:
     starts = _line_starts(text)
     steps: dict[tuple[int, int], Step] = {}
     tree = ast.parse(text)
-    rows = _rows(tree) if module in TABLES else ()
-    for from_, to, instead, told in (*_Finder().found(tree), *rows):
+    found = list(_Finder().found(tree))
+    if module in TABLES:
+        found += _rows(tree)
+    for from_, to, instead, told in found:
         start, end = _offset(*from_, starts, text), _offset(*to, starts, text)
         source = text[start:end]
         condition = " ".join(told.replace("{}", source).split())

@@ -13,13 +13,13 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from zmq.utils import z85
 
 from nondum.transport.peers import (
     HostKeys,
     PeerRefused,
     Trust,
     fingerprint,
-    keys,
     load_or_create,
     private_file,
     trust_file,
@@ -124,8 +124,8 @@ def test_key_has_one_text_whatever_the_reader_of_z85_takes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Some readers let groups beyond 2**32 wrap around: another text for the same key."""
-    decode = keys.z85.decode
-    monkeypatch.setattr(keys.z85, "decode", lambda text: decode(text.replace("#", "0")))
+    decode = z85.decode
+    monkeypatch.setattr(z85, "decode", lambda text: decode(text.replace("#", "0")))
     with pytest.raises(PeerRefused, match="KEY_MALFORMED"):
         parse_key("#" * 40)
 
