@@ -137,6 +137,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     # How they are confined.
     f"{_H}/confinement/choice.py": ("tests/confinement/test_level.py",),
     f"{_H}/confinement/level.py": ("tests/confinement/test_level.py",),
+    f"{_H}/confinement/bubblewrap.py": ("tests/confinement/test_room_command.py",),
     f"{_H}/confinement/refusals.py": ("tests/confinement/test_refused_calls.py",),
     f"{_H}/confinement/systemd.py": ("tests/confinement/test_systemd.py",),
     f"{_H}/confinement/systemd_warden.py": ("tests/confinement/test_systemd.py",),

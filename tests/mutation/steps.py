@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -38,8 +38,12 @@ _MACHINE = frozenset(
 _JUDGES = re.compile(r"(flaw|overlap|use|excess|contradiction|twice)s?$")
 """What functions are called that return what is wrong as text."""
 
-TABLES = frozenset({"host/nondum/host/confinement/refusals.py"})
-"""Modules whose tables say what is refused, row by row."""
+_CONFINEMENT = "host/nondum/host/confinement"
+TABLES: Mapping[str, tuple[str, ...]] = {
+    f"{_CONFINEMENT}/refusals.py": ("GROUPS", "WITHOUT_NAMESPACES", "SOCKETS_OF_THE_HOST"),
+    f"{_CONFINEMENT}/bubblewrap.py": ("NAMESPACES",),
+}
+"""Module → its tables that say, row by row, what workers are kept from."""
 
 _Function = ast.FunctionDef | ast.AsyncFunctionDef
 _Branch = ast.If | ast.match_case | ast.ExceptHandler
@@ -92,7 +96,7 @@ def steps_of(module: str, text: str) -> tuple[Step, ...]:
     tree = ast.parse(text)
     found = list(_Finder().found(tree))
     if module in TABLES:
-        found += _rows(tree)
+        found += _rows(tree, TABLES[module])
     for from_, to, instead, told in found:
         start, end = _offset(*from_, starts, text), _offset(*to, starts, text)
         source = text[start:end]
@@ -294,11 +298,12 @@ def _necessities(test: ast.expr) -> Iterator[_Found]:
             yield _whole(test, "(({}) or True)", "not ({})")
 
 
-def _rows(module: ast.Module) -> Iterator[_Found]:
-    """The rows of a module's tables: groups, rules, and calls by their names. In the place of one
-    stands nothing."""
+def _rows(module: ast.Module, tables: Collection[str]) -> Iterator[_Found]:
+    """The rows of tables: groups, rules, calls and flags by their names. In the place of one stands
+    nothing."""
     for statement in module.body:
-        if isinstance(statement, ast.Assign | ast.AnnAssign) and statement.value is not None:
+        if isinstance(statement, ast.AnnAssign) and ast.unparse(statement.target) in tables:
+            assert statement.value is not None
             for node in ast.walk(statement.value):
                 match node:
                     case ast.Dict(keys=keys, values=values):

@@ -87,8 +87,8 @@ def test_a_step_is_what_leads_to_a_refusal(source: str, conditions: list[str]) -
 
 
 def test_each_row_of_a_table_of_refusals_is_a_step() -> None:
-    source = 'GROUPS = {"a": _all("x", *("y", "z")), "b": (Rule("w", 1, equal=(5,)),)}'
-    (module,) = TABLES
+    source = 'GROUPS: M = {"a": _all("x", *("y", "z")), "b": (Rule("w", 1, equal=(5,)),)}'
+    module = next(module for module, tables in TABLES.items() if "GROUPS" in tables)
     assert [step.condition for step in steps_of(module, source)] == [
         *("'a'", '"x"', '"y"', '"z"', "'b'", 'Rule("w", 1, equal=(5,))')
     ]

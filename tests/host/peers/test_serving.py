@@ -5,11 +5,13 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
-from tests.host.peers.test_shared import component, snapshot
+from tests.host.peers.test_shared import component, merged_watcher, snapshot
 
+from nondum.host.mind.composition import Composition
 from nondum.host.peers.offered import Policy
 from nondum.host.peers.serving import FactValue, Serving
 from nondum.host.workers.call import Call
@@ -58,6 +60,37 @@ class Behaving:
 def serving(workers: Behaving, policy: Policy = ALL, own: Sequence[str] = ()) -> Serving:
     here = snapshot(component())
     return Serving(workers, lambda: here, lambda: None, lambda: policy, lambda: own, lambda: None)
+
+
+def composed(workers: Behaving, own: Sequence[str] = ()) -> Serving:
+    """Where it is known what behaviours take."""
+    here = snapshot(component())
+    composition = cast(Composition, SimpleNamespace(merged=merged_watcher()))
+    return Serving(
+        workers, lambda: here, lambda: composition, lambda: ALL, lambda: own, lambda: None
+    )
+
+
+async def test_what_is_in_use_here_is_not_taken() -> None:
+    workers = Behaving()
+    served = composed(workers, own=("idle mule__watcher__eye",))
+    with pytest.raises(CallFailed, match="UNIT_TAKEN"):
+        await served.behave(errand(LOOK))
+    assert workers.calls == []
+
+
+async def test_what_a_peer_uses_is_told_and_not_taken_by_another() -> None:
+    workers = Behaving()
+    served = composed(workers)
+    first = asyncio.create_task(served.behave(errand(LOOK)))
+    await workers.begun.wait()
+    taken = {"idle mule__watcher__eye": "rover", "free mule__watcher__image": "rover"}
+    assert served.taken == taken
+    with pytest.raises(CallFailed, match="UNIT_TAKEN"):
+        await served.behave(errand(LOOK, "mule-2"))
+    workers.calls[0].end(RunState.SUCCEEDED)
+    await first
+    assert served.taken == {}
 
 
 def errand(args: Body, caller: str = "rover") -> Errand:

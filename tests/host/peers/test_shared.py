@@ -31,6 +31,7 @@ from nondum.host.peers.heard import (
 from nondum.host.peers.offered import Policy, changes, passing, standing
 from nondum.host.peers.uses import taken_by
 from nondum.planning.contribution import Contribution
+from nondum.planning.domain import Merged
 from nondum.planning.merge import merge
 from nondum.sdk.description import Behaviour, Fragment, Output, PluginDescription, Unit
 
@@ -243,7 +244,8 @@ def test_changes_lead_from_one_to_the_other(
     assert now == after
 
 
-def test_behaviour_takes_what_its_action_deletes_of_what_can_be_taken() -> None:
+def merged_watcher() -> Merged:
+    """What the behaviour `look` of the watcher means."""
     domain = """
     (define (domain watcher)
       (:predicates (rested ?u - unit))
@@ -262,6 +264,11 @@ def test_behaviour_takes_what_its_action_deletes_of_what_can_be_taken() -> None:
     here = Contribution.from_description(described, host="mule", component="watcher")
     merged = merge([here], "mule")
     assert not merged.quarantined, merged.quarantined
+    return merged
+
+
+def test_behaviour_takes_what_its_action_deletes_of_what_can_be_taken() -> None:
+    merged = merged_watcher()
     arguments = {"u": "mule__watcher__eye", "o": "mule__watcher__image", "h": "rover"}
     assert taken_by(merged, "watcher", "look", arguments) == {
         "free mule__watcher__image",
