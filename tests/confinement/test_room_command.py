@@ -1,4 +1,4 @@
-"""How bubblewrap is called: which namespaces are its worker's own, and what of the host is there."""
+"""How bubblewrap is called: which namespaces a worker has, and what of the host is there."""
 
 from __future__ import annotations
 

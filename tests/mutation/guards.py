@@ -322,6 +322,9 @@ SPARED: Mapping[tuple[str, str], str] = {
     (f"{_T}/fleet/zenoh_node.py", "link.session is None and not link.is_over"): (
         "tells of a host that does not answer, which is let in by nothing"
     ),
+    (f"{_H}/peers/serving.py", "component is None"): (
+        "nothing is offered of a component that is not there"
+    ),
     (f"{_H}/peers/goals.py", "able"): "asks a person which of two hosts is meant",
     (f"{_H}/peers/goals.py", "except NondumError"): "passes on why a peer has refused",
     (f"{_H}/bridge/remote_streams.py", "wanted.kind != kind"): (

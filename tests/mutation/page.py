@@ -20,11 +20,11 @@ that misses it. (`--only wheel.py` tries a part, `--all` what is here already, t
 A step is what leads to a refusal of something that was plugged in, or that a worker, a program of
 this machine, or another host, has sent: a condition, of `a or b` each, and each bound of two; a
 condition that must hold, or what follows refuses; a kind of error that is answered with a refusal;
-the loop or call by which flaws that were found are told; a row of a table of refused system calls, or
-of namespaces. What limits of this machine do (a full disk) is no step. Tests of properties
-(Hypothesis) count only if they fail with each of three seeds. Modules that refuse something and stand aside are in
-`tests/mutation/guards.py`, with the reason; a test sees that no module is in neither list. A step
-that another one makes up for has no test, and the reason stands in its place.
+the loop or call by which flaws that were found are told; a row of a table of refused system calls,
+or of namespaces. What limits of this machine do (a full disk) is no step. Tests of properties
+(Hypothesis) count only if they fail with each of three seeds. Modules that refuse something and
+stand aside are in `tests/mutation/guards.py`, with the reason; a test sees that no module is in
+neither list. A step that another one makes up for has no test, and the reason stands in its place.
 """
 MISSING = "**no test misses it**"
 _SPARED = "no test: "
