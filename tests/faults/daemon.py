@@ -5,7 +5,8 @@ The orders are one JSON object: `root`, and optionally
 - `kill` ([when, step, event]): SIGKILL itself `BEFORE` or `AFTER` the commit of that transition, of
   a payload or (step is then a component's state) of a component,
 - `nudge` ([[step, what], …]): `pull` the drive, `plug` another one, `retry` the payload, report its
-  worker `lost`, … as soon as that step was committed, one after the other,
+  worker `lost`, `keep` what lies beside the catalogue (tests/faults/kept.py), … as soon as that
+  step was committed, one after the other,
 - `kill_while` (a drive's state): SIGKILL itself once a drive was committed to be in it,
 - `script`: things to do one after the other, each when all that came before has settled: `plug`
   and `pull` slots, `retry`, `send` or `distrust` the payload, `end`; or `end now`.
@@ -25,6 +26,8 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
+
+from tests.faults import kept
 
 from nondum.host import events
 from nondum.host.catalogue.catalogue import Catalogue
@@ -67,6 +70,8 @@ class DeadlyCatalogue(Catalogue):
     told: int
     """Descriptor of the file `told`: it was opened before anything could fail."""
     entries = 0
+    kept = 0
+    """How often it has kept what lies beside the catalogue."""
     committed: asyncio.Event
     """Set at each commit."""
     is_scanned = False
@@ -133,6 +138,11 @@ class DeadlyCatalogue(Catalogue):
         match what:
             case "plug":
                 (root / "slots" / OTHER).symlink_to(root / "drives" / OTHER)
+            case "keep":
+                self.kept += 1
+                folders = Folders(root / "state")
+                for line in kept.lines(kept.keep(folders, self.kept), folders.root):
+                    self.tell(line)
             case "pull":
                 (root / "slots" / SLOT).unlink()
                 self.bus.emit(events.DriveRemoved(SLOT))

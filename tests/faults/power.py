@@ -1,29 +1,36 @@
 """The power is cut after any write that a host's disk was ever given.
 
-One life of a daemon (installation, upgrade, removals) is recorded; its disk is then brought to
-where it was after each of its writes, with and without what had not been flushed yet, mounted as
-after a power failure, and a daemon started on it.
+One life of a daemon (installation, upgrade, removals; trust, peers, notes and backups beside them)
+is recorded; its disk is then brought to where it was after each of its writes, with and without
+what had not been flushed yet, mounted as after a power failure, and a daemon started on it.
 """
 
 from __future__ import annotations
 
+import bisect
 import contextlib
 import random
 import shutil
+import sqlite3
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tests.faults.model import Ended, Told, check
+from tests.faults import kept
+from tests.faults.model import Ended, Told, check, look
 from tests.faults.play import Player
 from tests.faults.points import prepare
-from tests.faults.recorded_disk import Write, cut, recorded, writes
+from tests.faults.recorded_disk import Write, cut, drop, recorded, writes
 from tests.faults.ways import newer, sound
 from tests.kit.fork_server import Nursery
 
 SIZE_MB = 48
 SCRIPT = ("plug a", "plug b", "pull b", "pull a")
+_STORED = ("stored", "probed", "active", "superseded")
+"""Steps of payloads whose files are on disk, as it is promised."""
+KEEPS = (("ACTIVE", "keep"), ("SUPERSEDED", "keep"))
+"""When it keeps what lies beside the catalogue."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +64,8 @@ def live(nursery: Nursery, folder: Path, script: Sequence[str] = SCRIPT) -> Life
     (folder / "disk").mkdir()
     with recorded(folder / "disk", SIZE_MB, root / "state") as log:
         player = Player(root, script)
-        nursery.run({"root": str(root), "log": str(log)}, player.play, expect=0)
+        orders = {"root": str(root), "log": str(log), "nudge": [list(one) for one in KEEPS]}
+        nursery.run(orders, player.play, expect=0)
         assert not player.stuck
     return Life(folder, tuple(writes(log)))
 
@@ -80,11 +88,31 @@ def fail(life: Life, after: int, seed: int | None, folder: Path) -> Ended:
     cut(image, list(life.done[:after]), random.Random(seed) if seed is not None else None)
     (root / "slots").mkdir(parents=True)
     (root / "slots/a").symlink_to(life.root / "drives/a")
-    told = Told.of(life.root, life.done[after - 1].end if after else 0)
+    log = life.done[after - 1].end if after else 0
     with _mounted(image, root / "state"):
-        ended = check(root, told)
-        wrong = [*ended.wrong, *_unsound(root / "state")]
+        lost = list(kept.lost(life.root, root / "state", log))
+        ended = check(root, Told.of(life.root, log))
+        wrong = [*lost, *ended.wrong, *_unsound(root / "state")]
     return replace(ended, wrong=tuple(wrong))
+
+
+def promises(life: Life) -> Iterator[int]:
+    """After how many writes something was promised, each time."""
+    ends = [write.end for write in life.done]
+    for log in kept.moments(life.root):
+        yield bisect.bisect_right(ends, log)
+
+
+def lost(life: Life, after: int, folder: Path) -> list[str]:
+    """What is wrong with a disk of which the power failure took all that was not flushed; no
+    daemon is started on it."""
+    image, root = folder / "image", folder / "host"
+    shutil.copyfile(life.first, image)
+    drop(image, list(life.done[:after]))
+    log = life.done[after - 1].end if after else 0
+    with _mounted(image, root / "state"):
+        wrong = [*kept.lost(life.root, root / "state", log), *_unsound(root / "state", _STORED)]
+        return [*wrong, *look(root, Told.of(life.root, log))]
 
 
 @contextlib.contextmanager
@@ -97,9 +125,27 @@ def _mounted(image: Path, at: Path) -> Iterator[None]:
         subprocess.run(["umount", "--lazy", str(at)], check=True)
 
 
-def _unsound(state: Path) -> Iterator[str]:
-    """What only a power failure leaves behind: files that are there, and empty."""
-    for name in ("store", "payloads", "installed", "backups"):
+def _unsound(state: Path, steps: Collection[str] = ()) -> Iterator[str]:
+    """What only a power failure leaves behind: files that are there, and empty; with `steps`, those
+    of payloads at these only, which must be there."""
+    stored = _at(state / "catalogue.sqlite", steps)
+    for key in stored:
+        if not (state / "payloads" / key / "CONTENTS").exists():
+            yield f"gone: payloads/{key}"
+    folders = [f"payloads/{key}" for key in stored] if steps else ["payloads"]
+    for name in ("store", "installed", "backups", *folders):
         for path in (state / name).rglob("*"):
             if path.is_file() and not path.stat().st_size and path.suffix in (".json", ".toml"):
                 yield f"empty: {path.relative_to(state)}"
+
+
+def _at(catalogue: Path, steps: Collection[str]) -> list[str]:
+    """Payloads that are at one of these steps."""
+    if not steps or not catalogue.exists():
+        return []
+    with contextlib.closing(sqlite3.connect(catalogue)) as connection:
+        try:
+            found = connection.execute("SELECT key, step FROM payloads").fetchall()
+        except sqlite3.OperationalError:  # its tables are not made yet
+            return []
+    return [key for key, step in found if step in steps]

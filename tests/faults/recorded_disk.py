@@ -56,12 +56,21 @@ def cut(image: Path, done: list[Write], chance: random.Random | None = None) -> 
 
     With a `chance`, what came after the last flush is there or not, each write by itself.
     """
-    flushed = max((i for i, write in enumerate(done) if not write.data), default=0)
+    flushed = _flushed(done)
     with image.open("r+b") as disk:
         for i, write in enumerate(done):
             if i < flushed or chance is None or chance.random() < 0.5:
                 disk.seek(write.offset)
                 disk.write(write.data)
+
+
+def drop(image: Path, done: list[Write]) -> None:
+    """The same, with nothing there of what came after the last flush."""
+    cut(image, done[: _flushed(done)])
+
+
+def _flushed(done: list[Write]) -> int:
+    return max((i for i, write in enumerate(done) if not write.data), default=0)
 
 
 @contextmanager

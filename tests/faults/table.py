@@ -12,11 +12,11 @@ from tests.faults.ways import COMPONENT_WAYS
 from nondum.host.transitions import TRANSITIONS
 
 WHAT = {
-    "boundary": "SIGKILL before and after the commit of each row of the transition tables",
+    "boundary": "SIGKILL before or after the commit of a row of the transition tables",
     "kill": "SIGKILL of the process that makes the nth call of a kind (strace)",
     "moment": "SIGKILL at a random moment of an installation, an upgrade and two removals",
     "error": "the nth call of a kind fails (strace: ENOSPC, EIO, EMFILE, ENOMEM, EROFS, EAGAIN)",
-    "power": "the power is cut after any write of the disk; a part of what was not flushed is lost",
+    "power": "the power is cut after a write of the disk; a part of what was not flushed is lost",
 }
 
 
@@ -31,8 +31,11 @@ def _lines(results: Sequence[Result], full: Mapping[str, int], machine: str) -> 
     yield "Written by `python -m tests.faults --table docs/reliability/faults.md`; see"
     yield f"[reliability](../reliability.md) for what is checked after each. Machine: {machine}."
     yield ""
-    yield "| fault | points | of | daemon killed | lived on | wrong | restart, median (p95, max) |"
-    yield "|---|---|---|---|---|---|---|"
+    yield "Points are drawn by lot: `sampled: N of M` are N of the M that one draw has. What was"
+    yield "not drawn, or not run yet, was not tried."
+    yield ""
+    yield "| fault | points | daemon killed | lived on | wrong | restart, median (p95, max) |"
+    yield "|---|---|---|---|---|---|"
     for kind, what in WHAT.items():
         found = [result for result in results if result.kind == kind]
         outcomes = Counter(result.outcome for result in found)
@@ -41,7 +44,8 @@ def _lines(results: Sequence[Result], full: Mapping[str, int], machine: str) -> 
         killed = len(found) if kind == "power" else outcomes["killed"]
         lived = outcomes["lived"]
         spread = _spread([result.restart_s for result in found if result.restart_s])
-        yield f"| {what} | {len(found)} | {whole} | {killed} | {lived} | {wrong} | {spread} |"
+        done = f"all {whole}" if len(found) == whole else f"sampled: {len(found)} of {whole}"
+        yield f"| {what} | {done} | {killed} | {lived} | {wrong} | {spread} |"
     yield ""
     yield "Restart is the time from opening the catalogue until the daemon has recovered and"
     yield "follows events, with one payload or two; the interpreter's own start comes on top."

@@ -1,6 +1,6 @@
 """The daemon is killed at every commit of every transition, and comes back consistent by itself.
 
-Before and after each row of both tables, each alone, twenty times: `python -m tests.faults`.
+Before and after each row of both tables, each alone, up to twenty times: `python -m tests.faults`.
 """
 
 from __future__ import annotations

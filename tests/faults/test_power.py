@@ -1,12 +1,13 @@
 """The power fails, at whatever write of the disk: what was acknowledged is there.
 
-The long form, `python -m tests.faults`, does so a thousand times.
+The long form, `python -m tests.faults`, draws up to a thousand of them.
 """
 
 from __future__ import annotations
 
 import os
 import random
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -35,6 +36,19 @@ def test_power_fails_after_some_write(life: Life, tmp_path: Path, nth: int) -> N
     ended = fail(life, after, seed, tmp_path)
     assert not ended.wrong
     assert not out_of_place(ended)
+
+
+def test_what_was_promised_is_on_the_disk_from_then_on(life: Life, tmp_path: Path) -> None:
+    """At every promise of that life, with all lost that the disk was not told to flush."""
+    at = list(power.promises(life))
+    assert len(at) > len(power.KEEPS) * 7
+    lost = {}
+    for after in at:
+        folder = tmp_path / str(after)
+        folder.mkdir(exist_ok=True)
+        lost[after] = power.lost(life, after, folder)
+        shutil.rmtree(folder)
+    assert {after: wrong for after, wrong in lost.items() if wrong} == {}
 
 
 def synced(path: Path, data: bytes, *, with_folder: bool) -> None:

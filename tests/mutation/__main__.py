@@ -24,7 +24,7 @@ from pathlib import Path
 
 from tests.campaign.rounds import Limit
 from tests.mutation import page
-from tests.mutation.guards import GUARDS
+from tests.mutation.guards import GUARDS, SPARED
 from tests.mutation.page import Key
 from tests.mutation.steps import Step, steps_in
 from tests.mutation.trial import Copy, copies
@@ -43,7 +43,9 @@ def main() -> int:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="nondum-mutation-")))
         folder.chmod(0o755)  # some tests are other users
         made = [stack.enter_context(copy) for copy in copies(ROOT, folder, os.cpu_count() or 1)]
-        steps = page.keyed(steps_in(made[0].folder, tuple(GUARDS)))
+        every = page.keyed(steps_in(made[0].folder, tuple(GUARDS)))
+        spared = {k: page.spared(SPARED[k[:2]]) for k in every if k[:2] in SPARED}
+        steps = {key: step for key, step in every.items() if key not in spared}
         tried = (
             Tried(options.folder, options.keep or options.folder, made[0].folder, steps)
             if options.folder
@@ -57,7 +59,7 @@ def main() -> int:
             and (options.only or "") in key.module
         ]
         due.sort(key=lambda key: key in known)
-        guards = {key: known[key] for key in steps if key in known}
+        guards = {**spared, **{key: known[key] for key in steps if key in known}}
         broken = 0
         with contextlib.suppress(KeyboardInterrupt):
             for number, (key, guard) in enumerate(_tried(made, steps, due, known, limit), start=1):
@@ -70,11 +72,11 @@ def main() -> int:
                 told = "not tried" if guard is None else guards[key]
                 sys.stdout.write(f"{limit} {number}/{len(due)} {steps[key].name}: {told}\n")
                 sys.stdout.flush()
-                _write(steps, guards, page.took(before))
+                _write(every, guards, page.took(before))
         if options.all and not options.only:
             minutes = round((time.monotonic() - began_s) / 60)
             told = f"All of them took {minutes} minutes on {len(made)} processors."
-            _write(steps, guards, told)
+            _write(every, guards, told)
     if tried:
         sys.stdout.write(f"{tried.tally} tried, {len(tried.tally.failed)} without a guard\n")
         return 1 if tried.tally.failed or broken else 0

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 _W, _TW = "wheelhouse/nondum/wheelhouse", "tests/wheelhouse"
 _H, _TH = "host/nondum/host", "tests/host"
 _S, _TS = "plugins/sdk/nondum/sdk", "tests/sdk"
+_T, _TT = "transport/nondum/transport", "tests/transport"
 _WHEELS = (f"{_TW}/test_wheel.py",)
 _MOUNTED = tuple(
     f"{_TH}/drives/test_blocks.py::{test}"
@@ -30,6 +31,15 @@ _BROUGHT = tuple(
 _RELEASES = (f"{_TH}/lifecycle/test_releases.py", f"{_TH}/trust/test_releases_of_strangers.py")
 _CONTROL = (f"{_TH}/control/test_arguments.py", f"{_TH}/control/test_control.py")
 _HELPER = (f"{_TH}/helper/test_server.py",)
+_GRANTS = tuple(f"{_TT}/bridge/test_{each}.py" for each in ("packets", "grants", "lying_owners"))
+_TELLERS = tuple(f"{_TT}/fleet/test_{each}.py" for each in ("bad_tellers", "meeting", "fleets"))
+_ZENOH = (f"{_TT}/fleet/test_zenoh.py",)
+_OWNERS = (f"{_TH}/bridge/test_hostile_owner.py", f"{_TH}/bridge/test_bridge.py")
+_STREAMS = (f"{_TH}/bridge/test_remote_streams.py",)
+_ADMISSION = tuple(f"{_TT}/peers/test_{each}.py" for each in ("gate", "admission"))
+_PEER_KEYS = (f"{_TT}/peers/test_keys.py",)
+_PAIRING = tuple(f"{_TT}/peers/test_{each}.py" for each in ("pairing", "pairing_channel"))
+_PEER_CALLS = tuple(f"{_TT}/peers/test_{each}.py" for each in ("calls", "once", "allowance"))
 
 GUARDS: Mapping[str, tuple[str, ...]] = {
     # Who is believed.
@@ -129,12 +139,80 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     # How they are confined.
     f"{_H}/confinement/choice.py": ("tests/confinement/test_level.py",),
     f"{_H}/confinement/level.py": ("tests/confinement/test_level.py",),
+    f"{_H}/confinement/bubblewrap.py": ("tests/confinement/test_room_command.py",),
+    f"{_H}/confinement/refusals.py": ("tests/confinement/test_refused_calls.py",),
     f"{_H}/helper/requests.py": (f"{_TH}/helper/test_requests.py",),
     f"{_H}/helper/disks.py": (f"{_TH}/helper/test_disks.py",),
     f"{_H}/helper/nodes.py": (f"{_TH}/helper/test_nodes.py",),
     f"{_H}/helper/service.py": (f"{_TH}/helper/test_service.py", *_HELPER),
     f"{_H}/helper/server.py": _HELPER,
     f"{_H}/helper/client.py": _HELPER,
+    # What other hosts say of themselves, and send.
+    f"{_T}/discovery/announcement.py": (
+        f"{_TT}/discovery/test_hint.py",
+        f"{_TT}/discovery/test_discovery.py",
+    ),
+    f"{_T}/discovery/asking.py": (f"{_TT}/discovery/test_asking.py",),
+    f"{_T}/discovery/book.py": (f"{_TT}/discovery/test_book.py",),
+    f"{_T}/discovery/ears.py": (
+        f"{_TT}/discovery/test_discovery.py",
+        f"{_TT}/discovery/test_networks.py",
+    ),
+    f"{_T}/discovery/hint.py": (f"{_TT}/discovery/test_hint.py",),
+    f"{_T}/discovery/packets.py": (f"{_TT}/discovery/test_packets.py",),
+    f"{_T}/discovery/static_host.py": (f"{_TT}/discovery/test_static_host.py",),
+    f"{_T}/fleet/catalogues.py": _TELLERS,
+    f"{_T}/fleet/chunk.py": (f"{_TT}/fleet/test_ledger.py", f"{_TT}/fleet/test_replica.py"),
+    f"{_T}/fleet/ledger.py": (f"{_TT}/fleet/test_ledger.py",),
+    f"{_T}/fleet/mesh.py": (f"{_TT}/fleet/test_meeting.py",),
+    f"{_T}/fleet/replica.py": (f"{_TT}/fleet/test_replica.py",),
+    f"{_T}/fleet/zenoh_line.py": _ZENOH,
+    f"{_T}/fleet/zenoh_node.py": _ZENOH,
+    f"{_T}/bridge/exporter.py": _GRANTS,
+    f"{_T}/bridge/incoming.py": _GRANTS,
+    f"{_T}/bridge/outgoing.py": _GRANTS,
+    f"{_T}/bridge/packets.py": _GRANTS,
+    f"{_T}/bridge/sockets.py": _GRANTS,
+    f"{_T}/bridge/window.py": (f"{_TT}/bridge/test_window.py",),
+    f"{_H}/bridge/bridge.py": (_OWNERS[1], *_STREAMS),
+    f"{_H}/bridge/inbound.py": (_OWNERS[0],),
+    f"{_H}/bridge/jpeg.py": (f"{_TH}/bridge/test_jpeg.py",),
+    f"{_H}/bridge/remote_streams.py": _STREAMS,
+    f"{_H}/bridge/shared_streams.py": _STREAMS,
+    f"{_H}/peers/desk.py": (f"{_TH}/peers/test_desk.py",),
+    f"{_H}/peers/stream_desk.py": (f"{_TH}/peers/test_desk.py",),
+    f"{_H}/peers/heard.py": (f"{_TH}/peers/test_shared.py",),
+    f"{_H}/peers/serving.py": (f"{_TH}/peers/test_serving.py",),
+    f"{_H}/peers/goals.py": (f"{_TH}/peers/test_goals.py",),
+    f"{_H}/peers/pairing_desk.py": (f"{_TH}/peers/test_pairing_desk.py",),
+    f"{_H}/peers/trust_keeper.py": (f"{_TH}/peers/test_trust_keeper.py",),
+    f"{_H}/peers/placement/fetching.py": (f"{_TH}/peers/placement/test_fetching.py",),
+    f"{_H}/peers/placement/taking.py": ("tests/daemon/test_placed_by_strangers.py",),
+    f"{_H}/peers/placement/handover.py": ("tests/daemon/test_placed_by_strangers.py",),
+    # Which other hosts are let in, and what they may say.
+    f"{_T}/peers/allowance.py": (f"{_TT}/peers/test_allowance.py",),
+    f"{_T}/peers/certificate.py": _PEER_KEYS,
+    f"{_T}/peers/ed25519.py": _PEER_KEYS,
+    f"{_T}/peers/fleet_files.py": (f"{_TT}/peers/test_public_file.py",),
+    f"{_T}/peers/gate.py": (*_ADMISSION, f"{_TT}/peers/test_death.py"),
+    f"{_T}/peers/identity.py": (f"{_TT}/peers/test_identity.py",),
+    f"{_T}/peers/keys.py": _PEER_KEYS,
+    f"{_T}/peers/listener.py": _ADMISSION,
+    f"{_T}/peers/messages.py": (f"{_TT}/peers/test_messages.py",),
+    f"{_T}/peers/node.py": _ADMISSION,
+    f"{_T}/peers/pairing.py": _PAIRING,
+    f"{_T}/peers/pairing_channel.py": _PAIRING[1:],
+    f"{_T}/peers/pairing_messages.py": (f"{_TT}/peers/test_pairing_messages.py",),
+    f"{_T}/peers/private_file.py": _PEER_KEYS,
+    f"{_T}/peers/public_file.py": (f"{_TT}/peers/test_public_file.py",),
+    f"{_T}/peers/roster.py": (
+        *_ADMISSION,
+        *(f"{_TT}/peers/test_{each}.py" for each in ("allowance", "calls", "death")),
+    ),
+    f"{_T}/peers/session.py": (_ADMISSION[0], *_PEER_CALLS),
+    f"{_T}/peers/trust.py": (*_PEER_KEYS, *_ADMISSION),
+    f"{_T}/peers/trust_file.py": _PEER_KEYS,
+    f"{_T}/peers/zap.py": _ADMISSION,
     # What people and programs of this machine ask for.
     f"{_H}/control/arguments.py": _CONTROL,
     f"{_H}/control/protocol.py": _CONTROL,
@@ -151,6 +229,12 @@ ROOMS = (
     f"{_H}/control",
     f"{_H}/lifecycle",
     f"{_H}/workers",
+    f"{_T}/discovery",
+    f"{_T}/fleet",
+    f"{_T}/bridge",
+    f"{_T}/peers",
+    f"{_H}/bridge",
+    f"{_H}/peers",
 )
 """Folders in which every module that refuses something is guarded, or stands aside."""
 
@@ -186,5 +270,67 @@ ASIDE: Mapping[str, str] = {
     f"{_H}/workers/supervisor.py": _RUNS,
     f"{_H}/workers/worker.py": _SPEAKS,
     f"{_H}/workers/workers.py": _RUNS,
+    f"{_T}/discovery/discovery.py": "tells of hints that have no address to go to",
+    f"{_T}/discovery/interfaces.py": "reads what the kernel lists",
+    f"{_T}/discovery/multicast.py": "tells which interfaces of this machine cannot be used",
+    f"{_T}/peers/arrivals.py": "counts what ZeroMQ has turned away",
+    f"{_T}/peers/calls.py": "bounds what this host itself asks of others",
+    f"{_T}/peers/dial.py": "tells why a peer is not reached",
+    f"{_T}/peers/errands.py": "answers with what work of this host's own has failed by",
+    f"{_T}/peers/pairing_door.py": "tells that this machine cannot listen there",
+    f"{_H}/peers/finder.py": "hands on the addresses that the mesh takes",
+    f"{_H}/peers/peering.py": "says that a peer is not there",
+    f"{_H}/peers/trust_orders.py": "asks a person of this host which peer is meant",
+    f"{_H}/peers/placement/decide.py": "decides where payloads of this host go",
+    f"{_H}/peers/placement/orders.py": "tells a person of this host what cannot be placed",
+    f"{_H}/bridge/outbound.py": "sends what workers of this host made; `transport/bridge` judges"
+    " its reader",
+    f"{_H}/bridge/service.py": "does what its own daemon says",
 }
 """Module → why removing a refusal from it lets nothing in."""
+
+_FORM = "what it refuses is not in the one form of a certificate, either"
+_LIMIT = "tells of a limit of this host"
+_EITHER = "where there is no code, there is no try either, and each is refused"
+_MONITOR = "the socket's monitor tells of the same end"
+SPARED: Mapping[tuple[str, str], str] = {
+    (f"{_T}/bridge/outgoing.py", "case Sent.GONE"): _MONITOR,
+    (
+        f"{_T}/bridge/outgoing.py",
+        "self._way.send([packets.told(Pong(at_s, self._loop.time()))]) is Sent.GONE",
+    ): _MONITOR,
+    (f"{_T}/discovery/ears.py", "not _INSTANCE.fullmatch(name)"): (
+        "another name is not made of the key either, which is refused below"
+    ),
+    (
+        f"{_T}/fleet/zenoh_node.py",
+        "self._roster.session(peer).notify(Notice(method, args)) is Sent.FULL",
+    ): _LIMIT,
+    (
+        f"{_T}/peers/node.py",
+        "self._roster.session(peer).notify(Notice(method, args)) is Sent.FULL",
+    ): _LIMIT,
+    (f"{_T}/peers/pairing_channel.py", "not isinstance(shown, Comparing)"): _EITHER,
+    (f"{_T}/peers/pairing_channel.py", "self._try is None"): _EITHER,
+    (f"{_T}/peers/certificate.py", "len(data) > MAX_BYTES"): _FORM,
+    (f"{_T}/peers/certificate.py", "header != _HEADER"): _FORM,
+    (f"{_T}/peers/certificate.py", 'names != (*_FIELDS, "")'): _FORM,
+    (f"{_T}/peers/messages.py", "not isinstance(problems, list)"): (
+        "what else there may be has no problem in it, which is refused for that"
+    ),
+    (f"{_T}/fleet/zenoh_node.py", "link.session is None and not link.is_over"): (
+        "tells of a host that does not answer, which is let in by nothing"
+    ),
+    (f"{_H}/peers/serving.py", "component is None"): (
+        "nothing is offered of a component that is not there"
+    ),
+    (f"{_H}/peers/goals.py", "able"): "asks a person which of two hosts is meant",
+    (f"{_H}/peers/goals.py", "except NondumError"): "passes on why a peer has refused",
+    (f"{_H}/bridge/remote_streams.py", "wanted.kind != kind"): (
+        "both readers are workers of this host, whose plan has matched the types"
+    ),
+    (f"{_H}/bridge/remote_streams.py", 'opened.get("type") != wanted.kind'): (
+        "the bridge refuses a stream of another type, too"
+    ),
+}
+"""(Module, condition) → why no test can or need miss that step."""

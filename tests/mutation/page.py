@@ -17,15 +17,17 @@ Written by `python -m tests.mutation`, which removes one step after the other fr
 source and runs the tests nearest to it: each must make one fail. With each stands the first test
 that misses it. (`--only wheel.py` tries a part, `--all` what is here already, too.)
 
-A step is what leads to a refusal of something that was plugged in, or that a worker, or a program
-of this machine, has sent: a condition, of `a or b` each, and each bound of two; a condition that
-must hold, or what follows refuses; a kind of error that is answered with a refusal; the loop or
-call by which flaws that were found are told. What limits of this machine do (a full disk) is no
-step. Tests of properties (Hypothesis) count only if they fail with each of three seeds. Modules
-that refuse something and stand aside are in `tests/mutation/guards.py`, with the reason; a test
-sees that no module is in neither list.
+A step is what leads to a refusal of something that was plugged in, or that a worker, a program of
+this machine, or another host, has sent: a condition, of `a or b` each, and each bound of two; a
+condition that must hold, or what follows refuses; a kind of error that is answered with a refusal;
+the loop or call by which flaws that were found are told; a row of a table of refused system calls,
+or of namespaces. What limits of this machine do (a full disk) is no step. Tests of properties
+(Hypothesis) count only if they fail with each of three seeds. Modules that refuse something and
+stand aside are in `tests/mutation/guards.py`, with the reason; a test sees that no module is in
+neither list. A step that another one makes up for has no test, and the reason stands in its place.
 """
 MISSING = "**no test misses it**"
+_SPARED = "no test: "
 _TOOK = re.compile(r"All of them took .*$", re.MULTILINE)
 _SECTION = re.compile(r"^## `(.+)`$", re.MULTILINE)
 _ROW = re.compile(r"^\| `` (.+) `` \| (.+) \|$", re.MULTILINE)
@@ -48,6 +50,11 @@ def keyed(steps: Sequence[Step]) -> dict[Key, Step]:
             number += 1
         found[key] = step
     return found
+
+
+def spared(why: str) -> str:
+    """What stands in the place of a guard, where none is needed."""
+    return f"{_SPARED}{why}"
 
 
 def read(text: str) -> dict[Key, str]:
@@ -78,7 +85,7 @@ def written(guards: Mapping[Key, str], took: str = "") -> str:
         for key, guard in guards.items():
             if key.module == module:
                 condition = key.condition.replace("|", "\\|")
-                told = guard if guard == MISSING else f"`{guard}`"
+                told = guard if guard == MISSING or guard.startswith(_SPARED) else f"`{guard}`"
                 lines.append(f"| `` {condition} `` | {told} |")
         lines.append("")
     return "\n".join(lines)

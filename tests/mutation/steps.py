@@ -6,7 +6,8 @@ Refusing is raising, telling a problem, or returning what is wrong. A step is wh
   `a or b` each is a step of its own, and of `not (a and b)` and `not 0 < a <= 9`, too;
 - the condition that must hold if the refusal that follows, or stands in `else`, is not to come;
 - a `case` or `except` that does nothing but refuse, and the loop that finds what to tell;
-- the call by which the flaws that another function finds are told with the others.
+- the call by which the flaws that another function finds are told with the others;
+- a row of a table of what workers are refused (`TABLES`).
 
 Without the step, the refusal never comes; what its condition reads on the way is still read.
 """
@@ -15,7 +16,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -36,6 +37,13 @@ _MACHINE = frozenset(
 """What these tell went wrong in this machine, and not with what was plugged in."""
 _JUDGES = re.compile(r"(flaw|overlap|use|excess|contradiction|twice)s?$")
 """What functions are called that return what is wrong as text."""
+
+_CONFINEMENT = "host/nondum/host/confinement"
+TABLES: Mapping[str, tuple[str, ...]] = {
+    f"{_CONFINEMENT}/refusals.py": ("GROUPS", "WITHOUT_NAMESPACES", "SOCKETS_OF_THE_HOST"),
+    f"{_CONFINEMENT}/bubblewrap.py": ("NAMESPACES",),
+}
+"""Module → its tables that say, row by row, what workers are kept from."""
 
 _Function = ast.FunctionDef | ast.AsyncFunctionDef
 _Branch = ast.If | ast.match_case | ast.ExceptHandler
@@ -85,7 +93,11 @@ def steps_of(module: str, text: str) -> tuple[Step, ...]:
     """
     starts = _line_starts(text)
     steps: dict[tuple[int, int], Step] = {}
-    for from_, to, instead, told in _Finder().found(ast.parse(text)):
+    tree = ast.parse(text)
+    found = list(_Finder().found(tree))
+    if module in TABLES:
+        found += _rows(tree, TABLES[module])
+    for from_, to, instead, told in found:
         start, end = _offset(*from_, starts, text), _offset(*to, starts, text)
         source = text[start:end]
         condition = " ".join(told.replace("{}", source).split())
@@ -133,7 +145,9 @@ class _Finder:
                 yield from _necessities(test)
             case ast.IfExp(test=test, body=body) if self._makes_problem(body):
                 yield from _alternatives(test)
-            case ast.IfExp(test=test, orelse=orelse) if self._makes_problem(orelse):
+            case ast.IfExp(test=test, orelse=orelse) if self._makes_problem(orelse) or _is_reason(
+                orelse
+            ):
                 yield from _necessities(test)
             case ast.match_case(guard=ast.expr() as guard, body=body) if self._refuses(body):
                 yield from _alternatives(guard)
@@ -194,7 +208,8 @@ class _Finder:
             case ast.Raise(exc=ast.expr() as raised):
                 return not (isinstance(raised, ast.Call) and _name(raised) in _MACHINE)
             case ast.Return(value=ast.expr() as value):
-                return self._makes_problem(value) or _tells_some(value) or self._is_judge(value)
+                is_told = _tells_some(value) or _is_reason(value)
+                return is_told or self._makes_problem(value) or self._is_judge(value)
             case ast.Expr(value=ast.Yield(value=ast.expr() as value)):
                 return self._makes_problem(value) or self._is_judge(value)
             case ast.Expr(value=ast.Call() as value):
@@ -283,6 +298,31 @@ def _necessities(test: ast.expr) -> Iterator[_Found]:
             yield _whole(test, "(({}) or True)", "not ({})")
 
 
+def _rows(module: ast.Module, tables: Collection[str]) -> Iterator[_Found]:
+    """The rows of tables: groups, rules, calls and flags by their names. In the place of one stands
+    nothing."""
+    for statement in module.body:
+        if isinstance(statement, ast.AnnAssign) and ast.unparse(statement.target) in tables:
+            assert statement.value is not None
+            for node in ast.walk(statement.value):
+                match node:
+                    case ast.Dict(keys=keys, values=values):
+                        for key, value in zip(keys, values, strict=True):
+                            if isinstance(key, ast.Constant) and isinstance(key.value, str):
+                                yield _Found(_start(key), _end(value), "**dict()", ast.unparse(key))
+                    case ast.Tuple(elts=parts) | ast.Call(func=ast.Name(id="_all"), args=parts):
+                        yield from (_whole(one, "*()") for one in parts if _is_row(one))
+
+
+def _is_row(part: ast.expr) -> bool:
+    match part:
+        case ast.Constant(value=str()):
+            return True
+        case ast.Call(func=ast.Name(id="Rule")):
+            return True
+    return False
+
+
 def _bounds(between: ast.Compare) -> Iterator[_Found]:
     """Of `low < middle <= high`, each half."""
     low, middle, high = between.left, *between.comparators
@@ -321,6 +361,11 @@ def _tells_some(value: ast.expr) -> bool:
         and (node.id if isinstance(node, ast.Name) else node.attr) in _TOLD
         for node in ast.walk(value)
     )
+
+
+def _is_reason(value: ast.expr) -> bool:
+    """Whether a value is why a peer is turned away."""
+    return isinstance(value, ast.Attribute) and ast.unparse(value.value) == "Reason"
 
 
 def _name(call: ast.Call) -> str:

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.mutation import page
-from tests.mutation.guards import ASIDE, GUARDS, ROOMS
+from tests.mutation.guards import ASIDE, GUARDS, ROOMS, SPARED
 from tests.mutation.page import Key
-from tests.mutation.steps import steps_in, steps_of
+from tests.mutation.steps import TABLES, steps_in, steps_of
 
 ROOT = Path(__file__).parents[2]
 
@@ -21,7 +21,11 @@ def test_the_page_has_every_step_and_a_test_that_guards_it() -> None:
     steps = page.keyed(steps_in(ROOT, tuple(GUARDS)))
     assert listed.keys() == steps.keys(), "run `python -m tests.mutation`"
     assert page.MISSING not in listed.values()
-    for guard in sorted({guard.partition("[")[0] for guard in listed.values()}):
+    spared = {key: why for key, why in listed.items() if key[:2] in SPARED}
+    assert spared == {key: page.spared(SPARED[key[:2]]) for key in spared}
+    assert {key[:2] for key in spared} == SPARED.keys()
+    guards = {guard for key, guard in listed.items() if key not in spared}
+    for guard in sorted({guard.partition("[")[0] for guard in guards}):
         file, _, test = guard.partition("::")
         assert f"def {test}(" in (ROOT / file).read_text(encoding="utf-8"), guard
 
@@ -67,6 +71,8 @@ def test_what_stands_aside_is_not_guarded() -> None:
         ("refuse_if_any(a.problems())", ["refuse_if_any(a.problems())"]),
         ("reader.end()", ["reader.end()"]),
         ("def gone() -> Problem: ...\nif a:\n    yield gone()", ["a"]),
+        ("def judge():\n    if a:\n        return Reason.REVOKED", ["a"]),
+        ("def judge():\n    return None if a else Reason.REVOKED", ["not (a)"]),
     ],
 )  # fmt: skip
 def test_a_step_is_what_leads_to_a_refusal(source: str, conditions: list[str]) -> None:
@@ -78,6 +84,17 @@ def test_a_step_is_what_leads_to_a_refusal(source: str, conditions: list[str]) -
         assert without[: step.start] == source[: step.start]
         assert without.endswith(source[step.end :])
         assert without != source
+
+
+def test_each_row_of_a_table_of_refusals_is_a_step() -> None:
+    source = 'GROUPS: M = {"a": _all("x", *("y", "z")), "b": (Rule("w", 1, equal=(5,)),)}'
+    module = next(module for module, tables in TABLES.items() if "GROUPS" in tables)
+    assert [step.condition for step in steps_of(module, source)] == [
+        *("'a'", '"x"', '"y"', '"z"', "'b'", 'Rule("w", 1, equal=(5,))')
+    ]
+    for step in steps_of(module, source):
+        ast.parse(step.removed(source))
+    assert steps_of("m.py", source) == ()
 
 
 def test_steps_are_found_behind_letters_of_many_bytes() -> None:

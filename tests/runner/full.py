@@ -43,7 +43,7 @@ def run(tox: Sequence[str]) -> int:
         passed_alone=tuple(passed_alone(done, folder)),
         folders=budget.spent(known, results),
         is_judged=slower <= yardstick.SLOWER_BY and others <= yardstick.OTHERS,
-        refused_skips=unknown if os.environ.get("CI") else (),
+        refused_skips=hardware.refused(skipped, hardware.read(), os.environ),
     )
     note(found.unstable)
     _print(report.slowest(results))

@@ -18,6 +18,7 @@ from nondum.host.catalogue.records import (
     Snapshot,
 )
 from nondum.host.events import FactForgotten, FactKnown, StreamFlowing
+from nondum.host.peers import heard
 from nondum.host.peers.heard import (
     BELOW_OWN,
     Introduced,
@@ -30,6 +31,7 @@ from nondum.host.peers.heard import (
 from nondum.host.peers.offered import Policy, changes, passing, standing
 from nondum.host.peers.uses import taken_by
 from nondum.planning.contribution import Contribution
+from nondum.planning.domain import Merged
 from nondum.planning.merge import merge
 from nondum.sdk.description import Behaviour, Fragment, Output, PluginDescription, Unit
 
@@ -165,7 +167,12 @@ def test_peer_speaks_of_its_own_streams_only() -> None:
     [
         ("component/Bad Id", {}, "its id is no id of a component"),
         ("component/a", {}, "readiness or rank is missing"),
+        ("component/a", {"ready": 1, "rank": 1}, "readiness or rank is missing"),
+        ("component/a", {"ready": True, "rank": True}, "readiness or rank is missing"),
         ("component/a", {"ready": True, "rank": 1}, "the list of what is withheld is missing"),
+        ("component/a", {"ready": True, "rank": 1, "withheld": "a"}, "the list of what is"),
+        ("component/a", {"ready": True, "rank": 1, "withheld": [7]}, "the list of what is"),
+        ("component/a", {"ready": True, "rank": 1, "withheld": []}, "DESCRIPTION_INVALID"),
         ("mount/rover__a__b", {"xyz": [0, 0, 0], "rpy": [0, 0, 0]}, "the unit is not its own"),
         ("mount/mule__a__b", {"xyz": [0, 0], "rpy": [0, 0, 0]}, "xyz is not three numbers"),
         ("device/usb1", {}, "component is missing"),
@@ -180,6 +187,22 @@ def test_entry_that_is_wrong_costs_itself_and_is_told(
     (problem,) = record.problems
     assert problem.code == "PEER_ENTRY"
     assert told in problem.message
+
+
+def test_only_so_many_components_are_taken_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(heard, "MOST_COMPONENTS", 1)
+    (key, body), *_ = standing(snapshot(component()), Policy()).items()
+    assert key == "component/watcher"
+    record = record_of(ME, {key: body, "component/watcher-2": body})
+    assert len(record.components) == 1
+    assert [problem.code for problem in record.problems] == ["PEER_ENTRY"]
+
+
+@pytest.mark.parametrize("value", [{"type": "nothing"}, 7, "text"])
+def test_fact_with_a_value_that_is_no_message_says_nothing(value: object) -> None:
+    said: dict[str, Any] = {"predicate": "sees", "arguments": ["mule__watcher__eye", "mule"]}
+    assert len(list(claims_of("mule", {"fact/watcher/1": said}))) == 1
+    assert list(claims_of("mule", {"fact/watcher/1": {**said, "value": value}})) == []
 
 
 KEYS = st.builds(
@@ -221,7 +244,8 @@ def test_changes_lead_from_one_to_the_other(
     assert now == after
 
 
-def test_behaviour_takes_what_its_action_deletes_of_what_can_be_taken() -> None:
+def merged_watcher() -> Merged:
+    """What the behaviour `look` of the watcher means."""
     domain = """
     (define (domain watcher)
       (:predicates (rested ?u - unit))
@@ -240,6 +264,11 @@ def test_behaviour_takes_what_its_action_deletes_of_what_can_be_taken() -> None:
     here = Contribution.from_description(described, host="mule", component="watcher")
     merged = merge([here], "mule")
     assert not merged.quarantined, merged.quarantined
+    return merged
+
+
+def test_behaviour_takes_what_its_action_deletes_of_what_can_be_taken() -> None:
+    merged = merged_watcher()
     arguments = {"u": "mule__watcher__eye", "o": "mule__watcher__image", "h": "rover"}
     assert taken_by(merged, "watcher", "look", arguments) == {
         "free mule__watcher__image",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import secrets
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from typing import TypeVar
 
 import zmq
@@ -106,6 +106,61 @@ class Raw:
         self.said.put_nowait(packets.read_told([frame.bytes for frame in frames]))
 
 
+class LyingOwner:
+    """A bridge that answers the first claim with whatever it is given, and says no more."""
+
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], *answers: Sequence[bytes]) -> None:
+        self.keys = HostKeys.generate()
+        self._answers = answers
+        socket = context.socket(zmq.ROUTER)
+        socket.linger = 0
+        socket.curve_server = True
+        socket.curve_secretkey = self.keys.secret.encode("ascii")
+        self.port = socket.bind_to_random_port("tcp://127.0.0.1")
+        self.socket = Drained(socket, self._on_frames)
+
+    @property
+    def place(self) -> Place:
+        return Place((f"tcp://127.0.0.1:{self.port}",), self.keys.public, "token")
+
+    def _on_frames(self, frames: list[zmq.Frame]) -> None:
+        answers, self._answers = self._answers, ()
+        for parts in answers:
+            self.socket.send([frames[0].bytes, *parts])
+
+
+@contextlib.asynccontextmanager
+async def stalling(port: int, *, to_port: int, to_client: int) -> AsyncIterator[int]:
+    """A way to a port of this machine on which only so many bytes get through each way, and the
+    rest is held back; its own port."""
+
+    async def carry(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, most: int) -> None:
+        while most > 0 and (data := await reader.read(min(most, 65536))):
+            most -= len(data)
+            writer.write(data)
+        if most > 0:
+            writer.close()
+
+    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        beyond, to_beyond = await asyncio.open_connection("127.0.0.1", port)
+        ends.extend((writer, to_beyond))
+        carried.add(asyncio.create_task(carry(reader, to_beyond, to_port)))
+        carried.add(asyncio.create_task(carry(beyond, writer, to_client)))
+
+    ends: list[asyncio.StreamWriter] = []
+    carried: set[asyncio.Task[None]] = set()
+    server = await asyncio.start_server(serve, "127.0.0.1", 0)
+    try:
+        yield server.sockets[0].getsockname()[1]
+    finally:
+        server.close()
+        for task in carried:
+            task.cancel()
+        await asyncio.gather(*carried, return_exceptions=True)
+        for end in ends:
+            end.close()
+
+
 class Owner:
     """A host's end, and what reads of it."""
 
@@ -126,8 +181,8 @@ class Owner:
         self._closing.append(reading.incoming.close)
         return reading
 
-    def raw(self, keys: HostKeys, granted: Granted | str) -> Raw:
-        raw = Raw(self.context, keys, self.place(granted))
+    def raw(self, keys: HostKeys, granted: Granted | str, *, port: int = 0) -> Raw:
+        raw = Raw(self.context, keys, self.place(granted, port=port))
         self._closing.append(raw.socket.close)
         return raw
 

@@ -6,11 +6,13 @@ import asyncio
 import contextlib
 
 import pytest
-from tests.transport.bridge.ends import PATIENCE_S, Owner, owner, within
+import zmq
+from tests.transport.bridge.ends import PATIENCE_S, Owner, owner, stalling, within
 
 from nondum.sdk.errors import Problem
-from nondum.transport.bridge import outgoing, packets
+from nondum.transport.bridge import Exporter, outgoing, packets
 from nondum.transport.bridge.packets import Claim, Handled, Opened, Over, Pong
+from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import HostKeys
 from nondum.transport.peers.refusals import Reason
 
@@ -127,9 +129,10 @@ async def test_reader_that_closes_is_noticed_at_once() -> None:
         (b"",),
         (packets.asked(Handled(7)),),
         (packets.asked(Handled(1)), b"more"),
+        (b"more", packets.asked(packets.Ping(1.0))),
         (packets.asked(Claim(1, "again")),),
     ],
-    ids=["garbage", "empty", "never-sent", "two-parts", "claim"],
+    ids=["garbage", "empty", "never-sent", "two-parts", "two-parts-the-last-sound", "claim"],
 )
 async def test_reader_that_breaks_the_rules_loses_its_stream(parts: tuple[bytes, ...]) -> None:
     async with owner() as host:
@@ -140,6 +143,7 @@ async def test_reader_that_breaks_the_rules_loses_its_stream(parts: tuple[bytes,
         raw.say(*parts)
         told = await raw.hears()
         assert isinstance(told, Over)
+        assert told.problem.code in {"BRIDGE_PACKET", "PACKET_MALFORMED"}
         assert (await within(granted.over)) == told.problem
         await works(host)
 
@@ -170,6 +174,29 @@ async def test_first_message_must_be_the_claim(parts: tuple[bytes, ...]) -> None
         await within(host.read(READER, granted).opened)
 
 
+async def test_claim_in_another_version_is_told_so() -> None:
+    async with owner() as host:
+        granted = host.grant(READER)
+        raw = host.raw(READER, granted)
+        raw.say(packets.asked(Claim(packets.VERSION + 1, granted.outgoing.token)))
+        told = await raw.hears()
+        assert isinstance(told, Over)
+        assert told.problem.code == "BRIDGE_VERSION"
+        assert not granted.claimed.done()
+
+
+async def test_readers_are_told_that_the_bridge_ends() -> None:
+    async with owner() as host:
+        granted = host.grant(READER)
+        raw = host.raw(READER, granted)
+        raw.say(packets.asked(Claim(1, granted.outgoing.token)))
+        assert await raw.hears() == Opened("image")
+        host.exporter.close()
+        told = await raw.hears()
+        assert isinstance(told, Over)
+        assert told.problem.code == "STREAM_ENDED"
+
+
 async def test_oversized_message_cuts_its_sender_only() -> None:
     async with owner() as host:
         granted = host.grant(READER)
@@ -193,6 +220,18 @@ async def test_message_without_an_end_is_cut() -> None:
         await works(host)
 
 
+async def test_message_whose_end_is_held_back_is_cut() -> None:
+    """It is never handed over by ZeroMQ, and so is known only by what the kernel has received."""
+    async with owner() as host, stalling(host.port, to_port=600_000, to_client=10_000_000) as port:
+        granted = host.grant(READER)
+        raw = host.raw(READER, granted, port=port)
+        raw.say(packets.asked(Claim(1, granted.outgoing.token)))
+        assert await raw.hears() == Opened("image")
+        raw.say(*([b"x" * 10] * 30_000))
+        assert (await within(granted.over)).code == "BRIDGE_PACKET"
+        await works(host)
+
+
 async def test_stranger_without_keys_gets_nothing() -> None:
     async with owner() as host:
         granted = host.grant(READER)
@@ -204,6 +243,15 @@ async def test_stranger_without_keys_gets_nothing() -> None:
         writer.close()
         await within(host.read(READER, granted).opened)
         assert host.exporter.refusals.counts[Reason.GARBAGE] == 1
+
+
+async def test_bridge_listens_at_addresses_of_this_machine_only() -> None:
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    exporter = Exporter(context, READER)
+    with pytest.raises(PeerRefused, match="ADDRESS_UNUSABLE"):
+        await exporter.start(("203.0.113.9",))
+    exporter.close()
+    context.term()
 
 
 async def test_signs_of_life_tell_the_owners_clock() -> None:

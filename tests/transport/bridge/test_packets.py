@@ -72,15 +72,16 @@ def test_anything_else_is_a_violation(data: bytes) -> None:
     "parts",
     [
         [],
-        [b"\x93\x02\x01\x00", b"", b""],
+        [pack([2, 1, 0, {}]), b"", b""],
         [pack([1, "image"]), b"bulk"],
         [pack([2, 1, 7, {}])],
         [pack([2, 1, True, {}])],
         [pack([2, 0, 0, {}])],
         [pack([3, 1, 2])],
+        [b"\x93\x03\xcb?\xf0\0\0\0\0\0\0\xcb\x7f\xf0\0\0\0\0\0\0"],
         [pack([4, {"code": "X"}])],
     ],
-    ids=["nothing", "three", "bulk", "coding", "bool", "seq", "clock", "problem"],
+    ids=["nothing", "three", "bulk", "coding", "bool", "seq", "clock", "endless", "problem"],
 )
 def test_almost_right_is_wrong(parts: list[bytes]) -> None:
     with pytest.raises(ProtocolViolation):

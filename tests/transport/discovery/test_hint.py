@@ -104,7 +104,18 @@ def test_a_scope_stays_with_its_address() -> None:
     assert hint.addresses == ("tcp://[fe80::1%lan0]:7410", "tcp://10.0.0.1:7410")
 
 
+@pytest.mark.parametrize("name", ["", "r" * 64, "\x1b[31mrover"], ids=["none", "long", "escape"])
+def test_the_name_in_a_key_of_development_is_one(name: str) -> None:
+    txt = {**to_txt(HERE), "pk": f"development:{name}"}
+    with pytest.raises(ProtocolViolation) as refused:
+        from_txt(txt, 7410, (), source=Source.STATIC, security=Security.DEVELOPMENT)
+    assert refused.value.code == "HINT_MALFORMED"
+
+
 class TestAnnouncement:
+    def test_a_host_that_listens_by_name_does_not_listen_everywhere(self) -> None:
+        assert not Announcement(KEY, "rover", 1, ("tcp://lan0:7410",)).is_everywhere
+
     def test_a_host_that_listens_everywhere_says_so(self) -> None:
         assert HERE.is_everywhere and not HERE.is_on_this_machine_only
 

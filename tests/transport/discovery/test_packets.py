@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import msgpack
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -12,6 +14,8 @@ from nondum.transport.peers.keys import HostKeys
 
 KEY = HostKeys.generate().public
 LONGEST = Announcement(KEY, "n" * 63, 2**53, ("tcp://[::]:65535",), 65_535, (2**53,) * 16)
+
+HERE = Announcement(KEY, "rover", 7, ("tcp://[::]:7410",))
 
 nonces = st.binary(min_size=packets.NONCE, max_size=packets.NONCE)
 
@@ -33,6 +37,22 @@ def test_no_answer_is_longer_than_its_question(nonce: bytes) -> None:
 @given(st.integers(0, packets.LENGTH - 1))
 def test_a_question_that_is_too_short_is_none(length: int) -> None:
     assert packets.nonce_of(packets.question(bytes(packets.NONCE))[:length]) is None
+
+
+NONCE = bytes(packets.NONCE)
+SOUND = packets.answer(NONCE, HERE)
+LONG = msgpack.packb([7410, {str(number): "x" * 250 for number in range(4)}])
+
+
+@pytest.mark.parametrize(
+    "data",
+    [packets.question(NONCE)[:8] + SOUND[8:], SOUND[: 8 + packets.NONCE], SOUND[:8] + NONCE + LONG],
+    ids=["a question", "nothing after the nonce", "long"],
+)
+def test_what_is_not_the_answer_is_refused(data: bytes) -> None:
+    assert packets.read_answer(SOUND).port == 7410
+    with pytest.raises(ProtocolViolation):
+        packets.read_answer(data)
 
 
 @given(st.binary(max_size=600), st.booleans())

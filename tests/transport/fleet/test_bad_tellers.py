@@ -18,6 +18,7 @@ from nondum.transport.fleet.catalogues import CHANGED, READ
 from nondum.transport.fleet.ledger import Ledger
 from nondum.transport.peers import (
     Admission,
+    CallFailed,
     Errand,
     Identity,
     Lease,
@@ -103,6 +104,20 @@ async def test_wrong_catalogue_has_its_host_cut() -> None:
         assert not [event for event in here.events if isinstance(event, PeerChanged)]
         refused = [event for event in here.events if isinstance(event, Refusal)]
         assert refused[0].reason is Reason.GARBAGE
+
+
+@pytest.mark.parametrize(
+    "args",
+    [{"epoch": "7", "revision": 0}, {"epoch": 7, "revision": None}, {"epoch": 7}, {"revision": 0}],
+    ids=str,
+)
+async def test_odd_question_for_a_catalogue_is_refused(args: Body) -> None:
+    base, rover = identity("base"), identity("rover")
+    async with meshed(base, rover) as here, telling(rover, here, Teller()) as node:
+        await here.sees(PeerKey(node.identity.key), {})
+        with pytest.raises(CallFailed) as failed:
+            await node.call(here.key, READ, args, deadline_s=60.0)
+        assert failed.value.code == "PACKET_FIELDS"
 
 
 async def test_peers_that_never_answer_keep_nobody_waiting(

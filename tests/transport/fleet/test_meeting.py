@@ -199,6 +199,8 @@ async def test_address_that_cannot_be_dialled_is_refused() -> None:
     async with started(host, Trust()) as (rover, _):
         with pytest.raises(PeerRefused, match="ADDRESS_MALFORMED"):
             rover.meet(PeerKey("development:base"), ["udp://127.0.0.1:1"])
+        with pytest.raises(PeerRefused, match="ADDRESS_MALFORMED"):
+            rover.check_address("udp://127.0.0.1:1")
 
 
 async def test_hosts_without_keys_meet_on_this_machine() -> None:

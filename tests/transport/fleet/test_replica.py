@@ -17,10 +17,11 @@ from hypothesis.stateful import (
 from nondum.sdk.errors import ProtocolViolation
 from nondum.sdk.wire import pack
 from nondum.transport.fleet import chunk as chunks
+from nondum.transport.fleet import replica as replicas
 from nondum.transport.fleet.chunk import Chunk
 from nondum.transport.fleet.ledger import Ledger
 from nondum.transport.fleet.replica import Change, Replica
-from nondum.transport.peers.pulse import State
+from nondum.transport.peers.pulse import DIGEST_BYTES, State
 
 REMEMBERED = 3
 keys = st.sampled_from([f"fact/{number}" for number in range(8)])
@@ -195,9 +196,21 @@ def test_whole_with_a_wrong_digest_is_a_violation() -> None:
 )
 def test_entry_that_is_no_table_is_a_violation(packed: bytes) -> None:
     replica = Replica(7)
+    digest = chunks.digest_of("fact/a", packed).to_bytes(DIGEST_BYTES)
     with pytest.raises(ProtocolViolation):
-        replica.take(Chunk(7, 0, State(2, b"........"), 0, 1, {"fact/a": packed}))
+        replica.take(Chunk(7, 0, State(2, digest), 0, 1, {"fact/a": packed}))
     assert (replica.revision, replica.entries) == (0, {})
+
+
+def test_catalogue_beyond_its_limit_is_a_violation(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(replicas, "MAX_CATALOGUE", 100)
+    ledger = Ledger(7)
+    replica = replica_of(ledger)
+    ledger.publish({"fact/a": {"text": "x" * 100}})
+    (delta,) = ledger.delta(1) or ()
+    with pytest.raises(ProtocolViolation):
+        replica.take(delta)
+    assert dict(replica.entries) == {}
 
 
 def test_what_was_handed_out_never_changes() -> None:

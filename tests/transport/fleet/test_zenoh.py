@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import sys
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 
@@ -116,6 +117,21 @@ async def test_peer_whose_key_is_revoked_is_cut(world: ZenohWorld) -> None:
         assert (await rover.told(PeerLost)).reason is Loss.TURNED_AWAY
 
 
+async def test_peer_that_is_no_longer_trusted_is_cut(world: ZenohWorld) -> None:
+    """Nothing that it says is waited for."""
+    async with world.member("rover"), world.member("base") as base:
+        await base.told(PeerUp)
+        world.members[1].set_trust(Trust())
+        assert (await base.told(PeerLost)).reason is Loss.REVOKED
+
+
+def test_host_without_zenoh_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "zenoh", None)
+    access = RouterAccess("test", ("tls/10.0.0.1:7447",), Path("ca.pem"))
+    with pytest.raises(PeerRefused, match="ZENOH_MISSING"):
+        access.to_config()
+
+
 async def test_hosts_without_keys_use_a_router_on_this_machine_only(world: ZenohWorld) -> None:
     async with (
         started(world, "rover", None, Trust()) as rover,
@@ -135,6 +151,7 @@ async def test_hosts_without_keys_use_a_router_on_this_machine_only(world: Zenoh
         ({"fleet": ""}, "FLEET_NAME"),
         ({"endpoints": ()}, "ADDRESS_MALFORMED"),
         ({"endpoints": ("tcp://10.0.0.1:7447",)}, "ADDRESS_MALFORMED"),
+        ({"endpoints": ("tls/10.0.0.1:7447#",)}, "ADDRESS_MALFORMED"),
     ],
     ids=str,
 )

@@ -355,7 +355,9 @@ async def test_self_test_leaves_no_trace() -> None:
 
 
 @contextlib.contextmanager
-def raw_dealer(there: Host, me: Identity) -> Iterator[zmq.Socket[bytes]]:
+def raw_dealer(
+    there: Host, me: Identity, *, routing_id: bytes = b""
+) -> Iterator[zmq.Socket[bytes]]:
     """A peer that says whatever the test wants."""
     assert me.keys is not None
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
@@ -364,6 +366,8 @@ def raw_dealer(there: Host, me: Identity) -> Iterator[zmq.Socket[bytes]]:
         sock.curve_publickey = me.keys.public.encode("ascii")
         sock.curve_secretkey = me.keys.secret.encode("ascii")
         sock.curve_serverkey = there.key.encode("ascii")
+        if routing_id:
+            sock.routing_id = routing_id
         try:
             sock.connect(there.address)
             yield sock

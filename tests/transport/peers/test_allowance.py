@@ -19,6 +19,7 @@ from nondum.transport.peers import (
     roster,
 )
 from nondum.transport.peers.allowance import LOOK_S, Allowance, Paced
+from nondum.transport.peers.messages import Reply, encode
 
 pytestmark = pytest.mark.anyio
 
@@ -119,6 +120,15 @@ async def test_answers_are_free(narrow: tuple[Host, Host]) -> None:
     for _ in range(300):
         await base.node.call(rover.key, "echo", {"text": "x" * 1000}, deadline_s=5)
     assert base.node.refusals.counts == {}
+
+
+async def test_answers_that_nobody_waits_for_are_not_free(narrow: tuple[Host, Host]) -> None:
+    rover, base = narrow
+    session = rover.node._roster.session(base.key)
+    for number in range(1, 251):
+        session.send(encode(Reply(number, {})))
+    assert (await base.told(PeerLost)).reason is Loss.VIOLATED
+    await base.counted(Reason.FLOODING)
 
 
 async def test_flooding_peer_is_let_in_after_a_while(

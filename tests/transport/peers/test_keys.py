@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import base64
+import json
+import os
 import stat
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from zmq.utils import z85
 
 from nondum.transport.peers import (
     HostKeys,
@@ -21,7 +25,14 @@ from nondum.transport.peers import (
     trust_file,
 )
 from nondum.transport.peers import certificate as certificates
-from nondum.transport.peers.certificate import Certificate, issue, new_fleet, parse, verify
+from nondum.transport.peers.certificate import (
+    Certificate,
+    FleetKey,
+    issue,
+    new_fleet,
+    parse,
+    verify,
+)
 from nondum.transport.peers.keys import PeerKey, parse_key
 from nondum.transport.peers.trust import Standing
 
@@ -104,6 +115,21 @@ def test_key_beyond_its_range_is_refused() -> None:
         parse_key("#" * 40)
 
 
+def test_longer_text_than_a_key_is_refused() -> None:
+    with pytest.raises(PeerRefused, match="KEY_MALFORMED"):
+        parse_key(KEYS.public + "00000")
+
+
+def test_key_has_one_text_whatever_the_reader_of_z85_takes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Some readers let groups beyond 2**32 wrap around: another text for the same key."""
+    decode = z85.decode
+    monkeypatch.setattr(z85, "decode", lambda text: decode(text.replace("#", "0")))
+    with pytest.raises(PeerRefused, match="KEY_MALFORMED"):
+        parse_key("#" * 40)
+
+
 def test_fingerprints_differ_and_have_a_hundred_bits() -> None:
     assert fingerprint(KEYS.public) != fingerprint(OTHERS.public)
     assert len(fingerprint(KEYS.public).replace("-", "")) * 5 == 100
@@ -132,9 +158,21 @@ def test_any_bytes_are_a_certificate_or_refused(data: bytes) -> None:
 
 def test_certificate_has_one_form() -> None:
     form = issued().to_bytes()
-    for other in (form + b"\n", form.replace(b"\n", b"\r\n"), form[:-1], b" " + form):
+    padded = _other_base64(form.removesuffix(b"\n")) + b"\n"
+    short = form.replace(b"not-before: 2026-05-31T00", b"not-before: 2026-5-31T0")
+    assert short != form
+    others = (form + b"\n", form.replace(b"\n", b"\r\n"), form[:-1], b" " + form, padded, short)
+    for other in others:
         with pytest.raises(PeerRefused, match="CERTIFICATE_MALFORMED"):
             parse(other)
+
+
+def _other_base64(text: bytes) -> bytes:
+    """The same bytes, written otherwise: bits that fill the last letter are not looked at."""
+    letters = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
+    assert text.endswith(b"==")
+    last = letters[letters.index(text[-3]) + 1]
+    return text[:-3] + bytes([last]) + b"=="
 
 
 def test_fleet_that_is_not_trusted_is_named() -> None:
@@ -180,6 +218,37 @@ def test_certificate_that_ends_before_it_begins_is_refused() -> None:
         issued(not_after=NOW - timedelta(days=2))
 
 
+def test_name_in_a_certificate_that_is_no_hosts_is_refused() -> None:
+    """Whoever signed it."""
+    for odd, code in (
+        (replace(issued(), host="Rover"), "HOST_NAME"),
+        (replace(issued(), not_after=NOW - timedelta(days=2)), "CERTIFICATE_VALIDITY"),
+    ):
+        with pytest.raises(PeerRefused, match=code):
+            parse(odd.to_bytes())
+
+
+@pytest.mark.parametrize("fleet", ["AAAA", "no base64"])
+def test_fleet_key_that_is_none_has_signed_nothing(fleet: str) -> None:
+    odd = replace(issued(), fleet=FleetKey(fleet))
+    with pytest.raises(PeerRefused, match="CERTIFICATE_SIGNATURE"):
+        verify(odd, {FleetKey(fleet)}, NOW)
+
+
+def test_certificate_of_another_key_lets_nobody_in() -> None:
+    trust = Trust().with_fleet(FLEET, "survey")
+    assert trust.admit(KEYS.public, issued().to_bytes(), NOW).name == "rover-1"
+    with pytest.raises(PeerRefused, match="CERTIFICATE_KEY"):
+        trust.admit(OTHERS.public, issued().to_bytes(), NOW)
+    with pytest.raises(PeerRefused, match="CERTIFICATE_TIME"):
+        trust.admit(KEYS.public, issued().to_bytes(), NOW + timedelta(days=60))
+    for nobody in (trust, Trust()):
+        with pytest.raises(PeerRefused, match="KEY_UNKNOWN"):
+            nobody.admit(KEYS.public, b"", NOW)
+    with pytest.raises(PeerRefused, match="KEY_UNKNOWN"):
+        Trust().admit(KEYS.public, issued().to_bytes(), NOW)
+
+
 def test_revoked_key_is_out_however_it_came_in() -> None:
     trust = Trust().with_fleet(FLEET, "survey").with_paired(KEYS.public, "rover")
     revoked = trust.with_revoked(KEYS.public, "stolen")
@@ -216,6 +285,45 @@ def test_trust_that_others_may_change_is_refused(tmp_path: Path) -> None:
 def test_any_text_is_trust_or_refused(text: str) -> None:
     with pytest.raises(PeerRefused, match="FILE_MALFORMED"):
         trust_file.parse(text)
+
+
+WHOLE = {"format": "nondum-trust@1", "fleets": {}, "paired": {}, "revoked": {}}
+
+
+@pytest.mark.parametrize(
+    ("data", "code"),
+    [
+        ([], "FILE_MALFORMED"),
+        ({key: WHOLE[key] for key in ("format", "fleets", "paired")}, "FILE_MALFORMED"),
+        ({**WHOLE, "more": {}}, "FILE_MALFORMED"),
+        ({**WHOLE, "format": "nondum-trust@2"}, "FILE_MALFORMED"),
+        ({**WHOLE, "paired": []}, "FILE_MALFORMED"),
+        ({**WHOLE, "revoked": {KEYS.public: 7}}, "FILE_MALFORMED"),
+        ({**WHOLE, "paired": {"key": "rover"}}, "KEY_MALFORMED"),
+    ],
+)
+def test_almost_a_trust_file_is_refused(data: object, code: str) -> None:
+    assert trust_file.parse(json.dumps(WHOLE)) == Trust()
+    with pytest.raises(PeerRefused) as refused:
+        trust_file.parse(json.dumps(data))
+    assert refused.value.code == code
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="giving files away needs root")
+def test_file_of_another_user_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "trust.json"
+    trust_file.save(path, Trust())
+    os.chown(path, 65534, -1)
+    with pytest.raises(PeerRefused, match="FILE_OPEN_TO_OTHERS"):
+        trust_file.load(path)
+
+
+def test_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "trust.json"
+    trust_file.save(path, Trust())
+    path.write_bytes(b"\xff")
+    with pytest.raises(PeerRefused, match="FILE_MALFORMED"):
+        trust_file.load(path)
 
 
 def test_fleet_keys_are_ed25519() -> None:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from nondum.sdk.errors import Problem, ProtocolViolation
 from nondum.sdk.wire_fields import MAX_ID
 from nondum.transport.peers.messages import (
+    MAX_CERTIFICATE,
     MAX_MESSAGE,
     Bye,
     Cancel,
@@ -26,6 +27,7 @@ from nondum.transport.peers.messages import (
     Reply,
     Request,
     Welcome,
+    agreed_version,
     decode,
     encode,
 )
@@ -93,6 +95,55 @@ def test_any_list_is_a_message_or_a_violation(kind: int, fields: list[Any]) -> N
         decode(msgpack.packb([kind, *fields]))
     except ProtocolViolation:
         return
+
+
+PROBLEM = Problem("CODE", "what happened").to_dict()
+HELLO = [[1], "rover", "key", 1, 1, b""]
+
+
+@pytest.mark.parametrize(
+    ("fields", "code"),
+    [
+        (7, "PACKET_KIND"),
+        ({}, "PACKET_KIND"),
+        ([], "PACKET_KIND"),
+        (["ping"], "PACKET_KIND"),
+        ([False, *HELLO], "PACKET_KIND"),
+        ([-1], "PACKET_KIND"),
+        ([-3, 1], "PACKET_KIND"),
+        ([12], "PACKET_KIND"),
+        ([10], "PACKET_FIELDS"),
+        ([10, 1, 1], "PACKET_FIELDS"),
+        ([9, 1, 1, 1], "PACKET_FIELDS"),
+        ([0, b"\x01", *HELLO[1:]], "PACKET_FIELDS"),
+        ([0, [], *HELLO[1:]], "PACKET_FIELDS"),
+        ([0, [1] * 17, *HELLO[1:]], "PACKET_FIELDS"),
+        ([0, *HELLO[:-1], "text"], "PACKET_FIELDS"),
+        ([0, *HELLO[:-1], b"x" * (MAX_CERTIFICATE + 1)], "PACKET_FIELDS"),
+        ([1, [1, 2], *HELLO[1:]], "PACKET_FIELDS"),
+        ([5, 1, []], "PACKET_FIELDS"),
+        ([5, 1, PROBLEM], "PACKET_FIELDS"),
+        ([5, 1, [PROBLEM] * 65], "PACKET_FIELDS"),
+        ([9, 1, 1, 1, "x" * DIGEST_BYTES], "PACKET_FIELDS"),
+        ([9, 1, 1, 1, b"x" * (DIGEST_BYTES - 1)], "PACKET_FIELDS"),
+    ],
+    ids=lambda value: str(value)[:30],
+)
+def test_almost_right_is_refused(fields: Any, code: str) -> None:
+    with pytest.raises(ProtocolViolation) as refused:
+        decode(msgpack.packb(fields))
+    assert refused.value.code == code
+
+
+def test_failure_names_each_of_its_problems() -> None:
+    told = (Problem("ONE", "first"), Problem("TWO", "second"))
+    assert decode(encode(Failure(1, told))) == Failure(1, told)
+
+
+def test_version_that_both_speak_is_agreed_on_or_none() -> None:
+    assert agreed_version(Hello((99, 1), "rover", "key", 1, 1, b"")) == 1
+    with pytest.raises(ProtocolViolation, match="PROTO_VERSION"):
+        agreed_version(Hello((99,), "rover", "key", 1, 1, b""))
 
 
 @given(messages, st.data())

@@ -155,6 +155,27 @@ def test_answer_after_two_minutes_is_refused() -> None:
         receive(asking, Agreed(b""), BASE, WINDOW_S + 0.1)
 
 
+def test_try_begins_within_the_window_and_with_a_whole_nonce() -> None:
+    window = PairingWindow(0.0)
+    with pytest.raises(PeerRefused, match="PAIRING_OVER"):
+        window.begin(Role.ASKING, ROVER, "rover", b"n" * NONCE_BYTES, WINDOW_S + 0.1)
+    with pytest.raises(ValueError, match="nonce"):
+        window.begin(Role.ASKING, ROVER, "rover", b"n" * (NONCE_BYTES - 1), 1.0)
+
+
+def test_nonce_of_another_length_is_refused() -> None:
+    answering = begin(Role.ANSWERING, BASE, b"n" * NONCE_BYTES)
+    answering, _ = receive(answering, Ask(ROVER, "rover"), ROVER, 1.0)
+    with pytest.raises(PeerRefused, match="PAIRING_COMMITMENT"):
+        receive(answering, Nonce(b"a" * (NONCE_BYTES - 1)), ROVER, 1.0)
+
+
+def test_own_key_is_no_others() -> None:
+    answering = begin(Role.ANSWERING, BASE, b"n" * NONCE_BYTES)
+    with pytest.raises(PeerRefused, match="PAIRING_KEY"):
+        receive(answering, Ask(BASE, "rover"), BASE, 1.0)
+
+
 def test_fourth_try_is_refused() -> None:
     window = PairingWindow(0.0)
     for _ in range(TRIES):

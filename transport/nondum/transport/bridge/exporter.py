@@ -130,8 +130,13 @@ class Exporter:
             told = f"this host's bridge speaks version {VERSION}"
             raise ProtocolViolation(Problem("BRIDGE_VERSION", told, have=str(message.version)))
         granted = self._grants.get(message.token)
-        is_theirs = granted is not None and granted.reader == data.get("User-Id")
-        if granted is None or not is_theirs or granted.way is not None or granted.is_over:
+        reader = data.get("User-Id")
+        if (
+            granted is None
+            or granted.reader != reader
+            or granted.way is not None
+            or granted.is_over
+        ):
             raise ProtocolViolation(
                 Problem("STREAM_NOT_GRANTED", "the claimed stream was not granted to this key")
             )

@@ -63,7 +63,7 @@ def answer(nonce: bytes, announcement: Announcement) -> bytes:
 def read_answer(data: bytes) -> Answer:
     """Read an answer. Raises `ProtocolViolation` (HINT_MALFORMED)."""
     start = len(_ANSWER) + NONCE
-    if not data.startswith(_ANSWER) or not start < len(data) <= LENGTH:
+    if not data.startswith(_ANSWER) or len(data) > LENGTH:
         raise _malformed()
     try:
         fields = msgpack.unpackb(

@@ -49,12 +49,14 @@ def parse_key(text: str) -> PeerKey:
     'rq:rM>}U?@Lns47E1%kR.o@n%FcmmsL/@{H8]yf7'
     """
     try:
-        # One text a key: otherwise a revoked key could come back in other clothes.
-        if len(text) == 40 and z85.encode(z85.decode(text)) == text.encode("ascii"):
-            return PeerKey(text)
+        if len(text) != 40:
+            raise ValueError("it has another length")
+        known = z85.encode(z85.decode(text)).decode("ascii")
     except Exception as error:  # z85 raises KeyError, struct.error, ValueError …
         raise PeerRefused(_malformed(text)) from error
-    raise PeerRefused(_malformed(text))
+    if known != text:  # one text a key: otherwise a revoked key could come back in another one
+        raise PeerRefused(_malformed(text))
+    return PeerKey(text)
 
 
 def fingerprint(key: str) -> str:

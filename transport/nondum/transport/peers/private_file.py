@@ -71,13 +71,22 @@ def _open_to_others(path: Path, status: os.stat_result) -> Problem:
 
 
 def _staged(path: Path, text: str) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
+    _make_folder(path.parent)
     descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)  # 0600
     with os.fdopen(descriptor, "w", encoding="utf-8") as file:
         file.write(text)
         file.flush()
         os.fsync(file.fileno())
     return Path(name)
+
+
+def _make_folder(folder: Path) -> None:
+    """With its name on disk, and the names of those above it that were not there either."""
+    if folder.is_dir():
+        return
+    _make_folder(folder.parent)
+    folder.mkdir(exist_ok=True)
+    _sync_folder(folder.parent)
 
 
 def _sync_folder(folder: Path) -> None:

@@ -44,7 +44,7 @@ def create(path: Path, trust: Trust) -> None:
     if path.exists():
         told, fix = "there is a trust file already", "choose another name, or change that one"
         raise TrustRefused(Problem("TRUST_EXISTS", told, where=str(path), fix=fix))
-    path.parent.mkdir(parents=True, exist_ok=True)
+    disk.make_folder(path.parent)
     _write(path, trust)
 
 

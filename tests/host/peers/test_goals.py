@@ -1,0 +1,57 @@
+"""Words that a peer heard become a goal here only if this host takes them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from nondum.host.mind.mind import Mind
+from nondum.host.peers.goals import MAX_WORDS, Goals
+from nondum.sdk.wire import Body
+from nondum.transport.peers import Admission, Call, CallFailed, Errand, PeerKey
+from nondum.transport.peers.messages import Request
+
+pytestmark = pytest.mark.anyio
+
+
+class Nobody:
+    """No peer is reached."""
+
+    def call(self, host: str, method: str, args: Body, *, deadline_s: float) -> Call:
+        raise AssertionError(f"{host} is asked for {method}")
+
+    def notify(self, host: str, method: str, args: Body) -> None:
+        raise AssertionError(f"{host} is told {method}")
+
+
+def no_mind() -> Mind:
+    raise AssertionError("a goal is made of it")
+
+
+def asked(words: object) -> Errand:
+    admission = Admission(PeerKey("rover"), "rover", "pairing")
+    request = Request(1, 1, 60_000, "goal.give", {"words": words})
+    return Errand(admission, request, lambda _, __: None)
+
+
+@pytest.mark.parametrize(
+    ("words", "accepts", "code"),
+    [
+        (7, True, "CALL_MALFORMED"),
+        (None, True, "CALL_MALFORMED"),
+        ("", True, "CALL_MALFORMED"),
+        (["search"], True, "CALL_MALFORMED"),
+        ("x" * (MAX_WORDS + 1), True, "CALL_MALFORMED"),
+        ("search for people", False, "GOALS_NOT_TAKEN"),
+    ],
+    ids=["number", "none", "empty", "list", "long", "not taken"],
+)
+async def test_words_that_are_not_taken_become_no_goal(
+    words: Any, accepts: bool, code: str
+) -> None:
+    goals = Goals("mule", no_mind, Nobody(), lambda: (), accepts=accepts)
+    with pytest.raises(CallFailed, match=code):
+        goals.serve_give(asked(words))
+    with pytest.raises(CallFailed, match=code):
+        await goals.serve_ask(asked(words))

@@ -1,0 +1,71 @@
+"""Every message of pairing has one exact form."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from nondum.sdk.errors import NondumError
+from nondum.sdk.wire import pack
+from nondum.transport.peers import HostKeys
+from nondum.transport.peers.pairing import NONCE_BYTES, Agreed, Ask, Commit, Nonce
+from nondum.transport.peers.pairing_messages import (
+    HASH_BYTES,
+    Beat,
+    Ended,
+    Ending,
+    Said,
+    decode,
+    encode,
+)
+
+KEY, HASH, NONCE = HostKeys.generate().public, bytes(HASH_BYTES), bytes(NONCE_BYTES)
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        Ask(KEY, "rover"),
+        Commit(KEY, "rover", HASH),
+        Nonce(NONCE),
+        Agreed(HASH),
+        *map(Ended, Ending),
+        Beat(),
+    ],
+)
+def test_message_survives_the_wire(said: Said) -> None:
+    assert decode(encode(said)) == said
+
+
+@pytest.mark.parametrize(
+    ("fields", "code"),
+    [
+        (7, "PACKET_KIND"),
+        ({}, "PACKET_KIND"),
+        ([], "PACKET_KIND"),
+        (["ask"], "PACKET_KIND"),
+        ([False, KEY, "rover"], "PACKET_KIND"),
+        ([-1], "PACKET_KIND"),
+        ([6], "PACKET_KIND"),
+        ([5, 1], "PACKET_FIELDS"),
+        ([0, KEY], "PACKET_FIELDS"),
+        ([0, KEY, "rover", 1], "PACKET_FIELDS"),
+        ([0, 7, "rover"], "PACKET_FIELDS"),
+        ([0, KEY, 7], "PACKET_FIELDS"),
+        ([0, "key", "rover"], "KEY_MALFORMED"),
+        ([0, KEY, "Rover"], "HOST_NAME"),
+        ([1, KEY, "rover", HASH[1:]], "PACKET_FIELDS"),
+        ([1, KEY, "rover", "x" * HASH_BYTES], "PACKET_FIELDS"),
+        ([2, NONCE[1:]], "PACKET_FIELDS"),
+        ([3, HASH + b"x"], "PACKET_FIELDS"),
+        ([4, 7], "PACKET_FIELDS"),
+        ([4, []], "PACKET_FIELDS"),
+        ([4, "tired"], "PACKET_FIELDS"),
+    ],
+    ids=str,
+)
+def test_almost_right_is_refused(fields: Any, code: str) -> None:
+    with pytest.raises(NondumError) as refused:
+        decode(pack(fields))
+    assert refused.value.code == code
