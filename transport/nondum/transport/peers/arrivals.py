@@ -22,11 +22,12 @@ class Arrivals:
         self,
         refusals: Refusals,
         on_closed: Callable[[int], None],
-        awake_s: Callable[[], float],
+        awake_s: Callable[[], float] | None = None,
     ) -> None:
         """`on_closed` is told the descriptor of every connection that ended; `awake_s` tells how
-        long the loop has run: while it stands still, nobody can show who it is."""
-        self._refusals, self._on_closed, self._awake_s = refusals, on_closed, awake_s
+        long the loop has run: while it stands still, no one can show who it is."""
+        self._refusals, self._on_closed = refusals, on_closed
+        self._awake_s = awake_s or asyncio.get_running_loop().time
         self._connections = AcceptedConnections()
         self._explained = 0
         """Connections whose failure was told, and counted, but not yet their end."""

@@ -24,6 +24,8 @@ HELPERS = 3
 """Peers that are asked about one that is late."""
 TICKS_AWAKE = 1.5
 """Of the time between two looks, so many ticks count: if more has passed, the loop stood still."""
+SOONEST_S = 0.001
+"""Between two looks at one link."""
 FIRST_PROBE = 2**40 * ANSWERED
 """Pings that ask for an answer have numbers of their own, all of which every host answers."""
 
@@ -60,9 +62,15 @@ class Presence:
         return self._awake.read(self._loop.time())
 
     def joined(self, link: Link, beat_s: float) -> None:
-        """A link became a peer's; `beat_s` counts until the peer has said its own."""
+        """A link became a peer's; `beat_s` counts until each end has said its own."""
         link.beat_s = beat_s
+        link.doubt_s = self.terms.doubt_s(beat_s)
         self.heard(link)
+
+    def pinged(self, link: Link, now_s: float, beat_s: float) -> None:
+        """This host has pinged a peer, and said that it will again in `beat_s`."""
+        link.due_s = now_s + beat_s
+        link.doubt_s = self.terms.doubt_s(beat_s)
 
     def heard(self, link: Link) -> None:
         """Something came over a link."""
@@ -114,7 +122,7 @@ class Presence:
             self._ask(link)
         wait_s = link.watched.due_s(self.terms, link.beat_s) - now_s
         if wait_s < self.terms.tick_s and link.looking is None:
-            link.looking = self._loop.call_later(wait_s, self._look_soon, link)
+            link.looking = self._loop.call_later(max(wait_s, SOONEST_S), self._look_soon, link)
 
     def _look_at_doubt(self, session: Session, doubt: Doubt) -> None:
         """Ask again over the newest link; whoever goes on talking, but does not answer, is dead."""

@@ -235,8 +235,7 @@ class Roster:
         if not link.is_over and link.ping(number, ping, now_s) is Sent.GONE:
             self.break_link(link, Loss.DISCONNECTED)
             return
-        link.due_s = now_s + self._beat_s
-        link.doubt_s = self._presence.terms.doubt_s(self._beat_s)
+        self._presence.pinged(link, now_s, self._beat_s)
 
     def _on_dead(self, link: Link) -> None:
         self.break_link(link, Loss.SILENT)

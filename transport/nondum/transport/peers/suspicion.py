@@ -137,20 +137,15 @@ class Watched:
 
     def look(self, awake_s: float, terms: Terms, beat_s: float) -> tuple[Watched, Verdict]:
         """Judge the peer at a moment."""
-        silent_s = awake_s - self.heard_s
-        if self.suspected_s is None:
-            if silent_s < terms.suspect_s(beat_s):
-                return self, Verdict.HEARD
-            return replace(self, suspected_s=awake_s), Verdict.ASK
-        return self, Verdict.WAIT if awake_s < self._ends_s(terms, beat_s) else Verdict.DEAD
+        is_due = awake_s >= self.due_s(terms, beat_s)
+        if self.suspected_s is not None:
+            return self, Verdict.DEAD if is_due else Verdict.WAIT
+        if not is_due:
+            return self, Verdict.HEARD
+        return replace(self, suspected_s=awake_s), Verdict.ASK
 
     def due_s(self, terms: Terms, beat_s: float) -> float:
         """When `look` will give another verdict if nothing is heard."""
         if self.suspected_s is None:
             return self.heard_s + terms.suspect_s(beat_s)
-        return self._ends_s(terms, beat_s)
-
-    def _ends_s(self, terms: Terms, beat_s: float) -> float:
-        assert self.suspected_s is not None
-        confirm_s = terms.confirm_s(beat_s)
-        return self.suspected_s + confirm_s * (2 if self.is_vouched else 1)
+        return self.suspected_s + terms.confirm_s(beat_s) * (2 if self.is_vouched else 1)
