@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import socket
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
 
 import pytest
+import zmq
 from tests.kit.clock import VirtualClock
+from tests.kit.until import until_async
 from tests.transport.peers.hosts import PATIENCE_S, Host, host, identity, trusting, two_hosts, up
 
-from nondum.transport.peers import Loss, PeerLost, Reason, roster
+from nondum.transport.peers import DialFailed, HostKeys, Loss, PeerLost, Reason, roster
+from nondum.transport.peers.accepted import AWAITED_S
+from nondum.transport.peers.dial import ANSWER_S, GREETING_S
 from nondum.transport.peers.messages import Ask, encode
 from nondum.transport.peers.suspicion import Terms
 
@@ -93,6 +98,35 @@ async def test_question_about_an_unknown_host_or_about_oneself_is_ignored() -> N
             say(rover, base, Ask(1, about))
         await talk((rover, base), (base, rover))
         assert not base.node.refusals.counts
+
+
+async def test_connection_is_not_cut_for_time_in_which_the_host_stood_still(
+    clock: VirtualClock,
+) -> None:
+    async with host(identity("base")) as there:
+        await clock.advance(1.0)
+        with socket.create_connection(("127.0.0.1", int(there.address.rpartition(":")[2]))):
+            await until_async("a stranger", lambda: there.node.strangers == 1)
+            for _ in range(3):
+                await clock.stand_still(60.0)
+                await clock.advance(BEAT_S)
+            assert there.node.strangers == 1
+            await clock.advance(AWAITED_S)
+            assert there.node.refusals.counts == {Reason.SILENT: 1}
+
+
+async def test_host_that_has_let_in_a_connection_may_be_slow_to_greet(clock: VirtualClock) -> None:
+    base = HostKeys.generate()
+    with zmq.Context() as context, context.socket(zmq.ROUTER) as slow:
+        slow.curve_server, slow.curve_secretkey, slow.linger = True, base.secret.encode(), 0
+        address = f"tcp://127.0.0.1:{slow.bind_to_random_port('tcp://127.0.0.1')}"
+        async with host(identity("rover"), trusting(identity("base", base))) as rover:
+            rover.node.dial(base.public, [address])
+            await asyncio.to_thread(slow.recv_multipart)  # its greeting
+            await clock.advance(ANSWER_S + 1.0)
+            assert rover.events.empty()
+            await clock.advance(GREETING_S)
+            assert (await rover.told(DialFailed)).problem.code == "PEER_SILENT"
 
 
 @dataclass
