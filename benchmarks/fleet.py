@@ -4,6 +4,8 @@ Every host is a process of its own, all on this machine over loopback: by mesh (
 linked to every other) and by way of a Zenoh router (a process more, no encryption). All start, and
 wait; then they are told of each other at one moment. Measured until every one of them has every
 other's catalogue of 10 kB; then for some seconds of quiet, and one change that all must hear of.
+In the mesh, hosts are then stopped and killed, while all are quiet and while all tell changes: how
+long until all others know, and whether a live one was taken for dead meanwhile.
 Writes docs/benchmarks/fleet.md.
 """
 
@@ -12,13 +14,18 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import itertools
 import json
+import math
 import os
+import random
+import signal
 import socket
 import struct
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -37,6 +44,14 @@ from nondum.transport.peers import Errand, HostKeys, Identity, Lease, PeerKey, P
 CATALOGUE = {f"component/{number}": {"text": "x" * 970} for number in range(10)}
 NEWS = {"component/9": {"text": "y" * 200}}
 QUIET_S = 4.0
+BUSY_S = 1.0
+"""Between two changes of every host while all are busy."""
+SEEN_S = 1.0
+"""Between two looks whether a death is known to all …"""
+PATIENCE_S = 20.0
+"""… until so much later."""
+TOGETHER = 8
+"""Hosts that start at the same time, or their self-tests would be late."""
 # struct tcp_info of linux/tcp.h: bytes_sent comes after 200 bytes.
 _TCP_INFO = struct.Struct("=200xQ")
 
@@ -58,14 +73,15 @@ class Watching:
 
     def __init__(self) -> None:
         self.complete: set[PeerKey] = set()
-        self.lost = 0
+        self.lost: list[tuple[float, str, str]] = []
+        """When, who, and why."""
         self.told: asyncio.Queue[str] = asyncio.Queue()
         self.expected = 0
 
     def hear(self, event: FleetEvent) -> None:
         match event:
             case PeerLost():
-                self.lost += 1
+                self.lost.append((time.monotonic(), event.name, event.reason.name))
                 self.complete.discard(event.key)
             case PeerChanged(is_whole=True):
                 if len(event.changes) == len(CATALOGUE):
@@ -76,16 +92,23 @@ class Watching:
                 self.told.put_nowait("news")
 
 
+def duplicate(descriptor: int) -> socket.socket:
+    """The socket of a descriptor once more. Raises `OSError` where there is none."""
+    copy = os.dup(descriptor)
+    try:
+        return socket.socket(fileno=copy)
+    except OSError:
+        os.close(copy)
+        raise
+
+
 def bytes_sent() -> int:
     """What has left by all TCP connections that this process has."""
     total = 0
     for name in os.listdir("/proc/self/fd"):  # noqa: PTH208  # numbers, not paths
-        try:
-            with socket.socket(fileno=os.dup(int(name))) as one:
-                info = one.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO.size)
-                total += int(_TCP_INFO.unpack(info)[0])
-        except OSError:  # no socket, or none of TCP
-            continue
+        with contextlib.suppress(OSError), duplicate(int(name)) as one:  # or none of TCP
+            info = one.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO.size)
+            total += int(_TCP_INFO.unpack(info)[0])
     return total
 
 
@@ -123,6 +146,7 @@ async def be_host(kind: str, config: dict[str, Any]) -> None:
         tell({"address": fleet.addresses[0]})
     else:
         tell({"address": ""})
+    telling: asyncio.Task[None] | None = None
     while line := await loop.run_in_executor(None, sys.stdin.readline):
         order = json.loads(line)
         match order["do"]:
@@ -136,11 +160,24 @@ async def be_host(kind: str, config: dict[str, Any]) -> None:
                 tell(usage() | {"lost": watching.lost})
             case "look":
                 tell(usage() | {"lost": watching.lost})
+            case "be busy":
+                telling = asyncio.create_task(tell_changes(fleet))
+            case "rest":
+                assert telling is not None
+                telling.cancel()
             case "publish":
                 fleet.publish(NEWS)
             case "hear":
                 await watching.told.get()
                 tell(usage())
+
+
+async def tell_changes(fleet: Fleet) -> None:
+    """One after the other, not in step with other hosts."""
+    await asyncio.sleep(random.uniform(0.0, BUSY_S))
+    for number in itertools.count():
+        fleet.publish({"component/9": {"text": "z" * 200, "number": number}})
+        await asyncio.sleep(BUSY_S)
 
 
 def be_router(endpoint: str) -> None:
@@ -169,6 +206,8 @@ class Child:
     """A process that does as it is told."""
 
     process: subprocess.Popen[str]
+    name: str
+    address: str = ""
 
     def order(self, do: str, **more: Any) -> None:
         assert self.process.stdin is not None
@@ -192,7 +231,10 @@ def children(kinds: list[tuple[str, Any]]) -> Iterator[list[Child]]:
             )
             stack.enter_context(process)
             stack.callback(process.kill)
-            started.append(Child(process))
+            started.append(Child(process, config["name"] if kind != "router" else kind))
+            if len(started) % TOGETHER == 0 or len(started) == len(kinds):
+                for one in started[-TOGETHER:]:
+                    one.address = one.address or one.answer()["address"] or "-"
         yield started
 
 
@@ -212,7 +254,57 @@ class Figures:
     news_bytes: float
     """That the host with the news has sent meanwhile."""
     lost: int
-    """Peers that were taken for dead, in all."""
+    """Live peers that were taken for dead, in all."""
+    why: dict[str, int]
+    """The reasons that were told for them."""
+    deaths_s: dict[str, float]
+    """By what happened: until the last host knew that another was dead."""
+
+
+DEATHS = {
+    "quiet, stopped": (False, signal.SIGSTOP),
+    "quiet, killed": (False, signal.SIGKILL),
+    "busy, stopped": (True, signal.SIGSTOP),
+    "busy, killed": (True, signal.SIGKILL),
+}
+
+
+def strike(nodes: list[Child]) -> tuple[dict[str, float], set[str], list[dict[str, Any]]]:
+    """Have hosts die, one after the other; how long until all others knew, which ones died, and
+    what the others told at the end."""
+    took_s, dead, alive = {}, set(), list(nodes)
+    is_busy = False
+    for what, (wants_busy, number) in DEATHS.items():
+        if wants_busy is not is_busy:
+            for node in alive:
+                node.order("be busy")
+            is_busy = True
+            time.sleep(QUIET_S)
+        struck = alive.pop()
+        at_s = time.monotonic()
+        struck.process.send_signal(number)
+        dead.add(struck.name)
+        took_s[what] = max(_known_to(node, struck.name, at_s) for node in alive)
+    time.sleep(QUIET_S)
+    for node in alive:
+        node.order("rest")
+    return took_s, dead, _all(alive, lambda node: node.order("look"))
+
+
+def _has_deaths(kind: str, hosts: int) -> bool:
+    return kind == "mesh" and hosts > len(DEATHS) + 1
+
+
+def _known_to(node: Child, name: str, at_s: float) -> float:
+    """How long after a moment a host lost another; infinite when it did not."""
+    while True:
+        node.order("look")
+        for lost_s, lost, _ in node.answer()["lost"]:
+            if lost == name and lost_s >= at_s:
+                return float(lost_s) - at_s
+        if time.monotonic() - at_s > PATIENCE_S:
+            return math.inf
+        time.sleep(SEEN_S)
 
 
 def measure(kind: str, hosts: int) -> Figures:
@@ -237,11 +329,8 @@ def measure(kind: str, hosts: int) -> Figures:
         relays = []
         if kind == "zenoh":
             relays = stack.enter_context(children([("router", router)]))
-            relays[0].answer()
         nodes = stack.enter_context(children(configs))
-        places = {
-            pair.public: node.answer()["address"] for pair, node in zip(keys, nodes, strict=True)
-        }
+        places = {pair.public: node.address for pair, node in zip(keys, nodes, strict=True)}
         everybody = [*nodes, *relays]
         before = _all(everybody, lambda node: node.order("look"))
         begun_s = time.monotonic()
@@ -259,6 +348,10 @@ def measure(kind: str, hosts: int) -> Figures:
         nodes[0].order("look")
         publisher = nodes[0].answer()
         silence = (quiet[0]["sent"] - after[0]["sent"]) / (quiet[0]["at_s"] - after[0]["at_s"])
+        took_s, dead, last = (
+            strike(nodes) if _has_deaths(kind, hosts) else ({}, set(), quiet[:hosts])
+        )
+        why = Counter(why for one in last for _, name, why in one["lost"] if name not in dead)
         noise = silence * (publisher["at_s"] - quiet[0]["at_s"])
         return Figures(
             converged_s=max(one["at_s"] for one in met) - begun_s,
@@ -271,7 +364,9 @@ def measure(kind: str, hosts: int) -> Figures:
             / (quiet[0]["at_s"] - after[0]["at_s"]),
             news_ms=(max(one["at_s"] for one in heard) - told_s) * 1000,
             news_bytes=publisher["sent"] - quiet[0]["sent"] - noise,
-            lost=sum(one["lost"] for one in quiet[:hosts]),
+            lost=why.total(),
+            why=dict(why),
+            deaths_s=took_s,
         )
 
 
@@ -314,23 +409,44 @@ machine over loopback, so that {max(hosts for _, hosts in found)} hosts share wh
 would have alone. All have started when they are told of each other at one moment; converged means
 that every one has every other's catalogue (10 kB, ten entries). Bytes are those that TCP carried,
 the router's included; CPU is until then, the router's and ZeroMQ's threads included. In quiet, mesh
-links are pinged from both ends, every 0.3 s for up to 32 peers and more seldom for more; by way of
+links are pinged from both ends, every 0.3 s for up to 32 peers and every 1.8 s for 99; by way of
 the router, hosts tell their state every 3 s.
 Then one entry of 200 bytes changes: until the last host has it, and what the one that told it has
-sent. The mesh is encrypted and every host proves its key; the router's links here are not.
+sent. Live hosts that were taken for dead by another are counted until the end, deaths included. The
+mesh is encrypted and every host proves its key; the router's links here are not.
 Medians of {repeats} repeats in turn (lowest-highest).
 
 {measuring.table(["hosts", "", *COLUMNS], rows)}
+
+## Deaths
+
+In the mesh, four hosts die one after the other: stopped (SIGSTOP: nothing of them is heard, and
+their connections stay) or killed (SIGKILL), while the others are quiet, and while every one of
+them changes an entry every {BUSY_S:.0f} s, which all others are told. Seconds until the last of the
+others knew.
+
+{measuring.table(["hosts", *DEATHS], _deaths(found))}
 
 Machine: {measuring.machine()}; libzmq {zmq.zmq_version()},
 eclipse-zenoh {version("eclipse-zenoh")}.
 """
 
 
+def _deaths(found: dict[tuple[str, int], list[Figures]]) -> list[list[str]]:
+    return [
+        [
+            str(hosts),
+            *(format(Spread(tuple(one.deaths_s[what] for one in some)), ".2f") for what in DEATHS),
+        ]
+        for (kind, hosts), some in found.items()
+        if _has_deaths(kind, hosts)
+    ]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--hosts", type=int, nargs="+", default=[2, 20, 100])
+    parser.add_argument("--hosts", type=int, nargs="+", default=[2, 32, 100])
     parser.add_argument("--kinds", nargs="+", default=["mesh", "zenoh"])
     parser.add_argument("--be", nargs=2, help=argparse.SUPPRESS)
     arguments = parser.parse_args()

@@ -95,6 +95,28 @@ async def test_what_is_more_than_allowed_is_handed_on_in_order_and_later(
     assert len(taken) == 50
 
 
+async def test_what_is_held_waits_in_order_until_it_is_released(clock: VirtualClock) -> None:
+    taken: list[str] = []
+    paced = Paced(Allowance(per_s=10.0, burst=4.0).bucket(), taken.append)
+    assert paced.take("before", cost=1)
+    paced.hold()
+    assert all(paced.take(one, cost=1) for one in ("first", "second", "third"))
+    assert paced.take("ping", cost=1, passes_held=True)
+    await clock.advance(60.0)
+    assert taken == ["before", "ping"]
+    paced.release()
+    await clock.advance(1.0)
+    assert taken == ["before", "ping", "first", "second", "third"]
+
+
+async def test_what_passes_by_those_held_is_paid_for_too(clock: VirtualClock) -> None:
+    taken: list[int] = []
+    paced = Paced(Allowance(per_s=1.0, burst=10.0).bucket(), taken.append)
+    paced.hold()
+    assert [paced.take(n, cost=1, passes_held=True) for n in range(111)] == [True] * 110 + [False]
+    assert taken == list(range(10))
+
+
 async def test_too_much_that_waits_is_refused(clock: VirtualClock) -> None:
     """Refused is what came too much; what waits is handed on."""
     taken: list[int] = []

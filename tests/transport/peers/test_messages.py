@@ -14,6 +14,7 @@ from nondum.sdk.wire_fields import MAX_ID
 from nondum.transport.peers.messages import (
     MAX_CERTIFICATE,
     MAX_MESSAGE,
+    Ask,
     Bye,
     Cancel,
     Failure,
@@ -26,6 +27,7 @@ from nondum.transport.peers.messages import (
     Refused,
     Reply,
     Request,
+    Vouch,
     Welcome,
     agreed_version,
     decode,
@@ -69,6 +71,8 @@ messages: st.SearchStrategy[Message] = st.one_of(
     st.builds(Ping, numbers, numbers, st.none() | st.builds(State, numbers, digests)),
     st.builds(Pong, numbers),
     st.builds(Bye, names),
+    st.builds(Ask, numbers, names),
+    st.builds(Vouch, numbers),
 )
 
 
@@ -89,7 +93,7 @@ def test_any_bytes_are_a_message_or_a_violation(data: bytes) -> None:
 plain = st.recursive(leaves, lambda x: st.lists(x, max_size=5) | st.dictionaries(names, x))
 
 
-@given(st.integers(-1, 13), st.lists(plain, max_size=7))
+@given(st.integers(-1, 15), st.lists(plain, max_size=7))
 def test_any_list_is_a_message_or_a_violation(kind: int, fields: list[Any]) -> None:
     try:
         decode(msgpack.packb([kind, *fields]))

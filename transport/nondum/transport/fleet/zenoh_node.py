@@ -30,11 +30,14 @@ from nondum.transport.peers.messages import Notice, encode
 from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.refusals import Reason, Refusals
 from nondum.transport.peers.roster import Roster
+from nondum.transport.peers.suspicion import Terms
 from nondum.transport.peers.trust import Admission, Standing, Trust
 
 SILENCE_S = 10.0
 """A peer that has told nothing for so long hangs: three of its tellings were missed."""
 TEND_S = 0.5
+TERMS = Terms(tick_s=TEND_S, shortest_beat_s=7.0, longest_beat_s=7.0, overdue_s=0.5)
+"""So that it is asked first, and given up after `SILENCE_S`."""
 ANSWER_S = 8.0
 """How long a greeting may take to be answered."""
 START_S = 3.0
@@ -108,7 +111,7 @@ class ZenohNode:
             on_event,
             lambda _link: None,
             Pulse(),
-            silence_s=SILENCE_S,
+            terms=TERMS,
         )
         self._loop = asyncio.get_running_loop()
         ears = Ears(self._on_present, self._on_message, self._on_to_all, self._on_trouble)

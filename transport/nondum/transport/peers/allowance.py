@@ -66,19 +66,37 @@ class Paced(Generic[T]):
         self._waiting: deque[tuple[int, T]] = deque()
         self._size = 0
         self._timer: asyncio.TimerHandle | None = None
+        self._is_held = False
 
-    def take(self, one: T, cost: int) -> bool:
-        """Hand it on, now or later; False when too much waits already."""
-        if not self._waiting and self._bucket.take(cost, self._loop.time()):
+    def take(self, one: T, cost: int, *, passes_held: bool = False) -> bool:
+        """Hand it on, now or later; False when too much waits already.
+
+        `passes_held`: it does not wait behind what is held, if the peer may send as much.
+        """
+        may_pass = passes_held if self._is_held else not self._waiting
+        if may_pass and self._bucket.take(cost, self._loop.time()):
             self._hand_on(one)
             return True
         if self._size + cost > WAITING:
             return False
         self._waiting.append((cost, one))
         self._size += cost
-        if self._timer is None:
+        if self._timer is None and not self._is_held:
             self._timer = self._loop.call_later(LOOK_S, self._look)
         return True
+
+    def hold(self) -> None:
+        """Hand nothing on until `release`."""
+        self._is_held = True
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def release(self) -> None:
+        """Hand on what was held."""
+        self._is_held = False
+        if self._timer is None:
+            self._look()
 
     def close(self) -> None:
         """Forget what waits."""

@@ -18,9 +18,16 @@ _OTHER_KEYS = frozenset({0x11000001, 0x11000002})
 class Arrivals:
     """Connections to this host until they are a peer's."""
 
-    def __init__(self, refusals: Refusals, on_closed: Callable[[int], None]) -> None:
-        """`on_closed` is told the descriptor of every connection that ended."""
+    def __init__(
+        self,
+        refusals: Refusals,
+        on_closed: Callable[[int], None],
+        awake_s: Callable[[], float] | None = None,
+    ) -> None:
+        """`on_closed` is told the descriptor of every connection that ended; `awake_s` tells how
+        long the loop has run: while it stands still, no one can show who it is."""
         self._refusals, self._on_closed = refusals, on_closed
+        self._awake_s = awake_s or asyncio.get_running_loop().time
         self._connections = AcceptedConnections()
         self._explained = 0
         """Connections whose failure was told, and counted, but not yet their end."""
@@ -32,9 +39,8 @@ class Arrivals:
 
     def on_event(self, event: SocketEvent) -> None:
         """Take in what the socket's monitor tells."""
-        now_s = asyncio.get_running_loop().time()
         if event.kind == zmq.EVENT_ACCEPTED:
-            for end in self._connections.opened(event.value, now_s):
+            for end in self._connections.opened(event.value, self._awake_s()):
                 self._count(Reason.CROWDED, end)
         elif event.kind == zmq.EVENT_DISCONNECTED:
             if self._connections.closed(event.value):
@@ -48,15 +54,15 @@ class Arrivals:
 
     def spoke(self, descriptor: int) -> None:
         """The first message has come over a connection."""
-        self._connections.spoke(descriptor, asyncio.get_running_loop().time())
+        self._connections.spoke(descriptor, self._awake_s())
 
     def became_peer(self, descriptor: int) -> None:
         """A connection has shown who it is."""
-        self._connections.became_peer(descriptor, asyncio.get_running_loop().time())
+        self._connections.became_peer(descriptor, self._awake_s())
 
     def cut_overdue(self) -> None:
         """Cut those that take too long or send too much."""
-        for end in self._connections.cut_overdue(asyncio.get_running_loop().time()):
+        for end in self._connections.cut_overdue(self._awake_s()):
             self._count(Reason.SILENT, end)
 
     def _count_end(self) -> None:

@@ -27,7 +27,9 @@ whenever the cable is out for a moment."""
 FIRST_WAIT_S = 0.05
 LONGEST_WAIT_S = 5.0
 ANSWER_S = 8.0
-"""How long one attempt may take, greeting included."""
+"""How long one attempt may take to be authenticated …"""
+GREETING_S = 12.0
+"""… and so much more to be greeted: the other end's loop has let it in, so it is only slow."""
 
 OnData: TypeAlias = Callable[[Link, list[zmq.Frame]], None]
 
@@ -180,6 +182,13 @@ class Dial:
                 self._tell(address, _unusable(error))
 
     def _give_up(self) -> None:
+        if any(one.is_connected and not one.is_settled for one in self._attempts):
+            self._limit = self._loop.call_later(GREETING_S, self._give_up_greeting)
+        for attempt in list(self._attempts):
+            if not attempt.is_connected:
+                self.over(attempt, Problem("PEER_SILENT", "nobody answers there"))
+
+    def _give_up_greeting(self) -> None:
         for attempt in list(self._attempts):
             if not attempt.is_settled:
                 self.over(attempt, Problem("PEER_SILENT", "nobody answers there"))

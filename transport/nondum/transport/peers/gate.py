@@ -9,6 +9,7 @@ from datetime import datetime
 
 from nondum.sdk.errors import NondumError, Problem
 from nondum.transport.peers.allowance import USUAL, greetings
+from nondum.transport.peers.enquiries import asks
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.identity import Identity, Security, is_loopback
 from nondum.transport.peers.keys import PeerKey, fingerprint
@@ -48,6 +49,8 @@ class Acquaintance:
     barred_until_s: float = float("-inf")
     """It has sent more: on the loop's clock."""
     greetings: TokenBucket = field(default_factory=greetings)
+    asks: TokenBucket = field(default_factory=asks)
+    """What it may still ask about others."""
 
     def meet(self, hello: Hello) -> bool:
         """Take a greeting in; whether it begins something new, so that what ran before is over.

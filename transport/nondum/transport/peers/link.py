@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
@@ -14,6 +15,7 @@ from nondum.transport.peers.drained import Drained, Sent
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.messages import Message, encode
 from nondum.transport.peers.monitor import SocketEvent, Watch
+from nondum.transport.peers.suspicion import Watched
 
 if TYPE_CHECKING:
     from nondum.transport.peers.session import Session
@@ -43,6 +45,19 @@ class Link:
         self.heard_s = now_s
         self.beat_s = 0.0
         """Between two of the other end's pings, as the last one said."""
+        self.watched = Watched(0.0)
+        """Set when the link becomes a peer's."""
+        self.looking: asyncio.TimerHandle | None = None
+        """When it is looked at next, if that is soon."""
+        self.version = 1
+        """Of the protocol, as agreed."""
+        self.due_s = now_s
+        """When this host is to ping next."""
+        self.doubt_s = math.inf
+        """How long this host may be silent without the other end giving the link up."""
+        self._sent_s = now_s
+        self._was_silent = False
+        self._loop = asyncio.get_running_loop()
         self.session: Session | None = None
         """The peer's, once greetings were exchanged."""
         self.is_over = False
@@ -54,7 +69,21 @@ class Link:
 
     def send(self, data: bytes) -> Sent:
         """Send without waiting."""
-        return Sent.GONE if self.is_over else self.route.send(data)
+        if self.is_over:
+            return Sent.GONE
+        sent, now_s = self.route.send(data), self._loop.time()
+        self._was_silent = self.is_doubtful(now_s)
+        if sent is Sent.SENT:
+            self._sent_s = now_s
+        return sent
+
+    def is_doubtful(self, now_s: float) -> bool:
+        """Whether the other end may have given the link up, since this host was silent."""
+        return self._was_silent or now_s - self._sent_s > self.doubt_s
+
+    def confirm(self) -> None:
+        """The other end has not given it up."""
+        self._was_silent = False
 
     def tell(self, message: Message) -> Sent:
         """Send what may be lost."""

@@ -23,8 +23,8 @@ from nondum.sdk.wire_fields import (
 )
 from nondum.transport.peers.pulse import DIGEST_BYTES, State
 
-VERSIONS: tuple[int, ...] = (1,)
-"""Versions of this protocol that this host speaks, newest first."""
+VERSIONS: tuple[int, ...] = (2, 1)
+"""Versions of this protocol that this host speaks, newest first. 2 adds `Ask` and `Vouch`."""
 MAX_MESSAGE = 128 * 1024
 """Bytes in a message."""
 MAX_CERTIFICATE = 1024
@@ -137,6 +137,22 @@ class Bye:
     reason: str
 
 
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """Whether a host answers that the sender does not hear (SWIM's ping-req)."""
+
+    number: int
+    key: str
+    """Of the host in question."""
+
+
+@dataclass(frozen=True, slots=True)
+class Vouch:
+    """The host that was asked about has answered the sender; nothing is said when it has not."""
+
+    number: int
+
+
 Message: TypeAlias = (
     Hello
     | Welcome
@@ -150,6 +166,8 @@ Message: TypeAlias = (
     | Ping
     | Pong
     | Bye
+    | Ask
+    | Vouch
 )
 
 
@@ -186,6 +204,10 @@ def encode(message: Message) -> bytes:
             fields = (2, problem.to_dict())
         case Bye(reason):
             fields = (11, reason)
+        case Ask(number, key):
+            fields = (12, number, key)
+        case Vouch(number):
+            fields = (13, number)
     return pack(fields, MAX_MESSAGE)
 
 
@@ -311,6 +333,14 @@ def _read_bye(fields: list[Any]) -> Bye:
     return Bye(read_text(fields[1]))
 
 
+def _read_ask(fields: list[Any]) -> Ask:
+    return Ask(read_number(fields[1]), read_text(fields[2]))
+
+
+def _read_vouch(fields: list[Any]) -> Vouch:
+    return Vouch(read_number(fields[1]))
+
+
 _READERS: tuple[tuple[tuple[int, ...], Callable[[list[Any]], Message]], ...] = (
     ((7,), _read_hello),
     ((7,), _read_welcome),
@@ -324,6 +354,8 @@ _READERS: tuple[tuple[tuple[int, ...], Callable[[list[Any]], Message]], ...] = (
     ((3, 5), _read_ping),
     ((2,), _read_pong),
     ((2,), _read_bye),
+    ((3,), _read_ask),
+    ((2,), _read_vouch),
 )
 """By kind: how many fields a message has, and how they are read."""
 

@@ -16,6 +16,7 @@ from nondum.sdk.wire import Body
 from nondum.sdk.wire_fields import MAX_ID
 from nondum.transport.peers.allowance import USUAL, Allowance
 from nondum.transport.peers.arrivals import Arrivals
+from nondum.transport.peers.beats import BEAT_S, beat_s
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.dial import Attempt, Dial
 from nondum.transport.peers.drained import Drained, Sent
@@ -35,10 +36,6 @@ from nondum.transport.peers.roster import LINGER_MS, Roster
 from nondum.transport.peers.trust import Admission, Trust
 from nondum.transport.peers.zap import Entry, Knock, ZapHandler
 
-BEAT_S = 0.3
-"""Time between two pings: sent by the loop that does the work, so that its hanging is noticed."""
-QUICK_LINKS = 32
-"""Peers that are pinged so often. With more of them, each is pinged less often, and told so."""
 SECOND_LOOK_S = 0.02
 """ZeroMQ tells of a broken connection a little before sending over it fails."""
 _NO_PULSE = Pulse()
@@ -87,7 +84,7 @@ class PeerNode:
             pulse,
             allowance=allowance,
         )
-        self._arrivals = Arrivals(self.refusals, self._on_closed)
+        self._arrivals = Arrivals(self.refusals, self._on_closed, self._roster.awake_s)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._loop = asyncio.get_running_loop()
         self._inbound: dict[bytes, Link] = {}
@@ -291,10 +288,10 @@ class PeerNode:
                 self._loop.call_later(SECOND_LOOK_S, self._roster.try_link, link)
 
     def _beat(self) -> None:
-        links = max(len(self._roster.sessions), self.expected)
-        next_s = BEAT_S * max(1.0, links / QUICK_LINKS)
-        self._beating = self._loop.call_later(next_s, self._beat)
-        self._roster.beat(next_s)
+        self._beating = self._loop.call_later(BEAT_S, self._beat)
+        self._roster.beat(beat_s(max(len(self._roster.sessions), self.expected)))
+        if self._listener is not None:
+            self._listener.drain()  # what makes a connection a peer's may wait to be read
         self._arrivals.cut_overdue()
         # Links that are over keep their ids until their connections are gone: what was read of
         # them before they were cut must not make a new link.

@@ -28,22 +28,19 @@ from nondum.transport.peers.messages import (
     encode,
     milliseconds,
 )
+from nondum.transport.peers.presence import Presence
 from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.refusals import Reason, Refusal, Refusals
 from nondum.transport.peers.session import Departed, OutOfPlace, Session
+from nondum.transport.peers.suspicion import Terms
 from nondum.transport.peers.trust import Admission
 
-SILENCE_S = 1.0
-"""A link over which nothing came for so long is dead: three pings were missed."""
-PINGS_MISSED = 3.3
-LONGEST_SILENCE_S = 10.0
-"""The same, however seldom a peer says that it pings."""
-RESUME_S = 0.5
-"""How long a peer may be without a link before it is lost."""
 ACQUAINTANCES = 1024
 """Peers that are remembered while they are away."""
 LINGER_MS = 200
 """How long the last words over a link may take."""
+
+_TERMS = Terms()
 
 
 class Roster:
@@ -58,14 +55,13 @@ class Roster:
         on_event: Callable[[PeerEvent], None],
         on_peer_link: Callable[[Link], None],
         pulse: Pulse,
-        silence_s: float = SILENCE_S,
+        terms: Terms = _TERMS,
         allowance: Allowance = USUAL,
     ) -> None:
-        """`on_peer_link` is told of every accepted link that became a peer's; a link is dead after
-        `silence_s`; `allowance` is every peer's."""
+        """`on_peer_link` is told of every accepted link that became a peer's; `terms` say when a
+        link is dead; `allowance` is every peer's."""
         self.gate, self.epoch = gate, epoch
         self.dials: dict[PeerKey, Dial] = {}
-        self.silence_s = silence_s
         self._allowance = allowance
         self._handler, self._refusals = handler, refusals
         self._on_event, self._on_peer_link, self._pulse = on_event, on_peer_link, pulse
@@ -75,12 +71,17 @@ class Roster:
         self._loop = asyncio.get_running_loop()
         self._beats, self._beat_s = 1, 0.0
         self._ping = encode(Ping(self._beats))
-        """The same for every link, so made once a beat."""
+        """The same for every link, so made once a tick."""
+        self._presence = Presence(terms, self._sessions, self._probe, self._on_dead)
 
     @property
     def sessions(self) -> Mapping[PeerKey, Session]:
         """Of the peers that can be called now."""
         return self._sessions
+
+    def awake_s(self) -> float:
+        """How long this host's loop has run; it does not count time in which it stood still."""
+        return self._presence.awake_s()
 
     def session(self, peer: PeerKey) -> Session:
         """A live peer's. Raises `PeerUnreachable` (PEER_DOWN)."""
@@ -106,11 +107,11 @@ class Roster:
             self.turn_away(link, Reason.REVOKED, _REVOKED)
             return
         now_s, session = self._loop.time(), link.session
-        if session is not None and self._is_silent(link):
-            # This host may have hung itself: what waited meanwhile is of a link that is over.
-            self.break_link(link, Loss.SILENT)
-            return
         link.heard_s = now_s
+        if session is not None:
+            self._presence.heard(link)
+            if link.is_doubtful(now_s):
+                self._presence.doubt(session)
         try:
             message = decode(data)
         except ProtocolViolation as violation:
@@ -118,7 +119,9 @@ class Roster:
             return
         if session is None or session.is_free(message):
             self._take_in((link, message))
-        elif not session.paced.take((link, message), cost(len(data))):
+        elif not session.paced.take(
+            (link, message), cost(len(data)), passes_held=isinstance(message, Ping)
+        ):
             self._bar(session.known)
             self.turn_away(link, Reason.FLOODING, _FLOODING)
 
@@ -129,6 +132,7 @@ class Roster:
             return
         try:
             if session is not None:
+                self._presence.take_in(session, link, message)
                 session.receive(link, message)
             else:
                 self._greeted(link, message)
@@ -166,7 +170,8 @@ class Roster:
         if reason is Loss.SILENT:
             self.lose(session, reason)
             return
-        session.missing = self._loop.call_later(RESUME_S, self.lose, session, reason)
+        wait_s = self._presence.terms.resume_s(self._beat_s)
+        session.missing = self._loop.call_later(wait_s, self.lose, session, reason)
         if dial := self.dials.get(key):
             dial.again()
 
@@ -192,15 +197,18 @@ class Roster:
             if not self.gate.still_admits(session.admission):
                 self._part(session, Refused(_REVOKED), Loss.REVOKED)
 
-    def beat(self, next_s: float) -> None:
-        """Ping every link, and find those that are dead; the next beat is in `next_s`."""
+    def beat(self, beat_s: float) -> None:
+        """Ping the links that are due, and find those that are dead; each is pinged again in
+        `beat_s`."""
         self._beats += 1
-        self._beat_s = next_s
-        self._ping = encode(Ping(self._beats, milliseconds(next_s), self._pulse.state()))
+        self._beat_s = beat_s
+        self._ping = self._encode_ping(self._beats)
         self.tend()
+        due_s = self._loop.time() + self._presence.terms.tick_s / 2
         for session in list(self._sessions.values()):
             for link in list(session.links):
-                self.try_link(link)
+                if link.due_s <= due_s:
+                    self.try_link(link)
 
     def tend(self) -> None:
         """What is due from time to time: end what is over, send what has waited."""
@@ -209,18 +217,28 @@ class Roster:
                 self._part(session, Refused(_EXPIRED), Loss.EXPIRED)
                 continue
             session.errands.pass_on_waiting()
-            for link in list(session.links):
-                if self._is_silent(link):
-                    self.break_link(link, Loss.SILENT)
-
-    def _is_silent(self, link: Link) -> bool:
-        missed_s = min(PINGS_MISSED * link.beat_s, LONGEST_SILENCE_S)
-        return self._loop.time() - link.heard_s > max(self.silence_s, missed_s)
+        self._presence.tick()
 
     def try_link(self, link: Link) -> None:
         """Ping a link; one whose connection is gone is broken."""
-        if not link.is_over and link.ping(self._beats, self._ping, self._loop.time()) is Sent.GONE:
+        self._send_ping(link, self._beats, self._ping)
+
+    def _probe(self, link: Link, number: int) -> None:
+        """Ping a link, to be answered."""
+        self._send_ping(link, number, self._encode_ping(number))
+
+    def _encode_ping(self, number: int) -> bytes:
+        return encode(Ping(number, milliseconds(self._beat_s), self._pulse.state()))
+
+    def _send_ping(self, link: Link, number: int, ping: bytes) -> None:
+        now_s = self._loop.time()
+        if not link.is_over and link.ping(number, ping, now_s) is Sent.GONE:
             self.break_link(link, Loss.DISCONNECTED)
+            return
+        self._presence.pinged(link, now_s, self._beat_s)
+
+    def _on_dead(self, link: Link) -> None:
+        self.break_link(link, Loss.SILENT)
 
     def close(self) -> None:
         """Say goodbye to all; what runs for peers is cancelled."""
@@ -236,10 +254,12 @@ class Roster:
         match message:
             case Hello() if not link.dialled:
                 admission, known = self._meet(link, message)
-                link.tell(Welcome(self._hello(known, agreed_version(message))))
+                link.version = agreed_version(message)
+                link.tell(Welcome(self._hello(known, link.version)))
                 self._on_peer_link(link)
             case Welcome(hello) if link.dialled:
                 admission, known = self._meet(link, hello)
+                link.version = agreed_version(hello)
             case Refused(problem) if link.on_refused is not None:
                 link.on_refused(problem)
                 return
@@ -284,7 +304,7 @@ class Roster:
             admission, known, self._handler, self._pulse, self._take_in
         )
         self._sessions[key] = session
-        link.beat_s = self._beat_s  # until the peer has said its own
+        self._presence.joined(link, self._beat_s)
         for replaced in session.join(link):
             replaced.cut()
         if known_session is None:

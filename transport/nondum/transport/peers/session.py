@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, assert_never
 
 from nondum.sdk.errors import Problem, ProtocolViolation
@@ -20,6 +21,7 @@ from nondum.transport.peers.events import Loss
 from nondum.transport.peers.gate import Acquaintance
 from nondum.transport.peers.link import Link
 from nondum.transport.peers.messages import (
+    Ask,
     Bye,
     Cancel,
     Failure,
@@ -32,6 +34,7 @@ from nondum.transport.peers.messages import (
     Refused,
     Reply,
     Request,
+    Vouch,
     Welcome,
     encode,
 )
@@ -56,6 +59,16 @@ class OutOfPlace(Exception):
     """A message that has no place in a session."""
 
 
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """This host was silent for so long that the peer may have given it up."""
+
+    ping: int
+    """The number of the one that is to be answered."""
+    since_s: float
+    """On the loop's clock."""
+
+
 class Session:
     """A live peer."""
 
@@ -74,6 +87,8 @@ class Session:
         """The last one is sent over."""
         self.missing: asyncio.TimerHandle | None = None
         """Ends the session, when the last link has broken."""
+        self.doubt: Doubt | None = None
+        """Set while it is not known whether the peer has given this host up: what comes waits."""
         self.calls = Calls(admission.name, self.send, known.next_number)
         self.errands = Errands(admission, known.once, handler, self.send)
         self._handler, self._pulse = handler, pulse
@@ -119,6 +134,8 @@ class Session:
         match message:
             case Reply(number) | Failure(number):
                 return self.calls.awaits(number)
+            case Pong(number):
+                return self.doubt is not None and number == self.doubt.ping
             case Bye() | Refused():
                 return True
         return False
@@ -142,6 +159,8 @@ class Session:
                     self._pulse.heard(self.admission.key, state)
             case Pong(number):
                 link.heard_pong(number, self._loop.time())
+            case Ask() | Vouch():
+                pass  # of those who watch the peers
             case Failure(number, problems):
                 self.calls.fail(number, problems)
             case Progress(number, body):
