@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import zmq
 
 from nondum.sdk.errors import NondumError, Problem
-from nondum.transport.peers import accepted, pairing
+from nondum.transport import tcp
+from nondum.transport.peers import pairing
 from nondum.transport.peers.dial import ANSWER_S, Attempt, Dial
 from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.events import DialFailed
@@ -367,7 +368,8 @@ def _part(link: Link, why: Ending) -> None:
 
 def _sent_too_much(asker: Asker) -> bool:
     """ZeroMQ bounds messages, but not their number of parts: see `accepted`."""
-    return accepted.bytes_received(asker.descriptor) > MOST_SENT
+    state = tcp.state(asker.descriptor)
+    return state is not None and state.bytes_received > MOST_SENT
 
 
 def _digits(code: str) -> str:
