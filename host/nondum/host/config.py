@@ -172,8 +172,8 @@ class PeersSection:
     offer_actuators: tuple[str, ...] = ()
     """Components whose actuators peers may use; those of no other may move for a peer."""
     accept_goals: bool = True
-    """Whether goals that a peer heard are taken. Where a router is named, `false` by default: no peer
-    proves its key there."""
+    """Whether goals that a peer heard are taken. Where a router is named, `false` by default: no
+    peer proves its key there."""
     place: bool = True
     """Whether payloads that do not fit here are offered to peers, and theirs are taken here. Where
     a router is named, `false` by default: no peer proves its key there."""

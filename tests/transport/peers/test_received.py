@@ -13,6 +13,7 @@ import pytest
 import zmq
 from tests.kit.clock import VirtualClock
 from tests.kit.until import until, until_async
+from tests.transport.peers.bad_ends import bad_dealer, bad_router, greeting, hello_of
 from tests.transport.peers.held_back import held_back
 from tests.transport.peers.hosts import (
     PATIENCE_S,
@@ -27,7 +28,7 @@ from tests.transport.peers.hosts import (
 from nondum.transport import tcp
 from nondum.transport.peers import Identity, Loss, PeerLost, PeerUp, Reason, drained, node
 from nondum.transport.peers.link import AcceptedRoute
-from nondum.transport.peers.messages import MAX_MESSAGE, Hello, Welcome, encode
+from nondum.transport.peers.messages import MAX_MESSAGE, Welcome, encode
 from nondum.transport.peers.node import LOOK_S
 from nondum.transport.peers.received import MOST_AHEAD, Received
 
@@ -243,43 +244,3 @@ def connection() -> Iterator[tuple[socket.socket, socket.socket]]:
         server.accept()[0] as there,
     ):
         yield here, there
-
-
-@contextlib.contextmanager
-def bad_dealer(address: str, me: Identity, there: Host) -> Iterator[zmq.Socket[bytes]]:
-    """A host that dials, and may say everything."""
-    with bad_socket(zmq.DEALER, me) as bad:
-        bad.curve_serverkey = there.key.encode("ascii")
-        bad.connect(address)
-        yield bad
-
-
-@contextlib.contextmanager
-def bad_router(me: Identity) -> Iterator[tuple[zmq.Socket[bytes], str]]:
-    """A host that is dialled, and may say everything; where it listens."""
-    with bad_socket(zmq.ROUTER, me) as bad:
-        bad.curve_server = True
-        bad.bind("tcp://127.0.0.1:*")
-        yield bad, bad.last_endpoint.rstrip(b"\0").decode("ascii")
-
-
-@contextlib.contextmanager
-def bad_socket(kind: int, me: Identity) -> Iterator[zmq.Socket[bytes]]:
-    assert me.keys is not None
-    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-    with context.socket(kind) as bad:
-        bad.linger = 0
-        bad.curve_publickey = me.keys.public.encode("ascii")
-        bad.curve_secretkey = me.keys.secret.encode("ascii")
-        try:
-            yield bad
-        finally:
-            context.destroy(linger=0)
-
-
-def greeting(me: Identity, term: int = 1) -> Hello:
-    return Hello((1,), me.name, me.key, 7, term, me.certificate)
-
-
-def hello_of(me: Identity, term: int = 1) -> bytes:
-    return encode(greeting(me, term))
