@@ -138,3 +138,30 @@ def test_any_text_is_a_config_or_refused(text: str) -> None:
         parse(text, "host.toml", HostConfig())
     except ConfigRefused as error:
         assert all(problem.code.startswith("CONFIG_") for problem in error.problems)
+
+
+ROUTER = '[router]\nendpoints = ["tls/router.example:7447"]\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "takes"),
+    [
+        ("", (True, True)),
+        (ROUTER, (False, False)),
+        (ROUTER + "[peers]\naccept_goals = true\n", (True, False)),
+        (ROUTER + "[peers]\nplace = true\n", (False, True)),
+        ("[peers]\nplace = true\naccept_goals = true\n" + ROUTER, (True, True)),
+        ("[peers]\nplace = false\n", (True, False)),
+        ("[router]\nfleet = 'other'\n", (True, True)),
+    ],
+)
+def test_peers_that_prove_no_keys_give_nothing_unless_the_file_says_so(
+    text: str, takes: tuple[bool, bool]
+) -> None:
+    peers = parse(text, "host.toml", HostConfig()).peers
+    assert (peers.accept_goals, peers.place) == takes
+
+
+def test_peers_that_are_no_table_are_told_with_a_router_too() -> None:
+    (told,) = refused("peers = 1\n" + ROUTER)
+    assert told.startswith("CONFIG_VALUE host.toml:1")

@@ -9,7 +9,7 @@ import re
 import socket
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
 from types import GenericAlias
 from typing import Any, get_args, get_type_hints
@@ -176,9 +176,11 @@ class PeersSection:
     offer_actuators: tuple[str, ...] = ()
     """Components whose actuators peers may use; those of no other may move for a peer."""
     accept_goals: bool = True
-    """Whether goals that a peer heard are taken."""
+    """Whether goals that a peer heard are taken. Where a router is named, `false` by default: no
+    peer proves its key there."""
     place: bool = True
-    """Whether payloads that do not fit here are offered to peers, and theirs are taken here."""
+    """Whether payloads that do not fit here are offered to peers, and theirs are taken here. Where
+    a router is named, `false` by default: no peer proves its key there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -283,6 +285,8 @@ def parse(text: str, where: str, defaults: HostConfig) -> HostConfig:
             problems.append(_wrong(f"[{name}]", "a table", table, places.of(name)))
         else:
             sections[name] = _section(name, sections[name], table, places, problems)
+    if sections["router"].endpoints:
+        sections["peers"] = _unproved(sections["peers"], data.get("peers"))
     problems.extend(_contradictions(HostConfig(**sections), places))
     problems.extend(feedback_section.problems(sections["feedback"], places))
     if problems:
@@ -302,6 +306,12 @@ def documented() -> Iterator[tuple[str, str, Any]]:
         kind = get_type_hints(HostConfig)[section.name]
         for key in fields(kind):
             yield section.name, key.name, None if key.default is MISSING else key.default
+
+
+def _unproved(peers: PeersSection, table: object) -> PeersSection:
+    """What holds among peers that prove no keys, but for what the file's table says."""
+    unsaid = {"accept_goals", "place"} - (table.keys() if isinstance(table, dict) else set())
+    return replace(peers, **dict.fromkeys(unsaid, False))
 
 
 def _section(

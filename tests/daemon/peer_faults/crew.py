@@ -37,6 +37,11 @@ class Crew:
     def __iter__(self) -> Iterator[Member]:
         return iter(self.members)
 
+    @property
+    def fleet_secret(self) -> bytes:
+        """What certifies hosts of the fleet; empty where hosts are paired."""
+        return self._trust.secret
+
     def add(self, machine: str, keys: HostKeys, *, name: str = "") -> Member:
         """A host on a machine more, not started yet; it is no member that `all` would mean."""
         made = self.network.machine(machine)
@@ -147,7 +152,7 @@ class Trusting:
 
     def __init__(self, names: Sequence[str], *, by_fleet: bool = False) -> None:
         self.keys = {name: HostKeys.generate() for name in names}
-        self.fleet, self._secret = new_fleet() if by_fleet else ("", b"")
+        self.fleet, self.secret = new_fleet() if by_fleet else ("", b"")
         self.paired = {} if by_fleet else {one.public: name for name, one in self.keys.items()}
 
     def config(self, name: str, keys: HostKeys) -> Told:
@@ -161,7 +166,7 @@ class Trusting:
     def _certificate(self, name: str, keys: HostKeys) -> bytes:
         yesterday = datetime.now(UTC) - timedelta(days=1)
         until = yesterday + timedelta(days=31)
-        signed = issue(self._secret, name, keys.public, not_before=yesterday, not_after=until)
+        signed = issue(self.secret, name, keys.public, not_before=yesterday, not_after=until)
         return signed.to_bytes()
 
 

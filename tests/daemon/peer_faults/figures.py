@@ -22,6 +22,8 @@ class Figures:
     middle_ms: float = 0.0
     p99_ms: float = 0.0
     growth_kb: int = 0
+    peak_kb: int = 0
+    """By how much it had more at any moment than before."""
     cpu: float = 0.0
     """Share of one core that the host took."""
 
@@ -31,6 +33,8 @@ def measured(caller: Member, victim: Member) -> Iterator[Figures]:
     """Have a host call another one meanwhile: a call that is not answered fails the test."""
     figures = Figures()
     before_kb, began_s, spent_s = victim.weight_kb(), time.monotonic(), _spent_s(victim.pid)
+    victim.forget_peak()
+    usual_kb = victim.peak_kb()
     caller.ask("time", peer=victim.name, every_s=0.01)
     yield figures
     figures.cpu = (_spent_s(victim.pid) - spent_s) / (time.monotonic() - began_s)
@@ -39,9 +43,11 @@ def measured(caller: Member, victim: Member) -> Iterator[Figures]:
     figures.calls, figures.middle_ms = len(times), percentiles[49] * 1000
     figures.p99_ms = percentiles[98] * 1000
     figures.growth_kb = victim.weight_kb() - before_kb
+    figures.peak_kb = victim.peak_kb() - usual_kb
     note(
         f"{figures.calls} calls: median {figures.middle_ms:.1f} ms, p99 {figures.p99_ms:.1f} ms; "
-        f"{figures.cpu:.0%} of a core; {figures.growth_kb:+} kB, {victim.descriptors()} descriptors"
+        f"{figures.cpu:.0%} of a core; {figures.growth_kb:+} kB, {figures.peak_kb:+} kB at most, "
+        f"{victim.descriptors()} descriptors"
     )
     note(str(victim.ask("status")))
 

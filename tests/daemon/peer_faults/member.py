@@ -236,9 +236,10 @@ class Member:
         self._skew = timedelta()
         self._works, self._sees = Works(), Sees(_tell)
         section = PeersSection(discover=config["discover"], static=tuple(config["static"]))
+        self._trust = _trust(config)
         self.mesh = Mesh(
             _identity(config),
-            _trust(config),
+            self._trust,
             self._works,
             on_event=self._sees.hear,
             listen=[f"tcp://*:{config['port']}"],
@@ -344,6 +345,12 @@ class Member:
         timed, self._timed = self._timed, None
         timed.cancel()
         return {"times": await timed}
+
+    async def order_revoke(self, key: str) -> Mapping[str, Any]:
+        """Let in a key no more."""
+        self._trust = self._trust.with_revoked(PeerKey(key), "gone bad")
+        self.mesh.set_trust(self._trust)
+        return {}
 
     async def order_set_clock(self, skew_s: float) -> Mapping[str, Any]:
         """Put the time of day on or back."""

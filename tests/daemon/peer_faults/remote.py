@@ -129,6 +129,15 @@ class Member:
         lines = Path(f"/proc/{self.pid}/smaps_rollup").read_text(encoding="utf-8").splitlines()
         return next(int(line.split()[1]) for line in lines if line.startswith("Pss_Anon:"))
 
+    def forget_peak(self) -> None:
+        """Have `peak_kb` begin again, at what it has now (proc(5), clear_refs)."""
+        Path(f"/proc/{self.pid}/clear_refs").write_text("5", encoding="ascii")
+
+    def peak_kb(self) -> int:
+        """The most memory that it had at any moment (resident set)."""
+        lines = Path(f"/proc/{self.pid}/status").read_text(encoding="utf-8").splitlines()
+        return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM:"))
+
     def descriptors(self) -> int:
         """Files and sockets that it has open."""
         return len(os.listdir(f"/proc/{self.pid}/fd"))  # noqa: PTH208  # links that may be gone

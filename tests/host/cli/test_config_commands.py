@@ -76,6 +76,15 @@ def test_every_key_is_shown_with_who_says_it(tmp_path: Path) -> None:
     assert found["install.method"] == ("store", "default")
 
 
+def test_what_a_router_makes_false_is_shown_with_the_reason(tmp_path: Path) -> None:
+    router = '[router]\nendpoints = ["tcp/10.0.0.1:7447"]\n'
+    file = written(tmp_path, router + "[peers]\nplace = true\n")
+    shown = nondum("config", "show", "--config", file, "--json").ok().json
+    found = {row["key"]: (row["value"], row["from"]) for row in shown["settings"]}
+    assert found["peers.accept_goals"] == (False, "default with a router")
+    assert found["peers.place"] == (True, f"{file}:4")
+
+
 def test_what_is_not_as_by_default_is_shown_alone(tmp_path: Path) -> None:
     file = written(tmp_path, '[drives]\nslots = ["/a"]\n')
     lines = nondum("config", "show", "--set", "--config", file).ok().out.splitlines()

@@ -17,6 +17,8 @@ from hypothesis import strategies as st
 from tests.kit.clock import VirtualClock
 from tests.kit.examples import a_share
 from tests.kit.until import until_async
+from tests.transport.peers.bad_ends import bad_router
+from tests.transport.peers.held_back import held_back
 from tests.transport.peers.hosts import PATIENCE_S, identity
 
 from nondum.sdk.errors import NondumError
@@ -489,6 +491,17 @@ async def test_asker_that_talks_without_end_is_cut(
         for _ in range(MOST_SENT // len(encode(Beat()))):
             talking.says(Beat())
         assert (await base.gives_up("PAIRING_BROKEN")).tries_left == TRIES - 1
+
+
+async def test_asked_host_that_sends_a_message_without_end_is_cut() -> None:
+    me = identity("base")
+    most = 4 * MOST_SENT
+    with bad_router(me) as (bad, where):
+        async with end("rover") as rover, held_back(where, to_it=most, from_it=most) as address:
+            rover.host.ask(me.key, [address])
+            routing_id, _ = await asyncio.to_thread(bad.recv_multipart)
+            bad.send_multipart([routing_id, *[bytes(MAX_BYTES // 2)] * (most // 100)])
+            await rover.gives_up("PAIRING_BROKEN")
 
 
 async def test_host_without_keys_cannot_ask() -> None:

@@ -35,7 +35,8 @@ class Setting:
     key: str
     value: Any
     origin: str
-    """`default`, `default with --user`, `FILE:LINE`, or the option's name."""
+    """`default`, `default with --user`, `default with a router`, `FILE:LINE`, or the option's
+    name."""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for tables and JSON."""
@@ -73,8 +74,7 @@ def settings(asked: Asked) -> Iterator[Setting]:
     said = dict(_said(asked))
     for section, key, _ in host_config.documented():
         value = getattr(getattr(chosen, section), key)
-        is_same = value == getattr(getattr(HostConfig(), section), key)
-        origin = "default with --user" if asked.is_user and not is_same else "default"
+        origin = _default_of(section, key, value, asked)
         if places is not None and places.has(section, key):
             origin = places.of(section, key)
         yield Setting(section, key, value, said.get((section, key), origin))
@@ -98,6 +98,14 @@ def as_toml(value: Any) -> str:
 
 def _defaults(asked: Asked) -> HostConfig:
     return host_config.user_config() if asked.is_user else HostConfig()
+
+
+def _default_of(section: str, key: str, value: Any, asked: Asked) -> str:
+    """Why a key that nothing sets has this value."""
+    if value == getattr(getattr(HostConfig(), section), key):
+        return "default"
+    is_users = value == getattr(getattr(_defaults(asked), section), key)
+    return "default with --user" if is_users else "default with a router"
 
 
 def _said(asked: Asked) -> Mapping[tuple[str, str], str]:

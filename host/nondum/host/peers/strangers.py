@@ -18,6 +18,7 @@ _FIXES = {
     Reason.UNKNOWN_KEY: "if it is one of yours: `nondum peers pair` on both",
     Reason.CERTIFICATE: "have the fleet's owner sign a new certificate, or pair the two hosts",
     Reason.DUPLICATE: "give one of the two hosts another name, or a key of its own",
+    Reason.ENDLESS: "look what runs there; if it was taken over, `nondum peers revoke`",
     Reason.FLOODING: "look for what it runs that calls or tells others without end",
 }
 """What a person can do; of other reasons people are told nothing, only counts."""

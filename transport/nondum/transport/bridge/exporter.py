@@ -13,10 +13,10 @@ from collections.abc import Callable, Sequence
 import zmq
 
 from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.transport import tcp
 from nondum.transport.bridge import packets, sockets
 from nondum.transport.bridge.outgoing import Outgoing
 from nondum.transport.bridge.packets import VERSION, Claim, Over
-from nondum.transport.peers import accepted
 from nondum.transport.peers.arrivals import Arrivals
 from nondum.transport.peers.drained import Drained, Sent
 from nondum.transport.peers.keys import HostKeys, PeerKey
@@ -175,7 +175,7 @@ class _Way:
 
     def __init__(self, listener: Drained, routing_id: bytes, descriptor: int) -> None:
         self._listener, self._routing_id, self.descriptor = listener, routing_id, descriptor
-        self._end = accepted.other_end(descriptor)
+        self._end = tcp.other_end(descriptor)
 
     def send(self, parts: list[bytes | zmq.Frame]) -> Sent:
         """Send without waiting."""
@@ -184,4 +184,4 @@ class _Way:
     def cut(self) -> None:
         """End the connection, after what was sent."""
         loop = asyncio.get_running_loop()
-        loop.call_later(LAST_WORDS_S, accepted.cut, self.descriptor, self._end)
+        loop.call_later(LAST_WORDS_S, tcp.cut, self.descriptor, self._end)

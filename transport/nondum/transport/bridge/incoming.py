@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import zmq
 
 from nondum.sdk.errors import Problem, ProtocolViolation
-from nondum.transport.bridge import packets, sockets, tcp
+from nondum.transport import tcp
+from nondum.transport.bridge import packets, sockets
 from nondum.transport.bridge.clocks import Clocks
 from nondum.transport.bridge.packets import Claim, Frame, Handled, Opened, Over, Ping, Pong
 from nondum.transport.bridge.window import Window
@@ -105,7 +106,7 @@ class Incoming:
         """A connection stands, and both ends have proved their keys: the first one is kept."""
         if self._winner is not None or self._is_closed:
             return
-        self._winner = attempt
+        self._winner, self._descriptor = attempt, attempt.descriptor
         for other in self._attempts:
             if other is not attempt:
                 other.close()
@@ -124,8 +125,6 @@ class Incoming:
     def receive(self, frames: list[zmq.Frame]) -> None:
         """A message came over the connection that was kept."""
         now_s = self._loop.time()
-        if self._descriptor is None:
-            self._descriptor = int(frames[0].get(zmq.SRCFD))
         length = sum(len(frame) for frame in frames)
         self.bytes_received += length
         try:
@@ -165,18 +164,18 @@ class Incoming:
     def _beat(self) -> None:
         self._beating = self._loop.call_later(BEAT_S, self._beat)
         self._say(Ping(self._loop.time()))
+        state = None if self._descriptor is None else tcp.state(self._descriptor)
+        most = self.bytes_received * 1.25 + 2 * packets.MAX_BULK
+        if state is not None and state.bytes_received > most:
+            self._lose(Problem("BRIDGE_PACKET", "a message that does not end"))
+            return
         if not self._is_opened:
             if self._loop.time() - self._began_s > OPEN_S:
                 told = f"its bridge did not answer in {OPEN_S:g} s"
                 self._lose(Problem("STREAM_UNREACHABLE", told))
             return
-        state = None if self._descriptor is None else tcp.state(self._descriptor)
-        if state is None:
-            return  # the monitor tells
-        if state.quiet_s > SILENT_S:
+        if state is not None and state.quiet_s > SILENT_S:  # of one that is gone the monitor tells
             self._lose(Problem("STREAM_SILENT", f"nothing came for {SILENT_S:g} s"))
-        elif state.bytes_received > self.bytes_received * 1.25 + 2 * packets.MAX_BULK:
-            self._lose(Problem("BRIDGE_PACKET", "a message that does not end"))
 
     def _lose(self, problem: Problem) -> None:
         if not self._is_closed:
@@ -190,6 +189,8 @@ class _Attempt:
     def __init__(self, incoming: Incoming, socket: zmq.Socket[bytes], address: str) -> None:
         self._incoming = incoming
         self._address = address
+        self.descriptor: int | None = None
+        """Of the connection, once there is one."""
         self._ears = Watch(socket, self._on_event)
         self._socket = Drained(socket, incoming.receive)
         try:
@@ -206,6 +207,9 @@ class _Attempt:
         self._socket.close()
 
     def _on_event(self, event: SocketEvent) -> None:
+        if event.kind == zmq.EVENT_CONNECTED:
+            self.descriptor = event.value
+            return
         if event.kind == zmq.EVENT_HANDSHAKE_SUCCEEDED:
             self._incoming.connected(self)
             return

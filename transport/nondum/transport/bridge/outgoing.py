@@ -10,7 +10,8 @@ import zmq
 
 from nondum.sdk.errors import Problem
 from nondum.sdk.messages import Buffer
-from nondum.transport.bridge import packets, tcp
+from nondum.transport import tcp
+from nondum.transport.bridge import packets
 from nondum.transport.bridge.packets import Asked, Claim, Coding, Handled, Over, Ping, Pong
 from nondum.transport.bridge.window import Window
 from nondum.transport.peers.drained import Sent

@@ -20,6 +20,7 @@ from nondum.transport.peers.events import DialFailed
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.link import DialledRoute, Link
 from nondum.transport.peers.monitor import HANDSHAKE_FAILED, SocketEvent
+from nondum.transport.peers.received import Received
 
 HEAD_START_S = 0.05
 """What addresses of the link alone come behind the others: a link by one of them would break
@@ -54,6 +55,15 @@ class Attempt:
         """End it, and have the dial try again."""
         self._route.cut(linger_ms)
         self.dial.over(self, None)
+
+    @property
+    def received(self) -> Received | None:
+        """The account of what came over the connection, once there is one."""
+        return self._route.received
+
+    def drain(self) -> bool:
+        """Take in what has come; whether nothing is left that waits."""
+        return self._route.drain()
 
     def drop(self) -> None:
         """End it without a word."""
@@ -104,6 +114,11 @@ class Dial:
         self._others: asyncio.TimerHandle | None = None
         self._is_closed = False
         self._try()
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """Of connections that are authenticated."""
+        return tuple(one.link for one in self._attempts if one.link is not None)
 
     def settled(self) -> None:
         """The link is a peer's: the next break is met at once."""

@@ -79,18 +79,22 @@ class Drained:
         ):
             self._again = self._loop.call_soon(self.drain)
 
-    def drain(self) -> None:
-        """Take in what has come; also when its end is told first, by the monitor."""
+    def drain(self) -> bool:
+        """Take in what has come, `AT_ONCE` at most; whether nothing is left that waits.
+
+        Also called when the end of a connection is told before what came over it, by the monitor.
+        """
         if self._again is not None:
             self._again.cancel()
             self._again = None
         for _ in range(AT_ONCE):
             if self.is_closed:
-                return
+                return True
             try:
                 frames = self._socket.recv_multipart(zmq.DONTWAIT, copy=False)
             except zmq.Again:
-                return
+                return True
             self._on_frames(frames)
         if not self.is_closed:
             self._look_again()
+        return False

@@ -14,9 +14,9 @@ import zmq
 from nondum.sdk.errors import Problem
 from nondum.sdk.wire import Body
 from nondum.sdk.wire_fields import MAX_ID
-from nondum.transport.peers.allowance import USUAL, Allowance
+from nondum.transport.peers.allowance import BARRED_S, USUAL, Allowance
 from nondum.transport.peers.arrivals import Arrivals
-from nondum.transport.peers.beats import BEAT_S, beat_s
+from nondum.transport.peers.beats import BEAT_S, QUICK_LINKS, beat_s
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.dial import Attempt, Dial
 from nondum.transport.peers.drained import Drained, Sent
@@ -27,10 +27,11 @@ from nondum.transport.peers.gate import Gate, entry
 from nondum.transport.peers.identity import Identity, Security
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.link import AcceptedRoute, Link, Route
-from nondum.transport.peers.listener import dialling, listening, prove_enforced
-from nondum.transport.peers.messages import Notice, Ping, encode
+from nondum.transport.peers.listener import HIGH_WATER, dialling, listening, prove_enforced
+from nondum.transport.peers.messages import MAX_MESSAGE, Notice, Ping, encode
 from nondum.transport.peers.monitor import Watch
 from nondum.transport.peers.pulse import Pulse
+from nondum.transport.peers.received import MOST_AHEAD
 from nondum.transport.peers.refusals import Reason, Refusal, Refusals
 from nondum.transport.peers.roster import LINGER_MS, Roster
 from nondum.transport.peers.trust import Admission, Trust
@@ -38,6 +39,12 @@ from nondum.transport.peers.zap import Entry, Knock, ZapHandler
 
 SECOND_LOOK_S = 0.02
 """ZeroMQ tells of a broken connection a little before sending over it fails."""
+LOOK_S = 0.1
+"""Time between two looks at what came over the links and is no whole message yet. What comes in
+between fills this process's memory. With more than `QUICK_LINKS` links it is longer.
+"""
+ENDLESS_LINGER_MS = 10
+"""How long the last words may take over a link that fills the memory meanwhile."""
 _NO_PULSE = Pulse()
 
 
@@ -92,6 +99,7 @@ class PeerNode:
         self._listener: Drained | None = None
         self._ears: Watch | None = None
         self._beating: asyncio.TimerHandle | None = None
+        self._looking: asyncio.TimerHandle | None = None
 
     @property
     def security(self) -> Security:
@@ -111,8 +119,12 @@ class PeerNode:
     @property
     def accepted(self) -> tuple[Route, ...]:
         """The connections that peers made to this host."""
-        links = (link for session in self._roster.sessions.values() for link in session.links)
-        return tuple(link.route for link in links if not link.dialled)
+        return tuple(link.route for link in self._roster.links if not link.dialled)
+
+    @property
+    def dialled(self) -> tuple[Route, ...]:
+        """The connections that this host made to peers."""
+        return tuple(link.route for link in self._roster.links if link.dialled)
 
     def round_trip_s(self, peer: PeerKey) -> float | None:
         """The last ping's time there and back; None before one was answered."""
@@ -143,6 +155,7 @@ class PeerNode:
             raise
         self._listener = Drained(socket, self._on_frames)
         self._beating = self._loop.call_later(BEAT_S, self._beat)
+        self._looking = self._loop.call_later(LOOK_S, self._look)
         return bound
 
     def dial(self, peer: PeerKey, addresses: Sequence[str]) -> None:
@@ -212,8 +225,9 @@ class PeerNode:
 
     async def close(self) -> None:
         """Say goodbye and let go of everything; what runs for peers is cancelled."""
-        if self._beating is not None:
-            self._beating.cancel()
+        for timer in (self._beating, self._looking):
+            if timer is not None:
+                timer.cancel()
         self._roster.close()
         if self._ears is not None:
             self._ears.close()
@@ -230,6 +244,8 @@ class PeerNode:
         if self.security is Security.CURVE:
             proved = PeerKey(str(data.get("User-Id")))
         link = self._link(frames[0].bytes, data, proved)
+        assert isinstance(link.route, AcceptedRoute)
+        link.route.received.delivered(frames[1:])
         if link.proved != proved:
             self._roster.turn_away(link, Reason.NOT_PROVED, _OTHER_KEY)
         elif len(frames) != 2:
@@ -241,7 +257,12 @@ class PeerNode:
         link = self._inbound.get(routing_id)
         if link is None:
             assert self._listener is not None
-            route = AcceptedRoute(self._listener, routing_id, int(data.get(zmq.SRCFD)))
+            descriptor = int(data.get(zmq.SRCFD))
+            is_sealed = self.security is Security.CURVE
+            route = AcceptedRoute(self._listener, routing_id, descriptor, is_sealed=is_sealed)
+            for other in self._inbound.values():
+                assert isinstance(other.route, AcceptedRoute)
+                other.route.received.yield_to(route.received)
             link = Link(route, proved, self._loop.time(), dialled=False)
             self._inbound[routing_id] = link
             self._arrivals.spoke(route.descriptor)
@@ -290,19 +311,53 @@ class PeerNode:
     def _beat(self) -> None:
         self._beating = self._loop.call_later(BEAT_S, self._beat)
         self._roster.beat(beat_s(max(len(self._roster.sessions), self.expected)))
-        if self._listener is not None:
-            self._listener.drain()  # what makes a connection a peer's may wait to be read
-        self._arrivals.cut_overdue()
         # Links that are over keep their ids until their connections are gone: what was read of
         # them before they were cut must not make a new link.
         for routing_id, link in list(self._inbound.items()):
             if link.is_over and link.route.send(_PING) is Sent.GONE:
                 del self._inbound[routing_id]
 
+    def _look(self) -> None:
+        """Cut the connections over which a message comes that does not end."""
+        links = list(self._roster.links)
+        next_s = LOOK_S * max(1.0, len(links) / QUICK_LINKS)
+        self._looking = self._loop.call_later(next_s, self._look)
+        if self._listener is not None:
+            self._listener.drain()  # what makes a connection a peer's may wait to be read
+        self._arrivals.cut_overdue()
+        for link in links:
+            if not link.is_over and self._is_endless(link.route):
+                problem = _endless(link)
+                self._roster.bar(link, Reason.ENDLESS, problem, linger_ms=ENDLESS_LINGER_MS)
+        for link in list(self._inbound.values()):
+            if link.is_over and self._is_endless(link.route):
+                link.route.cut()  # it has no time for its last words
+
+    def _is_endless(self, route: Route) -> bool:
+        assert isinstance(route, AcceptedRoute | Attempt)
+        received = route.received
+        if received is None:
+            return False
+        read = received.read()
+        if received.ahead(read) <= MOST_AHEAD:
+            return False
+        # Whole messages may wait to be taken in, but no more than ZeroMQ lets wait.
+        may_wait = 0 if route.drain() else HIGH_WATER * MAX_MESSAGE
+        return received.ahead(read) > MOST_AHEAD + may_wait
+
 
 _PING = encode(Ping(1))
 _PARTS = Problem("PACKET_KIND", "a message has one part")
 _OTHER_KEY = Problem("PEER_NOT_PROVED", "a message came under another key than the link's")
+
+
+def _endless(link: Link) -> Problem:
+    return Problem(
+        "PEER_ENDLESS",
+        f"it sends a message that does not end, and is not let in for {BARRED_S:.0f} s",
+        where=link.session.admission.name if link.session else link.route.address,
+        fix="look what runs on that host; if it was taken over, revoke its key",
+    )
 
 
 def _bind(socket: zmq.Socket[bytes], address: str) -> str:

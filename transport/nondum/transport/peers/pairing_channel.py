@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import zmq
 
 from nondum.sdk.errors import NondumError, Problem
-from nondum.transport.peers import accepted, pairing
+from nondum.transport import tcp
+from nondum.transport.peers import pairing
 from nondum.transport.peers.dial import ANSWER_S, Attempt, Dial
 from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.events import DialFailed
@@ -349,7 +350,7 @@ class PairingHost:
             self._give_up(_VANISHED, None)
         elif is_slow and not self._try.pairing.has_told_nonce:
             self._give_up(_VANISHED, Ending.BROKEN)
-        elif self._try.asker is not None and _sent_too_much(self._try.asker):
+        elif _sent_too_much(self._try):
             self._give_up(_BROKEN, Ending.BROKEN)
 
     def _waiting(self, problem: Problem | None) -> Waiting:
@@ -365,9 +366,14 @@ def _part(link: Link, why: Ending) -> None:
     link.cut(LINGER_MS)
 
 
-def _sent_too_much(asker: Asker) -> bool:
-    """ZeroMQ bounds messages, but not their number of parts: see `accepted`."""
-    return accepted.bytes_received(asker.descriptor) > MOST_SENT
+def _sent_too_much(current: Try) -> bool:
+    """ZeroMQ bounds messages, but not their number of parts: see `received`."""
+    if current.asker is not None:
+        state = tcp.state(current.asker.descriptor)
+        return state is not None and state.bytes_received > MOST_SENT
+    assert isinstance(current.link.route, Attempt)
+    received = current.link.route.received
+    return received is not None and received.ahead(received.read()) > MOST_SENT
 
 
 def _digits(code: str) -> str:

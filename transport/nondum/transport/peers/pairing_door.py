@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import zmq
 
 from nondum.sdk.errors import Problem
-from nondum.transport.peers import accepted
+from nondum.transport import tcp
 from nondum.transport.peers.arrivals import Arrivals
 from nondum.transport.peers.drained import Drained
 from nondum.transport.peers.failures import PeerRefused
@@ -73,16 +73,16 @@ class Door:
     def link(self, asker: Asker) -> Link:
         """A link to who has asked in earnest."""
         self._arrivals.became_peer(asker.descriptor)
-        route = AcceptedRoute(self._listener, asker.id, asker.descriptor)
+        route = AcceptedRoute(self._listener, asker.id, asker.descriptor, is_sealed=True)
         now_s = asyncio.get_running_loop().time()
         return Link(route, asker.proved, now_s, dialled=False)
 
     def turn_away(self, asker: Asker, told: str) -> None:
         """Cut who sent what does not belong here, and count it."""
-        end = accepted.other_end(asker.descriptor)
+        end = tcp.other_end(asker.descriptor)
         now_s = asyncio.get_running_loop().time()
         self._refusals.add(Refusal(Reason.GARBAGE, end, asker.proved, told, now_s))
-        accepted.cut(asker.descriptor, end)
+        tcp.cut(asker.descriptor, end)
 
     def cut_overdue(self) -> None:
         """Cut those that say nothing, or send too much."""

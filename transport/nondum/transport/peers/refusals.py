@@ -33,6 +33,8 @@ class Reason(Enum):
     """A second host with the same key, or this host itself."""
     FLOODING = "flooding"
     """A peer that sends more than any host needs to."""
+    ENDLESS = "endless"
+    """A peer that sends a message that does not end."""
     WRONG_DOMAIN = "wrong domain"
     INTERNAL = "internal"
 

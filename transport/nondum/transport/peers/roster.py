@@ -83,6 +83,14 @@ class Roster:
         """How long this host's loop has run; it does not count time in which it stood still."""
         return self._presence.awake_s()
 
+    @property
+    def links(self) -> Iterator[Link]:
+        """To peers, and those that this host has dialled and that are not a peer's yet."""
+        for session in self._sessions.values():
+            yield from session.links
+        for dial in self.dials.values():
+            yield from (link for link in dial.links if link.session is None)
+
     def session(self, peer: PeerKey) -> Session:
         """A live peer's. Raises `PeerUnreachable` (PEER_DOWN)."""
         session = self._sessions.get(peer)
@@ -122,8 +130,7 @@ class Roster:
         elif not session.paced.take(
             (link, message), cost(len(data)), passes_held=isinstance(message, Ping)
         ):
-            self._bar(session.known)
-            self.turn_away(link, Reason.FLOODING, _FLOODING)
+            self.bar(link, Reason.FLOODING, _FLOODING)
 
     def _take_in(self, come: tuple[Link, Message]) -> None:
         link, message = come
@@ -146,15 +153,26 @@ class Roster:
             assert session is not None
             self.lose(session, departed.reason)
 
-    def turn_away(self, link: Link, reason: Reason, problem: Problem) -> None:
+    def bar(
+        self, link: Link, reason: Reason, problem: Problem, *, linger_ms: int = LINGER_MS
+    ) -> None:
+        """Cut a link over which far too much comes, and do not let the peer in for a while."""
+        if link.session is not None:
+            self._bar(link.session.known)
+        self.turn_away(link, reason, problem, linger_ms=linger_ms)
+
+    def turn_away(
+        self, link: Link, reason: Reason, problem: Problem, *, linger_ms: int = LINGER_MS
+    ) -> None:
         """Cut a link for what came over it, tell the other end why, and count it."""
         key, told = link.proved or "", str(problem)
         self._refusals.add(Refusal(reason, link.route.address, key, told, self._loop.time()))
         link.tell(Refused(problem))
         if link.session is not None:
             is_trust = reason is Reason.REVOKED
-            self.lose(link.session, Loss.REVOKED if is_trust else Loss.VIOLATED)
-        link.cut(LINGER_MS)
+            loss = Loss.REVOKED if is_trust else Loss.VIOLATED
+            self.lose(link.session, loss, linger_ms=linger_ms)
+        link.cut(linger_ms)
 
     def break_link(self, link: Link, reason: Loss) -> None:
         """A link is over: the session waits for another, unless the link fell silent."""
@@ -175,7 +193,7 @@ class Roster:
         if dial := self.dials.get(key):
             dial.again()
 
-    def lose(self, session: Session, reason: Loss) -> None:
+    def lose(self, session: Session, reason: Loss, *, linger_ms: int = LINGER_MS) -> None:
         """The peer is lost: end what was between the hosts, on every link."""
         key = session.admission.key
         if self._sessions.get(key) is not session:
@@ -184,7 +202,7 @@ class Roster:
         if reason in _OURS:
             session.known.term += 1
         for link in list(session.links):
-            link.cut(LINGER_MS)
+            link.cut(linger_ms)
         for errand in session.end(reason):
             self._keep(errand)
         self._on_event(PeerLost(key, session.admission.name, reason))

@@ -151,6 +151,11 @@ CODES = (
         "give the copied host keys of its own, if there are two",
     ),
     Code(
+        "PEER_ENDLESS",
+        "Another host sends a message that does not end, and is not let in for a while.",
+        "look what runs on that host; if it was taken over, `nondum peers revoke`",
+    ),
+    Code(
         "PEER_ENTRY",
         "Another host shares what cannot be understood.",
         "use the same version of nondum on both hosts",
