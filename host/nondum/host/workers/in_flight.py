@@ -16,6 +16,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 
 from nondum.host.workers import problems
+from nondum.host.workers.leftovers import marked
 from nondum.host.workers.worker import Worker
 
 EXPLAINED = 3
@@ -26,6 +27,8 @@ MOST_IN_ONE = 253
 """Descriptors in one packet (SCM_MAX_FD)."""
 PAUSE_S = 0.2
 """After a search, before the next one."""
+TELL_S = 10.0
+"""Before the same is logged again."""
 log = logging.getLogger(__name__)
 
 _WAITING = re.compile(r"^scm_fds:\s*(\d+)$", re.MULTILINE)
@@ -99,6 +102,7 @@ class Search:
         self._running: asyncio.Task[None] | None = None
         self.refusals = 0
         """How often descriptors could not be sent at once, as far as that was told."""
+        self._told, self._told_s = "", 0.0
 
     def watch(self, worker: Worker) -> None:
         """Look at a worker, too, until it is gone."""
@@ -123,18 +127,25 @@ class Search:
         senders = dict(self._senders())
         counted = await asyncio.to_thread(_counted, workers, senders)
         name = culprit(counted, self._ends())
-        log.warning(
-            "descriptors cannot be sent for now: %s",
-            f"{name} keeps {counted[name]} under way" if name else "no worker explains that",
-        )
+        self._tell(f"{name} keeps {counted[name]} under way" if name else "no worker explains that")
         for worker in workers:
             if worker.spec.component == name:
                 worker.end(problems.in_flight(name, counted[name]))
         await asyncio.sleep(PAUSE_S)
 
+    def _tell(self, why: str) -> None:
+        """Say why, and the same again only after a while."""
+        now_s = asyncio.get_running_loop().time()
+        if why != self._told or now_s >= self._told_s + TELL_S:
+            self._told, self._told_s = why, now_s
+            log.warning("descriptors cannot be sent for now: %s", why)
+
 
 def _counted(workers: Collection[Worker], senders: Mapping[int, str]) -> Counter[str]:
     counted: Counter[str] = Counter()
     for worker in workers:
-        counted += sent(worker.pids(), worker.spec.component, senders, is_whole=worker.is_caged)
+        pids = set(worker.pids())
+        if not worker.is_caged:  # what it has started is found as far as it kept its environment
+            pids.update(marked(worker.spec.scratch))
+        counted += sent(pids, worker.spec.component, senders, is_whole=worker.is_caged)
     return counted

@@ -35,8 +35,20 @@ def end_leftovers(folder: Path) -> int:
     return len(ended)
 
 
+def marked(folder: Path) -> Iterator[int]:
+    """Every process of a worker whose scratch folder is `folder`, if it has kept its environment.
+
+    Blocks for some milliseconds.
+    """
+    return (pid for pid in _every() if _is_marked(pid, folder))
+
+
+def _every() -> list[int]:
+    return [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()]
+
+
 def _end_marked(folder: Path) -> Iterator[int]:
-    for pid in [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()]:
+    for pid in _every():
         with contextlib.suppress(OSError):
             # Taken before the look, so that what is ended is what was seen.
             descriptor = os.pidfd_open(pid)
