@@ -14,7 +14,7 @@ from tests.host.workers.streaming import CAMERA, STREAM, WATCH, WATCHER, sees
 from tests.kit.workers import HOST, TIMING, WorkersUnderTest, camera, level
 
 from nondum.host.cgroups import Cages
-from nondum.host.confinement import Level
+from nondum.wheelhouse.confinement import Level
 from nondum.host.events import WorkerExited, WorkerLogged, WorkerReady
 from nondum.host.workers import WorkerSpec
 from nondum.host.workers.in_flight import culprit, sent
