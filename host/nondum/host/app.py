@@ -224,7 +224,7 @@ async def _run(
     await control.open()
     log.info("host %s listens at %s", config.host.name, config.host.control)
     try:
-        workers.keep_spare()
+        await workers.keep_spare()
         if neighbours is not None:
             await neighbours.start()
         heap.keep_what_is_loaded()

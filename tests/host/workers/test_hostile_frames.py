@@ -54,10 +54,10 @@ class RawLauncher:
     def __init__(self, script: str) -> None:
         self._script = script
 
-    def launch(self, spec: WorkerSpec, sock: socket.socket) -> WorkerProcess:
+    async def launch(self, spec: WorkerSpec, sock: socket.socket) -> WorkerProcess:
         spec.scratch.mkdir(parents=True, exist_ok=True)
         arguments = [sys.executable, "-I", "-S", "-c", PROLOGUE + self._script, str(sock.fileno())]
-        popen = subprocess.Popen(
+        popen = subprocess.Popen(  # noqa: ASYNC220
             arguments,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
@@ -68,10 +68,10 @@ class RawLauncher:
         )
         return WorkerProcess(popen)
 
-    def warm(self) -> None:
+    async def warm(self) -> None:
         """Nothing is prepared."""
 
-    def close(self) -> None:
+    async def close(self) -> None:
         """Nothing was prepared."""
 
 

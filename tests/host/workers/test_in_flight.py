@@ -14,7 +14,6 @@ from tests.host.workers.streaming import CAMERA, STREAM, WATCH, WATCHER, sees
 from tests.kit.workers import HOST, TIMING, WorkersUnderTest, camera, level
 
 from nondum.host.cgroups import Cages
-from nondum.wheelhouse.confinement import Level
 from nondum.host.events import WorkerExited, WorkerLogged, WorkerReady
 from nondum.host.workers import WorkerSpec
 from nondum.host.workers.in_flight import culprit, sent
@@ -22,6 +21,7 @@ from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.process import WorkerProcess
 from nondum.sdk.description import Behaviour, Unit
 from nondum.sdk.errors import Problem, WorkerFailed
+from nondum.wheelhouse.confinement import Level
 
 pytestmark = pytest.mark.anyio
 
@@ -91,7 +91,7 @@ async def tested(tmp_path: Path) -> AsyncIterator[WorkersUnderTest]:
 
 def ways() -> list[str]:
     """What waits in sockets that are under way is seen in a room, and in a cage."""
-    hidden = level() is Level.BOX and bool(Cages.open(Path("/nowhere")).holds)
+    hidden = level() is Level.SANDBOXED and bool(Cages.open(Path("/nowhere")).holds)
     return ["openly", "by_a_child", *(["in_sockets_that_are_under_way"] if hidden else [])]
 
 
@@ -155,11 +155,11 @@ class Crowded:
         self.warm, self.close = launcher.warm, launcher.close
         self._launcher, self.refusals = launcher, refusals
 
-    def launch(self, spec: WorkerSpec, sock: socket.socket) -> WorkerProcess:
+    async def launch(self, spec: WorkerSpec, sock: socket.socket) -> WorkerProcess:
         if self.refusals:
             self.refusals -= 1
             raise WorkerFailed(Problem("LAUNCH_CROWDED", "as if", where=spec.component))
-        return self._launcher.launch(spec, sock)
+        return await self._launcher.launch(spec, sock)
 
 
 async def test_worker_that_cannot_be_started_yet_is_tried_again(tmp_path: Path) -> None:

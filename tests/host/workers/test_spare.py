@@ -9,18 +9,22 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
 from tests.kit.processes import is_alive, until_gone
+from tests.kit.until import PATIENCE_S
 from tests.kit.workers import SDK, WorkersUnderTest
 
+from nondum.host.cgroups.cages import Cages, NoTree
 from nondum.host.inside.bootstrap import PRELOADED
 from nondum.host.workers import base_interpreter
-from nondum.host.workers.launcher import MARK, WorkerLauncher
+from nondum.host.workers.launcher import MARK, WorkerLauncher, owner_mark
 from nondum.host.workers.leftovers import end_leftovers
+from nondum.host.workers.spare import OWNER
 from nondum.sdk.errors import WorkerFailed
 
 pytestmark = pytest.mark.anyio
@@ -63,7 +67,7 @@ def place(pid: int) -> Path:
 
 
 async def test_the_spare_becomes_the_next_worker(tested: WorkersUnderTest) -> None:
-    tested.workers.keep_spare()
+    await tested.workers.keep_spare()
     spare = spare_of(tested)
     await tested.start("cam", QUIET)
     assert spare in ancestors(tested.workers.pids()["cam"])
@@ -72,7 +76,7 @@ async def test_the_spare_becomes_the_next_worker(tested: WorkersUnderTest) -> No
 
 
 async def test_a_worker_that_was_a_spare_lives_where_others_do(tested: WorkersUnderTest) -> None:
-    tested.workers.keep_spare()
+    await tested.workers.keep_spare()
     spec = await tested.start("cam", "import os; print(os.getcwd(), dict(os.environ))\n")
     pid = tested.workers.pids()["cam"]
     assert environment(pid)[MARK] == str(spec.scratch)
@@ -85,7 +89,7 @@ async def test_a_worker_that_was_a_spare_lives_where_others_do(tested: WorkersUn
 
 
 async def test_what_a_spare_forks_is_found(tested: WorkersUnderTest) -> None:
-    tested.workers.keep_spare()
+    await tested.workers.keep_spare()
     spec = await tested.start("cam", FORKING)
     forked = tested.pid("cam", (spec.scratch / "child").read_text())
     assert is_alive(forked)
@@ -94,7 +98,7 @@ async def test_what_a_spare_forks_is_found(tested: WorkersUnderTest) -> None:
 
 
 async def test_a_spare_that_died_is_not_missed(tested: WorkersUnderTest) -> None:
-    tested.workers.keep_spare()
+    await tested.workers.keep_spare()
     spare = spare_of(tested)
     os.kill(spare, signal.SIGKILL)
     await asyncio.to_thread(os.waitid, os.P_PID, spare, os.WEXITED | os.WNOWAIT)
@@ -104,13 +108,13 @@ async def test_a_spare_that_died_is_not_missed(tested: WorkersUnderTest) -> None
 
 async def test_a_worker_that_cannot_be_watched_is_ended(tested: WorkersUnderTest) -> None:
     """The last descriptor that there is would have told of its end (pidfd_open(2))."""
-    tested.workers.keep_spare()
+    await tested.workers.keep_spare()
     spare = spare_of(tested)
     spec = tested.spec("cam", QUIET)
     launcher = tested.workers.launcher
     ours, theirs = socket.socketpair()
     with ours, theirs, no_descriptors_left(), pytest.raises(WorkerFailed) as failed:
-        launcher.launch(spec, theirs)
+        await launcher.launch(spec, theirs)
     assert failed.value.code == "LAUNCH_FAILED"
     assert "Too many open files" in str(failed.value)
     assert not is_alive(spare)
@@ -133,7 +137,7 @@ def no_descriptors_left() -> Iterator[None]:
 
 
 async def test_an_unused_spare_ends_with_the_workers(tested: WorkersUnderTest) -> None:
-    tested.workers.keep_spare()
+    await tested.workers.keep_spare()
     spare = spare_of(tested)
     await tested.workers.close()
     assert not is_alive(spare)
@@ -154,3 +158,60 @@ def loaded(*names: str) -> set[str]:
 def test_what_is_loaded_ahead_is_what_workers_need() -> None:
     assert loaded(*PRELOADED, "nondum.sdk.worker") == loaded(*PRELOADED)
     assert set(PRELOADED) <= loaded("nondum.sdk.worker")
+
+
+class SlowTree(NoTree):
+    """Puts no process anywhere, until it is let."""
+
+    def __init__(self) -> None:
+        self.is_asked = threading.Event()
+        self.may_go_on = threading.Event()
+
+    def add(self, name: str, pid: int) -> None:
+        """As slow as a kernel that waits for its other processors."""
+        self.is_asked.set()
+        assert self.may_go_on.wait(PATIENCE_S)
+
+
+async def test_others_go_on_while_a_process_is_put_into_a_control_group(
+    tested: WorkersUnderTest,
+) -> None:
+    tree = SlowTree()
+    tested.workers.launcher = WorkerLauncher(tested.confinement, Cages(tree))
+    starting = asyncio.create_task(tested.start("cam", QUIET))
+    await asyncio.to_thread(tree.is_asked.wait, PATIENCE_S)
+    assert not starting.done()
+    tree.may_go_on.set()
+    await starting
+    assert "cam" in tested.workers.pids()
+
+
+async def test_start_that_is_not_wanted_any_more_leaves_no_process(
+    tested: WorkersUnderTest,
+) -> None:
+    tree = SlowTree()
+    launcher = WorkerLauncher(tested.confinement, Cages(tree), tested.folder)
+    warming = asyncio.create_task(launcher.warm())
+    await asyncio.to_thread(tree.is_asked.wait, PATIENCE_S)
+    processes = spares(tested.folder)
+    warming.cancel()
+    tree.may_go_on.set()
+    await asyncio.wait([warming])
+    assert warming.cancelled()
+    assert processes
+    for process in processes:
+        await until_gone(process)
+    assert launcher.spare_pid is None
+
+
+def spares(scratches: Path) -> list[int]:
+    """Interpreters that wait to become workers of a daemon, and in rooms what makes these."""
+    return [int(each.name) for each in Path("/proc").glob("[0-9]*") if is_spare(each, scratches)]
+
+
+def is_spare(process: Path, scratches: Path) -> bool:
+    try:
+        about = environment(int(process.name))
+    except OSError:
+        return False
+    return about.get(OWNER) == owner_mark(scratches)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from nondum.host.cgroups import Cages
+from nondum.host.confinement.bubblewrap import Ground
 from nondum.host.workers import problems
 from nondum.host.workers.confinements import Confinement, Entry, Unconfined
 from nondum.host.workers.process import WorkerProcess
@@ -36,19 +37,19 @@ class Launcher(Protocol):
     level: Level
     """How its workers are confined."""
 
-    def launch(self, spec: WorkerSpec, sock: socket.socket) -> WorkerProcess:
+    async def launch(self, spec: WorkerSpec, sock: socket.socket) -> WorkerProcess:
         """Start a worker on its end of the link; the caller closes `sock`.
 
-        Call it on the thread of the loop: the worker ends when that thread does. Raises
+        The worker ends when the thread of the loop does. Raises
         `WorkerFailed` (LAUNCH_FAILED, LAUNCH_CROWDED).
         """
         ...
 
-    def warm(self) -> None:
-        """Prepare for the next launch what can be. Blocks for some milliseconds, never raises."""
+    async def warm(self) -> None:
+        """Prepare for the next launch what can be. Never raises."""
         ...
 
-    def close(self) -> None:
+    async def close(self) -> None:
         """Give up what was prepared."""
         ...
 
@@ -74,7 +75,7 @@ class WorkerLauncher:
         """The process of the spare interpreter, if there is one."""
         return None if self._spare is None else self._spare.popen.pid
 
-    def launch(self, spec: WorkerSpec, sock: socket.socket) -> WorkerProcess:
+    async def launch(self, spec: WorkerSpec, sock: socket.socket) -> WorkerProcess:
         """Start a worker (see `Launcher`), from the spare interpreter if there is one."""
         said = ""
         try:
@@ -84,16 +85,17 @@ class WorkerLauncher:
                 told = parameters(spec, entry)
                 for started in (self._taken(), None):
                     if started is not None and not started.serves(ground):
-                        started.close()
+                        await started.end()
                         continue
-                    spare = started or Spare(self._confinement, ground, self._cages, self._owner)
+                    spare = started or await self._started(ground)
                     try:
                         spare.limit(spec.limits)
                         if spare.become(told, sock, entry.ruleset):
                             return spare.process()
                     except OSError:
-                        spare.close()
+                        await spare.end()
                         raise
+                    await spare.end()
                     said = spare.said
         except OSError as error:
             problem = Problem("LAUNCH_FAILED", str(error), where=spec.component)
@@ -103,19 +105,21 @@ class WorkerLauncher:
         text = f"{spec.python} ends at once{f': {said}' if said else ''}"
         raise WorkerFailed(Problem("LAUNCH_FAILED", text, where=spec.component))
 
-    def warm(self) -> None:
-        """Have a spare interpreter."""
+    async def warm(self) -> None:
+        """Have a spare interpreter. One call at a time."""
         if self._spare is None:
             try:
-                ground = self._confinement.ground(None)
-                self._spare = Spare(self._confinement, ground, self._cages, self._owner)
+                self._spare = await self._started(self._confinement.ground(None))
             except OSError as error:  # launching will tell, should it be lasting
                 log.warning("no spare interpreter: %s", error)
 
-    def close(self) -> None:
+    async def close(self) -> None:
         """End the spare interpreter."""
         if (spare := self._taken()) is not None:
-            spare.close()
+            await spare.end()
+
+    async def _started(self, ground: Ground) -> Spare:
+        return await Spare.caged(self._confinement, ground, self._cages, self._owner)
 
     def _taken(self) -> Spare | None:
         spare, self._spare = self._spare, None

@@ -6,6 +6,7 @@ the same for all workers: it is done before anybody waits for it.
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import errno
 import json
@@ -19,6 +20,7 @@ from typing import IO, Any
 from nondum.host.cgroups import Cage, CageLimits, Cages
 from nondum.host.confinement.bubblewrap import Ground
 from nondum.host.printable import printable
+from nondum.host.waiting import until_done
 from nondum.host.workers.confinements import Confinement
 from nondum.host.workers.keeper import Keeper
 from nondum.host.workers.process import WorkerProcess
@@ -39,10 +41,9 @@ class Spare:
         self,
         confinement: Confinement,
         ground: Ground,
-        cages: Cages | None = None,
         owner: str = "",
     ) -> None:
-        """Start it, in a cage of its own; `owner`, if any, tells whose it is. Raises `OSError`."""
+        """Start it; `owner`, if any, tells whose it is. Raises `OSError`."""
         self.ground = ground
         self.cage: Cage | None = None
         self.said = ""
@@ -58,8 +59,25 @@ class Spare:
         except OSError:
             self._orders.close()
             raise
+
+    @classmethod
+    async def caged(
+        cls, confinement: Confinement, ground: Ground, cages: Cages | None, owner: str
+    ) -> Spare:
+        """Start one in a cage of its own, if there are cages. Raises `OSError`.
+
+        The kernel takes some 20 ms to put a process into a control group: a thread waits for it.
+        """
+        spare = cls(confinement, ground, owner)
         if cages is not None:
-            self._be_caged(cages)
+            caging = asyncio.create_task(asyncio.to_thread(spare._be_caged, cages))
+            try:
+                await until_done(caging)
+                caging.result()
+            except BaseException:
+                await spare.end()
+                raise
+        return spare
 
     def serves(self, ground: Ground) -> bool:
         """Whether it is there still, and stands on that ground."""
@@ -75,9 +93,9 @@ class Spare:
     ) -> bool:
         """Have it become a worker on its end of a link; answer whether it could be told.
 
-        From then on it is the caller's, see `process`. See `bootstrap.py` for the parameters.
-        Raises `OSError` (ETOOMANYREFS) when no descriptor can be sent now; then it is still to be
-        closed.
+        From then on it is the caller's, see `process`; else it is still to be closed. See
+        `bootstrap.py` for the parameters. Raises `OSError` (ETOOMANYREFS) when no descriptor can be
+        sent now.
         """
         descriptors = [link.fileno(), *([] if ruleset is None else [ruleset])]
         try:
@@ -85,7 +103,6 @@ class Spare:
         except OSError as error:
             if error.errno == errno.ETOOMANYREFS:
                 raise
-            self.close()
             return False
         return True
 
@@ -104,8 +121,12 @@ class Spare:
         self._orders.close()
         return WorkerProcess(self.popen, self.cage)
 
+    async def end(self) -> None:
+        """`close` it without holding up the loop, whoever is cancelled meanwhile."""
+        await until_done(asyncio.create_task(asyncio.to_thread(self.close)))
+
     def close(self) -> None:
-        """End it unused."""
+        """End it unused. Blocks until it has ended."""
         self._orders.close()
         with contextlib.suppress(ProcessLookupError):  # its room may not be finished: all of it
             os.killpg(self.popen.pid, signal.SIGKILL)
@@ -118,12 +139,8 @@ class Spare:
                 pipe.close()
 
     def _be_caged(self, cages: Cages) -> None:
-        try:
-            self.cage = cages.make("worker", CageLimits())
-            self.cage.add(self.popen.pid)
-        except OSError:
-            self.close()
-            raise
+        self.cage = cages.make("worker", CageLimits())
+        self.cage.add(self.popen.pid)
 
 
 def _last_line(pipe: IO[bytes] | None) -> str:

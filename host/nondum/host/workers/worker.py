@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -45,12 +46,13 @@ class Worker:
     def __init__(
         self,
         spec: WorkerSpec,
-        launcher: Launcher,
+        process: WorkerProcess,
+        link: socket.socket,
         timing: Timing,
         emit: Callable[[Event], None],
         on_crowded: OnCrowded = lambda count: None,
     ) -> None:
-        """Launch the process. Raises `WorkerFailed` (LAUNCH_FAILED, LAUNCH_CROWDED).
+        """Take over its process, and the host's end of its link.
 
         `on_crowded` is called with how often descriptors could not be sent to it, or by it.
         """
@@ -74,20 +76,14 @@ class Worker:
         """Why the worker ended, once nothing of it is left."""
         self._log_valve = Valve(self._loop.time)
         self._watch = Watch(spec.component, spec.limits, timing.spin_s)
-        ours, theirs = link_sockets()
-        try:
-            with theirs:
-                self._process: WorkerProcess = launcher.launch(spec, theirs)
-        except WorkerFailed:
-            ours.close()
-            raise
+        self._process = process
         self._gauge = Gauge(lambda: self.pid, self._process.cage)
         self._outputs = [
             Output(source, pipe, self._on_line)
             for source, pipe in zip(("stdout", "stderr"), self._process.outputs, strict=True)
         ]
         self.link = WorkerLink(
-            ours,
+            link,
             on_event=self._on_event,
             on_closed=self._on_hang_up,
             on_violation=self._on_foul,
@@ -420,16 +416,32 @@ async def _launched(
     emit: Callable[[Event], None],
     on_crowded: OnCrowded,
 ) -> Worker:
-    """A launched worker; what stands in the way only for now is waited for."""
+    """A launched worker; what stands in the way only for now is waited for.
+
+    Raises `WorkerFailed` (LAUNCH_FAILED, LAUNCH_CROWDED).
+    """
+    ours, theirs = link_sockets()
+    try:
+        with theirs:
+            process = await _process(spec, launcher, theirs, on_crowded)
+    except BaseException:
+        ours.close()
+        raise
+    return Worker(spec, process, ours, timing, emit, on_crowded)
+
+
+async def _process(
+    spec: WorkerSpec, launcher: Launcher, sock: socket.socket, on_crowded: OnCrowded
+) -> WorkerProcess:
     for _ in range(CROWDED_TRIES):
         try:
-            return Worker(spec, launcher, timing, emit, on_crowded)
+            return await launcher.launch(spec, sock)
         except WorkerFailed as error:
             if error.code != "LAUNCH_CROWDED":
                 raise
         on_crowded(1)
         await asyncio.sleep(CROWDED_S)
-    return Worker(spec, launcher, timing, emit, on_crowded)
+    return await launcher.launch(spec, sock)
 
 
 def _is_there(device: Mapping[str, Any]) -> bool:

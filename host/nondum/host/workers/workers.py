@@ -70,7 +70,8 @@ class Workers:
         self._call_ids = itertools.count(1)
         self._calls: dict[asyncio.Task[None], Call] = {}
         self._keeps_spare = False
-        self._warming: asyncio.TimerHandle | None = None
+        self._warm_at: asyncio.TimerHandle | None = None
+        self._warming: asyncio.Task[None] | None = None
 
     @property
     def hook(self) -> pluggy.HookRelay:
@@ -178,9 +179,11 @@ class Workers:
         await asyncio.gather(*self._calls, return_exceptions=True)
         await self.search.close()
         await self.streams.close()
+        if self._warm_at is not None:
+            self._warm_at.cancel()
         if self._warming is not None:
-            self._warming.cancel()
-        self.launcher.close()
+            await self._warming
+        await self.launcher.close()
 
     def behave(
         self,
@@ -262,10 +265,10 @@ class Workers:
         plugins = sorted(self.plugins().items())
         return {name: plugin.translate_goal(words, vocabulary) for name, plugin in plugins}
 
-    def keep_spare(self) -> None:
+    async def keep_spare(self) -> None:
         """Prepare the next launch, now and, from now on, some time after every launch."""
         self._keeps_spare = True
-        self.launcher.warm()
+        await self.launcher.warm()
 
     def pids(self) -> dict[str, int]:
         """The process of each running worker, by component."""
@@ -336,11 +339,15 @@ class Workers:
 
     def _warm_later(self) -> None:
         """Not while workers are being started: they need the processors."""
-        if self._warming is not None:
-            self._warming.cancel()
+        if self._warm_at is not None:
+            self._warm_at.cancel()
         if self._keeps_spare:
             loop = asyncio.get_running_loop()
-            self._warming = loop.call_later(self.timing.spare_s, self.launcher.warm)
+            self._warm_at = loop.call_later(self.timing.spare_s, self._warm)
+
+    def _warm(self) -> None:
+        if self._warming is None or self._warming.done():
+            self._warming = asyncio.create_task(self.launcher.warm())
 
     def _worker(self, component: str) -> Worker:
         supervisor = self._supervisors.get(component)
