@@ -6,7 +6,7 @@ import asyncio
 import inspect
 
 import pytest
-from tests.host.peers.test_shared import component, no_claims, snapshot
+from tests.host.peers.watcher import component, no_claims, snapshot
 from tests.transport.fleet.fleets import mesh_member
 
 from nondum.host.bridge.bridge import Bridge

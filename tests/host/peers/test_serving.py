@@ -9,7 +9,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
-from tests.host.peers.test_shared import component, merged_watcher, snapshot
+from tests.host.peers.watcher import component, merged_watcher, snapshot
 
 from nondum.host.mind.composition import Composition
 from nondum.host.peers.offered import Policy

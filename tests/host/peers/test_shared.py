@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.host.peers.watcher import (
+    HEAD,
+    component,
+    merged_watcher,
+    no_claims,
+    snapshot,
+)
 
 from nondum.host.catalogue.records import (
-    ComponentRecord,
-    ComponentState,
     DeviceClaim,
-    MountPose,
-    Snapshot,
 )
 from nondum.host.events import FactForgotten, FactKnown, StreamFlowing
 from nondum.host.peers import heard
@@ -30,52 +32,9 @@ from nondum.host.peers.heard import (
 )
 from nondum.host.peers.offered import Policy, changes, passing, standing
 from nondum.host.peers.uses import taken_by
-from nondum.planning.contribution import Contribution
-from nondum.planning.domain import Merged
-from nondum.planning.merge import merge
-from nondum.sdk.description import Behaviour, Fragment, Output, PluginDescription, Unit
+from nondum.sdk.description import Unit
 
-EYE = Unit("eye", "camera", outputs=(Output("image", "image"),))
-HEAD = Unit("head", "pointer", users=1)
 ME = Introduced("key", "mule", "tcp://10.0.0.2:7410", "pairing", "1f")
-
-
-def description(*units: Unit) -> PluginDescription:
-    behaviours = (
-        Behaviour("look", "(look ?u - camera ?o - image ?h - host)", lasting=True),
-        Behaviour("turn", "(turn ?u - pointer ?h - host)"),
-    )
-    return PluginDescription("watcher", "1.0", units=units, behaviours=behaviours)
-
-
-def component(id: str = "watcher", *units: Unit, **more: Any) -> ComponentRecord:
-    return ComponentRecord(
-        id=id,
-        payload="abc",
-        payload_id="org.example.watcher",
-        distribution="watcher",
-        entry_point="watcher",
-        version="1.0",
-        state=ComponentState.READY,
-        description=description(*(units or (EYE, HEAD))),
-        venv=Path("/v"),
-        site_packages=Path("/v/s"),
-        scratch=Path("/x"),
-        rank=3,
-        **more,
-    )
-
-
-def snapshot(*components: ComponentRecord) -> Snapshot:
-    mounts = (
-        MountPose("mule__watcher__eye", (1.0, 0.0, 0.5), (0.0, 0.0, 0.0), "payload"),
-        MountPose("mule__watcher__head", (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), "payload"),
-    )
-    return Snapshot("mule", revision=1, components=components, mounts=mounts)
-
-
-def no_claims(_: str) -> tuple[FactKnown, ...]:
-    return ()
 
 
 def test_what_is_offered_is_understood() -> None:
@@ -242,29 +201,6 @@ def test_changes_lead_from_one_to_the_other(
         else:
             now[key] = body
     assert now == after
-
-
-def merged_watcher() -> Merged:
-    """What the behaviour `look` of the watcher means."""
-    domain = """
-    (define (domain watcher)
-      (:predicates (rested ?u - unit))
-      (:action look
-        :parameters (?u - camera ?o - image ?h - host)
-        :precondition (and (ready ?u) (output ?u ?o) (free ?o) (idle ?u))
-        :effect (and (not (free ?o)) (not (idle ?u)) (flowing ?o) (from ?o ?h))))
-    """
-    described = PluginDescription(
-        "watcher",
-        "1.0",
-        units=(EYE,),
-        fragments=(Fragment("watcher.pddl", domain),),
-        behaviours=description().behaviours[:1],
-    )
-    here = Contribution.from_description(described, host="mule", component="watcher")
-    merged = merge([here], "mule")
-    assert not merged.quarantined, merged.quarantined
-    return merged
 
 
 def test_behaviour_takes_what_its_action_deletes_of_what_can_be_taken() -> None:

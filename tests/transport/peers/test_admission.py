@@ -6,11 +6,11 @@ import asyncio
 import contextlib
 import os
 import socket
-from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 
 import pytest
 import zmq
+from tests.transport.peers.dealers import hello_of, raw_dealer
 from tests.transport.peers.hosts import (
     PATIENCE_S,
     Host,
@@ -38,7 +38,7 @@ from nondum.transport.peers import (
 )
 from nondum.transport.peers.certificate import issue, new_fleet
 from nondum.transport.peers.listener import listening, prove_enforced
-from nondum.transport.peers.messages import MAX_MESSAGE, Hello, encode
+from nondum.transport.peers.messages import MAX_MESSAGE
 from nondum.transport.peers.zap import Entry, Knock, ZapHandler
 
 pytestmark = pytest.mark.anyio
@@ -352,31 +352,6 @@ async def test_judge_that_fails_turns_away_and_goes_on(caplog: pytest.LogCapture
 async def test_self_test_leaves_no_trace() -> None:
     async with host(identity("base")) as there:
         assert there.node.refusals.counts == {}
-
-
-@contextlib.contextmanager
-def raw_dealer(
-    there: Host, me: Identity, *, routing_id: bytes = b""
-) -> Iterator[zmq.Socket[bytes]]:
-    """A peer that says whatever the test wants."""
-    assert me.keys is not None
-    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-    with context.socket(zmq.DEALER) as sock:
-        sock.linger = 0
-        sock.curve_publickey = me.keys.public.encode("ascii")
-        sock.curve_secretkey = me.keys.secret.encode("ascii")
-        sock.curve_serverkey = there.key.encode("ascii")
-        if routing_id:
-            sock.routing_id = routing_id
-        try:
-            sock.connect(there.address)
-            yield sock
-        finally:
-            context.destroy(linger=0)
-
-
-def hello_of(me: Identity, versions: tuple[int, ...] = (1,)) -> bytes:
-    return encode(Hello(versions, me.name, me.key, 7, 1, me.certificate))
 
 
 def tcp(there: Host) -> socket.socket:

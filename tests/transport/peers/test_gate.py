@@ -8,8 +8,8 @@ from datetime import UTC, datetime
 
 import pytest
 import zmq
+from tests.transport.peers.dealers import hello_of, raw_dealer
 from tests.transport.peers.hosts import PATIENCE_S, host, identity, trusting, two_hosts
-from tests.transport.peers.test_admission import hello_of, raw_dealer
 
 from nondum.transport.peers import (
     HostKeys,

@@ -81,7 +81,7 @@ async def test_wrong_piece_is_refused_wherever_it_is(tmp_path: Path, at: int, wr
             "cut": piece[:-1],
             "longer": piece + b"\0",
             "changed": b"\1" + piece[1:],
-            "text": "zeros",
+            "text": "0" * len(piece),
             "failed": failure,
         }[wrong]
 
