@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -54,12 +55,12 @@ async def test_as_little_is_reached_where_landlock_is_older(
 async def test_nobody_is_left_a_special_file_at_level_0(
     tmp_path: Path, bait: dict[str, Any]
 ) -> None:
-    names = ["leave a set id file", "make a device node"]
+    names = ["leave a set id file", *(["make a device node"] if os.geteuid() == 0 else [])]
     results = await attempted(tmp_path / "held", bait, Unconfined(), names)
-    assert [results[name].could for name in names] == [False, False]
+    assert not any(results[name].could for name in names), results
     free = Unconfined(without=["special files"])
     results = await attempted(tmp_path / "free", bait, free, names)
-    assert [results[name].could for name in names] == [True, True], results
+    assert all(results[name].could for name in names), results
 
 
 async def test_baits_are_there_to_be_reached(tmp_path: Path, bait: dict[str, Any]) -> None:

@@ -218,7 +218,7 @@ with tempfile.TemporaryDirectory() as folder, tempfile.NamedTemporaryFile() as f
     shutil.make_archive(folder + '/packed', 'gztar', here / 'tree')
     shutil.unpack_archive(folder + '/packed.tar.gz', here / 'unpacked')
     with tarfile.open(folder + '/packed.tar.gz') as archive:
-        archive.extractall(here / 'extracted', filter='fully_trusted')
+        archive.extractall(here / 'extracted')
     with zipfile.ZipFile(file, 'w') as archive:
         archive.write(one, 'one')
     shutil.unpack_archive(file.name, here / 'unzipped', 'zip')

@@ -85,6 +85,18 @@ async def test_halves_are_connected_and_the_host_keeps_none() -> None:
     assert eye.asked == [("consume", {"stream": WIRE.stream, "type": "image"})]
 
 
+async def test_each_half_is_known_by_who_sends_to_it_as_long_as_it_is_connected() -> None:
+    camera, eye = Party(), Party()
+    async with linked(camera, eye) as (camera_link, eye_link):
+        broker = StreamBroker()
+        await broker.connect(WIRE, camera_link, eye_link)
+        (of_camera,), (of_eye,) = camera.halves, eye.halves
+        inodes = [os.fstat(half.fileno()).st_ino for half in (of_camera, of_eye)]
+        assert broker.senders == dict(zip(inodes, ("eye", "cam"), strict=True))
+        await broker.disconnect(WIRE, camera_link, eye_link)
+        assert broker.senders == {}
+
+
 async def test_optional_input_is_named() -> None:
     base, eye = Party(), Party()
     async with linked(base, eye) as (base_link, eye_link):
