@@ -310,8 +310,12 @@ def documented() -> Iterator[tuple[str, str, Any]]:
 
 def _unproved(peers: PeersSection, table: object) -> PeersSection:
     """What holds among peers that prove no keys, but for what the file's table says."""
-    unsaid = {"accept_goals", "place"} - (table.keys() if isinstance(table, dict) else set())
-    return replace(peers, **dict.fromkeys(unsaid, False))
+    said = table.keys() if isinstance(table, dict) else set()
+    return replace(
+        peers,
+        accept_goals="accept_goals" in said and peers.accept_goals,
+        place="place" in said and peers.place,
+    )
 
 
 def _section(

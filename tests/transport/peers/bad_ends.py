@@ -30,7 +30,9 @@ def bad_router(me: Identity) -> Iterator[tuple[zmq.Socket[bytes], str]]:
     with bad_socket(zmq.ROUTER, me) as bad:
         bad.curve_server = True
         bad.bind("tcp://127.0.0.1:*")
-        yield bad, bad.last_endpoint.rstrip(b"\0").decode("ascii")
+        where = bad.getsockopt(zmq.LAST_ENDPOINT)
+        assert isinstance(where, bytes)
+        yield bad, where.rstrip(b"\0").decode("ascii")
 
 
 @contextlib.contextmanager

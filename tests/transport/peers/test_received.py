@@ -27,6 +27,7 @@ from tests.transport.peers.hosts import (
 
 from nondum.transport import tcp
 from nondum.transport.peers import Identity, Loss, PeerLost, PeerUp, Reason, drained, node
+from nondum.transport.peers.dial import Attempt
 from nondum.transport.peers.link import AcceptedRoute
 from nondum.transport.peers.messages import MAX_MESSAGE, Welcome, encode
 from nondum.transport.peers.node import LOOK_S
@@ -129,7 +130,7 @@ async def test_peer_that_was_turned_away_has_no_time_for_a_message_without_end(
             before = bytes_received(route)
             await until_async("it has come", lambda: bytes_received(route) > before + MOST_AHEAD)
             await clock.advance(LOOK_S)
-            assert await asyncio.to_thread(ended.poll, PATIENCE_S * 1000)
+            assert await asyncio.to_thread(ended.poll, int(PATIENCE_S * 1000))
             ended.close(0)
 
 
@@ -231,6 +232,7 @@ def bytes_received(route: object) -> int:
 
 def accounts_of(one: Host) -> Iterator[Received]:
     for route in (*one.node.accepted, *one.node.dialled):
+        assert isinstance(route, AcceptedRoute | Attempt)
         assert route.received is not None
         yield route.received
 
