@@ -61,7 +61,7 @@ class Questions:
     shown: Callable[[], Row] = NOTHING.to_dict
     """What people without a screen are shown."""
     trusted: Callable[[], Row | None] = lambda: None
-    """The trust file in force, in a few words."""
+    """The active trust file, in a few words; None: there is none."""
 
     async def status(self, arguments: Arguments) -> Row:
         """The host, its payloads and its goals at a glance."""

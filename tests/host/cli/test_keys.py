@@ -166,7 +166,7 @@ def test_a_host_is_given_its_trust_and_keeps_to_it(owner: Path) -> None:
 
 
 @pytest.mark.daemon
-def test_a_carrier_of_the_first_trust_file_adds_nobody(owner: Path) -> None:
+def test_a_carrier_of_the_first_trust_file_adds_no_key(owner: Path) -> None:
     """The genuine roots stay in it, so their fingerprints are the genuine ones."""
     trust, anchor = owner / "trust.toml", owner / "etc/trust.toml"
     nondum("keys", "sign", trust, "--key", owner / "alice").ok()

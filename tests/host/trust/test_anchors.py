@@ -103,7 +103,7 @@ def test_file_of_another_user_is_not_believed(anchor: Path) -> None:
     ("suffix", "size"), [("", trust_file.MAX_BYTES), (".sig", sshsig.MAX_BYTES)]
 )
 def test_file_that_is_too_long_is_not_parsed(anchor: Path, suffix: str, size: int) -> None:
-    """Whoever replaced it has done so on purpose."""
+    """It was replaced on purpose."""
     anchor.with_name(anchor.name + suffix).write_bytes(b"\n" * (size + 1))
     with pytest.raises(TrustRefused) as refused:
         anchors.load(anchor)
@@ -182,13 +182,24 @@ def test_links_on_the_way_are_followed(etc: Path, tmp_path: Path) -> None:
 
 
 def test_links_that_others_can_change_are_not_followed(etc: Path, tmp_path: Path) -> None:
-    """Whoever can change the link chooses where root writes, and that place is a safe one."""
+    """Another user would choose where root writes, among the safe places."""
     shared = tmp_path / "shared"
     shared.mkdir()
     (shared / "way").symlink_to(etc)
     shared.chmod(0o777)
     assert place(shared / "way/trust.toml") == "TRUST_OPEN_TO_OTHERS"
     assert not list(etc.iterdir())
+
+
+@needs_root
+def test_links_that_others_have_made_are_not_followed(etc: Path, tmp_path: Path) -> None:
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    (shared / "way").symlink_to(etc)
+    shared.chmod(0o1777)
+    assert place(shared / "way/trust.toml") == ""
+    os.chown(shared / "way", 65534, -1, follow_symlinks=False)
+    assert place(shared / "way/trust.toml") == "TRUST_OPEN_TO_OTHERS"
 
 
 def test_links_to_where_others_can_write_are_not_followed(etc: Path, tmp_path: Path) -> None:

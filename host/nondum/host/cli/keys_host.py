@@ -60,9 +60,9 @@ def trust(session: Session, file: Path, user: bool, config_file: Path | None, ye
     """Have the host go by a trust file: its first one, or the next versions.
 
     The first one must be signed by its own roots: compare their fingerprints with what the owner
-    says, and see whom they have let do what. It is written where this host's configuration says
-    (`file` under [trust]), which needs root. Later ones are taken as their roots have signed them;
-    those between lie beside FILE.
+    says, and read which payloads the other keys may bring. It is written where this host's
+    configuration says (`file` under [trust]), which needs root. Later ones are taken as their roots
+    have signed them; those between lie beside FILE.
 
     \b
     Examples: sudo nondum keys trust /media/usb/nondum-trust/trust.toml

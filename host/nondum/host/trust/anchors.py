@@ -84,8 +84,10 @@ def place(path: Path, file: SignedFile) -> None:
     """Write a first trust file and its signatures where a host reads them; folders that are missing
     are made.
 
-    Whoever can change a folder on the way could have the caller, who may be root, write to another
-    place: nothing is written there. Raises `TrustRefused` (TRUST_OPEN_TO_OTHERS), `OSError`.
+    Nothing is written where another user can change a folder on the way: that user could have the
+    caller, who may be root, write to another place.
+
+    Raises `TrustRefused` (TRUST_OPEN_TO_OTHERS), `OSError`.
     """
     try:
         folder = os.open(_safe_folder(path.parent), _FOLDER)
@@ -129,7 +131,7 @@ def _signed(path: Path, opened: BinaryIO) -> SignedFile:
 def _open_to_others(path: Path, status: os.stat_result) -> Problem:
     return Problem(
         "TRUST_OPEN_TO_OTHERS",
-        "others can change this file, so it says nothing about whom to trust",
+        "others can change this file, so it does not say which keys to trust",
         where=str(path),
         need="owner root, mode 0644",
         have=f"user {status.st_uid}, mode {stat.S_IMODE(status.st_mode):04o}",
@@ -142,7 +144,7 @@ def _safe_folder(folder: Path) -> Path:
     to, is one that others cannot change.
 
     In a folder with the sticky bit (/tmp) others cannot replace what is not theirs, so it may lead
-    to one, but not be it.
+    to one, but not be it; links that they have made there are not followed.
     """
     here = Path(folder.absolute().anchor)
     left = list(reversed(folder.absolute().parts[1:]))
@@ -158,6 +160,7 @@ def _safe_folder(folder: Path) -> Path:
         if not inner.is_symlink():
             here = inner
             continue
+        _refuse_open(inner, is_last=False)
         links += 1
         if links > MOST_LINKS:
             raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(folder))
@@ -166,9 +169,11 @@ def _safe_folder(folder: Path) -> Path:
 
 
 def _refuse_open(folder: Path, *, is_last: bool) -> None:
+    """Raise `TrustRefused` for a folder, or a link to one, that others can change."""
     status = folder.lstat()
-    is_sticky = bool(status.st_mode & stat.S_ISVTX) and not is_last
-    is_open = bool(status.st_mode & _OTHERS_WRITE) and not is_sticky
+    may_lead = bool(status.st_mode & stat.S_ISVTX) and not is_last
+    is_link = stat.S_ISLNK(status.st_mode)  # its mode means nothing (symlink(7))
+    is_open = bool(status.st_mode & _OTHERS_WRITE) and not may_lead and not is_link
     if is_open or status.st_uid not in (0, os.geteuid()):
         raise TrustRefused(
             Problem(

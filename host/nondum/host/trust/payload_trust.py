@@ -186,7 +186,7 @@ class PayloadTrust:
         }
 
     def summary(self) -> dict[str, Any] | None:
-        """The trust file in force, in a few words; None: nobody is trusted."""
+        """The active trust file, in a few words; None: there is none."""
         trust = self.trust
         if trust is None:
             return None

@@ -97,8 +97,8 @@ def successor(trust: Trust, file: SignedFile) -> Trust:
 
 
 def first(file: SignedFile) -> Trust:
-    """The trust that begins with a file that a person brings: enough of its own roots have signed
-    it. Raises `TrustRefused` (TRUST_SIGNATURE, TRUST_…)."""
+    """The trust that begins with a file that a person brings: enough of the roots that it names
+    have signed it. Raises `TrustRefused` (TRUST_SIGNATURE, TRUST_…)."""
     return _begun(file, _FIRST)
 
 

@@ -128,8 +128,8 @@ CODES = (
     ),
     Code(
         "TRUST_OPEN_TO_OTHERS",
-        "Others can change the trust file, or a folder that leads to it, so it says nothing about "
-        "whom to trust.",
+        "Others can change the trust file, or a folder that leads to it, so it does not say which "
+        "keys to trust.",
         "put the genuine file there, then `chown root` and `chmod go-w` it and its folders",
     ),
     Code(
@@ -141,7 +141,7 @@ CODES = (
         "TRUST_SIGNATURE",
         "Too few of its owner's root keys have signed the trust file, or it was changed since.",
         "have the trust file signed by as many root keys as the present one demands; a first one "
-        "by as many of its own",
+        "by as many of its root keys as it demands",
     ),
     Code(
         "TRUST_TOML",
