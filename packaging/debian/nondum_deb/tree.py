@@ -128,8 +128,9 @@ def _machine_files(root: Path) -> None:
 
 def _completions(root: Path) -> None:
     """As this checkout's own command prints them: they ask nothing of an architecture."""
+    command = (sys.executable, "-P", "-m", "nondum.host.cli", "completion")
     for shell, path in COMPLETIONS.items():
-        _write(root / path, call(sys.executable, "-m", "nondum.host.cli", "completion", shell))
+        _write(root / path, call(*command, shell))
 
 
 def _write(path: Path, text: str, mode: int = 0o644) -> None:

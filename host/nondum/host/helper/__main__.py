@@ -1,4 +1,4 @@
-"""The helper's command line, as its service unit has it: `python -m nondum.host.helper`."""
+"""The helper's command line, as its service unit has it: `python -I -m nondum.host.helper`."""
 
 from __future__ import annotations
 
