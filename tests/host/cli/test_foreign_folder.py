@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 from tests.daemon.plugins import scribe, talker
-from tests.host.cli.test_pddl import MAP, ROADS
 from tests.kit.command_line import quiet_environment
 from tests.kit.payloads import installed_wheel, make_wheel, sdk_wheel
 from tests.kit.running_host import COMMAND, running
@@ -18,6 +17,14 @@ from tests.wheelhouse.sources import make_source
 NONDUM = COMMAND[0]
 """The installed command: `python -m` would itself look into the current folder."""
 OTHERS = ("click", "isal", "lark", "msgpack", "packaging", "pip", "pluggy", "py_trees", "zmq")
+DOMAIN = """(define (domain roads)
+  (:predicates (at ?x) (road ?x ?y))
+  (:action go :parameters (?x ?y) :precondition (and (at ?x) (road ?x ?y))
+    :effect (and (at ?y) (not (at ?x)))))
+"""
+PROBLEM = """(define (problem map) (:domain roads)
+  (:objects a b) (:init (at a) (road a b)) (:goal (at b)))
+"""
 NOTING = "with open({notes!r}, 'a') as file:\n    file.write('{name} ')\n"
 NAMES = sorted({*sys.stdlib_module_names, *OTHERS, "nondum/host/__init__", "nondum/sdk/__init__"})
 
@@ -61,8 +68,8 @@ def test_modules_there_do_what_they_are_for(foreign: Path) -> None:
 
 
 def test_planning_runs_nothing_that_lies_there(foreign: Path) -> None:
-    (foreign / "domain.pddl").write_text(ROADS)
-    (foreign / "problem.pddl").write_text(MAP.format(goal="(at c)"))
+    (foreign / "domain.pddl").write_text(DOMAIN)
+    (foreign / "problem.pddl").write_text(PROBLEM)
     run_there(foreign, "pddl", "plan", "domain.pddl", "problem.pddl")
 
 
