@@ -7,6 +7,7 @@ for any, and a venv is little else than a link to Python and a file beside it (P
 from __future__ import annotations
 
 import gzip
+import os
 import shutil
 import sys
 import tempfile
@@ -62,8 +63,16 @@ def make(root: Path, architecture: Architecture, own: Path) -> None:
 
 
 def own_wheels(folder: Path) -> None:
-    """Build the checkout's distributions: they are the same for every architecture."""
-    call(*PIP, "wheel", "--no-deps", "-w", folder, *(CHECKOUT / place for place in DISTRIBUTIONS))
+    """Build the checkout's distributions: they are the same for every architecture.
+
+    Without pip's isolation, which would fetch whatever is the newest to build them with.
+    """
+    places = [CHECKOUT / place for place in DISTRIBUTIONS]
+    with tempfile.TemporaryDirectory(prefix="nondum-backend-") as backend:
+        lock.install_backend(Path(backend))
+        surroundings = {**os.environ, "PYTHONPATH": backend}
+        held = ("--no-deps", "--no-build-isolation", "--no-index")
+        call(*PIP, "wheel", *held, "-w", folder, *places, env=surroundings)
 
 
 def compress(text: str, path: Path) -> None:
