@@ -68,6 +68,15 @@ def test_what_is_no_level_of_confinement_is_refused(value: str) -> None:
     assert "minimum_confinement" in least and 'expected "sandboxed", "restricted"' in least
 
 
+def test_a_relative_path_is_taken_from_the_current_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    config = parse('[host]\nstate = "s"\n[drives]\nslots = ["d"]\n', "host.toml", HostConfig())
+    assert config.host.state == tmp_path / "s"
+    assert config.drives.slots == (tmp_path / "d",)
+
+
 def test_all_mistakes_are_told_at_once() -> None:
     remedy = " → correct it; docs/configuration.md says what is expected"
     assert refused(

@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-BUILDER = ROOT / "packaging/debian"
 EPOCH = "1767225600"
 """One time for all, whatever is committed meanwhile."""
 Build = Callable[..., Path]
@@ -21,14 +20,16 @@ Package = Callable[[str], Path]
 
 @pytest.fixture(scope="session")
 def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """Runs the builder; answers the folder of what it built."""
+    """Runs the builder of a checkout, which is this one; answers the folder of what it built."""
 
-    def run(*words: str, **variables: str) -> Path:
+    def run(*words: str, checkout: Path = ROOT, umask: int = 0o022, **variables: str) -> Path:
         folder = tmp_path_factory.mktemp("packages")
-        command = [sys.executable, "-m", "nondum_deb", "-o", str(folder), *words]
-        ours = {"PYTHONPATH": str(BUILDER), "SOURCE_DATE_EPOCH": EPOCH}
+        command = [sys.executable, "-P", "-m", "nondum_deb", "-o", str(folder), *words]
+        ours = {"PYTHONPATH": str(checkout / "packaging/debian"), "SOURCE_DATE_EPOCH": EPOCH}
         surroundings = {**os.environ, **ours, **variables}
-        done = subprocess.run(command, env=surroundings, capture_output=True, text=True, cwd="/")
+        done = subprocess.run(
+            command, env=surroundings, capture_output=True, text=True, cwd="/", umask=umask
+        )
         assert done.returncode == 0, done.stderr
         return folder
 

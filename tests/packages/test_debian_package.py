@@ -15,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from tests.packages.checkout import copied
 from tests.packages.conftest import ROOT, Build, Package
 
 from nondum.host import config
@@ -161,9 +162,11 @@ def test_command_of_the_tree_runs_wherever_it_lies(tree: Tree) -> None:
 
 
 @long
-def test_same_bytes_whoever_builds_it(package: Package, build: Build) -> None:
+def test_same_bytes_whoever_builds_it(package: Package, build: Build, tmp_path: Path) -> None:
     words = ("--arch", "arm64", "--version", "0.1.0+test1")
-    (again,) = build(*words, TZ="Asia/Tokyo", LC_ALL="C", HOME="/nonexistent").iterdir()
+    checkout = copied(tmp_path / "some where/else", umask=0o077, time_s=1_700_000_000)
+    theirs = {"TZ": "Asia/Tokyo", "LC_ALL": "C", "HOME": "/nonexistent"}
+    (again,) = build(*words, checkout=checkout, umask=0o077, **theirs).iterdir()
     assert again.read_bytes() == package("arm64").read_bytes()
 
 

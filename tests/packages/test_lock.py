@@ -1,4 +1,4 @@
-"""The lock of the Debian packages: whole, and what the distributions of today ask for."""
+"""The locks of the Debian packages: whole, and what the distributions of today ask for."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ import re
 import tomllib
 from pathlib import Path
 
+import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[2]
 LOCK = ROOT / "packaging/debian/requirements.lock"
+BACKEND_LOCK = ROOT / "packaging/debian/backend.lock"
 DISTRIBUTIONS = ("plugins/sdk", ".", "plugins/planner-pyperplan")
 OWN = {"nondum", "nondum-sdk", "nondum-planner-pyperplan"}
 
@@ -23,15 +25,24 @@ def test_lock_satisfies_what_is_declared() -> None:
         assert pinned[name] in requirement.specifier, requirement
 
 
-def test_every_version_has_its_hashes() -> None:
-    blocks = LOCK.read_text().replace("\\\n", " ").splitlines()
+def test_locked_backend_satisfies_what_is_declared() -> None:
+    pinned = _pinned(BACKEND_LOCK)
+    for place in DISTRIBUTIONS:
+        told = tomllib.loads((ROOT / place / "pyproject.toml").read_text())["build-system"]
+        for requirement in map(Requirement, told["requires"]):
+            assert pinned[canonicalize_name(requirement.name)] in requirement.specifier
+
+
+@pytest.mark.parametrize("lock", [LOCK, BACKEND_LOCK], ids=lambda path: path.name)
+def test_every_version_has_its_hashes(lock: Path) -> None:
+    blocks = lock.read_text().replace("\\\n", " ").splitlines()
     for block in blocks:
         if not block.startswith("#"):
             assert re.fullmatch(r"\S+==\S+( +--hash=sha256:[0-9a-f]{64})+", block), block
 
 
-def _pinned() -> dict[str, str]:
-    lines = [line for line in LOCK.read_text().splitlines() if "==" in line]
+def _pinned(lock: Path = LOCK) -> dict[str, str]:
+    lines = [line for line in lock.read_text().splitlines() if "==" in line]
     pairs = [line.rstrip("\\ ").split("==") for line in lines]
     assert len({name for name, _ in pairs}) == len(pairs), "one version of each"
     return {name: version for name, version in pairs}

@@ -62,7 +62,7 @@ WORDS = {
     "doubled-slash": "is not in its shortest form",
     "long-part": "has a part longer than 255 bytes",
     "dot-at-the-end": "has a name that some systems take for another",
-    "too-big-together": "more than 2147483648",
+    "too-big-together": "more than 8589934592",
 }
 """What is told of some, whatever else would refuse them with the same code."""
 

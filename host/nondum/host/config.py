@@ -363,7 +363,8 @@ def _typed(hint: Any, value: Any) -> Any:
         typed = [_typed(item, v) for v in value] if isinstance(value, list) else [None]
         return None if None in typed else tuple(typed)
     if hint in (Path, Path | None):
-        return Path(value).expanduser() if isinstance(value, str) and value else None
+        # Absolute: processes that the daemon starts work in other folders.
+        return Path(value).expanduser().absolute() if isinstance(value, str) and value else None
     if hint is float:
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         return float(value) if is_number and value > 0 else None

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-PIP = (sys.executable, "-m", "pip", "-q", "--disable-pip-version-check")
+PIP = (sys.executable, "-I", "-m", "pip", "-q", "--disable-pip-version-check")
 """Begins the command of everything that has to do with wheels."""
 
 

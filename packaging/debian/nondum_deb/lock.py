@@ -1,22 +1,27 @@
-"""Other people's wheels that go into the packages: versions and hashes, of all architectures.
+"""Other people's wheels that go into the packages, and those that build nondum's own: versions and
+hashes, of all architectures.
 
-A file in the words of pip (`--require-hashes`), so that it is pip who holds what it fetches to it.
+Files in the words of pip (`--require-hashes`), so that it is pip who holds what it fetches to them.
 """
 
 from __future__ import annotations
 
 import hashlib
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from nondum_deb.architecture import ARCHITECTURES, Architecture
 from nondum_deb.command import PIP, call
-from nondum_deb.places import LOCK, declared
+from nondum_deb.places import BACKEND_LOCK, LOCK, declared, declared_backend
 
 HEAD = """\
 # What is in the Debian packages besides nondum: exact versions, with the hashes of the wheels of
 # every architecture. Written by `./run package --lock`.
+"""
+BACKEND_HEAD = """\
+# What builds nondum's own wheels for the packages: exact versions, with hashes. Written by
+# `./run package --lock`.
 """
 
 
@@ -30,15 +35,27 @@ def locked_wheels(architecture: Architecture, folder: Path) -> None:
     download(architecture, folder, "--no-deps", "--require-hashes", "-r", str(LOCK))
 
 
-def write(path: Path = LOCK) -> None:
-    """Write the lock anew, with the newest versions that there are."""
+def install_backend(folder: Path) -> None:
+    """Unpack what builds wheels, and nothing else. Raises `BuildFailed` where a hash is not one of
+    the lock's."""
+    held = ("--only-binary=:all:", "--no-deps", "--require-hashes", "-r", str(BACKEND_LOCK))
+    call(*PIP, "install", "--target", folder, "--no-compile", *held)
+
+
+def write(path: Path = LOCK, backend: Path = BACKEND_LOCK) -> None:
+    """Write both locks again, with the newest versions that there are."""
+    path.write_text(HEAD + "".join(_newest(declared())), encoding="utf-8")
+    backend.write_text(BACKEND_HEAD + "".join(_newest(declared_backend())), encoding="utf-8")
+
+
+def _newest(wanted: Sequence[str]) -> list[str]:
     wheels: list[tuple[str, str, str]] = []
     with tempfile.TemporaryDirectory(prefix="nondum-lock-") as scratch:
         for architecture in ARCHITECTURES.values():
             folder = Path(scratch, architecture.debian)
-            download(architecture, folder, *declared())
+            download(architecture, folder, *wanted)
             wheels += map(_entry, folder.glob("*.whl"))
-    path.write_text(HEAD + "".join(_lines(wheels)), encoding="utf-8")
+    return _lines(wheels)
 
 
 def _entry(wheel: Path) -> tuple[str, str, str]:

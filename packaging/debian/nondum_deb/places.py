@@ -9,6 +9,8 @@ PACKAGING = Path(__file__).parents[2]
 CHECKOUT = PACKAGING.parent
 DEBIAN = PACKAGING / "debian"
 LOCK = DEBIAN / "requirements.lock"
+BACKEND_LOCK = DEBIAN / "backend.lock"
+"""What builds the wheels of the checkout."""
 DISTRIBUTIONS = ("plugins/sdk", ".", "plugins/planner-pyperplan")
 """Of the checkout, what is in the package. pyperplan is here as the DESIGN asks of every package: a
 distribution of its own, for it is under the GPL."""
@@ -41,6 +43,15 @@ def declared() -> list[str]:
         for extra in EXTRAS.get(str(table["name"]), ()):
             wanted += _strings(extras.get(extra) if isinstance(extras, dict) else None)
     return sorted({line for line in wanted if not any(_is(line, name) for name in own)})
+
+
+def declared_backend() -> list[str]:
+    """What building the distributions needs, as pip is told (PEP 518)."""
+    wanted: set[str] = set()
+    for place in DISTRIBUTIONS:
+        text = (CHECKOUT / place / "pyproject.toml").read_text(encoding="utf-8")
+        wanted.update(_strings(tomllib.loads(text)["build-system"]["requires"]))
+    return sorted(wanted)
 
 
 def _strings(value: object) -> list[str]:

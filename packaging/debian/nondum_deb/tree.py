@@ -7,6 +7,7 @@ for any, and a venv is little else than a link to Python and a file beside it (P
 from __future__ import annotations
 
 import gzip
+import os
 import shutil
 import sys
 import tempfile
@@ -62,8 +63,16 @@ def make(root: Path, architecture: Architecture, own: Path) -> None:
 
 
 def own_wheels(folder: Path) -> None:
-    """Build the checkout's distributions: they are the same for every architecture."""
-    call(*PIP, "wheel", "--no-deps", "-w", folder, *(CHECKOUT / place for place in DISTRIBUTIONS))
+    """Build the checkout's distributions: they are the same for every architecture.
+
+    Without pip's isolation, which would fetch whatever is the newest to build them with.
+    """
+    places = [CHECKOUT / place for place in DISTRIBUTIONS]
+    with tempfile.TemporaryDirectory(prefix="nondum-backend-") as backend:
+        lock.install_backend(Path(backend))
+        surroundings = {**os.environ, "PYTHONPATH": backend}
+        held = ("--no-deps", "--no-build-isolation", "--no-index")
+        call(*PIP, "wheel", *held, "-w", folder, *places, env=surroundings)
 
 
 def compress(text: str, path: Path) -> None:
@@ -128,8 +137,9 @@ def _machine_files(root: Path) -> None:
 
 def _completions(root: Path) -> None:
     """As this checkout's own command prints them: they ask nothing of an architecture."""
+    command = (sys.executable, "-P", "-m", "nondum.host.cli", "completion")
     for shell, path in COMPLETIONS.items():
-        _write(root / path, call(sys.executable, "-m", "nondum.host.cli", "completion", shell))
+        _write(root / path, call(*command, shell))
 
 
 def _write(path: Path, text: str, mode: int = 0o644) -> None:

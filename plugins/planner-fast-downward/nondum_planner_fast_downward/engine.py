@@ -49,7 +49,7 @@ def _of_up_fast_downward() -> Engine | None:
     if builds is None:
         return None
     return Engine(
-        translate=(sys.executable, "-m", "fast_downward.translate"),
+        translate=(sys.executable, "-P", "-m", "fast_downward.translate"),
         search=(str(builds / "downward"), *_LAMA_FIRST),
         environment={"PYTHONPATH": str(builds)},
     )

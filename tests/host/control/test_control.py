@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import socket
 import stat
 from collections.abc import AsyncIterator, Callable, Mapping
@@ -18,7 +19,7 @@ from tests.kit.until import arrived
 
 from nondum.host.control import protocol
 from nondum.host.control.client import ControlClient
-from nondum.host.control.server import ControlServer, Handing
+from nondum.host.control.server import MODE, ControlServer, Handing
 from nondum.sdk.errors import (
     ConfigRefused,
     GoalRefused,
@@ -99,6 +100,37 @@ async def test_an_answer_comes_back(tmp_path: Path) -> None:
     async with serving(tmp_path / "control.sock"):
         answer = await asyncio.to_thread(ask, tmp_path / "control.sock", "echo", words="héllo")
     assert answer == {"words": "héllo"}
+
+
+async def test_the_socket_is_nobody_elses_from_its_first_moment(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, seen, chmod = tmp_path / "control.sock", list[tuple[int, bool]](), os.chmod
+
+    def look(*arguments: Any, **options: Any) -> None:
+        with socket.socket(socket.AF_UNIX) as client:
+            listens = client.connect_ex(str(path)) == 0
+        seen.append((stat.S_IMODE(path.stat().st_mode), listens))
+        chmod(*arguments, **options)
+
+    monkeypatch.setattr(os, "chmod", look)  # the first thing that is done to it after `bind`
+    before = os.umask(0)
+    try:
+        async with serving(path):
+            assert stat.S_IMODE(path.stat().st_mode) == MODE
+    finally:
+        os.umask(before)
+    assert seen == [(MODE, False)]
+
+
+async def test_the_socket_is_the_groups_whatever_the_umask_is(tmp_path: Path) -> None:
+    path = tmp_path / "control.sock"
+    before = os.umask(0o077)
+    try:
+        async with serving(path):
+            assert stat.S_IMODE(path.stat().st_mode) == MODE
+    finally:
+        os.umask(before)
 
 
 async def test_a_refusal_keeps_its_words(tmp_path: Path) -> None:

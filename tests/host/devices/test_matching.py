@@ -103,6 +103,18 @@ def test_other_hids_go_to_who_asks() -> None:
     assert names(KNOB, {"subsystem": "hidraw"}) == ["hidraw0"]
 
 
+def test_keyboard_without_a_protocol_is_known_by_its_keys() -> None:
+    device = usb("1-7", ID_VENDOR_ID="0627", ID_MODEL_ID="0001")
+    games = interface(device, 1, "3/0/0", "usbhid")
+    keys = node(games, "input", "input/event5", ID_INPUT="1", ID_INPUT_KEYBOARD="1")
+    wheel = node(games, "input", "input/event6", ID_INPUT="1", ID_INPUT_MOUSE="1")
+    both = hid("3/0/0", games, node(games, "hidraw", "hidraw1"), keys, wheel)
+    named = {"usb": "0627:0001"}
+    assert names(both, {"subsystem": "hidraw"} | named) == ["hidraw0"]
+    assert names(both, {"subsystem": "usb"} | named) == []
+    assert names(both, {"subsystem": "input"} | named) == ["event3", "event6"]
+
+
 def test_keyboard_hidden_in_an_instrument_is_not_given_with_it() -> None:
     device = usb("1-6", ID_VENDOR_ID="0627", ID_MODEL_ID="0001")
     typing = interface(device, 1, "3/1/1", "usbhid")

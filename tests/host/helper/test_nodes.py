@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import stat
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -92,6 +93,109 @@ def test_raw_usb_node_of_a_keyboard_or_hub_is_refused(tmp_path: Path) -> None:
     (interface / "bInterfaceProtocol").write_text("02")
     (sys / "devices/pci0000:00/usb1/1-2/bDeviceClass").write_text("09")
     assert "hubs" in refused(nodes(tmp_path), (189, 1))
+
+
+LETTERS_AND_ENTER = "10000 7 ff9f207ac14057ff febeffdfffefffff fffffffffffffffe"
+"""Key bits of a keyboard, as sysfs tells them."""
+BUTTONS = {
+    "mouse": "1f0000 0 0 0 0",
+    "game pad": "7fdb000000000000 0 0 0 0",
+    "volume keys": "3e000000000000 0 0 0",
+    "presenter": "2000000000000 0 0 0 1000000000000",
+}
+
+
+def input_device(sys: Path, place: str, keys: str) -> None:
+    """An input device in sysfs, and the keys that its driver tells."""
+    folder = sys / place / "capabilities"
+    folder.mkdir(parents=True)
+    (folder / "key").write_text(f"{keys}\n")
+
+
+@pytest.mark.parametrize(
+    ("place", "subsystem"),
+    [
+        (f"{INTERFACE}/0003:1/input/input3/event3", "input"),
+        (f"{INTERFACE}/0003:1/hidraw/hidraw0", "hidraw"),
+        (f"{INTERFACE}/usbmisc/hiddev0", "usbmisc"),
+        ("devices/pci0000:00/usb1/1-2", "usb"),
+    ],
+    ids=["input", "hidraw", "hiddev", "usb"],
+)
+def test_what_has_letters_and_enter_is_a_keyboard_whatever_its_protocol(
+    tmp_path: Path, place: str, subsystem: str
+) -> None:
+    sys, keys = tmp_path / "sys", f"{INTERFACE}/0003:1/input/input3"
+    plug(sys, place, "240:0", subsystem, interface="03 00")
+    input_device(sys, keys, LETTERS_AND_ENTER)
+    assert "keyboards" in refused(nodes(tmp_path), (240, 0))
+
+
+@pytest.mark.parametrize("keys", BUTTONS.values(), ids=BUTTONS)
+def test_what_has_other_keys_is_none(tmp_path: Path, keys: str) -> None:
+    sys = tmp_path / "sys"
+    plug(sys, f"{INTERFACE}/0003:1/hidraw/hidraw0", "240:0", "hidraw", interface="03 00")
+    input_device(sys, f"{INTERFACE}/0003:1/input/input3", keys)
+    assert nodes(tmp_path).put("eye", "line", 240, 0).exists()
+
+
+def test_a_keyboard_beside_keeps_back_only_what_is_its_own(tmp_path: Path) -> None:
+    sys, other = tmp_path / "sys", "devices/pci0000:00/usb1/1-2/1-2:1.1"
+    plug(sys, f"{INTERFACE}/0003:1/input/input4/event4", "13:68", "input", interface="03 00")
+    input_device(sys, f"{INTERFACE}/0003:1/input/input3", LETTERS_AND_ENTER)
+    input_device(sys, f"{INTERFACE}/0003:1/input/input4", BUTTONS["mouse"])
+    (sys / other / "ttyACM0").mkdir(parents=True)
+    (sys / other / "ttyACM0/subsystem").symlink_to(sys / "class/input")
+    (sys / "dev/char/166:0").symlink_to(sys / other / "ttyACM0")
+    made = nodes(tmp_path)
+    assert made.put("eye", "mouse", 13, 68).exists()
+    assert made.put("eye", "line", 166, 0).exists()
+
+
+def test_nodes_go_with_their_device(tmp_path: Path) -> None:
+    sys = tmp_path / "sys"
+    plug(sys, f"{INTERFACE}/ttyUSB0/tty/ttyUSB0", "188:0", "tty")
+    made = nodes(tmp_path)
+    one, other = made.put("eye", "line", 188, 0), made.put("arm", "wire", 188, 0)
+    made.drop(188, 1)
+    assert one.exists()
+    assert made.are_there
+    made.drop(188, 0)
+    assert not one.exists()
+    assert not other.exists()
+    assert not made.are_there
+
+
+def test_a_device_that_goes_meanwhile_leaves_no_node(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sys, chown = tmp_path / "sys", os.chown
+    plug(sys, f"{INTERFACE}/ttyUSB0/tty/ttyUSB0", "188:0", "tty")
+
+    def pull(*arguments: Any) -> None:
+        chown(*arguments)
+        (sys / "dev/char/188:0").unlink()
+
+    monkeypatch.setattr(os, "chown", pull)  # between the look at the device and its node
+    made = nodes(tmp_path)
+    with pytest.raises(NondumError) as error:
+        made.put("eye", "line", 188, 0)
+    assert error.value.code == "HELPER_REFUSED"
+    assert not made.are_there
+
+
+def test_nodes_of_numbers_that_are_something_else_now_go(tmp_path: Path) -> None:
+    sys = tmp_path / "sys"
+    plug(sys, f"{INTERFACE}/0003:1/hidraw/hidraw0", "240:0", "hidraw", interface="03 00")
+    made = nodes(tmp_path)
+    node = made.put("eye", "line", 240, 0)
+    made.drop_unfit()
+    assert node.exists()
+    input_device(sys, f"{INTERFACE}/0003:1/input/input9", LETTERS_AND_ENTER)
+    made.drop_unfit()
+    assert not node.exists()
+    (sys / "dev/char/240:0").unlink()
+    made.drop_unfit()
 
 
 def test_integrator_may_grant_what_does_not_hang_on_usb(tmp_path: Path) -> None:

@@ -24,9 +24,14 @@ from tests.kit.loop_devices import attached
 from tests.kit.until import until
 
 from nondum.host.cgroups import CageLimits, Cages
+from nondum.host.cgroups.cages import NoTree
 from nondum.host.drives import nodes
-from nondum.host.helper import HelperClient, requests
-from nondum.host.helper.server import MOST_CHILDREN
+from nondum.host.feedback.lamps import Lamps
+from nondum.host.helper import HelperClient, removals, requests
+from nondum.host.helper.disks import Disks
+from nondum.host.helper.nodes import Nodes
+from nondum.host.helper.server import MOST_CHILDREN, Server
+from nondum.host.helper.service import Service
 from nondum.sdk.errors import NondumError
 
 pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="the helper is root's")
@@ -34,6 +39,12 @@ SERVED = pwd.getpwnam("daemon")
 STRANGER = pwd.getpwnam("nobody")
 _R = TypeVar("_R")
 
+REMOVED = (
+    b"remove@/devices/usb1/1-2/1-2:1.0/hidraw/hidraw0\0ACTION=remove\0"
+    b"DEVPATH=/devices/usb1/1-2/1-2:1.0/hidraw/hidraw0\0SUBSYSTEM=hidraw\0"
+    b"MAJOR=240\0MINOR=3\0DEVNAME=hidraw0\0SEQNUM=4711\0"
+)
+"""What the kernel writes."""
 START = 'export LISTEN_PID=$$ LISTEN_FDS=1; exec "$@"'
 
 
@@ -345,6 +356,49 @@ def test_helper_ends_when_nobody_asks(tmp_path: Path) -> None:
             check=False,
         )
     assert done.returncode == 0
+
+
+def test_nodes_go_when_the_kernel_tells_that_their_device_has_gone(tmp_path: Path) -> None:
+    hidraw, sys = "devices/usb1/1-2/1-2:1.0/hidraw/hidraw0", tmp_path / "sys"
+    (sys / hidraw).mkdir(parents=True)
+    (sys / "dev/char").mkdir(parents=True)
+    (sys / "dev/char/240:3").symlink_to(sys / hidraw)
+    nodes = Nodes(tmp_path / "run", SERVED.pw_uid, sys=sys)
+    mine = nodes.put("eye", "line", 240, 3)
+    lamps = Lamps((), tmp_path / "lamps.json")
+    service = Service(SERVED.pw_uid, tmp_path / "m", Disks(), nodes, NoTree(), lambda: lamps)
+    told, kernel = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    ending, _ = os.pipe()
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening, told, kernel:
+        listening.bind(str(tmp_path / "s"))
+        listening.listen()
+        server = threading.Thread(target=Server(listening, service, ending, told, 0.05).run)
+        server.start()
+        kernel.send(REMOVED)
+        server.join()  # once there is no node, it ends when nobody asks
+    assert not mine.exists()
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        REMOVED.replace(b"remove", b"add"),
+        REMOVED.replace(b"=hidraw", b"=block"),
+        REMOVED.replace(b"=240", b"=x"),
+        REMOVED.partition(b"MINOR")[0],
+        b"libudev\0\xfe\xed\xca\xfe",
+        b"",
+    ],
+    ids=["added", "a disk", "no number", "no node", "udev's", "nothing"],
+)
+def test_other_messages_are_of_no_device_that_has_gone(other: bytes) -> None:
+    assert removals.removed(REMOVED) == (240, 3)
+    assert removals.removed(other) is None
+
+
+def test_kernel_lets_the_helper_listen() -> None:
+    with removals.listen() as uevents:
+        assert uevents.getsockname()[1] == 1
 
 
 def test_helper_is_started_by_its_socket_only() -> None:

@@ -23,6 +23,7 @@ from nondum.sdk.errors import InstallFailed
 
 pytestmark = pytest.mark.anyio
 
+ROOT = Path(__file__).parents[3]
 JOB = "listing"
 WithPython = Callable[[str], None]
 
@@ -143,7 +144,10 @@ async def test_server_and_its_processes_end_with_the_client() -> None:
         forked.close()
 
 
-async def test_server_that_cannot_fork_says_why_and_goes_on() -> None:
+async def test_server_that_cannot_fork_says_why_and_goes_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
     async with fork_client("tests.host.lifecycle.server_that_cannot_fork") as client:
         with pytest.raises(OSError) as first:
             await client.fork(JOB, START_S)

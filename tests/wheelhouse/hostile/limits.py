@@ -33,7 +33,7 @@ def _folders(canary: Path) -> bytes:
 def _many_declared(canary: Path) -> bytes:
     """No single member is much; together they claim more than may be unpacked."""
     big = 1000 * _MB
-    extra = tuple(ZipMember(f"evil/{n}.bin", bytes(1200 * 1024), Lie(size=big)) for n in range(3))
+    extra = tuple(ZipMember(f"evil/{n}.bin", bytes(1200 * 1024), Lie(size=big)) for n in range(9))
     return WheelBuilder(extra=extra).bytes()
 
 

@@ -19,11 +19,12 @@ from dataclasses import dataclass
 
 from nondum.sdk.errors import Problem
 from nondum.wheelhouse import outline
-from nondum.wheelhouse.inflate import beginning, crc32, inflated
+from nondum.wheelhouse.contents import MAX_FILE_BYTES
+from nondum.wheelhouse.fixed_file import Bytes, pieces
+from nondum.wheelhouse.inflate import HEAD_FEED, beginning, crc32, inflated
 
-Bytes = memoryview
 MAX_MEMBERS = 20_000
-MAX_TOTAL_BYTES = 2 * 1024**3
+MAX_TOTAL_BYTES = MAX_FILE_BYTES
 MAX_RATIO = 1000
 """A member may unpack to so many times its packed size; deflate can do no more than 1032."""
 MAX_WHOLE_RATIO = 100
@@ -35,7 +36,6 @@ MAX_PATH = 1000
 """Bytes of a whole path: it is laid below folders of the store, and Linux takes 4096."""
 MAX_DEPTH = 64
 
-_CHUNK = 1024 * 1024
 _RESERVED = re.compile(r"(con|prn|aux|nul|(com|lpt)[0-9¹²³])(\..*)?", re.IGNORECASE)
 """Names that are devices on Windows, whatever follows a dot."""
 
@@ -92,14 +92,15 @@ def read(data: Bytes, where: str) -> Archive:
 
 def unpack(data: Bytes, member: Member) -> Iterator[bytes]:
     """The member's bytes in pieces. Raises `ValueError` when they are not whole."""
-    raw = data[member.start : member.end]
-    yield from _checked(inflated(raw) if member.is_packed else _cut(raw), member)
+    raw = pieces(data, member.start, member.end)
+    yield from _checked(inflated(raw) if member.is_packed else map(bytes, raw), member)
 
 
 def head(data: Bytes, member: Member, count: int) -> bytes:
     """The member's first bytes, fewer where it is shorter or damaged, without reading on."""
-    raw = data[member.start : member.end]
-    return beginning(raw, count) if member.is_packed else bytes(raw[:count])
+    enough = HEAD_FEED if member.is_packed else count
+    raw = data[member.start : min(member.end, member.start + enough)]
+    return beginning(raw, count) if member.is_packed else bytes(raw)
 
 
 def contains(data: Bytes, member: Member, wanted: bytes) -> bool:
@@ -113,11 +114,6 @@ def contains(data: Bytes, member: Member, wanted: bytes) -> bool:
     except ValueError:  # told where its contents are judged
         pass
     return False
-
-
-def _cut(raw: Bytes) -> Iterator[bytes]:
-    for start in range(0, len(raw), _CHUNK):
-        yield bytes(raw[start : start + _CHUNK])
 
 
 def _checked(pieces: Iterator[bytes], member: Member) -> Iterator[bytes]:
@@ -226,7 +222,7 @@ def _kind_flaw(info: zipfile.ZipInfo) -> str | None:
 
 
 class _View(io.RawIOBase):
-    """A memoryview as a raw file, without copying it."""
+    """Bytes as a raw file, read where they are asked for."""
 
     def __init__(self, data: Bytes) -> None:
         self._data = data

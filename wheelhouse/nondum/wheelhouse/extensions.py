@@ -16,9 +16,10 @@ from dataclasses import dataclass
 
 from nondum.sdk.errors import Problem
 from nondum.wheelhouse import archive
-from nondum.wheelhouse.archive import Bytes, Member
+from nondum.wheelhouse.archive import Member
 from nondum.wheelhouse.dist_info import WheelName
 from nondum.wheelhouse.elf import ARCHITECTURES, HEAD_BYTES, Elf
+from nondum.wheelhouse.fixed_file import Bytes
 
 MAX_TOLD = 10
 """Files that are told when they are wrong."""

@@ -6,14 +6,12 @@ Either way the bytes are the same, and what is read is bounded piece by piece.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
-_FEED = 256 * 1024
-"""Packed bytes given at once. What is not taken is copied every time, so not all of them."""
 _PIECE = 1024 * 1024
 """Most unpacked bytes taken at once."""
-_HEAD_FEED = 4096
+HEAD_FEED = 4096
 """Packed bytes that are enough for the first few: what describes a block takes some hundred."""
 
 
@@ -30,26 +28,30 @@ crc32 = _LIBRARY.crc32
 """crc32(data, value=0) of ISO 3309, as zlib has it."""
 
 
-def inflated(packed: memoryview, library: Any = _LIBRARY) -> Iterator[bytes]:
+def inflated(packed: Iterable[bytes | memoryview], library: Any = _LIBRARY) -> Iterator[bytes]:
     """Unpack raw deflated bytes piece by piece. Raises `ValueError` unless all of them were one
-    whole stream."""
+    whole stream.
+
+    They are given in pieces, too: what is not taken of one is copied every time.
+    """
     inflate = library.decompressobj(-zlib.MAX_WBITS)
     try:
-        for start in range(0, len(packed), _FEED):
+        for fed in packed:
             if inflate.eof:
                 raise ValueError("bytes follow the packed ones")
-            yield from _taken(inflate, packed[start : start + _FEED])
+            yield from _taken(inflate, fed)
     except (library.error, zlib.error) as error:
         raise ValueError(str(error)) from error
     if not inflate.eof or inflate.unused_data:
         raise ValueError("the packed bytes do not end where the directory says")
 
 
-def beginning(packed: memoryview, count: int, library: Any = _LIBRARY) -> bytes:
-    """The first of some raw deflated bytes; fewer where there are no more, or they are damaged."""
+def beginning(packed: bytes | memoryview, count: int, library: Any = _LIBRARY) -> bytes:
+    """The first of some raw deflated bytes, of which `HEAD_FEED` are enough; fewer where there are
+    no more, or they are damaged."""
     inflate = library.decompressobj(-zlib.MAX_WBITS)
     try:
-        found: bytes = inflate.decompress(packed[:_HEAD_FEED], count)
+        found: bytes = inflate.decompress(packed[:HEAD_FEED], count)
     except (library.error, zlib.error):
         return b""
     return found

@@ -13,7 +13,8 @@ import zipfile
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-Bytes = memoryview
+from nondum.wheelhouse.fixed_file import Bytes
+
 MAX_DIRECTORY = 8 * 1024**2
 """Bytes of a directory: more are not read, since each entry takes ten times its bytes."""
 LOCAL = struct.Struct("<4s5H3L2H")
@@ -29,7 +30,10 @@ _ELSEWHERE, _ELSEWHERE_SHORT = 0xFFFFFFFF, 0xFFFF
 _ENCRYPTED, _TOLD_LATER, _UTF8 = 0x1, 0x8, 0x800
 _FLAGS = _ENCRYPTED | _TOLD_LATER | _UTF8 | 0x6
 """Those that are known here; 0x6 tells how hard deflate tried."""
+_LONGEST_DESCRIPTOR = 24
 _ZIP64 = 0x0001
+_USUAL_HEADER = LOCAL.size + 226
+"""Bytes that most headers are no longer than, name and extra fields included: read at once."""
 _OTHER_NAMES = {0x7075: "another name", 0x6375: "another comment", 0x9901: "an encryption"}
 
 
@@ -78,7 +82,7 @@ def end_flaws(data: Bytes) -> Iterator[str]:
     if at < 0 or bytes(data[at : at + 4]) != _END_MARK:
         yield "does not end as a zip file does, or bytes follow its end"
         return
-    if _END.unpack_from(data, at)[-1]:
+    if _END.unpack(data[at:])[-1]:
         yield "has a comment"
     end, at = _end(data, at)
     if end is None:
@@ -97,16 +101,18 @@ def end_flaws(data: Bytes) -> Iterator[str]:
 def _end(data: Bytes, at: int) -> tuple[_End | None, int]:
     """What the end record at `at` tells, or the one of zip64 before it, and where that begins;
     None when they do not agree."""
-    _, *told, _ = _END.unpack_from(data, at)
+    _, *told, _ = _END.unpack(data[at:])
     end = _End(*told)
-    if bytes(data[max(0, at - _LOCATOR.size) :][:4]) != _LOCATOR_MARK:
+    before = max(0, at - _LOCATOR.size)
+    if bytes(data[before : before + 4]) != _LOCATOR_MARK:
         is_elsewhere = _ELSEWHERE in end or _ELSEWHERE_SHORT in (end.disk, end.members)
         return None if is_elsewhere else end, at
     at -= _LOCATOR.size + _END64.size
     if at < 0:
         return None, at
-    mark, length, _, _, *rest = _END64.unpack_from(data, at)
-    located = _LOCATOR.unpack_from(data, at + _END64.size)
+    records = data[at : at + _END64.size + _LOCATOR.size]
+    mark, length, _, _, *rest = _END64.unpack_from(records)
+    located = _LOCATOR.unpack_from(records, _END64.size)
     is_plain = (mark, length) == (_END64_MARK, _END64.size - 12)
     if not is_plain or located[1:] != (0, at, 1):
         return None, at
@@ -157,34 +163,39 @@ def span(data: Bytes, info: zipfile.ZipInfo) -> tuple[int, int]:
 
 def _directory(data: Bytes, at: int, count: int) -> tuple[list[_Central], int]:
     """The entries of the directory, and where it ends. Raises `ValueError`, `struct.error`."""
-    entries = []
+    read = bytes(data[at : at + MAX_DIRECTORY])
+    entries, begin, at = [], at, 0
     for _ in range(count):
-        mark, _, _, flags, method, _, _, crc, packed, size, *rest = _CENTRAL.unpack_from(data, at)
+        mark, _, _, flags, method, _, _, crc, packed, size, *rest = _CENTRAL.unpack_from(read, at)
         name_length, extra_length, comment_length, disk, _, _, offset = rest
         if mark != _CENTRAL_MARK:
             raise ValueError("no entry")
         at += _CENTRAL.size
-        name, extra, comment, at = _three(data, at, name_length, extra_length, comment_length)
+        name, extra, comment, at = _three(read, at, name_length, extra_length, comment_length)
         sizes = (size, packed, offset)
         entries.append(_Central(name, flags, method, crc, sizes, disk, extra, comment))
-    return entries, at
+    return entries, begin + at
 
 
 def _local(data: Bytes, at: int) -> _Local:
     """A member's own header. Raises `ValueError`, `struct.error`."""
-    mark, _, flags, method, _, _, crc, packed, size, *lengths = LOCAL.unpack_from(data, at)
+    read = bytes(data[at : at + _USUAL_HEADER])
+    mark, _, flags, method, _, _, crc, packed, size, *lengths = LOCAL.unpack_from(read)
     if mark != _LOCAL_MARK:
         raise ValueError("no header")
-    name, extra, _, start = _three(data, at + LOCAL.size, *lengths, 0)
-    return _Local(name, flags, method, crc, (size, packed), extra, start)
+    length = LOCAL.size + sum(lengths)
+    if length > len(read):
+        read = bytes(data[at : at + length])
+    name, extra, _, _ = _three(read, LOCAL.size, *lengths, 0)
+    return _Local(name, flags, method, crc, (size, packed), extra, at + length)
 
 
-def _three(data: Bytes, at: int, *lengths: int) -> tuple[bytes, bytes, bytes, int]:
+def _three(data: bytes, at: int, *lengths: int) -> tuple[bytes, bytes, bytes, int]:
     """Three runs of bytes and where they end."""
     ends = [at]
     for length in lengths:
         ends.append(ends[-1] + length)
-    first, second, third = (bytes(data[a:b]) for a, b in itertools.pairwise(ends))
+    first, second, third = (data[a:b] for a, b in itertools.pairwise(ends))
     return first, second, third, ends[-1]
 
 
@@ -281,11 +292,12 @@ def _descriptor(data: Bytes, info: zipfile.ZipInfo) -> bytes:
     if not info.flag_bits & _TOLD_LATER:
         return b""
     end = span(data, info)[1]
+    read = bytes(data[end : end + _LONGEST_DESCRIPTOR])
     for mark in (_DESCRIPTOR_MARK, b""):
         for form in ("<LQQ", "<LLL"):
             if form == "<LLL" and max(info.compress_size, info.file_size) > _ELSEWHERE:
                 continue
             sizes = struct.pack(form, info.CRC, info.compress_size, info.file_size)
-            if bytes(data[end : end + len(mark + sizes)]) == mark + sizes:
+            if read.startswith(mark + sizes):
                 return mark + sizes
     return b""

@@ -72,7 +72,9 @@ def fetch(wheel: Path, target: Target, folder: Path, sources: Sources) -> tuple[
 
 
 def _pip(arguments: Sequence[str], code: str, where: str) -> None:
-    command = [sys.executable, "-m", "pip", *arguments, "--quiet", "--disable-pip-version-check"]
+    # `-I`: modules of the current folder are not run. Paths are relative to it all the same.
+    pip = (sys.executable, "-I", "-m", "pip")
+    command = [*pip, *arguments, "--quiet", "--disable-pip-version-check"]
     try:
         done = subprocess.run(
             command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False

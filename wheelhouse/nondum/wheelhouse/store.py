@@ -47,8 +47,10 @@ class Store:
         self,
         wheels: Sequence[tuple[Path, str]],
         progress: Progress | None = None,
+        alive: Callable[[], None] = lambda: None,
     ) -> tuple[StoredWheel, ...]:
-        """Unpack wheels whose hashes are given, but those that are here and whole.
+        """Unpack wheels whose hashes are given, but those that are here and whole: while these are
+        read, `alive` is called from any thread.
 
         The files must not change meanwhile: give staged copies. Either all of them are stored or
         none of those that were not. Raises `PayloadRefused` (HASH_MISMATCH, WHEEL_…),
@@ -57,7 +59,7 @@ class Store:
         stored: dict[str, StoredWheel] = {}
         sources = []
         for path, sha256 in wheels:
-            if (known := self.whole(sha256)) is not None:
+            if (known := self.whole(sha256, alive)) is not None:
                 os.utime(known.folder)
                 stored[sha256] = known
             else:
@@ -94,15 +96,16 @@ class Store:
             for file in checking.damaged(stored.root, stored.all_files)
         )
 
-    def whole(self, sha256: str) -> StoredWheel | None:
+    def whole(self, sha256: str, alive: Callable[[], None] = lambda: None) -> StoredWheel | None:
         """A stored wheel whose files have been hashed again, if they are as they were.
 
-        Compiled files are dropped if any of them is not. Raises `InstallFailed`.
+        Compiled files are dropped if any of them is not. `alive` is called, from any thread, while
+        large ones are read. Raises `InstallFailed`.
         """
         stored = self.get(sha256)
         if stored is None:
             return None
-        if not (damaged := checking.damaged(stored.root, stored.all_files)):
+        if not (damaged := checking.damaged(stored.root, stored.all_files, alive)):
             return stored
         if not set(damaged).isdisjoint(stored.files):
             return None

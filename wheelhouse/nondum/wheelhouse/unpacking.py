@@ -18,19 +18,22 @@ from pathlib import Path
 
 from nondum.sdk.errors import PayloadRefused, Problem
 from nondum.wheelhouse import archive, wheel
-from nondum.wheelhouse.archive import Bytes
+from nondum.wheelhouse.fixed_file import Bytes, FixedFile
 from nondum.wheelhouse.wheel import Layout, PlannedFile
 
 THREADS = max(2, min(8, os.cpu_count() or 2))
 
 _WRITE_SOON = 1024 * 1024
 """Files from this size on are sent to the disk at once, while others are still being inflated."""
+_HASHED_AT_ONCE = 1024 * 1024
+"""Bytes: each time, a thread has to wait for others."""
 _SYNC_FILE_RANGE_WRITE = 2
 _libc = ctypes.CDLL(None, use_errno=True)
 
 
 Progress = Callable[[int, int], None]
-"""Bytes written, bytes to write. Called from any thread, one at a time."""
+"""Bytes written, bytes to write, also again where none was written but a wheel was read on. Called
+from any thread, one at a time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +72,10 @@ def unpack(sources: Sequence[Source], progress: Progress | None = None) -> tuple
     with ExitStack() as opened, ThreadPoolExecutor(THREADS) as pool:
         try:
             views = [opened.enter_context(wheel.opened(source.path)) for source in sources]
-            hashes = [pool.submit(_hash, view) for view in views]
+            counter = _Counter(progress)
+            hashes = [pool.submit(_hash, view, counter) for view in views]
             layouts = [_laid_out(view, s) for view, s in zip(views, sources, strict=True)]
-            return _unpacked(pool, sources, views, layouts, hashes, progress)
+            return _unpacked(pool, sources, views, layouts, hashes, counter)
         finally:
             pool.shutdown(cancel_futures=True)
 
@@ -79,10 +83,10 @@ def unpack(sources: Sequence[Source], progress: Progress | None = None) -> tuple
 def _unpacked(
     pool: ThreadPoolExecutor,
     sources: Sequence[Source],
-    views: Sequence[Bytes],
+    views: Sequence[FixedFile],
     layouts: Sequence[Layout],
     hashes: Sequence[Future[str]],
-    progress: Progress | None,
+    counter: _Counter,
 ) -> tuple[Unpacked, ...]:
     planned = [
         (file, source, view)
@@ -90,8 +94,8 @@ def _unpacked(
         for file in layout.files
     ]
     planned.sort(key=lambda one: -one[0].member.size)
-    tell = _counter(sum(file.member.size for file, _, _ in planned), progress)
-    written = [(one[1], pool.submit(_write, *one, tell)) for one in planned]
+    counter.begin(sum(file.member.size for file, _, _ in planned))
+    written = [(one[1], pool.submit(_write, *one, counter)) for one in planned]
     for source, digest in zip(sources, hashes, strict=True):
         if digest.result() != source.sha256:
             text = "is not the wheel that was locked"
@@ -111,8 +115,14 @@ def _unpacked(
     )
 
 
-def _hash(data: Bytes) -> str:
-    return hashlib.sha256(data).hexdigest()
+def _hash(data: FixedFile, counter: _Counter) -> str:
+    digest, at = hashlib.sha256(), 0
+    buffer = memoryview(bytearray(min(len(data), _HASHED_AT_ONCE)))
+    while count := data.read_into(buffer, at):
+        digest.update(buffer[:count])
+        at += count
+        counter.add(0)  # a large wheel takes minutes on a slow disk
+    return digest.hexdigest()
 
 
 def _laid_out(data: Bytes, source: Source) -> Layout:
@@ -124,22 +134,31 @@ def _laid_out(data: Bytes, source: Source) -> Layout:
     return layout
 
 
-def _counter(total: int, progress: Progress | None) -> Callable[[int], None]:
+class _Counter:
     """Adds up what all threads have written."""
-    lock, done = threading.Lock(), 0
 
-    def tell(size: int) -> None:
-        nonlocal done
-        with lock:
-            done += size
-            if progress is not None:
-                progress(done, total)
+    def __init__(self, progress: Progress | None) -> None:
+        self._progress = progress
+        self._lock = threading.Lock()
+        self._done, self._total = 0, -1
 
-    return tell
+    def begin(self, total: int) -> None:
+        """Know how much is to be written: from now on progress is told."""
+        with self._lock:
+            self._total = total
+
+    def add(self, size: int) -> None:
+        """Count so many bytes, perhaps none, and tell of it."""
+        if self._progress is None:
+            return
+        with self._lock:
+            self._done += size
+            if self._total >= 0:
+                self._progress(self._done, self._total)
 
 
 def _write(
-    file: PlannedFile, source: Source, data: Bytes, tell: Callable[[int], None]
+    file: PlannedFile, source: Source, data: Bytes, counter: _Counter
 ) -> StoredFile | Problem:
     digest = hashlib.sha256()
     try:
@@ -148,6 +167,7 @@ def _write(
             for piece in archive.unpack(data, file.member):
                 digest.update(piece)
                 out.write(piece)
+                counter.add(len(piece))
             out.flush()
             os.fchmod(out.fileno(), 0o555 if file.member.is_executable else 0o444)
             if file.member.size >= _WRITE_SOON:
@@ -156,5 +176,4 @@ def _write(
         return wheel.damaged(file, source.path.name, str(error))
     if file.sha256 and digest.hexdigest() != file.sha256:
         return wheel.damaged(file, source.path.name, "it is not what RECORD says")
-    tell(file.member.size)
     return StoredFile(file.target, file.member.size, digest.hexdigest())

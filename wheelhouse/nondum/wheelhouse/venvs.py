@@ -81,10 +81,11 @@ def make_with_pip(
         encoding="utf-8",
     )
     command = [
-        *(sys.executable, "-m", "pip", "--isolated", "install", "--no-index", "--no-deps"),
+        *(sys.executable, "-I", "-m", "pip", "--isolated", "install", "--no-index", "--no-deps"),
         *("--only-binary", ":all:", "--require-hashes", "--no-cache-dir", "--no-compile"),
         *("--no-input", "--disable-pip-version-check", "--quiet", "--no-warn-script-location"),
-        *("--target", str(site_packages(unfinished)), "--requirement", str(requirements)),
+        *("--target", str(site_packages(unfinished).absolute())),
+        *("--requirement", str(requirements.absolute())),
     ]
     failure = _run_pip(command, alive)
     if failure is not None:
@@ -102,6 +103,7 @@ def _run_pip(command: Sequence[str], alive: Callable[[], None]) -> str | None:
         stderr=subprocess.PIPE,
         text=True,
         env={"PATH": os.defpath, "LC_ALL": "C.UTF-8"},
+        cwd="/",
     ) as pip:
         for _ in range(0, PIP_TIMEOUT_S, PIP_ALIVE_S):
             try:

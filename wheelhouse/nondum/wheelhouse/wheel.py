@@ -9,18 +9,17 @@ beside or instead of its worker.
 from __future__ import annotations
 
 import hashlib
-import mmap
 import sys
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
 from nondum.sdk.errors import PayloadRefused, Problem
 from nondum.wheelhouse import archive, dist_info, extensions, record
-from nondum.wheelhouse.archive import Bytes, Member
+from nondum.wheelhouse.archive import Member
 from nondum.wheelhouse.dist_info import Needs, WheelName
+from nondum.wheelhouse.fixed_file import Bytes, FixedFile
 
 SDK = "nondum-sdk"
 HARMLESS_HOOKS = frozenset({"distutils-precedence.pth", "a1_coverage.pth"})
@@ -54,19 +53,9 @@ class Layout:
     """What its metadata asks for."""
 
 
-@contextmanager
-def opened(path: Path) -> Iterator[Bytes]:
-    """A wheel's bytes, mapped read-only. Only for files that nobody else can change."""
-    with path.open("rb") as file:
-        if not path.stat().st_size:
-            yield memoryview(b"")
-            return
-        with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as mapped:
-            view = memoryview(mapped)
-            try:
-                yield view
-            finally:
-                view.release()
+def opened(path: Path) -> FixedFile:
+    """A wheel's bytes; close it. Only for files that nobody else can change. Raises `OSError`."""
+    return FixedFile(path)
 
 
 def lay_out(data: Bytes, filename: str) -> Layout:

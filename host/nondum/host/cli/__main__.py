@@ -1,4 +1,4 @@
-"""`python -m nondum.host.cli` is `nondum`."""
+"""`python -P -m nondum.host.cli` is `nondum`."""
 
 from nondum.host.cli.main import main
 

@@ -7,6 +7,7 @@ import contextlib
 import difflib
 import errno
 import logging
+import os
 import socket
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from dataclasses import dataclass
@@ -21,6 +22,9 @@ Verb = Callable[[Mapping[str, Any]], Awaitable[Any]]
 """Answers once."""
 Follow = Callable[[Mapping[str, Any]], AsyncIterator[Any]]
 """Answers until the client leaves."""
+
+MODE = 0o660
+"""Of the socket: for its owner and group."""
 
 log = logging.getLogger(__name__)
 
@@ -52,10 +56,14 @@ class ControlServer:
         """
         try:
             await self._replace_dead_socket()
-            self._server = await asyncio.start_unix_server(
-                self._serve, path=self._path, limit=protocol.LINE_LIMIT
-            )
-            self._path.chmod(0o660)
+            listening = _bound(self._path)
+            try:
+                self._server = await asyncio.start_unix_server(
+                    self._serve, sock=listening, limit=protocol.LINE_LIMIT
+                )
+            except BaseException:
+                listening.close()
+                raise
         except OSError as error:
             raise _refused("CONTROL_SOCKET", self._path, f"cannot listen ({error})") from error
 
@@ -132,6 +140,20 @@ class ControlServer:
         raise ProtocolViolation(
             Problem("CONTROL_VERB", f"unknown verb {name!r}", where="control socket", fix=fix)
         )
+
+
+def _bound(path: Path) -> socket.socket:
+    """A socket at a path, which does not listen yet. At no time does its mode let others in: what
+    a socket's own mode refuses, the umask cannot allow (unix(7))."""
+    bound = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        os.fchmod(bound.fileno(), MODE)
+        bound.bind(str(path))
+        path.chmod(MODE)  # the umask may have taken the group's part
+    except BaseException:
+        bound.close()
+        raise
+    return bound
 
 
 async def _hand(handing: Handing, writer: asyncio.StreamWriter) -> None:

@@ -90,9 +90,19 @@ def never_given(device: DeviceRecord, node: DeviceNode) -> str:
     if any(kind[0] == _HUB for kind in kinds):
         return "it is a hub"
     is_usb_keyboard = any((kind[0], kind[-1]) == (_HID, KEYBOARD) for kind in kinds)
-    if is_usb_keyboard or node.properties.get("ID_INPUT_KEYBOARD") == "1":
+    if is_usb_keyboard or any(
+        other.properties.get("ID_INPUT_KEYBOARD") == "1" for other in _same_input(device, node)
+    ):
         return "it is a keyboard"
     return ""
+
+
+def _same_input(device: DeviceRecord, node: DeviceNode) -> Sequence[DeviceNode]:
+    """The nodes that may tell what a node tells of keys: an input node is one input device's, a raw
+    one its whole interface's, or all of them."""
+    if node.subsystem not in (RAW, "hidraw"):
+        return (node,)
+    return [one for one in device.nodes if node.interface in ("", one.interface)]
 
 
 def left_alone(device: DeviceRecord) -> str:

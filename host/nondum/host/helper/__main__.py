@@ -1,4 +1,4 @@
-"""The helper's command line, as its service unit has it: `python -m nondum.host.helper`."""
+"""The helper's command line, as its service unit has it: `python -I -m nondum.host.helper`."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from nondum.host.cgroups.cage import Tree
 from nondum.host.cgroups.cages import tree
 from nondum.host.config import SYSTEM_FILE, HostConfig, load
 from nondum.host.feedback.lamps import Lamps
+from nondum.host.helper import removals
 from nondum.host.helper.disks import Disks
 from nondum.host.helper.nodes import Nodes
 from nondum.host.helper.server import IDLE_S, Server
@@ -47,8 +48,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     ending, end = os.pipe()
     signal.signal(signal.SIGTERM, lambda *_: os.write(end, b"."))
     try:
-        with _handed_over() as listening:
-            Server(listening, service, ending, told.idle_s).run()
+        with _handed_over() as listening, removals.listen() as uevents:
+            Server(listening, service, ending, uevents, told.idle_s).run()
     finally:
         service.tree.close()
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from nondum.host.helper.requests import refused
+from nondum.sdk.errors import NondumError
 
 SYS = Path("/sys")
 SIZE = "size=256k,nr_inodes=4096,mode=0755"
@@ -21,6 +22,11 @@ _RAW = frozenset({"scsi_generic", "bsg", "nvme", "nvme-generic"})
 """Subsystems whose nodes give away whole disks."""
 KEYBOARD = ("03", "01")
 """Interface class and protocol (USB HID 1.11, 4.2): what is typed is nobody's but the machine's."""
+_ENTER = 28
+_LETTERS = (*range(16, 26), *range(30, 39), *range(44, 51))
+"""KEY_Q to KEY_P, KEY_A to KEY_L, KEY_Z to KEY_M."""
+_WORD = 8 * ctypes.sizeof(ctypes.c_ulong)
+"""Bits of a word in sysfs' bitmaps."""
 HUB = "09"
 STORAGE = "08"
 
@@ -37,6 +43,7 @@ class Nodes:
 
     def put(self, component: str, need: str, major: int, minor: int) -> Path:
         """Make a node for a device that was plugged in. Raises `NondumError` (HELPER_REFUSED)."""
+        device = self._identity(major, minor)
         self._check(major, minor)
         self.prepare()
         folder = self.base / component
@@ -46,7 +53,29 @@ class Nodes:
         os.mknod(fresh, stat.S_IFCHR | 0o600, os.makedev(major, minor))
         os.chown(fresh, self.uid, -1)
         fresh.rename(node)  # whoever looks finds the old one or the new one
+        if self._identity(major, minor) != device:  # pulled meanwhile: its removal may be past
+            node.unlink(missing_ok=True)
+            raise refused("there is no such device", f"{major}:{minor}")
         return node
+
+    def drop(self, major: int, minor: int) -> None:
+        """Remove all nodes of a device that has gone: its number may be another one's next."""
+        for node in self._made():
+            if _number(node) == (major, minor):
+                node.unlink(missing_ok=True)
+
+    def drop_unfit(self) -> None:
+        """Remove all nodes whose number is not a device's any more that may be given."""
+        for node in self._made():
+            try:
+                self._check(*_number(node))
+            except NondumError:
+                node.unlink(missing_ok=True)
+
+    @property
+    def are_there(self) -> bool:
+        """Whether there is any node."""
+        return bool(self._made())
 
     def take(self, component: str, need: str) -> None:
         """Remove a node; none there is fine."""
@@ -62,6 +91,17 @@ class Nodes:
                     node.unlink(missing_ok=True)
                 folder.rmdir()
 
+    def _made(self) -> list[Path]:
+        folders = list(self.base.iterdir()) if self.base.is_dir() else []
+        return [node for folder in folders for node in folder.iterdir()]
+
+    def _identity(self, major: int, minor: int) -> int | None:
+        """Of the device that has a number now: sysfs gives no two folders one inode."""
+        try:
+            return (self.sys / "dev/char" / f"{major}:{minor}").stat().st_ino
+        except OSError:
+            return None
+
     def _check(self, major: int, minor: int) -> None:
         link = self.sys / "dev/char" / f"{major}:{minor}"
         if not link.exists():
@@ -69,7 +109,13 @@ class Nodes:
         device = link.resolve()
         subsystem = (device / "subsystem").resolve().name
         is_hub = _attribute(device, "bDeviceClass") == HUB
-        if subsystem in _RAW or is_hub or _is_keyboard(device) or _is_drive(device):
+        if (
+            subsystem in _RAW
+            or is_hub
+            or _is_keyboard(device)
+            or _types(device, subsystem)
+            or _is_drive(device)
+        ):
             raise refused("a component is not given disks, keyboards or hubs", f"{major}:{minor}")
         if not _usb(device) and subsystem not in self.subsystems:
             raise refused("it does not hang on USB", f"{major}:{minor}")
@@ -99,6 +145,41 @@ def _is_keyboard(device: Path) -> bool:
         (_attribute(at, "bInterfaceClass"), _attribute(at, "bInterfaceProtocol")) == KEYBOARD
         for at in interfaces
     )
+
+
+def _types(device: Path, subsystem: str) -> bool:
+    """Whether an input device that it is of, or that is of its interface, has letters and Enter.
+
+    Keyboards that a machine's firmware cannot use have no protocol of their own. An input node
+    tells of its own input device only; others may tell all that comes from their interface.
+    """
+    if subsystem == "input":
+        return _has_letters(device.parent)
+    line = _usb(device)
+    interface = next((at for at in line if ":" in at.name and at.parent in line), None)
+    above = interface if interface is not None else device
+    return any(_has_letters(at.parent.parent) for at in above.rglob("capabilities/key"))
+
+
+def _has_letters(device: Path) -> bool:
+    """By the keys that its input driver tells (input-event-codes.h), in words, highest first."""
+    words = _attribute(device, "capabilities/key").split()
+    bits = 0
+    try:
+        for word in words:
+            bits = bits << _WORD | int(word, 16)
+    except ValueError:
+        return True  # nobody knows
+    return bool(bits >> _ENTER & 1 and any(bits >> letter & 1 for letter in _LETTERS))
+
+
+def _number(node: Path) -> tuple[int, int]:
+    """The device of a node, or (0, 0), which is none."""
+    try:
+        device = node.lstat().st_rdev
+    except FileNotFoundError:
+        return 0, 0
+    return os.major(device), os.minor(device)
 
 
 def _is_drive(device: Path) -> bool:

@@ -16,7 +16,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from nondum.host.helper import requests
+from nondum.host.helper import removals, requests
 from nondum.host.helper.requests import refused
 from nondum.host.helper.service import Service
 from nondum.sdk.errors import InstallFailed, NondumError, Problem
@@ -35,27 +35,49 @@ class Server:
     """Serves connections until it is told to end, or nobody comes any more."""
 
     def __init__(
-        self, listening: socket.socket, service: Service, ending: int, idle_s: float = IDLE_S
+        self,
+        listening: socket.socket,
+        service: Service,
+        ending: int,
+        uevents: socket.socket,
+        idle_s: float = IDLE_S,
     ) -> None:
-        """`ending` is a descriptor that can be read once the server is to end."""
+        """`ending` is a descriptor that can be read once the server is to end; `uevents` gets the
+        kernel's messages (see `removals.listen`)."""
         self._listening, self._service, self._idle_s = listening, service, idle_s
-        self._ending = ending
+        self._ending, self._uevents = ending, uevents
         self._children: set[int] = set()
 
     def run(self) -> None:
-        """Serve; returns when it is to end, or after `idle_s` without a connection and with no
-        child left."""
+        """Serve; returns when it is to end, or after `idle_s` without a connection, with no child
+        left and no node, which would have to be removed with its device."""
         self._listening.settimeout(0)
-        sources = [self._ending, self._listening.fileno()]
+        self._uevents.settimeout(0)
+        self._service.nodes.drop_unfit()  # what was removed while no helper ran
+        listening, told = self._listening.fileno(), self._uevents.fileno()
+        sources = [self._ending, listening, told]
         while True:
             ready, _, _ = select.select(sources, [], [], self._idle_s)
             self._reap()
             if self._ending in ready:
                 return
-            if ready:
+            if told in ready:
+                self._see_removal()
+            if listening in ready:
                 self._accept()
-            elif not self._children:
+            elif not ready and not self._children and not self._service.nodes.are_there:
                 return
+
+    def _see_removal(self) -> None:
+        try:
+            number = removals.removed(self._uevents.recv(removals.UEVENT_BYTES))
+        except BlockingIOError:
+            return
+        except OSError:  # ENOBUFS: more came than the kernel keeps
+            self._service.nodes.drop_unfit()
+            return
+        if number is not None:
+            self._service.nodes.drop(*number)
 
     def _accept(self) -> None:
         try:

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from nondum.wheelhouse.contents import MAX_FILE_BYTES
+from nondum.wheelhouse.contents import MAX_FILE_BYTES, MAX_FILES
 
 _MB = 1024 * 1024
 
@@ -37,7 +37,8 @@ ALLOWANCES: Mapping[str, Allowance] = {
 
 OTHERWISE = Allowance(cpu_s=3600, memory_mb=1536)
 
-DESCRIPTORS = 512
+DESCRIPTORS = 2 * MAX_FILES
+"""All wheels of a payload may be open at once, and what is written of them."""
 ADDRESS_SPACE = 2 * 1024**3
 FILE_BYTES = MAX_FILE_BYTES + 1
 """One byte more than any file of a payload may have."""

@@ -12,6 +12,7 @@ import json
 import os
 import socket
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
@@ -107,12 +108,14 @@ def _failure(kind: str, *problems: Problem) -> dict[str, Any]:
 
 def _reporter(answers: TextIO) -> Callable[[str, int, int], None]:
     told: dict[str, float] = {}
+    lock = threading.Lock()  # a job may have several threads
 
     def report(phase: str, done: int, total: int) -> None:
-        now = time.monotonic()
-        if done >= total or now - told.get(phase, 0.0) >= PROGRESS_S:
-            told[phase] = now
-            _say(answers, {"progress": [phase, done, total]})
+        with lock:
+            now = time.monotonic()
+            if done >= total or now - told.get(phase, 0.0) >= PROGRESS_S:
+                told[phase] = now
+                _say(answers, {"progress": [phase, done, total]})
 
     return report
 

@@ -170,11 +170,13 @@ class ForkClient:
         with theirs:
             try:
                 self._server = await asyncio.create_subprocess_exec(
-                    *(sys.executable, "-m", self._module, str(os.getpid()), str(theirs.fileno())),
+                    *(sys.executable, "-P", "-m", self._module),
+                    *(str(os.getpid()), str(theirs.fileno())),
                     stdin=DEVNULL,
                     stdout=DEVNULL,
                     pass_fds=(theirs.fileno(),),
                     start_new_session=True,
+                    cwd="/",
                 )
             except BaseException:
                 channel.close()

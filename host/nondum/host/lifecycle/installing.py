@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from functools import partial
@@ -160,18 +160,19 @@ def _stored(
     fresh = sum(store.get(locked.sha256) is None for locked in wheels)
     paths = [(folder / locked.path, locked.sha256) for locked in wheels]
     copied = [(path, sha256) for path, sha256 in paths if path.exists()]
-    added = store.add_all(copied, lambda done, total: report("install", done, total))
+    alive = partial(report, "check", 0, 1)  # how much there is to be read is not counted
+    added = store.add_all(copied, partial(report, "install"), alive)
     stored = {wheel.sha256: wheel for wheel in added}
     known = [locked for locked in wheels if locked.sha256 not in stored]
     with ThreadPoolExecutor(THREADS) as pool:
-        checked = pool.map(lambda locked: _checked(store, locked), known)
+        checked = pool.map(lambda locked: _checked(store, locked, alive), known)
         stored.update((wheel.sha256, wheel) for wheel in checked)
     return stored, fresh
 
 
-def _checked(store: Store, locked: LockedWheel) -> StoredWheel:
+def _checked(store: Store, locked: LockedWheel, alive: Callable[[], None]) -> StoredWheel:
     """A wheel that was not copied because the store had it."""
-    found = store.whole(locked.sha256)
+    found = store.whole(locked.sha256, alive)
     if found is not None:
         return found
     store.remove(locked.sha256)  # so that it is copied the next time

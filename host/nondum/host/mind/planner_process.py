@@ -123,13 +123,14 @@ class PlannerProcess:
         folder = await asyncio.to_thread(self._folder.make)
         module = "nondum.host.mind.planner_child"
         self._process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", module, self._reference),
+            *(sys.executable, "-P", "-m", module, self._reference),
             *(str(self._memory_mb), str(os.getpid())),
             stdin=PIPE,
             stdout=PIPE,
             stderr=DEVNULL,
             env={**self._environment, **folder},
             start_new_session=True,
+            cwd="/",
         )
         try:
             async with asyncio.timeout(START_S):
