@@ -10,13 +10,12 @@ import sys
 
 from nondum.host.lifecycle import fork_server
 
-NOBODY = 65534
 MANY = 250
 
 if __name__ == "__main__":
-    if os.geteuid() == 0:  # root is not held to it
-        os.setgid(NOBODY)
-        os.setuid(NOBODY)
+    if os.geteuid() == 0:  # root is not held to it, and the descriptors of all of a user count
+        os.setgid(50_000 + os.getpid() % 10_000)
+        os.setuid(os.getgid())
     resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
     full, unread = socket.socketpair()
     socket.send_fds(full, [b"x"], [0] * MANY)
