@@ -424,7 +424,7 @@ def test_ring_uses_no_slot_that_is_read() -> None:
 
 
 CROWDED = """
-import asyncio, os, resource, socket
+import asyncio, ctypes, os, resource, socket  # all before the interpreter's files are another's
 from nondum.sdk import Header, Image
 from nondum.sdk.packets import SocketPackets
 from nondum.sdk.streams import Consumer, Producer

@@ -159,7 +159,10 @@ async def test_server_that_cannot_fork_says_why_and_goes_on(
         assert server_of(client) == server
 
 
-async def test_server_that_may_not_send_yet_is_asked_again() -> None:
+async def test_server_that_may_not_send_yet_is_asked_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
     refusals: list[None] = []
     module = "tests.host.lifecycle.server_that_may_not_send"
     async with fork_client(module, lambda: refusals.append(None)) as client:
