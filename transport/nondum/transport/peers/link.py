@@ -48,6 +48,8 @@ class Link:
         """Between two of the other end's pings, as the last one said."""
         self.watched = Watched(0.0)
         """Set when the link becomes a peer's."""
+        self.calm_until_s = 0.0
+        """There is nothing to look at before, in the same time as `watched`."""
         self.looking: asyncio.TimerHandle | None = None
         """When it is looked at next, if that is soon."""
         self.version = 1

@@ -74,7 +74,9 @@ class Presence:
 
     def heard(self, link: Link) -> None:
         """Something came over a link."""
-        link.watched = Watched(self.awake_s())
+        now_s = self.awake_s()
+        link.watched = Watched(now_s)
+        link.calm_until_s = now_s + self.terms.suspect_s(link.beat_s) - self.terms.tick_s
 
     def doubt(self, session: Session) -> None:
         """This host was silent for so long that the peer may have given it up: ask, and carry out
@@ -106,7 +108,8 @@ class Presence:
                 del self._asked[number]
         for session in list(self._sessions.values()):
             for link in list(session.links):
-                self._look(link)
+                if self._awake.seconds >= link.calm_until_s:
+                    self._look(link)
             if session.doubt is not None:
                 self._look_at_doubt(session, session.doubt)
 
