@@ -15,7 +15,9 @@ def refusal(reason: Reason, key: PeerKey = KEY) -> Refusal:
     return Refusal(reason, "10.77.0.9:40000", key, "why", 0.0)
 
 
-@pytest.mark.parametrize("reason", [Reason.UNKNOWN_KEY, Reason.DUPLICATE, Reason.FLOODING])
+@pytest.mark.parametrize(
+    "reason", [Reason.UNKNOWN_KEY, Reason.DUPLICATE, Reason.ENDLESS, Reason.FLOODING]
+)
 def test_who_is_turned_away_again_and_again_is_told_of_once(reason: Reason) -> None:
     events: list[Event] = []
     strangers = Strangers(events.append, lambda: 0.0)
