@@ -41,6 +41,10 @@ def test_sound_picture_has_the_bytes_that_its_header_promises() -> None:
         ({}, picture()[:-40]),
         ({}, b""),
     ],
+    ids=[
+        *("sixteen bits", "encoding", "width", "height", "no width", "negative", "turned"),
+        *("grey", "colours", "png", "cut short", "nothing"),
+    ],
 )
 def test_other_picture_than_its_header_says_is_refused(header: dict[str, Any], data: bytes) -> None:
     with pytest.raises(MessageInvalid, match="JPEG_INVALID"):

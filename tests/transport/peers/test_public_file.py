@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from nondum.transport.peers import HostKeys, PeerRefused, fleet_files, private_file
-from nondum.transport.peers.certificate import new_fleet, verify
+from nondum.transport.peers import PeerKey, PeerRefused, fleet_files, private_file
+from nondum.transport.peers.certificate import verify
 from nondum.transport.peers.public_file import (
     FleetPublic,
     HostPublic,
@@ -19,8 +19,8 @@ from nondum.transport.peers.public_file import (
     parse_host,
 )
 
-HOST = HostPublic(HostKeys.generate().public, "rover")
-FLEET = FleetPublic(new_fleet()[0], "survey")
+HOST = HostPublic(PeerKey("rq:rM>}U?@Lns47E1%kR.o@n%FcmmsL/@{H8]yf7"), "rover")
+FLEET = FleetPublic(parse_fleet_key("A" * 43 + "="), "survey")
 NOW = datetime(2026, 6, 1, tzinfo=UTC)
 
 
@@ -42,6 +42,7 @@ def test_public_files_survive() -> None:
         (parse_fleet, f"nondum-host@1 {FLEET.key} survey", "FILE_MALFORMED"),
         (parse_fleet, f"nondum-fleet@1 {HOST.key} survey", "KEY_MALFORMED"),
     ],
+    ids=range(9),
 )
 def test_malformed_public_file_is_refused(
     parse: Callable[[str], object], text: str, code: str
