@@ -104,6 +104,11 @@ def test_all_mistakes_are_told_at_once() -> None:
             "CONFIG_TOML host.toml:2: Exceeds the limit",
             id="number without end",
         ),
+        pytest.param(
+            f"[host]\nstate = 0x{'f' * 5_000}",
+            "CONFIG_VALUE host.toml:2: [host] state = a value too long to be shown",
+            id="hexadecimal number without end",
+        ),
         ("\na = 1\na = 2", "CONFIG_TOML host.toml:3: Cannot overwrite"),
         ("host = 3", "CONFIG_VALUE host.toml:1: [host] = 3: expected a table"),
         ('[host]\nsystem_tree = "tree"', 'expected "package:function"'),

@@ -180,6 +180,11 @@ WRONG = {
             "huge": f"0x{'f' * 5000}",
         }.items()
     },
+    "memory-is-huge": (
+        "MANIFEST_VALUE",
+        ":10",
+        PLAIN.replace("memory_mb = 50", f"memory_mb = 0x{'f' * 5000}"),
+    ),
     "alone-is-huge": (
         "MANIFEST_VALUE",
         ":10",

@@ -408,4 +408,8 @@ def _unknown(key: str, known: Mapping[str, Any], where: str) -> Problem:
 
 
 def _wrong(key: str, expected: str, value: Any, where: str) -> Problem:
-    return Problem("CONFIG_VALUE", f"{key} = {value!r}: expected {expected}", where=where)
+    try:
+        shown = repr(value)
+    except ValueError:  # of a number with thousands of digits (sys.set_int_max_str_digits)
+        shown = "a value too long to be shown"
+    return Problem("CONFIG_VALUE", f"{key} = {shown}: expected {expected}", where=where)

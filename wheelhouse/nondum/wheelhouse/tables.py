@@ -79,6 +79,10 @@ class Report:
         return header_line
 
 
+LARGEST = 2**53 - 1
+"""Of a whole number: what every reader of JSON takes exactly (RFC 8259, section 6)."""
+
+
 class Table:
     """One table being read: take its keys, then `close` it to have unknown ones told."""
 
@@ -102,10 +106,11 @@ class Table:
         return ""
 
     def integer(self, key: str, default: int) -> int:
-        """A whole number of at least 0."""
+        """A whole number of at least 0 and at most `LARGEST`."""
         value = self._take(key, default)
-        if type(value) is not int or value < 0:
-            self.wrong(key, f"expected a whole number of at least 0, found {_shown(value)}")
+        if type(value) is not int or not 0 <= value <= LARGEST:
+            expected = f"a whole number from 0 to {LARGEST}"
+            self.wrong(key, f"expected {expected}, found {_shown(value)}")
             return default
         return value
 
