@@ -79,8 +79,8 @@ class Report:
         return header_line
 
 
-LARGEST = 2**53 - 1
-"""Of a whole number: what every reader of JSON takes exactly (RFC 8259, section 6)."""
+LARGEST = 2**63 - 1
+"""Of a whole number: what 64 bits hold (TOML 1.0, Integer)."""
 
 
 class Table:
