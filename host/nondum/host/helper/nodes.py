@@ -24,7 +24,7 @@ KEYBOARD = ("03", "01")
 """Interface class and protocol (USB HID 1.11, 4.2): what is typed is nobody's but the machine's."""
 _ENTER = 28
 _LETTERS = (*range(16, 26), *range(30, 39), *range(44, 51))
-"""KEY_Q to KEY_P, KEY_A to KEY_L, KEY_Z to KEY_M."""
+"""From Q to P, from A to L, from Z to M."""
 _WORD = 8 * ctypes.sizeof(ctypes.c_ulong)
 """Bits of a word in sysfs' bitmaps."""
 HUB = "09"
