@@ -86,6 +86,7 @@ class Unconfined:
 
     level = Level.LIMITS
     has_keeper = False
+    without: frozenset[str] = frozenset()
 
     def __init__(self, *, without: Collection[str] = ()) -> None:
         self.without = frozenset(without)
