@@ -424,14 +424,13 @@ def test_ring_uses_no_slot_that_is_read() -> None:
 
 
 CROWDED = """
-import asyncio, ctypes, os, resource, socket  # all before the interpreter's files are another's
+import asyncio, ctypes, os, resource, socket  # all now: later it is another user
 from nondum.sdk import Header, Image
 from nondum.sdk.packets import SocketPackets
 from nondum.sdk.streams import Consumer, Producer
 
-if os.geteuid() == 0:  # root is not held to it, and what other tests have sent counts for root
-    os.setgid(50_000 + os.getpid() % 10_000)
-    os.setuid(os.getgid())
+if os.geteuid() == 0:  # it is counted by user, and root is not held to it
+    os.setresuid(*[2_000_000 + os.getpid()] * 3)
 resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
 full, unread = socket.socketpair()
 socket.send_fds(full, [b"x"], [0] * 250)

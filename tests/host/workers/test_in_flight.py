@@ -15,7 +15,7 @@ from tests.kit.workers import HOST, TIMING, WorkersUnderTest, camera, level
 
 from nondum.host.cgroups import Cages
 from nondum.host.events import WorkerExited, WorkerLogged, WorkerReady
-from nondum.host.workers import WorkerSpec
+from nondum.host.workers import Limits, WorkerSpec
 from nondum.host.workers.in_flight import culprit, sent
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.process import WorkerProcess
@@ -46,12 +46,12 @@ def fill(one, count):
 def openly():
     pair = socket.socketpair()
     kept.append(pair)
-    fill(pair[0], 250)
+    fill(pair[0], 20)
 
 def in_sockets_that_are_under_way():
     outer = socket.socketpair()
     kept.append(outer)
-    for count in (100, 10):  # so that few are left to be seen
+    for count in (20, 5):  # so that few are left to be seen
         while hidden(outer[0], count):
             pass
     fill(outer[0], 1)
@@ -76,6 +76,9 @@ async def do(ctx, u):
     {way}()
     await ctx.sleep(600)
 """
+FEW_FILES, MORE_FILES = Limits(descriptors=200), Limits(descriptors=400)
+"""The kernel counts by user: other programs of this one, with usual limits, are not to notice, and
+what they have under way for a moment is not to matter."""
 DO = Behaviour("do", "(do ?u - sensor)")
 
 
@@ -101,8 +104,9 @@ async def test_streams_of_others_wait_until_the_worker_is_found_and_ended(
 ) -> None:
     units = (Unit("it", "sensor"),)
     source = HOSTILE.replace("{way}", way)
-    await tested.start("hostile", source, behaviours=(DO,), units=units)
-    await tested.start("cam", CAMERA, behaviours=(STREAM,), units=(camera(),))
+    await tested.start("hostile", source, behaviours=(DO,), units=units, limits=MORE_FILES)
+    cameras = (camera(),)
+    await tested.start("cam", CAMERA, behaviours=(STREAM,), units=cameras, limits=FEW_FILES)
     eye = (Unit("eye", "detector"),)
     await tested.start("watcher", WATCHER, behaviours=(WATCH,), units=eye)
     tested.behave("hostile", "do", u=f"{HOST}__hostile__it")

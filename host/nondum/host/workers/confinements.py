@@ -84,6 +84,7 @@ class Unconfined:
 
     level = Level.NONE
     has_keeper = False
+    without: frozenset[str] = frozenset()
 
     def __init__(self, *, without: Collection[str] = ()) -> None:
         self.without = frozenset(without)
