@@ -124,6 +124,7 @@ SPECIAL = {
     "a folder, without a mode": ("openat", (0, 0, os.O_DIRECTORY, 0o4755), False),
     "one that is there, and no mode": ("open", (0, os.O_RDWR, 0o7777), False),
     "a file by mknod": ("mknodat", (0, 0, stat.S_IFREG | 0o4755), True),
+    "a file by mknod, in the old way": ("mknod", (0, stat.S_IFREG | 0o2755), True),
     "a plain file by mknod": ("mknodat", (0, 0, stat.S_IFREG | 0o644), False),
     "a named pipe": ("mknodat", (0, 0, stat.S_IFIFO | 0o600), False),
     "a socket": ("mknod", (0, stat.S_IFSOCK | 0o600), False),
