@@ -462,5 +462,9 @@ async def test_frame_waits_while_too_many_descriptors_are_under_way() -> None:
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-c", CROWDED), stdout=asyncio.subprocess.PIPE
     )
-    told, _ = await asyncio.wait_for(process.communicate(), 60)
+    try:
+        told, _ = await asyncio.wait_for(process.communicate(), 60)
+    finally:
+        if process.returncode is None:
+            process.kill()
     assert told.decode().splitlines() == ["is fed", "got 7"]
