@@ -323,6 +323,12 @@ SPARED: Mapping[tuple[str, str], str] = {
         f"{_T}/peers/node.py",
         "self._roster.session(peer).notify(Notice(method, args)) is Sent.FULL",
     ): _LIMIT,
+    (f"{_T}/peers/node.py", "received is None"): (
+        "the socket's monitor has told of a connection before there is a link"
+    ),
+    (f"{_T}/peers/node.py", "received.ahead(read) <= MOST_AHEAD"): (
+        "saves a look at what waits; what is no more than that is within the limit below, too"
+    ),
     (f"{_T}/peers/pairing_channel.py", "not isinstance(shown, Comparing)"): _EITHER,
     (f"{_T}/peers/pairing_channel.py", "self._try is None"): _EITHER,
     (f"{_T}/peers/certificate.py", "len(data) > MAX_BYTES"): _FORM,

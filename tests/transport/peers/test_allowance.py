@@ -19,7 +19,8 @@ from nondum.transport.peers import (
     roster,
 )
 from nondum.transport.peers.allowance import LOOK_S, Allowance, Paced
-from nondum.transport.peers.messages import Reply, encode
+from nondum.transport.peers.messages import Pong, Reply, encode
+from nondum.transport.peers.session import Doubt
 
 pytestmark = pytest.mark.anyio
 
@@ -150,6 +151,18 @@ async def test_answers_that_nobody_waits_for_are_not_free(narrow: tuple[Host, Ho
     for number in range(1, 251):
         session.send(encode(Reply(number, {})))
     assert (await base.told(PeerLost)).reason is Loss.VIOLATED
+    await base.counted(Reason.FLOODING)
+
+
+async def test_answers_to_other_pings_than_the_one_in_doubt_are_not_free(
+    narrow: tuple[Host, Host],
+) -> None:
+    rover, base = narrow
+    asked = base.node._roster.session(rover.key)
+    asked.doubt = Doubt(ping=1_000, since_s=asyncio.get_running_loop().time())
+    session = rover.node._roster.session(base.key)
+    for _ in range(250):
+        session.send(encode(Pong(1)))
     await base.counted(Reason.FLOODING)
 
 

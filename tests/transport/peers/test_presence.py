@@ -160,6 +160,7 @@ class Cable:
         self._is_whole = asyncio.Event()
         self._is_whole.set()
         self._carrying: set[asyncio.Task[None]] = set()
+        self._ends: list[asyncio.StreamWriter] = []
 
     async def __aenter__(self) -> Cable:
         self._server = await asyncio.start_server(self._accept, "127.0.0.1", 0)
@@ -171,6 +172,9 @@ class Cable:
         for one in self._carrying:
             one.cancel()
         await asyncio.gather(*self._carrying, return_exceptions=True)
+        for end in self._ends:
+            end.close()
+        await asyncio.gather(*(end.wait_closed() for end in self._ends), return_exceptions=True)
 
     def break_silently(self) -> None:
         self._is_whole.clear()
@@ -179,7 +183,9 @@ class Cable:
         self._is_whole.set()
 
     async def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._ends.append(writer)
         there = await asyncio.open_connection("127.0.0.1", self._to)
+        self._ends.append(there[1])
         for source, drain in ((reader, there[1]), (there[0], writer)):
             self._carrying.add(asyncio.ensure_future(self._carry(source, drain)))
 

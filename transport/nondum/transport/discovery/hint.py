@@ -67,7 +67,7 @@ def to_txt(announcement: Announcement) -> dict[str, str]:
     """The TXT record of a host.
 
     >>> to_txt(Announcement(PeerKey("development:rover"), "rover", 7, ("tcp://[::]:7410",)))
-    {'id': 'rover', 'pk': 'development:rover', 'epoch': '7', 'proto': '1'}
+    {'id': 'rover', 'pk': 'development:rover', 'epoch': '7', 'proto': '2,1'}
     """
     txt = {
         "id": announcement.name,

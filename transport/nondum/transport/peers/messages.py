@@ -230,8 +230,8 @@ def decode(data: bytes | memoryview) -> Message:
 def agreed_version(hello: Hello) -> int:
     """The newest version that both ends speak.
 
-    >>> agreed_version(Hello((2, 1), "rover", "", 1, 1, b""))
-    1
+    >>> agreed_version(Hello((3, 2, 1), "rover", "", 1, 1, b""))
+    2
 
     Raises `ProtocolViolation` (PROTO_VERSION).
     """
