@@ -115,7 +115,7 @@ HELLO = [[1], "rover", "key", 1, 1, b""]
         ([False, *HELLO], "PACKET_KIND"),
         ([-1], "PACKET_KIND"),
         ([-3, 1], "PACKET_KIND"),
-        ([12], "PACKET_KIND"),
+        ([14], "PACKET_KIND"),
         ([10], "PACKET_FIELDS"),
         ([10, 1, 1], "PACKET_FIELDS"),
         ([9, 1, 1, 1], "PACKET_FIELDS"),

@@ -17,7 +17,12 @@ from tests.transport.peers.hosts import PATIENCE_S, Host, host, identity, trusti
 from nondum.transport.peers import DialFailed, HostKeys, Loss, PeerLost, Reason, roster
 from nondum.transport.peers.accepted import AWAITED_S
 from nondum.transport.peers.dial import ANSWER_S, GREETING_S
-from nondum.transport.peers.messages import Ask, encode
+from nondum.transport.peers.drained import Sent
+from nondum.transport.peers.link import Link
+from nondum.transport.peers.messages import Ask, Ping, Pong, encode
+from nondum.transport.peers.presence import Presence
+from nondum.transport.peers.pulse import Pulse
+from nondum.transport.peers.session import Session
 from nondum.transport.peers.suspicion import Terms
 
 pytestmark = pytest.mark.anyio
@@ -38,6 +43,51 @@ async def test_host_whose_loop_stood_still_gives_no_peer_up(clock: VirtualClock)
         assert not lost(rover)
         assert not lost(base)
         assert len(base.servant.served) == 3
+
+
+async def test_answer_from_before_another_stall_does_not_show_that_the_link_lasts(
+    clock: VirtualClock,
+) -> None:
+    """The peer may have given the link up after it had answered."""
+    async with two_hosts() as (rover, base):
+        real = rover.node._roster.session(base.key)
+        session = Session(real.admission, real.known, rover.servant, Pulse(), lambda _: None)
+        link = Link(Wire(), base.key, clock.time(), dialled=True)
+        session.join(link)
+        pings: list[int] = []
+        presence = Presence(
+            TERMS, {base.key: session}, lambda link, n: _ping(link, n, pings), lambda _: None
+        )
+        presence.joined(link, BEAT_S)
+        presence.doubt(session)
+        for speaks_first in (True, False):
+            await clock.stand_still(10.0)
+            if speaks_first:
+                link.tell(Ping(1))
+            presence.take_in(session, link, Pong(pings[-1]))
+            assert session.doubt is not None
+        assert len(pings) == len(set(pings)) == 3
+        presence.take_in(session, link, Pong(pings[-1]))
+        assert session.doubt is None
+        assert not link.is_doubtful(clock.time())
+
+
+def _ping(link: Link, number: int, pings: list[int]) -> None:
+    pings.append(number)
+    link.tell(Ping(1))
+
+
+class Wire:
+    """Takes everything, and leads nowhere."""
+
+    address = "nowhere"
+
+    def send(self, data: bytes) -> Sent:
+        """Send without waiting."""
+        return Sent.SENT
+
+    def cut(self, linger_ms: int = 0) -> None:
+        """End the connection."""
 
 
 async def test_late_peer_that_others_hear_has_the_same_time_once_more(clock: VirtualClock) -> None:

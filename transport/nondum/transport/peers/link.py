@@ -60,6 +60,8 @@ class Link:
         """How long this host may be silent without the other end giving the link up."""
         self._sent_s = now_s
         self._was_silent = False
+        self._resumed_s = now_s
+        """When this host last sent something after it had been silent for too long."""
         self._loop = asyncio.get_running_loop()
         self.session: Session | None = None
         """The peer's, once greetings were exchanged."""
@@ -75,18 +77,26 @@ class Link:
         if self.is_over:
             return Sent.GONE
         sent, now_s = self.route.send(data), self._loop.time()
-        self._was_silent = self.is_doubtful(now_s)
+        if self._is_silent(now_s):
+            self._was_silent, self._resumed_s = True, now_s
         if sent is Sent.SENT:
             self._sent_s = now_s
         return sent
 
     def is_doubtful(self, now_s: float) -> bool:
         """Whether the other end may have given the link up, since this host was silent."""
-        return self._was_silent or now_s - self._sent_s > self.doubt_s
+        return self._was_silent or self._is_silent(now_s)
 
-    def confirm(self) -> None:
-        """The other end has not given it up."""
+    def confirm(self, since_s: float) -> bool:
+        """The other end had not given it up at `since_s`, or later; whether that is enough: not if
+        this host was silent again since."""
+        if self._resumed_s > since_s or self._is_silent(self._loop.time()):
+            return False
         self._was_silent = False
+        return True
+
+    def _is_silent(self, now_s: float) -> bool:
+        return now_s - self._sent_s > self.doubt_s
 
     def tell(self, message: Message) -> Sent:
         """Send what may be lost."""

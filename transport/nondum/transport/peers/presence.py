@@ -82,9 +82,13 @@ class Presence:
         """This host was silent for so long that the peer may have given it up: ask, and carry out
         nothing before the answer."""
         if session.doubt is None:
-            session.doubt = Doubt(next(self._probes), self._loop.time())
             session.paced.hold()
-            self._ping(session.links[-1], session.doubt.ping)
+            self._ask_about_itself(session)
+
+    def _ask_about_itself(self, session: Session) -> None:
+        number = next(self._probes)
+        self._ping(session.links[-1], number)
+        session.doubt = Doubt(number, self._loop.time())
 
     def take_in(self, session: Session, link: Link, message: Message) -> None:
         """Take in what is about who is there. Raises `OutOfPlace`."""
@@ -162,11 +166,13 @@ class Presence:
             self._ping(session.links[-1], ping)
 
     def _answered(self, session: Session, number: int) -> None:
-        if session.doubt is not None and number == session.doubt.ping:
-            session.doubt = None
-            for link in session.links:
-                link.confirm()
-            session.paced.release()
+        doubt = session.doubt
+        if doubt is not None and number == doubt.ping:
+            if all([link.confirm(doubt.since_s) for link in session.links]):
+                session.doubt = None
+                session.paced.release()
+            elif session.links:
+                self._ask_about_itself(session)
         for asker, asked in self._enquiries.answered(session.admission.key, number).items():
             if waiting := self._sessions.get(asker):
                 waiting.send(encode(Vouch(asked)))
