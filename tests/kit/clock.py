@@ -54,9 +54,13 @@ class VirtualClock(asyncio.SelectorEventLoop):
     async def stand_still(self, seconds: float) -> None:
         """Let time pass in which the loop does nothing, as when one of its callbacks blocks: what
         was due meanwhile is late, and what has come meanwhile was not read."""
+        self.skip(seconds)
+        await self.settle()
+
+    def skip(self, seconds: float) -> None:
+        """Let time pass in the midst of a callback."""
         assert seconds >= 0, "time does not run backwards"
         self._now_s += seconds
-        await self.settle()
 
     async def advance_until(self, awaited: Awaitable[_T], step_s: float = 0.1) -> _T:
         """Let time pass in steps until something has happened that takes input, too: the end of a

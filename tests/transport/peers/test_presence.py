@@ -72,6 +72,19 @@ async def test_answer_from_before_another_stall_does_not_show_that_the_link_last
         assert not link.is_doubtful(clock.time())
 
 
+async def test_host_that_stands_still_as_it_greets_doubts_the_link(clock: VirtualClock) -> None:
+    class Stalling(Wire):
+        def send(self, data: bytes) -> Sent:
+            """Send, and stand still before anything else is done."""
+            clock.skip(10.0)
+            return Sent.SENT
+
+    link = Link(Stalling(), None, clock.time(), dialled=False)
+    link.tell(Ping(1))
+    link.doubt_s = TERMS.doubt_s(BEAT_S)
+    assert link.is_doubtful(clock.time())
+
+
 def _ping(link: Link, number: int, pings: list[int]) -> None:
     pings.append(number)
     link.tell(Ping(1))

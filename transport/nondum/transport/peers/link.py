@@ -76,7 +76,8 @@ class Link:
         """Send without waiting."""
         if self.is_over:
             return Sent.GONE
-        sent, now_s = self.route.send(data), self._loop.time()
+        now_s = self._loop.time()  # before it is sent: this host may stand still from then on
+        sent = self.route.send(data)
         if self._is_silent(now_s):
             self._was_silent, self._resumed_s = True, now_s
         if sent is Sent.SENT:
