@@ -27,7 +27,7 @@ from nondum.host.lifecycle.folders import Folders
 from nondum.host.lifecycle.tally import Tally
 from nondum.host.peers.placement.pins import Pins
 from nondum.host.peers.trust_keeper import CERTIFICATE_NAME, KEY_NAME, TRUST_NAME, TrustKeeper
-from nondum.host.trust import chain
+from nondum.host.trust import anchors, chain
 from nondum.transport.peers import HostKeys, fleet_files
 from nondum.transport.peers.certificate import issue, new_fleet
 from nondum.wheelhouse.store import Store
@@ -43,6 +43,7 @@ def main(folder: Path, elsewhere: Path) -> None:
     folders = Folders(folder / "state")
     asyncio.run(keep_catalogue(folders))
     lose_catalogue(folders)
+    begin_to_trust(folder / "etc/nondum/trust.toml")
     follow_trust(folders)
     asyncio.run(keep_peers(folders))
     install(folders, elsewhere)
@@ -72,6 +73,15 @@ def lose_catalogue(folders: Folders) -> None:
     promise(Kind.GONE, folders.catalogue)
     Backups(folders.catalogue).restore(Backups(folders.catalogue).newest)
     promise(Kind.SAFE, folders.catalogue)
+
+
+def begin_to_trust(file: Path) -> None:
+    """The first trust file, as the command of a person writes it."""
+    anchors.place(file, signed(TRUST, ROOT_KEY))
+    signature = file.with_name(f"{file.name}.sig")
+    promise(Kind.WHOLE, file)
+    promise(Kind.WHOLE, signature)
+    promise(Kind.FIRST, signature, file)
 
 
 def follow_trust(folders: Folders) -> None:

@@ -201,6 +201,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_T}/peers/gate.py": (*_ADMISSION, f"{_TT}/peers/test_death.py"),
     f"{_T}/peers/identity.py": (f"{_TT}/peers/test_identity.py",),
     f"{_T}/peers/keys.py": _PEER_KEYS,
+    f"{_T}/peers/link.py": (f"{_TT}/peers/test_presence.py",),
     f"{_T}/peers/listener.py": _ADMISSION,
     f"{_T}/peers/messages.py": (f"{_TT}/peers/test_messages.py",),
     f"{_T}/peers/node.py": (*_ADMISSION, f"{_TT}/peers/test_received.py"),

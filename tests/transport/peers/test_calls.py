@@ -6,11 +6,21 @@ import asyncio
 
 import pytest
 from tests.kit.clock import VirtualClock
-from tests.transport.peers.hosts import Host, host, identity, raises, trusting, two_hosts, up
+from tests.transport.peers.hosts import (
+    PATIENCE_S,
+    Host,
+    host,
+    identity,
+    raises,
+    trusting,
+    two_hosts,
+    up,
+)
 
 from nondum.sdk.errors import ProtocolViolation
 from nondum.transport.peers import DialFailed, PeerUnreachable, PeerUp, Security
 from nondum.transport.peers.calls import CREDIT
+from nondum.transport.peers.messages import MAX_MESSAGE, Notice, encode
 
 pytestmark = pytest.mark.anyio
 
@@ -192,3 +202,14 @@ async def test_security_can_be_shown() -> None:
 
 async def wait(rover: Host, base: Host) -> None:
     await rover.node.call(base.key, "wait", {}, deadline_s=60)
+
+
+async def test_longest_message_passes_where_links_are_secured() -> None:
+    async with two_hosts() as (rover, base):
+        beside = len(encode(Notice("values", {"text": "x" * 100_000}))) - 100_000
+        longest = {"text": "x" * (MAX_MESSAGE - beside)}
+        assert len(encode(Notice("values", longest))) == MAX_MESSAGE
+        rover.node.notify(base.key, "values", longest)
+        async with asyncio.timeout(PATIENCE_S):
+            assert (await base.servant.notices.get())["text"] == longest["text"]
+        assert rover.key in base.node.peers

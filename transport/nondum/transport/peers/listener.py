@@ -15,6 +15,7 @@ from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import HostKeys, PeerKey
 from nondum.transport.peers.messages import MAX_MESSAGE
 from nondum.transport.peers.monitor import HANDSHAKE_FAILED, SocketEvent, Watch
+from nondum.transport.peers.received import SEALED
 from nondum.transport.peers.zap import DOMAIN
 
 Context = zmq.Context[zmq.Socket[bytes]]
@@ -107,7 +108,7 @@ _LET_IN = zmq.EVENT_HANDSHAKE_SUCCEEDED
 def _bound_sizes(socket: zmq.Socket[bytes]) -> None:
     socket.linger = 0
     socket.setsockopt(zmq.IPV6, 1)
-    socket.setsockopt(zmq.MAXMSGSIZE, MAX_MESSAGE)
+    socket.setsockopt(zmq.MAXMSGSIZE, MAX_MESSAGE + SEALED)  # ZeroMQ counts what CURVE adds
     socket.setsockopt(zmq.HANDSHAKE_IVL, HANDSHAKE_MS)
     socket.setsockopt(zmq.SNDHWM, HIGH_WATER)
     socket.setsockopt(zmq.RCVHWM, HIGH_WATER)

@@ -21,7 +21,8 @@ from nondum.transport.peers.messages import MAX_MESSAGE
 MOST_AHEAD = 4 * MAX_MESSAGE
 """Bytes that may have been read from a connection beyond the messages that were delivered: the
 handshake, the part that is being read, and room."""
-_SEALED = 33
+SEALED = 33
+"""Bytes that CURVE adds to a part."""
 _LONG = 256
 
 
@@ -32,7 +33,7 @@ class Received:
         """Of a connection just made, or just heard of; `is_sealed` where CURVE secures it."""
         self.descriptor = descriptor
         self.end = tcp.other_end(descriptor)
-        self._seal = _SEALED if is_sealed else 0
+        self._seal = SEALED if is_sealed else 0
         self._delivered = 0
 
     def delivered(self, parts: Iterable[zmq.Frame]) -> None:
