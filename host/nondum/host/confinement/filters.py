@@ -122,7 +122,7 @@ def _load(argument: int) -> Instruction:
 
 
 def _condition(rule: Rule, length: int) -> Iterator[Instruction]:
-    """Leads past the next instructions, so many, where a rule does not count."""
+    """Skip the rule, which is the next `length` instructions, unless its condition holds."""
     if rule.only_with is not None:
         argument, bits = rule.only_with
         yield _load(argument)

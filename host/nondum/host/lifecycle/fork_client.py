@@ -159,7 +159,7 @@ class ForkClient:
         if self._channel is not None:
             with contextlib.suppress(EOFError):
                 return await self._fork(self._channel, message)
-            log.warning("the fork server has ended, and is started anew")
+            log.warning("the fork server has ended; another one is started")
             await self._end()
         self._channel = await self._start()
         return await self._fork(self._channel, message)
