@@ -52,7 +52,7 @@ async def test_as_little_is_reached_where_landlock_is_older(
     assert await reached(tmp_path, bait, Held(abi=2)) <= LEFT_WHEN_RESTRICTED | {"signal the host"}
 
 
-async def test_nobody_is_left_a_special_file_at_level_0(
+async def test_nobody_is_left_a_special_file_without_confinement(
     tmp_path: Path, bait: dict[str, Any]
 ) -> None:
     names = ["leave a set id file", *(["make a device node"] if os.geteuid() == 0 else [])]

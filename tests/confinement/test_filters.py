@@ -137,7 +137,7 @@ SPECIAL = {
     "a pair of tipc": ("socketpair", (30, 1), True),
     "a pair of packets": ("socketpair", (17, 3), True),
 }
-AT_LEVEL_1 = {
+FOR_RESTRICTED = {
     "neither to read nor to write": ("openat", (0, 0, 3), True),
     "the same, and truncate": ("open", (0, 3 | os.O_TRUNC), True),
     "to read and write": ("openat", (0, 0, os.O_RDWR | os.O_TRUNC | os.O_CLOEXEC), False),
@@ -161,14 +161,14 @@ AT_LEVEL_1 = {
 TOGETHER = [
     (machine, case)
     for machine, architecture in ARCHITECTURES.items()
-    for case, (call, *_) in {**SPECIAL, **AT_LEVEL_1}.items()
+    for case, (call, *_) in {**SPECIAL, **FOR_RESTRICTED}.items()
     if call in architecture.numbers
 ]
 
 
 @pytest.mark.parametrize(("machine", "case"), TOGETHER)
 def test_several_arguments_decide_together(machine: str, case: str) -> None:
-    call, arguments, is_refused = {**SPECIAL, **AT_LEVEL_1}[case]
+    call, arguments, is_refused = {**SPECIAL, **FOR_RESTRICTED}[case]
     architecture = ARCHITECTURES[machine]
     code = filter_of(GROUPS if case in SPECIAL else EVERY, machine)
     said = run(code, architecture.numbers[call], architecture.audit, *arguments)
