@@ -41,7 +41,8 @@ def main(words: Sequence[str]) -> int:
     labs = []
     for number in range(asked.jobs):
         (folder := work / str(number)).mkdir()
-        labs.append(Lab(machine, disk, asked.commit, folder, brought=asked.payload))
+        is_alone = asked.jobs == 1
+        labs.append(Lab(machine, disk, asked.commit, folder, asked.payload, is_alone))
     try:
         if asked.shell:
             return talk(labs[0])

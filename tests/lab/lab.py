@@ -34,6 +34,8 @@ class Lab:
     """A folder with a short path, for all that is made on the way."""
     brought: Path | None = None
     """A payload, or a drive, of whoever runs the laboratory."""
+    is_alone: bool = True
+    """Whether nothing else runs beside it, so that what is measured goes into the documents."""
     machines: list[Machine] = field(default_factory=list)
     """Every machine that was switched on in the present scenario, the shared one first."""
     all_machines: list[Machine] = field(default_factory=list)

@@ -44,8 +44,9 @@ def run(lab: Lab) -> str:
         idle=idle,
         with_worker=with_worker,
     )
-    results.keep(f"lab-{recipe.name}", found)
-    report.write()
+    if lab.is_alone:
+        results.keep(f"lab-{recipe.name}", found)
+        report.write()
     assert found.daemon_mb <= DAEMON_MB, f"the daemon takes {found.daemon_mb:.1f} MB"
     assert found.worker_mb <= WORKER_MB, f"a worker takes {found.worker_mb:.1f} MB"
     written = idle["kb_written_per_hour"]
