@@ -18,7 +18,7 @@ from nondum.sdk.errors import Problem, ProtocolViolation
 
 MAX_HANDLES = 4
 """Descriptors in one packet."""
-BATCH = 64
+BATCH = 8
 """Packets read before the loop gets its turn: a flood cannot starve the rest."""
 CROWDED_S = 0.02
 """Before another attempt where too many descriptors of this user are under way."""
