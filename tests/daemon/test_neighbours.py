@@ -213,6 +213,26 @@ def test_camera_of_another_body_is_not_planned_with(trio: Hosts) -> None:
     rover.until_goal(rover.want("(written rover)"), "holds")
 
 
+def test_stop_that_is_heard_stops_every_host(pair: Hosts, tmp_path: Path) -> None:
+    said = tmp_path / "said"
+    rover, mule = pair
+    mule.bring("ears", ear(said))
+    rover.bring("talk", talker("talker"))
+    rover.bring("write", scribe())
+    until_shared(mule, "scribe@rover")
+    goal = rover.want("(written rover)")
+    rover.until_goal(goal, "holds")
+    say(said, "stop, please")
+    mule.until_told("stopped, with rover")
+    rover.until_goal(goal, "halted")
+    rover.until("nothing runs", lambda view: not view["plan"]["steps"])
+    other = rover.want("(written rover)")
+    rover.until_goal(other, "holds")
+    say(said, "rover, halt")
+    mule.until_told("'rover, halt': rover has stopped")
+    rover.until_goal(other, "halted")
+
+
 def test_goal_that_is_heard_goes_to_the_peer_that_can_have_it(pair: Hosts, tmp_path: Path) -> None:
     said, log = tmp_path / "said", tmp_path / "log"
     rover, mule = pair

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import signal
-from collections.abc import Callable, Coroutine, Iterator, Sequence
+from collections.abc import Awaitable, Callable, Coroutine, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from nondum.host import heap, verbs
@@ -57,6 +57,7 @@ from nondum.host.service.notify import Notifier
 from nondum.host.service.service import Part, Service
 from nondum.host.service.telling import Telling
 from nondum.host.service.words import words
+from nondum.host.stopping import Stopped, Stopping
 from nondum.host.trust.orders import TrustOrders
 from nondum.host.trust.payload_trust import TrustOptions
 from nondum.host.workers.confinements import changes_user
@@ -64,6 +65,7 @@ from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import Limits, Timing
 from nondum.host.workers.workers import Workers
 from nondum.planning.attempts import Patience
+from nondum.planning.stop_words import is_stop
 from nondum.sdk.errors import ConfigRefused, NondumError, Problem
 
 if TYPE_CHECKING:
@@ -147,7 +149,10 @@ async def _run(
     manager.leave_alone(*safety)
     for source in (*drive_sources(config, folders), *more_drives):
         manager.add_source(source)
-    neighbours = await _neighbours(config, folders, workers, catalogue, bus, lambda: mind, executor)
+    stopping = Stopping(lambda: mind, workers)
+    neighbours = await _neighbours(
+        config, folders, workers, catalogue, bus, lambda: mind, stopping.stop, executor
+    )
     mind = Mind(
         config.host.name,
         neighbours.calls if neighbours else workers,
@@ -185,7 +190,8 @@ async def _run(
 
     places = neighbours.placement.places if neighbours else dict
     vouched = executor.trust.vouched
-    conversation = Conversation(mind, workers.plugins, workers.pids, _take(neighbours))
+    take = _take(neighbours, mind, stopping)
+    conversation = Conversation(mind, workers.plugins, workers.pids, take)
     feedback: Feedback = feedback_parts.made(
         config.feedback,
         folders.root,
@@ -211,7 +217,8 @@ async def _run(
         executor.trust.summary,
     )
     trust = TrustOrders(executor.trust, bus.emit)
-    orders = Orders(catalogue, mind, workers, news, bus, config.planning.translate_s)
+    stop_all, translate_s = _stop_all(neighbours, stopping), config.planning.translate_s
+    orders = Orders(catalogue, mind, workers, news, bus, stopping, stop_all, translate_s)
     goal_files = GoalFiles(
         catalogue.snapshot, mind, orders.translated, bus.emit, on_change=feedback.wake
     )
@@ -266,6 +273,7 @@ async def _neighbours(
     catalogue: Catalogue,
     bus: Bus,
     mind: Callable[[], Mind],
+    stop: Callable[[], Stopped],
     executor: Executor,
 ) -> Neighbourhood | None:
     """What this host has to do with others; None where it is to have nothing. Imported only where
@@ -284,6 +292,7 @@ async def _neighbours(
         catalogue,
         bus.emit,
         mind,
+        stop,
         executor.children,
         executor.judged_by,
     )
@@ -301,8 +310,29 @@ def _cages(folders: Folders) -> Cages:
     return cages
 
 
-def _take(neighbours: Neighbourhood | None) -> Take | None:
-    return neighbours.goals.take if neighbours else None
+def _take(neighbours: Neighbourhood | None, mind: Mind, stopping: Stopping) -> Take:
+    """What becomes of words that are heard."""
+    if neighbours is not None:
+        return neighbours.goals.take
+
+    async def taken(words: str) -> str:
+        if is_stop(words):
+            return str(stopping.stop())
+        return f"that is goal {mind.give(words=words).id}"
+
+    return taken
+
+
+def _stop_all(
+    neighbours: Neighbourhood | None, stopping: Stopping
+) -> Callable[[], Awaitable[Stopped]]:
+    if neighbours is not None:
+        return neighbours.goals.stop_all
+
+    async def alone() -> Stopped:
+        return stopping.stop()
+
+    return alone
 
 
 def drive_sources(config: HostConfig, folders: Folders) -> list[DriveSource]:

@@ -54,13 +54,13 @@ class Conversation:
         mind: Mind,
         plugins: Callable[[], Mapping[str, Speaking]],
         processes: Callable[[], Mapping[str, int]],
-        take: Take | None = None,
+        take: Take,
     ) -> None:
         """`plugins` are those that run now, by component, `processes` their ids: one that does not
         listen is asked again when its component has a new process. `take` makes goals of words,
-        here or elsewhere; without it, they are all this host's."""
+        here or elsewhere."""
         self._mind = mind
-        self._take = take or self._taken_here
+        self._take = take
         self._plugins = plugins
         self._processes = processes
         self._saying = asyncio.Lock()
@@ -88,9 +88,6 @@ class Conversation:
         except GoalRefused as refused:
             told = str(refused.problems[0])
         self._mind.people.tell(f"{component} heard {words!r}: {told}")
-
-    async def _taken_here(self, words: str) -> str:
-        return f"that is goal {self._mind.give(words=words).id}"
 
     async def _speak(self) -> None:
         version, said = self._mind.version, self._mind.people.last_number

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
@@ -23,8 +23,10 @@ from nondum.host.mind.mind import Mind
 from nondum.host.mind.translation import Understood
 from nondum.host.news import News
 from nondum.host.rows import Row, gone_back, is_at_rest, payload_row, unknown
+from nondum.host.stopping import Stopped, Stopping
 from nondum.host.workers.workers import Workers
 from nondum.planning.goal import GoalKind
+from nondum.planning.stop_words import is_stop
 from nondum.sdk.errors import ConfigRefused, GoalRefused, InstallFailed, NondumError, Problem
 from nondum.transport import link_sockets
 
@@ -43,6 +45,9 @@ class Orders:
     workers: Workers
     news: News
     bus: Bus
+    stopping: Stopping
+    stop_all: Callable[[], Awaitable[Stopped]]
+    """Stops this host, and the peers that go by what is said here."""
     translate_s: float
     """Time that components have to translate words."""
 
@@ -50,12 +55,14 @@ class Orders:
         """Give a goal, in `words` or in `pddl` (then `said` are the words it was understood from).
 
         Words that match no phrase are translated; with `yes` the goal is given as it was
-        understood, else the answer has `understood` only, for the person to confirm.
-        Raises `GoalRefused`.
+        understood, else the answer has `understood` only, for the person to confirm. Words that
+        stop the robot do, and the answer has `stopped` only. Raises `GoalRefused`.
         """
         words, pddl = arguments.optional_text("words"), arguments.optional_text("pddl")
         if (words is None) == (pddl is None):
             raise GoalRefused(Problem("GOAL_AMISS", "a goal is given in words, or in PDDL"))
+        if words is not None and is_stop(words):
+            return {"stopped": (await self.stop_all()).to_dict()}
         kind = cast(GoalKind | None, arguments.choice("kind", "achieve", "maintain"))
         highest = HIGHEST_PRIORITY
         priority = arguments.number("priority", 0, at_least=-highest, at_most=highest)
@@ -79,12 +86,14 @@ class Orders:
     async def halt(self, arguments: Arguments) -> Row:
         """Halt a goal, or everything: the goals that were open, the behaviours that ran."""
         now, id = arguments.flag("now"), arguments.optional_text("id")
+        if now and id is None:
+            return self.stopping.stop().to_dict()
         open_goals = [goal.id for goal in self.mind.queue if not goal.state.is_final]
         halted = self.mind.halt(id=id, now=now)
         if now:
             self.workers.halt_all()
         goals = [goal for goal in open_goals if id in (None, goal)]
-        return {"goals": goals, "halted": list(halted)}
+        return {"goals": goals, "halted": list(halted), "peers": []}
 
     async def mount(self, arguments: Arguments) -> Row:
         """Tell where a unit is mounted; what is not said stays as it was.

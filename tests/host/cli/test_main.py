@@ -57,6 +57,7 @@ Commands:
   plan        The plan that is being carried out.
   retry       Try again what was refused or quarantined.
   status      The host, its payloads and its goals at a glance.
+  stop        Stop this host and its peers at once.
   store       The wheels that this host keeps.
   streams     Who sends what to whom, and what is sent.
   tree        The behaviour tree as it is being ticked, and why.

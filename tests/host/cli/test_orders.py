@@ -82,7 +82,7 @@ def test_halting_one_goal_leaves_the_others(daemon: RunningHost) -> None:
     first = daemon.run("goal", "shine", "--wait", "--json").ok().json["id"]
     second = daemon.run("goal", "--pddl", "(reported person self)", "--json").ok().json["id"]
     halted = daemon.run("halt", "--goal", second, "--json").ok().json
-    assert halted == {"goals": [second], "halted": []}
+    assert halted == {"goals": [second], "halted": [], "peers": []}
     daemon.until_goal(second, "halted")
     kept = goal(daemon.view, first)
     assert kept and kept["state"] == "active"
@@ -93,6 +93,18 @@ def test_halting_now_halts_what_runs(daemon: RunningHost) -> None:
     shown = daemon.run("halt", "--now").ok().out
     assert shown == f"goal {id} is halted\nhalting {SHINE}\n"
     assert daemon.run("halt").ok().out == "nothing was asked for, nothing was running\n"
+
+
+@pytest.mark.parametrize("words", [["stop"], ["goal", "stop"], ["goal", "halt", "now,", "please"]])
+def test_a_word_stops_the_robot(daemon: RunningHost, words: list[str]) -> None:
+    id = daemon.run("goal", "shine", "--wait", "--json").ok().json["id"]
+    assert daemon.run(*words).ok().out == f"goal {id} is halted\nhalting {SHINE}\n"
+    daemon.until_goal(id, "halted")
+
+
+def test_a_robot_at_rest_can_be_stopped(daemon: RunningHost) -> None:
+    stopped = daemon.run("goal", "stop", "--wait", "--json").ok().json
+    assert stopped == {"goals": [], "halted": [], "peers": []}
 
 
 def test_a_goal_that_is_none_cannot_be_halted(daemon: RunningHost) -> None:

@@ -9,6 +9,8 @@ from tests.kit.beacon import BEACON
 from tests.kit.payloads import Part
 from tests.kit.running_host import running
 
+from nondum.planning.stop_words import STOPS
+
 ECHO = """
 '''Hears what it has been told, and answers.'''
 import asyncio
@@ -46,6 +48,16 @@ async def listen(ctx):
     names = vocabulary["names"].get("class", [])
     return {"words": " ".join(["learnt", *sorted(vocabulary["phrases"]), *names])}
 """
+GUARD = """
+'''Says one word.'''
+from nondum.sdk import hookimpl
+
+said = ["Stop!"]
+
+@hookimpl
+async def listen(ctx):
+    return {"words": said.pop() if said else ""}
+"""
 MUTE = """
 '''Neither speaks nor listens, for it hangs.'''
 import time
@@ -79,10 +91,21 @@ def test_listener_learns_what_can_be_said_and_when_that_changes(tmp_path: Path) 
         host.plug(host.drive("pupil", Part("pupil", PUPIL)))
         host.until("the pupil is ready", lambda view: are_ready(view, 1))
         host.plug(host.drive("beacon", Part("beacon", BEACON)))
-        host.until_told("pupil heard 'learnt greet {class} shine [for {text}] people person'")
+        learnt = sorted([*STOPS, "greet {class}", "shine [for {text}]"])
+        host.until_told(f"pupil heard {' '.join(['learnt', *learnt, 'people', 'person'])!r}")
         lamp = BEACON.replace("shine [for {words:text}]", "light up")
         host.plug(host.drive("lamp", Part("lamp", lamp)))
         host.until_told("light up")
+
+
+def test_robot_is_stopped_by_voice(tmp_path: Path) -> None:
+    with running(tmp_path) as host:
+        host.plug(host.drive("beacon", Part("beacon", BEACON)))
+        host.until("the beacon is ready", lambda view: are_ready(view, 1))
+        id = host.run("goal", "shine", "--wait", "--json").ok().json["id"]
+        host.plug(host.drive("guard", Part("guard", GUARD)))
+        host.until_told("guard heard 'Stop!': stopped: 1 goal and 1 behaviour halted")
+        host.until_goal(id, "halted")
 
 
 def are_ready(view: View, count: int) -> bool:

@@ -8,6 +8,7 @@ import pytest
 
 from nondum.host.mind.mind import Mind
 from nondum.host.peers.goals import MAX_WORDS, Goals
+from nondum.host.stopping import Stopped
 from nondum.sdk.wire import Body
 from nondum.transport.peers import Admission, Call, CallFailed, Errand, PeerKey
 from nondum.transport.peers.messages import Request
@@ -27,6 +28,10 @@ class Nobody:
 
 def no_mind() -> Mind:
     raise AssertionError("a goal is made of it")
+
+
+def no_stop() -> Stopped:
+    raise AssertionError("it is stopped")
 
 
 def asked(words: object) -> Errand:
@@ -50,7 +55,7 @@ def asked(words: object) -> Errand:
 async def test_words_that_are_not_taken_become_no_goal(
     words: Any, accepts: bool, code: str
 ) -> None:
-    goals = Goals("mule", no_mind, Nobody(), lambda: (), accepts=accepts)
+    goals = Goals("mule", no_mind, Nobody(), lambda: (), no_stop, accepts=accepts)
     with pytest.raises(CallFailed, match=code):
         goals.serve_give(asked(words))
     with pytest.raises(CallFailed, match=code):

@@ -10,6 +10,7 @@ import click
 from nondum.host.cli import complete, render
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.failure import EXIT_REFUSED
+from nondum.planning.stop_words import STOPS
 from nondum.sdk.errors import GoalRefused, Problem
 
 _TRIPLE = (float, float, float)
@@ -58,6 +59,9 @@ def goal(
     given = session.ask(
         "goal", timeout_s=None, words=said, pddl=pddl, kind=kind, priority=priority, yes=yes
     )
+    if "stopped" in given:
+        _show_stopped(session, given["stopped"])
+        return 0
     if "id" not in given:
         given = _confirmed(session, said or "", given["understood"], priority)
     elif "understood" in given and not session.as_json:
@@ -128,7 +132,25 @@ def halt(session: Session, now: bool, goal_id: str | None) -> None:
     Examples: nondum halt --now
               nondum halt --goal 3
     """
-    halted = session.ask("halt", now=now, id=goal_id)
+    _show_stopped(session, session.ask("halt", now=now, id=goal_id))
+
+
+@click.command()
+@json_option
+@click.pass_obj
+def stop(session: Session) -> None:
+    """Stop this host and its peers at once.
+
+    All goals are given up, all behaviours halted. The same as `nondum goal stop`, and as saying "stop" to it. Peers stop as well, for who says
+    stop may not know who acts; `nondum halt --now` halts this host alone. Software is no emergency
+    stop: see docs/stopping.md.
+
+    Example: nondum stop
+    """
+    _show_stopped(session, session.ask("goal", words=STOPS[0])["stopped"])
+
+
+def _show_stopped(session: Session, halted: dict[str, Any]) -> None:
     if session.as_json:
         render.as_json(halted)
         return
@@ -136,6 +158,8 @@ def halt(session: Session, now: bool, goal_id: str | None) -> None:
         click.echo(f"goal {goal} is halted")
     for behaviour in halted["halted"]:
         render.sentence(behaviour, mark="halting ")
+    for peer in halted["peers"]:
+        click.echo(f"{peer} has stopped")
     if not halted["goals"] and not halted["halted"]:
         click.echo("nothing was asked for, nothing was running")
 

@@ -47,6 +47,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "plan": ("mind", "The plan that is being carried out."),
     "retry": ("act", "Try again what was refused or quarantined."),
     "status": ("status", "The host, its payloads and its goals at a glance."),
+    "stop": ("act", "Stop this host and its peers at once."),
     "store": ("body", "The wheels that this host keeps."),
     "streams": ("streams", "Who sends what to whom, and what is sent."),
     "tree": ("tree", "The behaviour tree as it is being ticked, and why."),

@@ -13,6 +13,7 @@ from typing import TypeAlias
 from nondum.planning.pattern import Optional, Part, Slot, Word
 from nondum.planning.phrase import KnownPhrase
 from nondum.planning.phrases import Phrasebook
+from nondum.planning.stop_words import STOPS
 
 SAYINGS_BYTES = 40_000
 """What a packet to a worker has room for, and some to spare."""
@@ -26,18 +27,19 @@ Sayings: TypeAlias = dict[str, object]
 def sayings(book: Phrasebook, hosts: Sequence[str] = ()) -> Sayings:
     """`phrases`: patterns that can be said now; `names`: slot → words that may be said there.
 
-    Slots are called by the types of what they name. A phrase without a name for one of its slots
-    cannot be said. Where there are several hosts, each can be addressed first. What a packet has no
-    room for is left out, names first.
+    What stops the robot comes first. Slots are called by the types of what they name. A phrase
+    without a name for one of its slots cannot be said. Where there are several hosts, each can be
+    addressed first. What a packet has no room for is left out, names first.
     """
     names: dict[str, list[str]] = {}
-    phrases: dict[str, None] = {}
+    addressee = f"[{{{ADDRESSEE}}}] " if hosts else ""
+    phrases: dict[str, None] = dict.fromkeys(f"{addressee}{said}" for said in STOPS)
     for phrase in book.phrases:
         slots = {slot: _names(book, slot) for slot in phrase.binding_slots()}
         if all(slots.values()):
             names.update({_called(slot): words for slot, words in slots.items()})
-            phrases[f"[{{{ADDRESSEE}}}] {_pattern(phrase)}" if hosts else _pattern(phrase)] = None
-    if hosts and phrases:
+            phrases[f"{addressee}{_pattern(phrase)}"] = None
+    if hosts:
         names[ADDRESSEE] = sorted(host.replace("-", " ") for host in hosts)
     told = list(phrases)
     while told and _size(told, names) > SAYINGS_BYTES:

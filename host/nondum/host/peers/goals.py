@@ -15,7 +15,9 @@ from nondum.host.mind.mind import Mind
 from nondum.host.mind.offers import prospect
 from nondum.host.peers.remote_calls import Reaches
 from nondum.host.printable import printable
+from nondum.host.stopping import Stopped
 from nondum.planning.pattern import words_of
+from nondum.planning.stop_words import STOPS, is_stop
 from nondum.sdk.errors import GoalRefused, NondumError, Problem
 from nondum.sdk.wire import Body
 from nondum.transport.peers import CallFailed, Errand
@@ -35,11 +37,13 @@ class Goals:
         mind: Callable[[], Mind],
         reach: Reaches,
         peers: Callable[[], Sequence[str]],
+        stop: Callable[[], Stopped],
         *,
         accepts: bool,
     ) -> None:
-        """`accepts`: whether goals that peers heard are taken."""
+        """`stop` stops this host; `accepts`: whether goals that peers heard are taken."""
         self._host, self._mind, self._reach, self._peers = host, mind, reach, peers
+        self._stop = stop
         self._accepts = accepts
         self._givers: dict[str, str] = {}
         """Goal → the peer that gave it."""
@@ -47,11 +51,16 @@ class Goals:
     # What is heard here
 
     async def take(self, words: str) -> str:
-        """Make a goal of what was said, here or at a peer; says in words what became of it.
+        """Make a goal of what was said, here or at a peer, or stop; says in words what became of
+        it.
 
         Raises `GoalRefused` (PHRASE_…, WHOSE_GOAL), and as the peer refuses it.
         """
+        if is_stop(words):
+            return str(await self.stop_all())
         addressed, rest = addressed_to(words, (self._host, *self._peers()))
+        if addressed == self._host and is_stop(rest):
+            return str(self._stop())
         if addressed == self._host:
             return self._given_here(rest)
         if addressed is not None:
@@ -59,6 +68,20 @@ class Goals:
         if not self._peers() or await self._prospect(words) == "can":
             return self._given_here(words)
         return await self._given_to_whoever_can(words)
+
+    async def stop_all(self) -> Stopped:
+        """Stop this host at once, and then its peers: who says stop does not know who acts."""
+        stopped, peers = self._stop(), self._peers()
+        told = await asyncio.gather(*map(self._stopped, peers))
+        return stopped.with_peers(*(peer for peer, is_so in zip(peers, told, strict=True) if is_so))
+
+    async def _stopped(self, peer: str) -> bool:
+        try:
+            await self._given_to(peer, STOPS[0])
+        except GoalRefused as refused:
+            self._mind().people.tell(f"{peer} was not stopped: {refused.problems[0]}")
+            return False
+        return True
 
     async def _given_to_whoever_can(self, words: str) -> str:
         peers = self._peers()
@@ -86,6 +109,8 @@ class Goals:
             given = await call
         except NondumError as error:
             raise GoalRefused(*error.problems) from error
+        if "stopped" in given:
+            return f"{peer} has stopped"
         return f"that is goal {printable(str(given.get('goal')))} of {peer}"
 
     def _given_here(self, words: str) -> str:
@@ -98,7 +123,15 @@ class Goals:
         return {"now": await self._prospect(self._words(errand))}
 
     def serve_give(self, errand: Errand) -> Body:
-        """Take a goal that a peer heard: its `goal` id. Raises `GoalRefused`, `CallFailed`."""
+        """Take a goal that a peer heard: its `goal` id. Raises `GoalRefused`, `CallFailed`.
+
+        Whether or not goals are taken: words that stop this host do.
+        """
+        said = errand.args.get("words")
+        if isinstance(said, str) and len(said) <= MAX_WORDS and is_stop(said):
+            stopped = self._stop()
+            self._mind().people.tell(f"{errand.caller.name} heard {said!r}: {stopped}")
+            return {"stopped": True}
         words = self._words(errand)
         given = self._mind().give(words=words)
         self._givers[given.id] = errand.caller.name

@@ -35,6 +35,7 @@ from nondum.host.peers.trust_orders import TrustOrders
 from nondum.host.peers.uses import uses_of
 from nondum.host.peers.view import PeersView
 from nondum.host.rows import Row
+from nondum.host.stopping import Stopped
 from nondum.host.workers.workers import Workers
 from nondum.transport.discovery import Hint
 from nondum.transport.fleet import FleetEvent, Mesh
@@ -59,9 +60,10 @@ class Neighbourhood:
         emit: Emit,
         compute: Compute,
         mind: Callable[[], Mind],
+        stop: Callable[[], Stopped],
         placement: Placement,
     ) -> None:
-        """Use `open`. `mind` is asked for once the host runs."""
+        """Use `open`. `mind` is asked for once the host runs; `stop` stops this host."""
         host = config.host.name
         self.keeper = keeper
         self._tasks: set[asyncio.Task[None]] = set()
@@ -127,6 +129,7 @@ class Neighbourhood:
             mind,
             self.peering,
             self.peering.names,
+            stop,
             accepts=config.peers.accept_goals,
         )
         self.desk.add("goal.ask", self.goals.serve_ask)
@@ -146,6 +149,7 @@ class Neighbourhood:
         catalogue: Catalogue,
         emit: Emit,
         mind: Callable[[], Mind],
+        stop: Callable[[], Stopped],
         children: Children,
         judged_by: Callable[[str], Awaitable[Mapping[str, Any]]],
     ) -> Neighbourhood:
@@ -174,7 +178,7 @@ class Neighbourhood:
             judged_by=judged_by,
             known=lambda: made.view.known().values(),
         )
-        made = cls(config, keeper, workers, catalogue, emit, compute, mind, placement)
+        made = cls(config, keeper, workers, catalogue, emit, compute, mind, stop, placement)
         return made
 
     @property

@@ -1,0 +1,68 @@
+"""Stopping: all goals are given up and all behaviours halted, by a word or a command.
+
+It needs no planner, no payload and no peer. Software is no emergency stop: docs/stopping.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from nondum.host.mind.mind import Mind
+from nondum.host.workers.workers import Workers
+
+
+@dataclass(frozen=True, slots=True)
+class Stopped:
+    """What was stopped."""
+
+    goals: tuple[str, ...]
+    """Those that were open."""
+    behaviours: tuple[str, ...]
+    """Those that ran, and were asked to end."""
+    peers: tuple[str, ...] = ()
+    """Hosts that have stopped as well."""
+
+    def __str__(self) -> str:
+        """For people."""
+        who = f", with {' and '.join(self.peers)}" if self.peers else ""
+        if not self.goals and not self.behaviours:
+            return f"stopped{who}: nothing was asked for, nothing was running"
+        counted = (_counted(len(self.goals), "goal"), _counted(len(self.behaviours), "behaviour"))
+        return f"stopped{who}: {' and '.join(filter(None, counted))} halted"
+
+    def with_peers(self, *peers: str) -> Stopped:
+        """It, with hosts that have stopped as well."""
+        return replace(self, peers=(*self.peers, *peers))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for people's tools."""
+        return {
+            "goals": list(self.goals),
+            "halted": list(self.behaviours),
+            "peers": list(self.peers),
+        }
+
+
+class Stopping:
+    """Stops what one host does."""
+
+    def __init__(self, mind: Callable[[], Mind], workers: Workers) -> None:
+        """`mind` is asked for when it is needed."""
+        self._mind, self._workers = mind, workers
+
+    def stop(self) -> Stopped:
+        """Give up all goals, and halt all behaviours, those that run for peers, too.
+
+        Returns at once; how long a behaviour may take to end is bounded.
+        """
+        mind = self._mind()
+        goals = tuple(goal.id for goal in mind.queue if not goal.state.is_final)
+        behaviours = mind.halt(now=True)
+        self._workers.halt_all()
+        return Stopped(goals, behaviours)
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}{'s' if number != 1 else ''}" if number else ""

@@ -1,0 +1,39 @@
+"""Words that stop a robot, whatever is plugged in: understood before all phrases. English.
+
+Only a sentence that says nothing else is one of them: "stop" is, "stop following me" is for
+phrases.
+"""
+
+from __future__ import annotations
+
+from nondum.planning.pattern import words_of
+
+STOPS = ("stop", "halt", "freeze", "abort", "whoa", "stand still", "hold still", "don't move")
+"""What to say; those who listen are told to hear it."""
+
+_ORDERS = tuple(sorted(map(words_of, (*STOPS, "do not move")), key=len, reverse=True))
+_BESIDE = frozenset(
+    {
+        *("please", "now", "immediately", "right", "away", "at", "once", "there", "emergency"),
+        *("it", "that", "this", "all", "everything", "everybody", "robot", "moving", "everyone"),
+    }
+)
+"""Words that change nothing."""
+
+
+def is_stop(sentence: str) -> bool:
+    """Whether a sentence stops the robot.
+
+    >>> [is_stop(said) for said in ("Stop!", "stop it now, please", "robot, don't move")]
+    [True, True, True]
+    >>> [is_stop(said) for said in ("stop following me", "please", "")]
+    [False, False, False]
+    """
+    left, is_said = words_of(sentence), False
+    while left:
+        order = next((one for one in _ORDERS if left[: len(one)] == one), None)
+        if order is None and left[0] not in _BESIDE:
+            return False
+        is_said |= order is not None
+        left = left[len(order) if order else 1 :]
+    return is_said

@@ -1,0 +1,34 @@
+"""A robot stops at a word, and at no sentence that says something else."""
+
+from __future__ import annotations
+
+import pytest
+
+from nondum.planning.stop_words import STOPS, is_stop
+
+
+@pytest.mark.parametrize("said", STOPS)
+def test_what_listeners_are_told_to_hear_stops(said: str) -> None:
+    assert is_stop(said)
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        *("STOP", "stop!", "stop stop stop", "please stop now", "robot, halt", "Do not move!"),
+        *("stop it right now, please", "emergency stop", "stop moving", "whoa, stop everything"),
+    ],
+)
+def test_people_say_it_in_many_ways(said: str) -> None:
+    assert is_stop(said)
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        *("", "please", "right now", "stop following me", "stop at the door", "don't stop"),
+        *("bus stop", "never stop", "halt the people", "stopp", "full stop"),
+    ],
+)
+def test_sentences_that_say_more_are_for_phrases(said: str) -> None:
+    assert not is_stop(said)
