@@ -141,9 +141,9 @@ def halt(session: Session, now: bool, goal_id: str | None) -> None:
 def stop(session: Session) -> None:
     """Stop this host and its peers at once.
 
-    All goals are given up, all behaviours halted. The same as `nondum goal stop`, and as saying "stop" to it. Peers stop as well, for who says
-    stop may not know who acts; `nondum halt --now` halts this host alone. Software is no emergency
-    stop: see docs/stopping.md.
+    All goals are given up, all behaviours halted. The same as `nondum goal stop`, and as saying
+    "stop" to it. Peers stop as well, for who says stop may not know who acts; `nondum halt --now`
+    halts this host alone. Software is no emergency stop: see docs/stopping.md.
 
     Example: nondum stop
     """
