@@ -210,6 +210,11 @@ class Machine:
         """Plug in what QEMU calls `usb-tablet`, `usb-audio` …; answers its name for `unplug`."""
         return self._usb.plug_device(driver, port)
 
+    def press(self, key: str) -> None:
+        """Press and release a key of its keyboard, by QEMU's name for it: `f12`."""
+        assert self._qmp is not None, "it runs"
+        self._qmp.do("send-key", keys=[{"type": "qcode", "data": key}])
+
     def pull_line(self, name: str) -> None:
         """Pull a serial adapter out."""
         self._usb.pull(name)

@@ -57,6 +57,8 @@ from nondum.host.service.notify import Notifier
 from nondum.host.service.service import Part, Service
 from nondum.host.service.telling import Telling
 from nondum.host.service.words import words
+from nondum.host.stop_button.button import StopButton
+from nondum.host.stop_button.hook import StopHook
 from nondum.host.stopping import Stopped, Stopping
 from nondum.host.trust.orders import TrustOrders
 from nondum.host.trust.payload_trust import TrustOptions
@@ -149,7 +151,8 @@ async def _run(
     manager.leave_alone(*safety)
     for source in (*drive_sources(config, folders), *more_drives):
         manager.add_source(source)
-    stopping = Stopping(lambda: mind, workers)
+    stop_hook = StopHook(config.stop)
+    stopping = Stopping(lambda: mind, workers, stop_hook.run_soon)
     neighbours = await _neighbours(
         config, folders, workers, catalogue, bus, lambda: mind, stopping.stop, executor
     )
@@ -184,6 +187,8 @@ async def _run(
             *_warnings(catalogue, safety[1]),
             *standing.warnings(),
             *feedback.warnings,
+            *stop_hook.warnings,
+            *stop_button.warnings,
             *map(str, cages.problems()),
             *of_peers,
         )
@@ -217,6 +222,7 @@ async def _run(
         executor.trust.summary,
     )
     trust = TrustOrders(executor.trust, bus.emit)
+    stop_button = StopButton(config.stop, lambda: _pressed(mind, stop_all))
     stop_all, translate_s = _stop_all(neighbours, stopping), config.planning.translate_s
     orders = Orders(catalogue, mind, workers, news, bus, stopping, stop_all, translate_s)
     goal_files = GoalFiles(
@@ -253,12 +259,14 @@ async def _run(
                 questions.changed,
             ),
             conversation.run(),
+            stop_button.run(),
             feedback.run(),
             goal_files.run(),
             *(source.watch(bus.emit) for source in device_sources(config)),
         )
     finally:
         await control.close()
+        await stop_hook.close()
         await mind.close()
         if neighbours is not None:
             await neighbours.close()
@@ -321,6 +329,11 @@ def _take(neighbours: Neighbourhood | None, mind: Mind, stopping: Stopping) -> T
         return f"that is goal {mind.give(words=words).id}"
 
     return taken
+
+
+async def _pressed(mind: Mind, stop_all: Callable[[], Awaitable[Stopped]]) -> None:
+    """The stop key was pressed."""
+    mind.people.tell(f"the stop key: {await stop_all()}")
 
 
 def _stop_all(

@@ -18,6 +18,8 @@ from nondum.host.configuration.places import Places
 from nondum.host.confinement.level import Wanted, parse_wanted
 from nondum.host.feedback import section as feedback_section
 from nondum.host.feedback.section import FeedbackSection
+from nondum.host.stop_button import section as stop_section
+from nondum.host.stop_button.section import StopSection
 from nondum.sdk.errors import ConfigRefused, Problem
 from nondum.wheelhouse import confinement
 from nondum.wheelhouse.confinement import Level
@@ -215,6 +217,7 @@ class HostConfig:
     peers: PeersSection = field(default_factory=PeersSection)
     router: RouterSection = field(default_factory=RouterSection)
     feedback: FeedbackSection = field(default_factory=FeedbackSection)
+    stop: StopSection = field(default_factory=StopSection)
 
     @property
     def first_trust_file(self) -> Path:
@@ -289,6 +292,7 @@ def parse(text: str, where: str, defaults: HostConfig) -> HostConfig:
         sections["peers"] = _unproved(sections["peers"], data.get("peers"))
     problems.extend(_contradictions(HostConfig(**sections), places))
     problems.extend(feedback_section.problems(sections["feedback"], places))
+    problems.extend(stop_section.problems(sections["stop"], places))
     if problems:
         raise ConfigRefused(*problems)
     return HostConfig(**sections)

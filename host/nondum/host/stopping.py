@@ -48,9 +48,11 @@ class Stopped:
 class Stopping:
     """Stops what one host does."""
 
-    def __init__(self, mind: Callable[[], Mind], workers: Workers) -> None:
-        """`mind` is asked for when it is needed."""
-        self._mind, self._workers = mind, workers
+    def __init__(
+        self, mind: Callable[[], Mind], workers: Workers, told: Callable[[Stopped], None]
+    ) -> None:
+        """`mind` is asked for when it is needed; `told` is called each time, after all is done."""
+        self._mind, self._workers, self._told = mind, workers, told
 
     def stop(self) -> Stopped:
         """Give up all goals, and halt all behaviours, those that run for peers, too.
@@ -61,7 +63,9 @@ class Stopping:
         goals = tuple(goal.id for goal in mind.queue if not goal.state.is_final)
         behaviours = mind.halt(now=True)
         self._workers.halt_all()
-        return Stopped(goals, behaviours)
+        stopped = Stopped(goals, behaviours)
+        self._told(stopped)
+        return stopped
 
 
 def _counted(number: int, what: str) -> str:

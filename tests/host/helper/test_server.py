@@ -30,8 +30,9 @@ from nondum.host.feedback.lamps import Lamps
 from nondum.host.helper import HelperClient, removals, requests
 from nondum.host.helper.disks import Disks
 from nondum.host.helper.nodes import Nodes
-from nondum.host.helper.server import MOST_CHILDREN, Server
+from nondum.host.helper.server import MOST_CHILDREN, Server, answer
 from nondum.host.helper.service import Service
+from nondum.host.stop_button.input_device import EV_KEY, EVENT, PressesOfDevice
 from nondum.sdk.errors import NondumError
 
 pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="the helper is root's")
@@ -358,6 +359,36 @@ def test_helper_ends_when_nobody_asks(tmp_path: Path) -> None:
     assert done.returncode == 0
 
 
+def no_key() -> PressesOfDevice:
+    raise requests.refused("there is none")
+
+
+def test_only_the_key_that_root_names_is_listened_to(helper: Helper) -> None:
+    with pytest.raises(NondumError, match="names no stop key"):
+        served(lambda: helper.client.stop_key(Path("/dev/input/event0"), 1))
+
+
+def test_presses_of_the_stop_key_are_told_until_it_is_gone() -> None:
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    device, keyboard = os.pipe2(os.O_NONBLOCK)
+    nodes, lamps = Nodes(Path("/nowhere"), 1), Lamps((), Path("/nowhere"))
+    service = Service(
+        *(1, Path("/nowhere"), Disks(), nodes, NoTree(), lambda: lamps),
+        lambda: PressesOfDevice(device, 119, is_down=True),
+    )
+    with ours, theirs:
+        ours.send(requests.encode(requests.ListenToStopKey()))
+        told: list[dict[str, Any]] = []
+        serving = threading.Thread(target=lambda: told.append(answer(theirs, service)))
+        serving.start()
+        assert json.loads(ours.recv(100)) == {"down": True}
+        os.write(keyboard, EVENT.pack(0, 0, EV_KEY, 119, 1))
+        assert json.loads(ours.recv(100)) == {"pressed": 1}
+        os.close(keyboard)
+        serving.join()
+    assert [problem["code"] for problem in told[0]["problems"]] == ["HELPER_FAILED"]
+
+
 def test_nodes_go_when_the_kernel_tells_that_their_device_has_gone(tmp_path: Path) -> None:
     hidraw, sys = "devices/usb1/1-2/1-2:1.0/hidraw/hidraw0", tmp_path / "sys"
     (sys / hidraw).mkdir(parents=True)
@@ -366,7 +397,9 @@ def test_nodes_go_when_the_kernel_tells_that_their_device_has_gone(tmp_path: Pat
     nodes = Nodes(tmp_path / "run", SERVED.pw_uid, sys=sys)
     mine = nodes.put("eye", "line", 240, 3)
     lamps = Lamps((), tmp_path / "lamps.json")
-    service = Service(SERVED.pw_uid, tmp_path / "m", Disks(), nodes, NoTree(), lambda: lamps)
+    service = Service(
+        SERVED.pw_uid, tmp_path / "m", Disks(), nodes, NoTree(), lambda: lamps, no_key
+    )
     told, kernel = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     ending, _ = os.pipe()
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening, told, kernel:

@@ -15,6 +15,7 @@ from nondum.host.helper import requests, service
 from nondum.host.helper.nodes import Nodes
 from nondum.host.helper.requests import Request
 from nondum.host.helper.service import Service
+from nondum.host.stop_button.input_device import PressesOfDevice
 from nondum.sdk.errors import NondumError
 
 pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="making device nodes needs root")
@@ -31,7 +32,11 @@ def stick(tmp_path: Path) -> Machine:
 def root(stick: Machine, tmp_path: Path) -> Service:
     nodes = Nodes(tmp_path / "nodes", NOBODY, sys=tmp_path / "sys")
     lamps = Lamps((), tmp_path / "lamps.json")
-    return Service(NOBODY, tmp_path / "mounts", stick.disks, nodes, NoTree(), lambda: lamps)
+    return Service(NOBODY, tmp_path / "mounts", stick.disks, nodes, NoTree(), lambda: lamps, no_key)
+
+
+def no_key() -> PressesOfDevice:
+    raise requests.refused("there is none")
 
 
 def test_lamps_are_those_of_root_alone(stick: Machine, tmp_path: Path) -> None:
@@ -45,7 +50,7 @@ def test_lamps_are_those_of_root_alone(stick: Machine, tmp_path: Path) -> None:
     def lamps() -> Lamps:
         return Lamps(tuple(names), tmp_path / "run/lamps.json", tmp_path / "leds")
 
-    root = Service(NOBODY, tmp_path / "mounts", stick.disks, nodes, NoTree(), lamps)
+    root = Service(NOBODY, tmp_path / "mounts", stick.disks, nodes, NoTree(), lamps, no_key)
     root.serve(requests.ShowLamps("ready"))
     assert (lamp / "brightness").read_text() == "0"
     names.append("ACT")

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import os
 import signal
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+
+from nondum.sdk.errors import InstallFailed, Problem
+
+log = logging.getLogger(__name__)
 
 OUTPUT_BYTES = 4096
 """Of what it writes, so much is kept."""
@@ -59,6 +64,46 @@ async def run(
     finally:
         await asyncio.shield(_end(transport, talk))
     return Ended(status, talk.output.decode(errors="replace").strip())
+
+
+async def succeed(
+    command: Sequence[str],
+    environment: Mapping[str, str],
+    data: bytes,
+    deadline_s: float,
+    *,
+    fix: str,
+) -> str:
+    """Run a program that must end well; the beginning of what it wrote.
+
+    Raises `InstallFailed` (PROGRAM_FAILED, PROGRAM_OVERDUE), with `fix` as what to do.
+    """
+    try:
+        ended = await run(command, environment, data, deadline_s)
+    except OSError as error:
+        text = f"cannot be run ({error.strerror})"
+        raise _failed("PROGRAM_FAILED", text, command, fix) from error
+    for line in ended.output.splitlines():
+        log.info("%s: %s", command[0], printable(line))
+    if ended.status is None:
+        text = f"was killed: it had not ended after {deadline_s:g} s"
+        raise _failed("PROGRAM_OVERDUE", text, command, fix)
+    if ended.status != 0:
+        raise _failed("PROGRAM_FAILED", f"ended with status {ended.status}", command, fix)
+    return ended.output
+
+
+def printable(text: str) -> str:
+    """Strangers' words, as arguments and log lines can carry them.
+
+    >>> printable("a\\x00b\\nc")
+    'a b c'
+    """
+    return "".join(letter if letter.isprintable() else " " for letter in text)
+
+
+def _failed(code: str, text: str, command: Sequence[str], fix: str) -> InstallFailed:
+    return InstallFailed(Problem(code, text, where=command[0], fix=fix))
 
 
 class _Talk(asyncio.SubprocessProtocol):

@@ -20,8 +20,13 @@ from nondum.host.feedback.lamps import Lamps
 from nondum.host.helper import removals
 from nondum.host.helper.disks import Disks
 from nondum.host.helper.nodes import Nodes
+from nondum.host.helper.requests import refused
 from nondum.host.helper.server import IDLE_S, Server
 from nondum.host.helper.service import Service
+from nondum.host.stop_button import input_device
+from nondum.host.stop_button.input_device import PressesOfDevice
+from nondum.host.stop_button.keys import code_of
+from nondum.host.stop_button.section import StopSection
 
 RUN = Path("/run/nondum-helper")
 """Root's own: who could replace a folder in it would choose where drives are mounted."""
@@ -42,6 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         nodes=Nodes(told.run / "devices", uid, frozenset(told.allow_subsystem)),
         tree=_tree(f"{OWNER}-{uid}"),
         lamps=partial(_lamps, told.config, told.run / "lamps.json"),
+        stop_key=partial(_stop_key, told.config),
     )
     service.nodes.prepare()  # workers' rooms, which are made early, show what is below it
     # No exception: Python drops those of signal handlers that run in its callbacks after a fork.
@@ -65,12 +71,23 @@ def _lamps(config: Path, kept: Path) -> Lamps:
     return Lamps(names, kept)
 
 
+def _stop_key(config: Path) -> PressesOfDevice:
+    """The key that the configuration names. Raises `ConfigRefused`, `NondumError`."""
+    section = load(config, HostConfig()).stop if config.exists() else StopSection()
+    if not section.device:
+        raise refused("root's configuration names no stop key", str(config))
+    return input_device.opened(Path(section.device), code_of(section.key) or 0)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="nondum-helper", description=__doc__)
     parser.add_argument("--user", default="nondum", help="the one user who is served")
     parser.add_argument("--run", type=Path, default=RUN, help="folder for mounts and devices")
     parser.add_argument(
-        "--config", type=Path, default=SYSTEM_FILE, help="the daemon's, which names the lamps"
+        "--config",
+        type=Path,
+        default=SYSTEM_FILE,
+        help="the daemon's, which names lamps and the stop key",
     )
     parser.add_argument("--idle-s", type=float, default=IDLE_S, help="end after such a silence")
     parser.add_argument("--allow-loop", action="store_true", help="loop devices are drives, too")

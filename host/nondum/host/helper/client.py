@@ -81,6 +81,18 @@ class HelperClient:
         """The cgroups of the helper's making. Raises `NondumError`."""
         return HelperTree(self)
 
+    def stop_key(self, device: Path, code: int) -> PressesOfHelper:
+        """Listen to the key that the helper's own configuration names."""
+        asked = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        try:
+            asked.settimeout(WAIT_S)
+            said = self._asked(asked, requests.ListenToStopKey())
+            asked.settimeout(0)
+            return PressesOfHelper(asked, is_down=said["down"])
+        except BaseException:
+            asked.close()
+            raise
+
     def ask(self, request: Request) -> dict[str, Any]:
         """Ask one thing. Raises what the helper raised, `InstallFailed` (HELPER_SILENT)."""
         return self._ask(request)
@@ -93,14 +105,18 @@ class HelperClient:
             log.warning("%s", error)
 
     def _ask(self, request: Request) -> dict[str, Any]:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as asked:
+            asked.settimeout(WAIT_S)
+            return self._asked(asked, request)
+
+    def _asked(self, asked: socket.socket, request: Request) -> dict[str, Any]:
+        """Ask over a socket; the first answer."""
         try:
-            with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as asked:
-                asked.settimeout(WAIT_S)
-                _connect(asked, self._path)
-                # Who is turned away is answered before the question is heard.
-                with contextlib.suppress(BrokenPipeError):
-                    asked.send(requests.encode(request))
-                answer = _heard(asked)
+            _connect(asked, self._path)
+            # Who is turned away is answered before the question is heard.
+            with contextlib.suppress(BrokenPipeError):
+                asked.send(requests.encode(request))
+            answer = _heard(asked)
         except OSError as error:
             raise _silent(str(error)) from error
         if not answer:
@@ -111,6 +127,33 @@ class HelperClient:
             failure: NondumError = kind(*(Problem(**problem) for problem in said["problems"]))
             raise failure
         return said
+
+
+class PressesOfHelper:
+    """Presses of the stop key, as the helper tells them."""
+
+    def __init__(self, connection: socket.socket, *, is_down: bool) -> None:
+        """Own the connection."""
+        self._connection, self.is_down_at_first = connection, is_down
+
+    def fileno(self) -> int:
+        """To wait for."""
+        return self._connection.fileno()
+
+    def read(self) -> int:
+        """How many presses have come. Raises `OSError` when the helper tells no more."""
+        try:
+            data = self._connection.recv(requests.ANSWER_BYTES)
+        except BlockingIOError:
+            return 0
+        said: dict[str, Any] = json.loads(data) if data else {}
+        if "pressed" not in said:
+            raise ConnectionResetError("the helper does not listen any more")
+        return int(said["pressed"])
+
+    def close(self) -> None:
+        """Hang up."""
+        self._connection.close()
 
 
 class HelperTree:

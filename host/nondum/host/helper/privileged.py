@@ -12,6 +12,8 @@ from nondum.host.drives import mounting
 from nondum.host.feedback.lamps import Lamps
 from nondum.host.feedback.state import State
 from nondum.host.helper.client import SOCKET, HelperClient
+from nondum.host.stop_button import input_device
+from nondum.host.stop_button.presses import Presses
 from nondum.sdk.errors import InstallFailed, Problem
 
 
@@ -62,6 +64,13 @@ class Privileged(Protocol):
         """Where cages are that this process may not make itself."""
         ...
 
+    def stop_key(self, device: Path, code: int) -> Presses:
+        """Listen to a key; the helper listens to the one that root's configuration names.
+
+        Raises `InstallFailed` (STOP_KEY, HELPER_SILENT).
+        """
+        ...
+
 
 class InProcess:
     """For a daemon that is root."""
@@ -101,6 +110,10 @@ class InProcess:
     def cages(self) -> Tree:
         """None but its own."""
         return NoTree()
+
+    def stop_key(self, device: Path, code: int) -> Presses:
+        """Read it from the device."""
+        return input_device.opened(device, code)
 
 
 class Unprivileged(InProcess):

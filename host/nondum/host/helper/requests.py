@@ -154,6 +154,15 @@ class RemoveCage:
     cage: str
 
 
+@dataclass(frozen=True, slots=True)
+class ListenToStopKey:
+    """Tell each press of the key that root's configuration names, until the caller hangs up.
+
+    The answer is whether it is `down` already; then a packet with how often it was `pressed` comes
+    each time.
+    """
+
+
 Request: TypeAlias = (
     Mount
     | Unmount
@@ -170,6 +179,7 @@ Request: TypeAlias = (
     | FillCage
     | KillCage
     | RemoveCage
+    | ListenToStopKey
 )
 
 _VERBS: Mapping[str, type[Any]] = {kind.__name__: kind for kind in get_args(Request)}

@@ -14,11 +14,13 @@ import socket
 import struct
 import sys
 from collections.abc import Callable
+from contextlib import closing
 from typing import Any
 
 from nondum.host.helper import removals, requests
 from nondum.host.helper.requests import refused
 from nondum.host.helper.service import Service
+from nondum.host.stop_button.input_device import PressesOfDevice
 from nondum.sdk.errors import InstallFailed, NondumError, Problem
 
 IDLE_S = 30.0
@@ -112,12 +114,29 @@ def answer(connection: socket.socket, service: Service) -> dict[str, Any]:
         data, _, flags, _ = connection.recvmsg(requests.MAX_BYTES + 1)
         if flags & (socket.MSG_TRUNC | socket.MSG_CTRUNC):
             raise refused("a question is one short packet, and brings no descriptors")
-        return service.serve(requests.parse(data))
+        request = requests.parse(data)
+        if isinstance(request, requests.ListenToStopKey):
+            return _listen(connection, service)
+        return service.serve(request)
     except NondumError as error:
         return _failure(error)
     except OSError as error:
         text = f"{error.strerror or error} ({error.filename})" if error.filename else str(error)
         return _failure(InstallFailed(Problem("HELPER_FAILED", text, fix=_LOOK)))
+
+
+def _listen(connection: socket.socket, service: Service) -> dict[str, Any]:
+    """Tell presses of the stop key until the other end hangs up, or its device is gone."""
+    signal.alarm(0)  # that may be long
+    with closing(service.stop_key()) as presses:
+        _say(connection, {"down": presses.is_down_at_first})
+        while True:
+            sources: list[socket.socket | PressesOfDevice] = [connection, presses]
+            ready, _, _ = select.select(sources, [], [])
+            if connection in ready:
+                return {}
+            if pressed := presses.read():
+                _say(connection, {"pressed": pressed})
 
 
 def _child(work: Callable[[], None]) -> int:

@@ -19,6 +19,7 @@ from nondum.host.helper import requests
 from nondum.host.helper.disks import Disks
 from nondum.host.helper.nodes import Nodes
 from nondum.host.helper.requests import Request, refused
+from nondum.host.stop_button.input_device import PressesOfDevice
 
 MOST_DRIVES = 128
 MOST_CAGES = 512
@@ -36,6 +37,8 @@ class Service:
     tree: Tree
     lamps: Callable[[], Lamps]
     """Those that root's configuration names now."""
+    stop_key: Callable[[], PressesOfDevice]
+    """Listens to the one that root's configuration names now."""
 
     def serve(self, request: Request) -> dict[str, Any]:
         """Do what is asked. Raises `NondumError`, `OSError`."""

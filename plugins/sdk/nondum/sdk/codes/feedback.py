@@ -6,13 +6,18 @@ AREA = "Feedback"
 CODES = (
     Code(
         "PROGRAM_FAILED",
-        "The program that is told the host's states cannot be run, or ended with an error.",
-        "run it by hand with the same arguments; see `hook` under [feedback]",
+        "A program that is told what happens cannot be run, or ended with an error.",
+        "run it by hand with the same arguments; see `hook` under [feedback] or [stop]",
     ),
     Code(
         "PROGRAM_OVERDUE",
-        "The program that is told the host's states did not end, and was killed.",
-        "have it end sooner, or raise `hook_deadline_s` under [feedback]",
+        "A program that is told what happens did not end, and was killed.",
+        "have it end sooner, or raise `hook_deadline_s` of its table",
+    ),
+    Code(
+        "STOP_KEY",
+        "The key that stops the robot cannot be listened to.",
+        "plug its device in, and see `device` and `key` under [stop]",
     ),
     Code(
         "LAMP_MISSING",

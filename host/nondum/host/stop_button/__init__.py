@@ -1,0 +1,1 @@
+"""The key that stops the robot: read by the host itself, and by nobody else."""
