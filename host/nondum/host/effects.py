@@ -5,7 +5,8 @@ Each is idempotent: after a crash it may be carried out again from the start.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from nondum.host.catalogue.records import DeviceNode
@@ -25,6 +26,8 @@ class ReadDrive(Effect):
     root: Path
     node: Path | None = None
     filesystem: str = ""
+    keys: Mapping[str, str] = field(default_factory=dict)
+    """Digest of a contents list → key of the payload that is here already."""
 
 
 @dataclass(frozen=True, slots=True)

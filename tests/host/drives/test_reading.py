@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import shutil
+import sqlite3
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.loop_devices import attached, can_be_made
 from tests.kit.payloads import Part, make_payload
 
+from nondum.host.catalogue import payload_key
 from nondum.host.catalogue.records import Step
 from nondum.host.drives import steady
 from nondum.host.drives.blocks import BlockSource
@@ -63,6 +66,38 @@ async def test_a_goal_that_lies_loose_is_told_with_its_drive(tmp_path: Path) -> 
         await host.until(lambda: bool(heard(host, DriveRead)))
         (drive,) = host.snapshot.drives
         assert [problem.code for problem in drive.problems] == ["GOAL_UNSIGNED"]
+
+
+async def test_payload_that_came_under_a_shorter_key_keeps_it(tmp_path: Path) -> None:
+    make_payload(tmp_path / "drive", Part("lamp", LAMP), payload_id=LAMP_ID)
+    async with host_in_process(tmp_path) as host:
+        host.plug(tmp_path / "drive")
+        key = (await host.until_step(LAMP_ID, Step.ACTIVE)).key
+    assert len(key) * 4 == 128  # bits
+    short = key[: payload_key.FORMER_DIGITS]
+    _rename(host.folders, key, short)
+    async with host_in_process(tmp_path) as host:
+        await host.until(lambda: bool(heard(host, DriveRead)))
+        assert (await host.until_step(LAMP_ID, Step.ACTIVE)).key == short
+        host.pull()
+        await host.until(lambda: not host.snapshot.payloads)
+        assert not left_over(host.folders)
+        host.plug(tmp_path / "drive")
+        assert (await host.until_step(LAMP_ID, Step.ACTIVE)).key == key
+
+
+def _rename(folders: Folders, key: str, short: str) -> None:
+    """Leave a payload as a former version of nondum would have."""
+    for folder in (folders.payload(key), folders.venvs(key), folders.scratches_of(key)):
+        folder.rename(folder.with_name(short))
+    connection = sqlite3.connect(folders.catalogue)
+    with contextlib.closing(connection), connection:
+        connection.execute("UPDATE payloads SET key = ? WHERE key = ?", (short, key))
+        for table in ("sources", "components"):
+            connection.execute(f"UPDATE {table} SET payload = ?", (short,))
+        for column in ("venv", "site_packages", "scratch"):
+            renamed = f"UPDATE components SET {column} = replace({column}, ?, ?)"
+            connection.execute(renamed, (key, short))
 
 
 async def test_copies_of_a_payload_are_installed_once(tmp_path: Path) -> None:

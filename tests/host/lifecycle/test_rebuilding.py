@@ -11,15 +11,15 @@ from typing import Any
 import pytest
 from tests.kit.lamp_drive import PAYLOAD, lamp, told
 
-from nondum.host.drives.reader import KEY_DIGITS
+from nondum.host.catalogue import payload_key
 from nondum.host.lifecycle import rebuilding
 
 
-@pytest.fixture
-def kept(tmp_path: Path) -> Path:
-    """A payload as it is kept, and the note that tells of it."""
+@pytest.fixture(params=[payload_key.DIGITS, payload_key.FORMER_DIGITS])
+def kept(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
+    """A payload as this version or a former one keeps it, and the note that tells of it."""
     folder = lamp(tmp_path / "drive")
-    key = hashlib.sha256((folder / "CONTENTS").read_bytes()).hexdigest()[:KEY_DIGITS]
+    key = hashlib.sha256((folder / "CONTENTS").read_bytes()).hexdigest()[: request.param]
     copied = shutil.copytree(folder, tmp_path / "payloads" / key)
     (tmp_path / "notes").mkdir()
     note = json.dumps({"drive": "a", "folder": str(folder)})
@@ -39,8 +39,17 @@ def test_payload_that_is_whole_is_found(kept: Path, tmp_path: Path) -> None:
 
 
 def test_payload_under_another_s_name_is_not_brought_back(kept: Path, tmp_path: Path) -> None:
-    kept.rename(kept.with_name("0" * KEY_DIGITS))
-    (tmp_path / f"notes/{kept.name}.json").rename(tmp_path / f"notes/{'0' * KEY_DIGITS}.json")
+    name = "0" * len(kept.name)
+    kept.rename(kept.with_name(name))
+    (tmp_path / f"notes/{kept.name}.json").rename(tmp_path / f"notes/{name}.json")
+    assert found(tmp_path) == []
+
+
+def test_payload_under_the_start_of_its_name_is_not_brought_back(
+    kept: Path, tmp_path: Path
+) -> None:
+    kept.rename(kept.with_name(kept.name[:8]))
+    (tmp_path / f"notes/{kept.name}.json").rename(tmp_path / f"notes/{kept.name[:8]}.json")
     assert found(tmp_path) == []
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -308,7 +307,7 @@ def test_refused_older_release_is_let_pass_once() -> None:
     assert target.key == "k1"
     asked = events.RollbackAsked("k1", 1, 2)
     state, done = after(asked, events.PayloadCleared("k1"), state=refused)
-    assert effects.ReadDrive("a", "slot", Path("/drives/a")) in done
+    assert "a" in [one.drive for one in done if isinstance(one, effects.ReadDrive)]
     state, _ = after(*way_to_active(), state=state)
     assert steps(state) == {"k1": Step.ACTIVE, "k2": Step.SUPERSEDED}
     again, _ = after(events.DriveRemoved("a"), events.PayloadCleared("k1"), state=state)

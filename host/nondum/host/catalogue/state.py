@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from nondum.host.catalogue import payload_key
 from nondum.host.catalogue.records import (
     ComponentRecord,
     DeviceRecord,
@@ -60,6 +61,14 @@ class HostState:
     """Key → a peer that is there. Not kept when the daemon ends: who is there is found out anew."""
     safety: Safety = Safety.OFF
     """Which payloads are left alone. Not kept either: each daemon finds that out as it starts."""
+
+    def key_of(self, digest: str) -> str:
+        """What this host calls, or would call, a payload, by the digest of its contents list."""
+        return self.keys().get(digest, payload_key.key_of(digest))
+
+    def keys(self) -> dict[str, str]:
+        """Digest of a contents list → key of the payload that is here."""
+        return {one.digest: one.key for one in self.payloads.values() if one.digest}
 
     def snapshot(self) -> Snapshot:
         """The state as readers get it."""

@@ -17,6 +17,7 @@ from typing import Any
 from packaging.version import Version
 
 from nondum.host.brief import brief
+from nondum.host.catalogue import payload_key
 from nondum.host.drives import trial
 from nondum.host.drives.loose_goals import loose_goals
 from nondum.host.drives.pace import paced
@@ -43,8 +44,6 @@ Arguments = Mapping[str, Any]
 
 CERTIFICATES = "nondum-peers"
 """Folder of a drive with hosts' certificates."""
-KEY_DIGITS = 16
-"""Hex digits of a contents list's digest that name a payload on a host."""
 
 
 def look(arguments: Arguments, report: Report) -> dict[str, list[Any]]:
@@ -213,7 +212,7 @@ def _found(folder: Path, verifier: Verifier) -> dict[str, Any]:
     # Two folders without a readable list are two payloads, wherever they are.
     name = digest or hashlib.sha256(str(folder).encode()).hexdigest()
     return {
-        "payload": name[:KEY_DIGITS],
+        "payload": payload_key.key_of(name),
         "folder": str(folder),
         "digest": digest,
         "payload_id": listed.payload_id if listed else folder.name,

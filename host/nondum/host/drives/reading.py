@@ -89,6 +89,7 @@ class DriveReading:
                 self._mounted[effect.drive] = effect.root
             found = await self._look(effect.drive, arguments)
         for said in found["payloads"]:
+            said["payload"] = effect.keys.get(said["digest"], said["payload"])
             self._trust.note(said["payload"], said)
         payloads = [
             PayloadFound(

@@ -115,7 +115,8 @@ def lose_source(turn: Turn, payload: PayloadRecord, drive: str, reason: str) -> 
 def read(turn: Turn, drive: DriveRecord) -> None:
     """Have a drive looked through."""
     turn.put_drive(replace(drive, state=DriveState.READING, problems=()))
-    turn.effects.append(ReadDrive(drive.id, drive.kind, drive.root, drive.node, drive.filesystem))
+    place = drive.kind, drive.root, drive.node, drive.filesystem
+    turn.effects.append(ReadDrive(drive.id, *place, turn.state.keys()))
 
 
 def copy_of(payload: PayloadRecord, state: HostState) -> CopyPayload:

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from nondum.host.catalogue import payload_key
 from nondum.host.catalogue.records import (
     INSTALLED,
     DriveRecord,
@@ -22,7 +23,6 @@ from nondum.host.catalogue.records import (
     Step,
 )
 from nondum.host.catalogue.state import Highwater, HostState
-from nondum.host.drives import reader
 from nondum.host.drives.reader import Arguments, Report
 from nondum.host.effects import NoteInstalled
 from nondum.host.lifecycle import tries
@@ -81,7 +81,7 @@ def found(arguments: Arguments, report: Report) -> list[dict[str, Any]]:
 def _told(note: Mapping[str, str], folder: Path) -> dict[str, Any]:
     data = (folder / contents.NAME).read_bytes()
     digest = hashlib.sha256(data).hexdigest()
-    if digest[: reader.KEY_DIGITS] != folder.name:
+    if not payload_key.is_key_of(folder.name, digest):
         raise ValueError("it is not the payload that it was")
     listed = contents.parse(data, contents.NAME)
     for entry in (entry for entry in listed.entries if payload.is_metadata(entry.path)):

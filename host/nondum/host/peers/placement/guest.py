@@ -62,6 +62,8 @@ class Guest:
     drive: str
     """Name of the drive that stands for it."""
     root: Path
+    key: str
+    """Of the payload on this host."""
     step: str = "waiting"
     """`waiting`, `checking`, `fetching`, `installing` or `active`."""
     done: int = 0
@@ -69,11 +71,6 @@ class Guest:
     version: str = ""
     news: asyncio.Event = field(default_factory=asyncio.Event)
     _told_s: float = 0.0
-
-    @property
-    def key(self) -> str:
-        """Of the payload on this host."""
-        return self.offer.digest[:16]
 
     @property
     def folder(self) -> Path:

@@ -122,7 +122,8 @@ class Taking:
     def _guest(self, offer: Offer, errand: Errand) -> Guest:
         number = next(self._numbers)
         drive = f"{PLACED}/{errand.caller.name}/{number}"
-        return Guest(offer, errand, drive, self._folders.placed / str(number))
+        root = self._folders.placed / str(number)
+        return Guest(offer, errand, drive, root, self._state().key_of(offer.digest))
 
     # Fetching
 
