@@ -18,12 +18,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from tests.confinement.escape import ATTEMPTS
 from tests.kit.workers import WorkersUnderTest
 
 from nondum.host.cgroups import Cages
 from nondum.host.events import WorkerLogged
 from nondum.host.workers import Limits, WorkerLauncher
 from nondum.host.workers.confinements import Confinement
+from nondum.sdk.errors import WorkerFailed
 
 ESCAPE = Path(__file__).with_name("escape.py")
 SMALL = Limits(memory_mb=256, tasks=100, descriptors=64, file_mb=16)
@@ -162,9 +164,34 @@ async def attempted(
     cages: Cages | None = None,
 ) -> dict[str, Result]:
     """What the hostile plugin can do, or some of it, so confined; `cages` are the machine's, if
-    none are given."""
-    tested = WorkersUnderTest(folder, confinement=confinement)
+    none are given.
+
+    A memory cgroup of Linux 4.19 and later ends the whole worker with an attempt to take memory
+    that only it limits: the others are made by the next one.
+    """
+    left, results = list(attempts or ATTEMPTS), dict[str, Result]()
     cages = cages or Cages.open(folder)
+    try:
+        while left:
+            place = folder / f"worker-{len(left)}"
+            found = await _attempted(place, bait, confinement, left, limits, cages)
+            results |= found
+            left = left[len(found) :]
+    finally:
+        cages.close()
+    return results
+
+
+async def _attempted(
+    folder: Path,
+    bait: dict[str, Any],
+    confinement: Confinement,
+    attempts: Sequence[str],
+    limits: Limits,
+    cages: Cages,
+) -> dict[str, Result]:
+    """What one worker comes to, until the first attempt that ends it."""
+    tested = WorkersUnderTest(folder, confinement=confinement)
     tested.workers.launcher = WorkerLauncher(confinement, cages)
     tested.workers.timing = replace(tested.timing, startup_s=120.0)
     source = ESCAPE.read_text(encoding="utf-8")
@@ -172,15 +199,22 @@ async def attempted(
     victim = _victim(folder)
     settings = {"bait": json.dumps({**bait, "victim": str(victim), "attempts": list(attempts)})}
     _lay_node(folder / "escape/scratch")
+    ended = ""
     try:
         await tested.start("escape", source, summary=summary, settings=settings, limits=limits)
         await tested.until(WorkerLogged, lambda line: line.message == "tried all", timeout_s=120)
+    except WorkerFailed as failed:
+        ended = failed.code
     finally:
         await tested.workers.close(grace_s=1.0)
-        cages.close()
     said = [line.message for line in tested.told(WorkerLogged)]
     rows = [json.loads(s.removeprefix("tried ")) for s in said if s.startswith("tried {")]
-    return {row["name"]: judged(row) for row in rows}
+    results = {row["name"]: judged(row) for row in rows}
+    if ended:
+        fatal = attempts[len(results)]
+        assert ended == "WORKER_OOM" and fatal in SHARED_MEMORY, (ended, fatal)
+        results[fatal] = Result(could=False, what=ended)
+    return results
 
 
 def _victim(folder: Path) -> Path:
