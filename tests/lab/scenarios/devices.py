@@ -6,6 +6,7 @@ from typing import Any
 
 from tests.lab.installed import Installed
 from tests.lab.lab import Lab
+from tests.lab.machine import Machine
 from tests.lab.plugins import opener, until_said
 
 DROP_IN = "/etc/systemd/system/nondum-helper.service.d/devices.conf"
@@ -41,6 +42,8 @@ while data := os.read(watching, 4096):
         data = data[16 + length:]
 """
 WATCHED = "/run/watched"
+PAD = "/run/nondum-helper/devices/pad/it"
+"""The node that the helper makes for a component."""
 KEYBOARD, MOUSE = "03:01:01", "03:01:02"
 """Of USB's interface classes, those of QEMU's keyboard and mouse."""
 
@@ -70,8 +73,12 @@ def _seen_through(lab: Lab, host: Installed) -> str:
     stick = host.bring(lab.stick("instruments", *COMPONENTS), "org.example.instruments")
     told = {id: until_said(host, id, "opened", least) for id, least in GRANTED.items()}
     _see_left_alone(host)
+    for id, least in GRANTED.items():  # by the workers of the daemon that was started anew
+        until_said(host, id, "opened", least)
+    tablet, *others = plugged
+    _see_node_go(machine, tablet)
     machine.pull_line(line)
-    for name in plugged:
+    for name in others:
         machine.unplug(name)
     machine.run(f"modprobe -r {' '.join(MODULES)}")
     for id in GRANTED:
@@ -80,6 +87,19 @@ def _seen_through(lab: Lab, host: Installed) -> str:
     machine.pull(stick)
     host.until_payload("org.example.instruments", "gone")
     return "; ".join(f"{id}: {said}" for id, said in told.items())
+
+
+def _see_node_go(machine: Machine, tablet: str) -> None:
+    """The helper takes a node away by itself: its number may be another device's next."""
+    machine.run(f"test -c {PAD}")
+    daemon = "$(systemctl show -p MainPID --value nondum.service)"
+    machine.run(f"kill -STOP {daemon}")
+    try:
+        machine.unplug(tablet)
+        gone = f"test ! -e {PAD}"
+        machine.until("its node is gone", lambda: machine.attempt(gone).status == 0 or None)
+    finally:
+        machine.run(f"kill -CONT {daemon}")
 
 
 def _see_left_alone(host: Installed) -> None:
