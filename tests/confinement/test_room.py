@@ -103,6 +103,26 @@ async def test_device_appears_and_vanishes_while_it_runs(
     assert await does(tested) == ""
 
 
+async def test_device_can_be_used_and_its_node_stays_as_it_is(
+    tested: WorkersUnderTest, line: tuple[int, str]
+) -> None:
+    """Its owner, who may be the worker's user, could close it to everybody else."""
+    before = Path(line[1]).stat().st_mode
+    await guest(
+        tested,
+        "os.close(os.open(device.node, os.O_RDWR | os.O_NOCTTY))\n"
+        "try:\n"
+        "    os.chmod(device.node, 0o606)\n"
+        "except OSError as error:\n"
+        "    assert error.errno in (1, 30), error\n"
+        "else:\n"
+        "    assert False, 'it could'",
+    )
+    await tested.workers.attach("guest", "line", line[1], {})
+    assert await does(tested) == ""
+    assert Path(line[1]).stat().st_mode == before
+
+
 async def test_only_devices_are_handed_in(tested: WorkersUnderTest, tmp_path: Path) -> None:
     secret = tmp_path / "secret"
     secret.write_text("of the host")

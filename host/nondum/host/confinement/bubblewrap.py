@@ -21,6 +21,8 @@ OUTSIDE = "/.host"
 INSIDE = Path(__file__).parents[1] / "inside"
 PLACE_OF_INSIDE = Path("/run/nondum/host/nondum/host/inside")
 BOOTSTRAP = PLACE_OF_INSIDE / "bootstrap.py"
+NODES = tuple(f"/dev/{name}" for name in ("null", "zero", "full", "random", "urandom", "tty"))
+"""The host's own, which bubblewrap brings into every room."""
 TEMPORARY_BYTES = 64 * 1024 * 1024
 """Size of /tmp."""
 

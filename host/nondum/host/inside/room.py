@@ -19,6 +19,10 @@ from nondum.host.inside import kernel
 
 DEVICES = "/dev/nondum"
 NOBODY = 65534
+INOTIFY_INSTANCES = 16
+"""Of a worker: those of all rooms count for the user of the host, who has 128 of them."""
+_STAGED = "/run/nondum/staged"
+"""Where a device is mounted before it appears: later changes of flags are not propagated."""
 _BOUND = kernel.MS_BIND | kernel.MS_REMOUNT
 
 
@@ -42,6 +46,7 @@ def furnish(room: Mapping[str, Any]) -> None:
     _write_users(room["scratch"])
     if room["is_last"]:  # the worker's own, below, is the only one there will ever be
         Path("/proc/sys/user/max_user_namespaces").write_text("1")
+    Path("/proc/sys/user/max_inotify_instances").write_text(str(room["inotify_instances"]))
 
 
 def move_in(room: Mapping[str, Any]) -> None:
@@ -110,16 +115,26 @@ def bind(source: str, target: str, more: int = 0) -> None:
 
 
 def _bind_node(source: str, target: str) -> None:
-    """A device, or a folder of devices, and nothing else."""
+    """A device, or a folder of devices, and nothing else.
+
+    It can be written to, and its node stays as it is: the node's owner, who may be the worker's
+    user, could close it to everybody else on the host. Raises `OSError`.
+    """
     mode = os.stat(source).st_mode  # noqa: PTH116
-    if stat.S_ISDIR(mode):
-        os.makedirs(target, exist_ok=True)  # noqa: PTH103
-    elif stat.S_ISCHR(mode) or stat.S_ISBLK(mode):
-        os.makedirs(os.path.dirname(target), exist_ok=True)  # noqa: PTH103, PTH120
-        os.close(os.open(target, os.O_CREAT | os.O_CLOEXEC, 0o600))
-    else:
+    is_folder = stat.S_ISDIR(mode)
+    if not (is_folder or stat.S_ISCHR(mode) or stat.S_ISBLK(mode)):
         raise OSError(f"{source} is no device")
-    kernel.mount(source, target, None, kernel.MS_BIND)
+    staged = f"{_STAGED}/{'folder' if is_folder else 'node'}"
+    for place in (staged, target):
+        os.makedirs(place if is_folder else os.path.dirname(place), exist_ok=True)  # noqa: PTH103, PTH120
+        if not is_folder:
+            os.close(os.open(place, os.O_CREAT | os.O_CLOEXEC, 0o600))
+    kernel.mount(source, staged, None, kernel.MS_BIND)
+    try:
+        kernel.mount(None, staged, None, _BOUND | kernel.MS_RDONLY | _flags_of(staged))
+        kernel.mount(staged, target, None, kernel.MS_BIND)
+    finally:
+        kernel.unmount(staged)
 
 
 def _mount_memory(target: str, kilobytes: int) -> None:

@@ -208,7 +208,11 @@ class Boxed:
             "nodes": list(_nodes(spec)),
             "shared_mb": SHARED_MB,
             "sealed": [] if "settings" in kept else SETTINGS,
-            "protected": [] if "system" in kept else ["/", "/dev", room.DEVICES],
+            "protected": [
+                *([] if "system" in kept else ["/", "/dev", room.DEVICES]),
+                *([] if "nodes" in kept else bubblewrap.NODES),
+            ],
+            "inotify_instances": room.INOTIFY_INSTANCES if "inotify" not in kept else 128,
             "is_last": "user namespaces" not in kept,
             "changes_user": "user" not in kept,
             "keeper_filter": calls_refused(refusals.GROUPS, mounts_too),
