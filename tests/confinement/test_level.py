@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,9 +23,11 @@ HELD = {
     "processes": 2,
     "interfaces": ["lo"],
     "sees_state": False,
+    "sees_library": True,
     "writes_system": False,
     "makes_namespaces": False,
     "signals_host": False,
+    "user": 0,
 }
 """What is seen from within a room that holds."""
 
@@ -34,7 +38,33 @@ def no_bwrap(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def test_this_machine_has_rooms() -> None:
-    assert probe.findings() == (Finding(Level.SANDBOXED, is_available=True),)
+    (found,) = probe.findings()
+    assert (found.level, found.is_available) == (Level.SANDBOXED, True)
+    assert found.has_users == (os.geteuid() == 0)
+    assert bool(found.reason) != found.has_users, "why workers share a user"
+
+
+ROOT_OF_A_CONTAINER = """
+import json
+from nondum.host.confinement import probe
+from nondum.host.inside import kernel
+kernel.unshare(kernel.CLONE_NEWUSER)
+open("/proc/self/setgroups", "w").write("deny")
+open("/proc/self/uid_map", "w").write("0 0 1")
+open("/proc/self/gid_map", "w").write("0 0 1")
+print(json.dumps([finding.to_dict() for finding in probe.findings()]))
+"""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root could have users for workers")
+def test_root_that_has_no_more_users_has_rooms_without() -> None:
+    """As in a container whose user namespace is small."""
+    told = subprocess.run(
+        [sys.executable, "-c", ROOT_OF_A_CONTAINER], capture_output=True, text=True, check=True
+    )
+    (found,) = map(Finding.from_dict, json.loads(told.stdout))
+    assert (found.is_available, found.has_users) == (True, False)
+    assert "Operation not permitted" in found.reason
 
 
 def test_without_bubblewrap_the_kernel_has_to_do(no_bwrap: None) -> None:
@@ -64,6 +94,7 @@ def test_bubblewrap_that_fails_is_told_in_its_words(
         ({"no_new_privileges": False}, "may gain privileges"),
         ({"filters": False}, "has all system calls"),
         ({"sees_state": True}, "reads the host's files"),
+        ({"sees_library": False}, "lacks its own library"),
         ({"writes_system": True}, "writes to the system"),
         ({"makes_namespaces": True}, "makes namespaces"),
         ({"processes": 80}, "sees other processes"),
@@ -80,7 +111,7 @@ def test_room_with_a_hole_is_none(hole: dict[str, object], said: str) -> None:
 
 
 def test_what_is_not_told_counts_as_a_hole() -> None:
-    for key in set(HELD) - {"signals_host"}:
+    for key in set(HELD) - {"signals_host", "user"}:
         told = {name: value for name, value in HELD.items() if name != key}
         assert not sight.judged(Level.SANDBOXED, told).is_available, key
 
