@@ -13,6 +13,7 @@ import pytest
 
 from nondum.host.confinement import choice, landlock, level, probe, sight
 from nondum.host.confinement.level import Finding, Standing
+from nondum.host.confinement.users import FIRST_USER
 from nondum.sdk.errors import ConfigRefused
 from nondum.wheelhouse.confinement import Level
 
@@ -110,6 +111,17 @@ def test_room_with_a_hole_is_none(hole: dict[str, object], said: str) -> None:
     assert finding.fix
 
 
+def test_room_whose_workers_share_a_user_says_why() -> None:
+    room = sight.judged(Level.SANDBOXED, HELD)
+    assert not room.has_users
+    assert "only root" in sight.sharing(room, "only root can give each its own").reason
+    assert sight.sharing(sight.MISSING, "of anything") == sight.MISSING
+    own = sight.judged(Level.SANDBOXED, {**HELD, "user": FIRST_USER})
+    assert own.has_users
+    assert Standing(Level.SANDBOXED, (own,)).has_users
+    assert not Standing(Level.RESTRICTED, (own,)).has_users
+
+
 def test_what_is_not_told_counts_as_a_hole() -> None:
     for key in set(HELD) - {"signals_host", "user"}:
         told = {name: value for name, value in HELD.items() if name != key}
@@ -192,5 +204,6 @@ def test_standing_tells_only_what_is_above_it() -> None:
     assert Standing(Level.RESTRICTED, findings).to_dict() == {
         "level": "restricted",
         "mechanism": "Landlock and filtered system calls",
+        "users": False,
         "missing": [findings[0].to_dict()],
     }

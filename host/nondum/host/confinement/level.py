@@ -86,6 +86,7 @@ class Standing:
         return {
             "level": str(self.level),
             "mechanism": self.mechanism,
+            "users": self.has_users,
             "missing": [f.to_dict() for f in self.findings if f.level > self.level],
         }
 
