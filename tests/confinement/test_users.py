@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pty
+import resource
 import shutil
 import stat
 import subprocess
@@ -21,6 +22,7 @@ from nondum.host.lifecycle.folders import remove
 from nondum.host.workers import confinements, scratch
 from nondum.host.workers.confinements import Boxed
 from nondum.host.workers.lending import Lending
+from nondum.host.workers.spare import Spare
 from nondum.planning.running import RunState
 from nondum.sdk.description import Behaviour, Unit
 
@@ -311,6 +313,32 @@ async def test_hosts_own_mask_does_not_shut_the_worker_out(tested: WorkersUnderT
         os.umask(before)
     await tested.until(WorkerLogged, lambda event: event.message == "here")
     assert is_workers(owner(spec.scratch))
+
+
+def test_no_descriptor_is_left_of_a_room_that_cannot_be_made() -> None:
+    boxed = Boxed(BWRAP, has_users=True)
+    before = open_descriptors()
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    free = [number for number in range(64) if number not in before]
+    failures = 0
+    try:
+        for more in range(16):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (free[more], limits[1]))
+            try:
+                Spare(boxed, boxed.ground(None)).close()
+            except OSError:
+                failures += 1
+            resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+            assert open_descriptors() == before, more
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+    assert failures >= 6, "two for orders, four for the namespace"
+
+
+def open_descriptors() -> set[int]:
+    with os.scandir("/proc/self/fd") as entries:
+        found = {int(entry.name) for entry in entries}
+    return {number for number in found if Path(f"/proc/self/fd/{number}").exists()}
 
 
 async def test_worker_inherits_nothing_of_how_it_got_its_user(tested: WorkersUnderTest) -> None:

@@ -1,9 +1,9 @@
 """Users of the machine that are workers' alone: whose is which, and how a room comes to have them.
 
-The kernel counts much by user, whatever namespace a process is in: descriptors under way over unix
-sockets, memory of pipes, processes, instances of inotify. A room whose user namespace maps these
-users to themselves can have its worker become one of them. Writing such a map takes a process that
-may be any user outside (user_namespaces(7)): a daemon that is root.
+The kernel counts some things by user, whatever namespace a process is in: descriptors under way
+over unix sockets, memory of pipes, watches of epoll. A room whose user namespace maps these users
+to themselves can have its worker become one of them. Writing such a map takes a process that may be
+any user outside (user_namespaces(7)): a daemon that is root.
 """
 
 from __future__ import annotations
@@ -79,7 +79,12 @@ class NewNamespace:
     def __init__(self) -> None:
         """Raises `OSError`."""
         self._tells, told = os.pipe()
-        waits, self._goes = os.pipe()
+        try:
+            waits, self._goes = os.pipe()
+        except OSError:
+            os.close(self._tells)
+            os.close(told)
+            raise
         self.descriptors = (told, waits)
         """What bubblewrap is to inherit."""
 
@@ -115,10 +120,10 @@ class NewNamespace:
 
     def _process(self) -> Path | None:
         """The one in the namespace, as bubblewrap tells it; None if that ended before."""
-        told = b""
+        told, poll = b"", select.poll()
+        poll.register(self._tells, select.POLLIN)
         while not told.endswith(b"}\n"):  # its other end stays open as long as that process waits
-            ready, _, _ = select.select([self._tells], [], [], MADE_S)
-            if not ready:
+            if not poll.poll(MADE_S * 1000):
                 raise TimeoutError(f"bubblewrap has made no user namespace in {MADE_S:g} s")
             more = os.read(self._tells, _TOLD_BYTES)
             if not more:

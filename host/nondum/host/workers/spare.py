@@ -50,23 +50,20 @@ class Spare:
         self.said = ""
         """The last line that it said before it ended without having become a worker."""
         self._has_keeper = confinement.has_keeper
-        self._namespace = NewNamespace() if confinement.has_users else None
+        self._namespace: NewNamespace | None = None
         self._orders, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         if self._has_keeper:  # whose a message is comes with it
             self._orders.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
-        inherited = (theirs.fileno(), *(self._namespace.descriptors if self._namespace else ()))
         try:
             with theirs:
-                command = confinement.command(ground, theirs.fileno(), self._namespace)
-                self.popen = _started(command, inherited, owner, confinement.without)
+                if confinement.has_users:
+                    self._namespace = NewNamespace()
+                self.popen = self._begin(confinement, theirs.fileno(), owner)
         except OSError:
             self._orders.close()
             if self._namespace is not None:
                 self._namespace.close()
             raise
-        finally:
-            if self._namespace is not None:
-                self._namespace.started()
 
     @classmethod
     async def caged(
@@ -159,6 +156,17 @@ class Spare:
         for pipe in (self.popen.stdout, self.popen.stderr):
             if pipe is not None:
                 pipe.close()
+
+    def _begin(self, confinement: Confinement, orders: int, owner: str) -> subprocess.Popen[bytes]:
+        namespace = self._namespace
+        command = confinement.command(self.ground, orders, namespace)
+        if namespace is None:
+            return _started(command, (orders,), owner, confinement.without)
+        try:
+            inherited = (orders, *namespace.descriptors)
+            return _started(command, inherited, owner, confinement.without)
+        finally:
+            namespace.started()
 
 
 def _last_line(pipe: IO[bytes] | None) -> str:
