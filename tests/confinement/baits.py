@@ -23,6 +23,7 @@ from tests.kit.workers import WorkersUnderTest
 
 from nondum.host.cgroups import Cages
 from nondum.host.events import WorkerLogged
+from nondum.host.inside import room
 from nondum.host.workers import Limits, WorkerLauncher
 from nondum.host.workers.confinements import Confinement
 from nondum.sdk.errors import WorkerFailed
@@ -33,7 +34,7 @@ TOKEN = "nondum-bait"  # a word to look for
 IPC_CREAT, IPC_EXCL = 0o1000, 0o2000  # sys/ipc.h
 LEFT_WHEN_RESTRICTED = {
     *("be root", "know the host name", "see a process of the host"),
-    "open a device node that lies there",
+    *("open a device node that lies there", "take all instances of inotify"),
 }
 """What is not hidden from restricted workers: names of processes can be seen, but nothing of what
 they hold. It is root where the host is, and the interpreter is root's alone. It can make no device
@@ -82,6 +83,8 @@ def laid(folder: Path, cgroup: str = "") -> Iterator[dict[str, Any]]:
         stack.callback(os.close, terminal)
         shared_key = stack.enter_context(_shared_memory())
         stack.enter_context(_environment())
+        mode = stat.S_IMODE(Path("/dev/full").stat().st_mode)
+        stack.callback(os.chmod, "/dev/full", mode)
         tmp = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="nondum-bait-")))
         yield {
             "secret": str(secret),
@@ -101,6 +104,8 @@ def laid(folder: Path, cgroup: str = "") -> Iterator[dict[str, Any]]:
             "host_name": socket.gethostname(),
             "shared_key": shared_key,
             "tmp": str(tmp),
+            "mode": mode ^ stat.S_IXOTH,  # which means nothing of a device
+            "few_inotify_instances": room.INOTIFY_INSTANCES,
             "cgroup": cgroup,
         }
 

@@ -186,6 +186,13 @@ def change_the_mode_of_its_own_code(bait: Bait) -> Any:
 
 
 @attempt
+def change_the_mode_of_a_device_of_the_host(bait: Bait) -> Any:
+    """Of one that is there at every level."""
+    os.chmod("/dev/full", bait["mode"])
+    return {"judge": ["has mode", "/dev/full", bait["mode"]]}
+
+
+@attempt
 def change_the_time_of_a_file_of_the_host(bait: Bait) -> Any:
     os.utime(bait["victim"], (1, 1))
     return {"judge": ["was read", bait["victim"], 1]}
@@ -537,6 +544,15 @@ def open_the_memory_device(bait: Bait) -> Any:
 def open_a_device_of_another(bait: Bait) -> Any:
     os.close(os.open(bait["terminal"], os.O_RDWR | os.O_NOCTTY))
     return bait["terminal"]
+
+
+@attempt
+def take_all_instances_of_inotify(bait: Bait) -> Any:
+    """The kernel counts them by user, and lets one have 128."""
+    taken = 0
+    while LIBC.inotify_init() >= 0:
+        taken += 1
+    return taken if taken > bait["few_inotify_instances"] else None
 
 
 @attempt

@@ -25,8 +25,10 @@ def bait(tmp_path: Path) -> Iterator[dict[str, Any]]:
         yield bait
 
 
-async def test_nothing_leaves_a_room(tmp_path: Path, bait: dict[str, Any]) -> None:
-    assert await reached(tmp_path, bait, Boxed(shutil.which("bwrap") or "bwrap")) == set()
+@pytest.mark.parametrize("has_users", [False, *([True] if os.geteuid() == 0 else [])])
+async def test_nothing_leaves_a_room(tmp_path: Path, bait: dict[str, Any], has_users: bool) -> None:
+    boxed = Boxed(shutil.which("bwrap") or "bwrap", has_users=has_users)
+    assert await reached(tmp_path, bait, boxed) == set()
 
 
 async def test_without_memory_cgroups_shared_memory_is_not_limited(

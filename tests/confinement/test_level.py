@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +13,7 @@ import pytest
 
 from nondum.host.confinement import choice, landlock, level, probe, sight
 from nondum.host.confinement.level import Finding, Standing
+from nondum.host.confinement.users import FIRST_USER
 from nondum.sdk.errors import ConfigRefused
 from nondum.wheelhouse.confinement import Level
 
@@ -21,9 +24,11 @@ HELD = {
     "processes": 2,
     "interfaces": ["lo"],
     "sees_state": False,
+    "sees_library": True,
     "writes_system": False,
     "makes_namespaces": False,
     "signals_host": False,
+    "user": 0,
 }
 """What is seen from within a room that holds."""
 
@@ -34,7 +39,33 @@ def no_bwrap(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def test_this_machine_has_rooms() -> None:
-    assert probe.findings() == (Finding(Level.SANDBOXED, is_available=True),)
+    (found,) = probe.findings()
+    assert (found.level, found.is_available) == (Level.SANDBOXED, True)
+    assert found.has_users == (os.geteuid() == 0)
+    assert bool(found.reason) != found.has_users, "why workers share a user"
+
+
+ROOT_OF_A_CONTAINER = """
+import json
+from nondum.host.confinement import probe
+from nondum.host.inside import kernel
+kernel.unshare(kernel.CLONE_NEWUSER)
+open("/proc/self/setgroups", "w").write("deny")
+open("/proc/self/uid_map", "w").write("0 0 1")
+open("/proc/self/gid_map", "w").write("0 0 1")
+print(json.dumps([finding.to_dict() for finding in probe.findings()]))
+"""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root could have users for workers")
+def test_root_that_has_no_more_users_has_rooms_without() -> None:
+    """As in a container whose user namespace is small."""
+    told = subprocess.run(
+        [sys.executable, "-c", ROOT_OF_A_CONTAINER], capture_output=True, text=True, check=True
+    )
+    (found,) = map(Finding.from_dict, json.loads(told.stdout))
+    assert (found.is_available, found.has_users) == (True, False)
+    assert "Operation not permitted" in found.reason
 
 
 def test_without_bubblewrap_the_kernel_has_to_do(no_bwrap: None) -> None:
@@ -64,6 +95,7 @@ def test_bubblewrap_that_fails_is_told_in_its_words(
         ({"no_new_privileges": False}, "may gain privileges"),
         ({"filters": False}, "has all system calls"),
         ({"sees_state": True}, "reads the host's files"),
+        ({"sees_library": False}, "lacks its own library"),
         ({"writes_system": True}, "writes to the system"),
         ({"makes_namespaces": True}, "makes namespaces"),
         ({"processes": 80}, "sees other processes"),
@@ -79,8 +111,19 @@ def test_room_with_a_hole_is_none(hole: dict[str, object], said: str) -> None:
     assert finding.fix
 
 
+def test_room_whose_workers_share_a_user_says_why() -> None:
+    room = sight.judged(Level.SANDBOXED, HELD)
+    assert not room.has_users
+    assert "only root" in sight.sharing(room, "only root can give each its own").reason
+    assert sight.sharing(sight.MISSING, "of anything") == sight.MISSING
+    own = sight.judged(Level.SANDBOXED, {**HELD, "user": FIRST_USER})
+    assert own.has_users
+    assert Standing(Level.SANDBOXED, (own,)).has_users
+    assert not Standing(Level.RESTRICTED, (own,)).has_users
+
+
 def test_what_is_not_told_counts_as_a_hole() -> None:
-    for key in set(HELD) - {"signals_host"}:
+    for key in set(HELD) - {"signals_host", "user"}:
         told = {name: value for name, value in HELD.items() if name != key}
         assert not sight.judged(Level.SANDBOXED, told).is_available, key
 
@@ -161,5 +204,6 @@ def test_standing_tells_only_what_is_above_it() -> None:
     assert Standing(Level.RESTRICTED, findings).to_dict() == {
         "level": "restricted",
         "mechanism": "Landlock and filtered system calls",
+        "users": False,
         "missing": [findings[0].to_dict()],
     }

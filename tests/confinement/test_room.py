@@ -21,18 +21,11 @@ from tests.kit.processes import until_gone
 from tests.kit.workers import HOST, LIBRARIES, SDK, WorkersUnderTest
 
 from nondum.host.confinement import bubblewrap
+from nondum.host.confinement.users import is_workers
 from nondum.host.events import WorkerLogged
 from nondum.host.lifecycle.folders import Folders, let_pass, make_private
 from nondum.host.workers import confinements
-from nondum.host.workers.confinements import (
-    FIRST_USER,
-    USERS,
-    Boxed,
-    Confinement,
-    Held,
-    Unconfined,
-    user_for,
-)
+from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined, user_for
 from nondum.planning.running import RunState
 from nondum.sdk.description import Behaviour, Unit
 
@@ -54,9 +47,11 @@ async def do(ctx, u):
 """
 
 
-@pytest.fixture
-async def tested(tmp_path: Path) -> AsyncIterator[WorkersUnderTest]:
-    tested = WorkersUnderTest(tmp_path, confinement=Boxed(shutil.which("bwrap") or "bwrap"))
+@pytest.fixture(params=[False, *([True] if os.geteuid() == 0 else [])], ids=["shared", "own"])
+async def tested(tmp_path: Path, request: pytest.FixtureRequest) -> AsyncIterator[WorkersUnderTest]:
+    """Workers that share the host's user, and workers that have one each."""
+    boxed = Boxed(shutil.which("bwrap") or "bwrap", has_users=request.param)
+    tested = WorkersUnderTest(tmp_path, confinement=boxed)
     yield tested
     await tested.workers.close(grace_s=1.0)
 
@@ -101,6 +96,26 @@ async def test_device_appears_and_vanishes_while_it_runs(
     assert await asyncio.to_thread(os.read, far, 5) == b"hello"
     await tested.workers.detach("guest", "line")
     assert await does(tested) == ""
+
+
+async def test_device_can_be_used_and_its_node_stays_as_it_is(
+    tested: WorkersUnderTest, line: tuple[int, str]
+) -> None:
+    """Its owner, who may be the worker's user, could close it to everybody else."""
+    before = mode(line[1])
+    await guest(
+        tested,
+        "os.close(os.open(device.node, os.O_RDWR | os.O_NOCTTY))\n"
+        "try:\n"
+        "    os.chmod(device.node, 0o606)\n"
+        "except OSError as error:\n"
+        "    assert error.errno in (1, 30), error\n"
+        "else:\n"
+        "    assert False, 'it could'",
+    )
+    await tested.workers.attach("guest", "line", line[1], {})
+    assert await does(tested) == ""
+    assert mode(line[1]) == before
 
 
 async def test_only_devices_are_handed_in(tested: WorkersUnderTest, tmp_path: Path) -> None:
@@ -322,6 +337,10 @@ def open_folder() -> Iterator[Path]:
         yield folder
 
 
+def mode(node: str) -> int:
+    return Path(node).stat().st_mode
+
+
 def status(pid: int) -> dict[str, str]:
     lines = Path(f"/proc/{pid}/status").read_text(encoding="ascii").splitlines()
     return dict(line.split(":\t", 1) for line in lines)
@@ -350,5 +369,5 @@ async def test_worker_of_root_gets_a_user_of_its_own(monkeypatch: pytest.MonkeyP
         said = await tested.until(WorkerLogged, lambda event: event.message.startswith("users"))
         user = user_for(spec)
         await tested.workers.close()
-    assert user in range(FIRST_USER, FIRST_USER + USERS)
+    assert user is not None and is_workers(user)
     assert said.message == f"users {user} [] {user}"

@@ -36,6 +36,8 @@ IN_A_ROOM = {
     "size of tmp": ("fill tmp", ()),
     "outside": ("see what the keeper sees", ()),
     "system": ("write among its devices", ()),
+    "nodes": ("change the mode of a device of the host", ()),
+    "inotify": ("take all instances of inotify", ()),
     "code": ("change its own code", ()),
     "settings": ("write a setting of the kernel", ()),
     "user": ("be root", ()),

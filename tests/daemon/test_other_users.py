@@ -6,8 +6,11 @@ import stat
 from pathlib import Path
 
 import pytest
-from tests.daemon.plugins import talker
+from tests.daemon.plugins import TALKER, talker
+from tests.kit.payloads import Part
 from tests.kit.running_host import RunningHost
+
+from nondum.host.confinement.users import is_workers
 
 pytestmark = pytest.mark.daemon
 
@@ -31,6 +34,39 @@ def test_state_folder_of_an_older_version_is_closed_at_the_next_start(
         path.chmod(0o755 if path.is_dir() else 0o644)
     own_host.start()
     assert [p for p in opened if is_open(p)] == []
+
+
+PLAYS = """
+import os, pathlib
+
+def play():
+    deep = pathlib.Path("games")
+    for _ in range(30):
+        deep.mkdir()
+        (deep / "file").write_text("x")
+        deep /= "d" * 50
+    for folder, folders, files in os.walk("games", topdown=False):
+        for name in (*folders, *files):
+            os.chmod(f"{folder}/{name}", 0)
+    os.chmod("games", 0)
+    os.chmod(".", 0)
+
+if "NONDUM_WORKER" in os.environ:  # and not where the payload is built
+    play()
+"""
+
+
+def test_nothing_is_left_of_a_scratch_folder_whatever_the_worker_did_to_it(
+    own_host: RunningHost,
+) -> None:
+    own_host.bring("talker", Part("talker", TALKER + PLAYS))
+    own_host.until_component("talker", "ready")
+    (scratch,) = own_host.state.glob("scratch/*/talker")
+    if own_host.ask("status")["confinement"]["users"]:
+        assert is_workers(scratch.stat().st_uid)
+    assert (scratch / "games").exists()
+    own_host.clear()
+    assert not list(own_host.state.glob("scratch/*"))
 
 
 def is_open(path: Path) -> bool:

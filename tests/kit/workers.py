@@ -16,7 +16,7 @@ import pluggy
 from tests.kit.until import PATIENCE_S, arrived
 
 from nondum.host.confinement import choice
-from nondum.host.confinement.level import parse_wanted
+from nondum.host.confinement.level import Standing, parse_wanted
 from nondum.host.events import BehaviourEnded, Event, WorkerExited, WorkerReady
 from nondum.host.workers import (
     Call,
@@ -45,9 +45,14 @@ _E = TypeVar("_E", bound=Event)
 
 
 @functools.cache
+def standing() -> Standing:
+    """How workers are tested."""
+    return choice.standing(parse_wanted(LEVEL), Level.NONE)
+
+
 def level() -> Level:
     """The level at which workers are tested."""
-    return choice.standing(parse_wanted(LEVEL), Level.NONE).level
+    return standing().level
 
 
 @dataclass
@@ -63,7 +68,7 @@ class WorkersUnderTest:
 
     def __post_init__(self) -> None:
         if self.confinement is None:
-            self.confinement = choice.confinement(level(), (self.folder, SDK, LIBRARIES))
+            self.confinement = choice.confinement(standing(), (self.folder, SDK, LIBRARIES))
         launcher = WorkerLauncher(self.confinement)
         self.workers = Workers(HOST, self._on_event, launcher=launcher, timing=self.timing)
 

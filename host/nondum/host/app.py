@@ -141,7 +141,7 @@ async def _run(
         config.workers.minimum_confinement,
         folders.confinement,
     )
-    confinement = choice.confinement(standing.level, folders.of_workers)
+    confinement = choice.confinement(standing, folders.of_workers)
     if changes_user(confinement):
         await in_thread(let_pass, folders)
     launcher = WorkerLauncher(confinement, cages, folders.scratches)

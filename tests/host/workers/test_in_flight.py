@@ -11,9 +11,19 @@ from pathlib import Path
 
 import pytest
 from tests.host.workers.streaming import CAMERA, STREAM, WATCH, WATCHER, sees
-from tests.kit.workers import HOST, TIMING, WorkersUnderTest, camera, level
+from tests.kit.workers import (
+    HOST,
+    LIBRARIES,
+    SDK,
+    TIMING,
+    WorkersUnderTest,
+    camera,
+    level,
+    standing,
+)
 
 from nondum.host.cgroups import Cages
+from nondum.host.confinement import choice
 from nondum.host.events import WorkerExited, WorkerLogged, WorkerReady
 from nondum.host.workers import Limits, WorkerSpec
 from nondum.host.workers.in_flight import culprit, sent
@@ -84,7 +94,9 @@ DO = Behaviour("do", "(do ?u - sensor)")
 
 @pytest.fixture
 async def tested(tmp_path: Path) -> AsyncIterator[WorkersUnderTest]:
-    tested = WorkersUnderTest(tmp_path)
+    """Workers that share a user, also where each could have its own."""
+    shared = choice.confinement(replace(standing(), findings=()), (tmp_path, SDK, LIBRARIES))
+    tested = WorkersUnderTest(tmp_path, confinement=shared)
     cages = Cages.open(tmp_path)
     tested.workers.launcher = WorkerLauncher(tested.confinement, cages)
     yield tested
@@ -98,10 +110,8 @@ def ways() -> list[str]:
     return ["openly", "by_a_child", *(["in_sockets_that_are_under_way"] if hidden else [])]
 
 
-@pytest.mark.parametrize("way", ways())
-async def test_streams_of_others_wait_until_the_worker_is_found_and_ended(
-    tested: WorkersUnderTest, way: str
-) -> None:
+async def fills_and_streams(tested: WorkersUnderTest, way: str) -> None:
+    """One worker sends descriptors until it may not; then another one begins to send frames."""
     units = (Unit("it", "sensor"),)
     source = HOSTILE.replace("{way}", way)
     await tested.start("hostile", source, behaviours=(DO,), units=units, limits=MORE_FILES)
@@ -114,6 +124,13 @@ async def test_streams_of_others_wait_until_the_worker_is_found_and_ended(
     frames = f"{HOST}__cam__frames"
     tested.behave("cam", "stream", u=f"{HOST}__cam__camera", o=frames)
     tested.behave("watcher", "watch", u=f"{HOST}__watcher__eye", i=frames)
+
+
+@pytest.mark.parametrize("way", ways())
+async def test_streams_of_others_wait_until_the_worker_is_found_and_ended(
+    tested: WorkersUnderTest, way: str
+) -> None:
+    await fills_and_streams(tested, way)
     exited = await tested.until(WorkerExited)
     assert exited.component == "hostile"
     assert exited.reason.startswith("WORKER_IN_FLIGHT")
@@ -121,6 +138,19 @@ async def test_streams_of_others_wait_until_the_worker_is_found_and_ended(
     assert tested.workers.search.refusals > 0
     assert {event.component for event in tested.told(WorkerExited)} == {"hostile"}
     assert len([e for e in tested.told(WorkerReady) if e.component == "cam"]) == 1
+
+
+@pytest.mark.skipif(not standing().has_users, reason="workers share a user here")
+@pytest.mark.parametrize("way", ways())
+async def test_nobody_waits_where_each_worker_is_a_user_of_its_own(
+    tmp_path: Path, way: str
+) -> None:
+    tested = WorkersUnderTest(tmp_path)
+    await fills_and_streams(tested, way)
+    await sees(tested, "watcher")
+    assert tested.workers.search.refusals == 0
+    assert not tested.told(WorkerExited)
+    await tested.workers.close(grace_s=1.0)
 
 
 def test_what_waits_with_a_reader_counts_for_its_sender() -> None:

@@ -108,9 +108,10 @@ async def test_a_spare_that_died_is_not_missed(tested: WorkersUnderTest) -> None
 
 async def test_a_worker_that_cannot_be_watched_is_ended(tested: WorkersUnderTest) -> None:
     """The last descriptor that there is would have told of its end (pidfd_open(2))."""
+    spec = await tested.start("cam", QUIET)  # whose user is known by now
+    await tested.workers.stop("cam")
     await tested.workers.keep_spare()
     spare = spare_of(tested)
-    spec = tested.spec("cam", QUIET)
     launcher = tested.workers.launcher
     ours, theirs = socket.socketpair()
     with ours, theirs, no_descriptors_left(), pytest.raises(WorkerFailed) as failed:

@@ -14,6 +14,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from nondum.host.confinement.users import NewNamespace
 from nondum.host.helper.client import DEVICES
 
 OUTSIDE = "/.host"
@@ -21,6 +22,8 @@ OUTSIDE = "/.host"
 INSIDE = Path(__file__).parents[1] / "inside"
 PLACE_OF_INSIDE = Path("/run/nondum/host/nondum/host/inside")
 BOOTSTRAP = PLACE_OF_INSIDE / "bootstrap.py"
+NODES = tuple(f"/dev/{name}" for name in ("null", "zero", "full", "random", "urandom", "tty"))
+"""The host's own, which bubblewrap brings into every room."""
 TEMPORARY_BYTES = 64 * 1024 * 1024
 """Size of /tmp."""
 
@@ -78,13 +81,22 @@ def program() -> str | None:
     return shutil.which("bwrap")
 
 
-def command(bwrap: str, ground: Ground, orders: int, *, without: Collection[str] = ()) -> list[str]:
+def command(
+    bwrap: str,
+    ground: Ground,
+    orders: int,
+    namespace: NewNamespace | None = None,
+    *,
+    without: Collection[str] = (),
+) -> list[str]:
     """How an interpreter is started on a ground; `orders` is the descriptor that it hears at.
 
+    The users of `namespace` are mapped by the caller; without one there is only the caller's.
     `without` leaves walls of `NAMESPACES` out, so that each can be seen to matter.
     """
     return [
         bwrap,
+        *(namespace.flags if namespace is not None else ()),
         *("--unshare-user", "--uid", "0", "--gid", "0", "--cap-add", "ALL"),
         *_namespaces(ground.permissions, without),
         *("--proc", "/proc", "--dev", "/dev"),

@@ -24,15 +24,15 @@ def standing(wanted: Wanted, minimum: Level, kept_in: Path | None = None) -> Sta
     return level.chosen(found, wanted)
 
 
-def confinement(at: Level, places: tuple[Path, ...]) -> Confinement:
+def confinement(found: Standing, places: tuple[Path, ...]) -> Confinement:
     """What holds workers at a level that was found; their code and scratch are in `places`."""
-    match at:
+    match found.level:
         case Level.SANDBOXED:
             bwrap = bubblewrap.program()
             assert bwrap is not None, "it has just been tried"
             for place in places:  # what is not there cannot be shown to a spare
                 place.mkdir(parents=True, exist_ok=True)
-            return Boxed(bwrap, places)
+            return Boxed(bwrap, places, has_users=found.has_users)
         case Level.RESTRICTED:
             return Held()
         case Level.NONE:

@@ -19,6 +19,7 @@ MECHANISMS: Mapping[Level, str] = {
     Level.SANDBOXED: "bubblewrap",
 }
 """What a level is made with, as status shows it."""
+A_USER_EACH = ", a user for each worker"
 
 
 def parse_wanted(value: object) -> Wanted:
@@ -36,23 +37,30 @@ class Finding:
     """Why it is not, in words; of an available one, what it lacks."""
     fix: str = ""
     """What a person can do about that."""
+    has_users: bool = False
+    """Whether each worker is a user of its own to the kernel."""
+
+    @property
+    def mechanism(self) -> str:
+        """What the level is made with here."""
+        return MECHANISMS[self.level] + (A_USER_EACH if self.has_users else "")
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""
         return {
             "level": str(self.level),
-            "mechanism": MECHANISMS[self.level],
+            "mechanism": self.mechanism,
             "available": self.is_available,
             "reason": self.reason,
             "fix": self.fix,
+            "users": self.has_users,
         }
 
     @classmethod
     def from_dict(cls, row: Mapping[str, Any]) -> Finding:
         """Read what `to_dict` made; raises `KeyError` and `ValueError`."""
-        return cls(
-            confinement.parse(row["level"]), bool(row["available"]), row["reason"], row["fix"]
-        )
+        level, is_available = confinement.parse(row["level"]), bool(row["available"])
+        return cls(level, is_available, row["reason"], row["fix"], bool(row.get("users")))
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,15 +72,21 @@ class Standing:
     """Highest level first; of every level that was tried."""
 
     @property
+    def has_users(self) -> bool:
+        """Whether each worker is a user of its own to the kernel."""
+        return any(f.has_users for f in self.findings if f.level is self.level)
+
+    @property
     def mechanism(self) -> str:
         """What the level is made with."""
-        return MECHANISMS[self.level]
+        return MECHANISMS[self.level] + (A_USER_EACH if self.has_users else "")
 
     def to_dict(self) -> dict[str, Any]:
         """As status has it."""
         return {
             "level": str(self.level),
             "mechanism": self.mechanism,
+            "users": self.has_users,
             "missing": [f.to_dict() for f in self.findings if f.level > self.level],
         }
 

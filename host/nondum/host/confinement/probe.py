@@ -18,6 +18,7 @@ from typing import Any
 
 from nondum.host.confinement import bubblewrap, landlock, refusals, sight
 from nondum.host.confinement.level import Finding
+from nondum.host.workers import scratch
 from nondum.host.workers.confinements import Boxed, Confinement, Held
 from nondum.host.workers.launcher import parameters
 from nondum.host.workers.spare import Spare
@@ -62,11 +63,21 @@ def _each() -> Iterator[Finding]:
     if not refusals.is_known(refusals.machine()):
         log.warning("system calls cannot be filtered on %s", refusals.machine())
     bwrap = bubblewrap.program()
-    yield sight.MISSING if bwrap is None else _tried(Boxed(bwrap))
+    yield sight.MISSING if bwrap is None else _rooms(bwrap)
     if not landlock.version():
         yield sight.failed(Level.RESTRICTED, "the kernel has no Landlock")
     else:
         yield _tried(Held())
+
+
+def _rooms(bwrap: str) -> Finding:
+    """With a user for each worker, if that can be had."""
+    if os.geteuid() != 0:
+        return sight.sharing(_tried(Boxed(bwrap)), "only root can give each its own")
+    own = _tried(Boxed(bwrap, has_users=True))
+    if own.has_users:
+        return own
+    return sight.sharing(_tried(Boxed(bwrap)), f"of their own they cannot be had: {own.reason}")
 
 
 def _tried(confinement: Confinement) -> Finding:
@@ -80,13 +91,16 @@ def _tried(confinement: Confinement) -> Finding:
 def _look(confinement: Confinement, folder: Path) -> dict[str, Any]:
     """What a process sees there. Raises `OSError` and `ValueError`."""
     spec = _spec(folder)
-    spec.scratch.mkdir()
+    spec.scratch.mkdir(parents=True)
     ground = confinement.ground(spec)
     spare = Spare(confinement, ground)
     try:
+        spare.settle()
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with ours, theirs:
             with confinement.entry(spec, ground) as entry:
+                if entry.user is not None:
+                    scratch.give(spec.scratch, entry.user)
                 spare.become(parameters(spec, entry, looks=True), theirs, entry.ruleset)
             theirs.close()
             ours.settimeout(ANSWER_S)
@@ -108,7 +122,7 @@ def _spec(folder: Path) -> WorkerSpec:
         entry_point="",
         site_packages=(),
         python=base_interpreter(),
-        scratch=folder / "scratch",
+        scratch=folder / "payload" / "probe",
         index=PluginDescription("probe", "0"),
     )
 

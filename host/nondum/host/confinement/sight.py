@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from nondum.host.confinement.level import Finding
+from nondum.host.confinement.users import is_workers
 from nondum.wheelhouse.confinement import Level
 
 MOST_PROCESSES = 3
@@ -35,7 +37,15 @@ def judged(level: Level, seen: Mapping[str, Any]) -> Finding:
         reason = f"in it a process still {', '.join(holes)}"
         return Finding(level, is_available=False, reason=reason, fix=_FIXES[level])
     lacks = "processes of the same user can be signalled" if seen["signals_host"] else ""
-    return Finding(level, is_available=True, reason=lacks)
+    has_users = level is Level.SANDBOXED and is_workers(seen["user"])
+    return Finding(level, is_available=True, reason=lacks, has_users=has_users)
+
+
+def sharing(finding: Finding, why: str) -> Finding:
+    """The same, if it can be had, of workers that share a user, with why they do."""
+    if not finding.is_available:
+        return finding
+    return replace(finding, reason=f"workers share a user, and its limits, since {why}")
 
 
 def failed(level: Level, why: str) -> Finding:
@@ -47,6 +57,7 @@ def _holes(level: Level, seen: Mapping[str, Any]) -> Iterator[tuple[str, bool]]:
     yield "holds capabilities", bool(seen.get("capabilities", True))
     yield "may gain privileges", not seen.get("no_new_privileges")
     yield "has all system calls", not seen.get("filters")
+    yield "lacks its own library", not seen.get("sees_library")
     yield "reads the host's files", bool(seen.get("sees_state", True))
     yield "writes to the system", bool(seen.get("writes_system", True))
     yield "makes namespaces", bool(seen.get("makes_namespaces", True))

@@ -14,7 +14,7 @@ import select
 import signal
 import socket
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from nondum.host.inside import kernel, room
@@ -30,10 +30,13 @@ def keep(orders: socket.socket, given: Mapping[str, Any], links: Sequence[int]) 
     """Furnish the room and fork; returns in the worker only. Raises `OSError`."""
     # The host's end is seen at the socket from now on: the plugin may have two seconds.
     kernel.prctl(kernel.PR_SET_PDEATHSIG, 0)
+    _close_all_but({0, 1, 2, orders.fileno(), *links})
+    mask = os.umask(0o022)  # what is made here is for the worker, who may be another user
     room.furnish(given)
     _say_who(orders, "keeper")
     worker = os.fork()
     if worker == 0:
+        os.umask(mask)
         os.setsid()
         _say_who(orders, "worker")
         orders.close()
@@ -42,6 +45,14 @@ def keep(orders: socket.socket, given: Mapping[str, Any], links: Sequence[int]) 
     for link in links:
         os.close(link)
     os._exit(_Keeper(orders, given, worker).run())
+
+
+def _close_all_but(needed: Collection[int]) -> None:
+    """Bubblewrap leaves open what it has told of itself by (`--info-fd`)."""
+    for name in os.listdir("/proc/self/fd"):  # noqa: PTH208
+        if int(name) not in needed:
+            with contextlib.suppress(OSError):  # that of the list itself
+                os.close(int(name))
 
 
 def _say_who(orders: socket.socket, who: str) -> None:

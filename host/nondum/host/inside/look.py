@@ -31,10 +31,18 @@ def around() -> dict[str, object]:
         "processes": sum(entry.isdigit() for entry in os.listdir("/proc")),  # noqa: PTH208
         "interfaces": sorted(name for _, name in socket.if_nameindex()) if _has_network() else [],
         "sees_state": _can_list("/var/lib"),
+        "sees_library": _can_list(os.path.dirname(os.__file__)),  # noqa: PTH120
         "writes_system": _can_write("/") or _can_write("/usr"),
         "makes_namespaces": kernel.LIBC.unshare(kernel.CLONE_NEWUSER) == 0,
         "signals_host": _can_signal(),
+        "user": _user_outside(),
     }
+
+
+def _user_outside() -> int:
+    """Which user it is one namespace further out (user_namespaces(7)), where it is one only."""
+    _, outside, _ = Path("/proc/self/uid_map").read_text(encoding="ascii").split()[:3]
+    return int(outside)
 
 
 def _has_network() -> bool:

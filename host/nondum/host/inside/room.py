@@ -11,7 +11,7 @@ from __future__ import annotations
 import contextlib
 import os
 import stat
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,10 @@ from nondum.host.inside import kernel
 
 DEVICES = "/dev/nondum"
 NOBODY = 65534
+INOTIFY_INSTANCES = 16
+"""Of a worker: those of all rooms count for the user of the host, who has 128 of them."""
+_STAGED = "/run/nondum/staged"
+"""Where a device is mounted before it appears: later changes of flags are not propagated."""
 _BOUND = kernel.MS_BIND | kernel.MS_REMOUNT
 
 
@@ -33,22 +37,27 @@ def furnish(room: Mapping[str, Any]) -> None:
     for folder in room["code"]:
         bind(outside + folder, folder, kernel.MS_RDONLY if room["protects_code"] else 0)
     bind(outside + room["scratch"], room["scratch"], 0)
-    _mount_memory("/dev/shm", room["shared_mb"] * 1024)  # of this namespace only
-    _mount_memory(DEVICES, 64)
+    _mount_memory("/dev/shm", room["shared_mb"] * 1024, "1777")  # of this namespace only
+    Path("/tmp").chmod(0o1777)
+    _mount_memory(DEVICES, 64, "755")
     kernel.mount(None, DEVICES, None, kernel.MS_SHARED)
     for node in room["nodes"]:
         with contextlib.suppress(FileNotFoundError):  # not every machine has it
             _bind_node(outside + node, node)
     _write_users(room["scratch"])
+    _let_pass(outside)
     if room["is_last"]:  # the worker's own, below, is the only one there will ever be
         Path("/proc/sys/user/max_user_namespaces").write_text("1")
+    with contextlib.suppress(FileNotFoundError):  # a kernel without inotify
+        Path("/proc/sys/user/max_inotify_instances").write_text(str(room["inotify_instances"]))
 
 
 def move_in(room: Mapping[str, Any]) -> None:
     """Leave the keeper's view for the worker's, and its user for one that owns nothing of it.
 
     `sealed`: what may be read only, though its user might write it; `protected`: mounts likewise.
-    Raises `OSError`.
+    `user`: one that is this worker's alone, also to the kernel, or null; `groups` that it has
+    beside. Raises `OSError`.
     """
     kernel.unshare(kernel.CLONE_NEWNS)
     kernel.mount(None, DEVICES, None, kernel.MS_SLAVE)
@@ -61,12 +70,24 @@ def move_in(room: Mapping[str, Any]) -> None:
             kernel.mount(None, folder, None, _BOUND | kernel.MS_RDONLY | _flags_of(folder))
     for folder in room["protected"]:
         kernel.mount(None, folder, None, _BOUND | kernel.MS_RDONLY | _flags_of(folder))
+    if room["user"] is not None:
+        _become(room["user"], room["groups"])
     user, group = os.geteuid(), os.getegid()
     if room["changes_user"]:
         kernel.unshare(kernel.CLONE_NEWUSER)
         Path("/proc/self/setgroups").write_text("deny")
         Path("/proc/self/uid_map").write_text(f"{NOBODY} {user} 1")
         Path("/proc/self/gid_map").write_text(f"{NOBODY} {group} 1")
+
+
+def _become(user: int, groups: Sequence[int]) -> None:
+    """Be another user from now on, for all that the kernel counts and asks."""
+    for output in (1, 2):  # which may be opened by name: /dev/stderr
+        os.fchown(output, user, user)
+    os.setgroups(groups)
+    os.setresgid(user, user, user)
+    os.setresuid(user, user, user)
+    kernel.prctl(kernel.PR_SET_DUMPABLE, 1)  # else what is its own in /proc is root's
 
 
 def grant(outside: str, need: str, node: str, own: str) -> None:
@@ -110,22 +131,46 @@ def bind(source: str, target: str, more: int = 0) -> None:
 
 
 def _bind_node(source: str, target: str) -> None:
-    """A device, or a folder of devices, and nothing else."""
+    """A device, or a folder of devices, and nothing else.
+
+    It can be written to, and its node stays as it is: the node's owner, who may be the worker's
+    user, could close it to everybody else on the host. Raises `OSError`.
+    """
     mode = os.stat(source).st_mode  # noqa: PTH116
-    if stat.S_ISDIR(mode):
-        os.makedirs(target, exist_ok=True)  # noqa: PTH103
-    elif stat.S_ISCHR(mode) or stat.S_ISBLK(mode):
-        os.makedirs(os.path.dirname(target), exist_ok=True)  # noqa: PTH103, PTH120
-        os.close(os.open(target, os.O_CREAT | os.O_CLOEXEC, 0o600))
-    else:
+    is_folder = stat.S_ISDIR(mode)
+    if not (is_folder or stat.S_ISCHR(mode) or stat.S_ISBLK(mode)):
         raise OSError(f"{source} is no device")
-    kernel.mount(source, target, None, kernel.MS_BIND)
+    staged = f"{_STAGED}/{'folder' if is_folder else 'node'}"
+    for place in (staged, target):
+        os.makedirs(place if is_folder else os.path.dirname(place), exist_ok=True)  # noqa: PTH103, PTH120
+        if not is_folder:
+            os.close(os.open(place, os.O_CREAT | os.O_CLOEXEC, 0o600))
+    kernel.mount(source, staged, None, kernel.MS_BIND)
+    try:
+        kernel.mount(None, staged, None, _BOUND | kernel.MS_RDONLY | _flags_of(staged))
+        kernel.mount(staged, target, None, kernel.MS_BIND)
+    finally:
+        kernel.unmount(staged)
 
 
-def _mount_memory(target: str, kilobytes: int) -> None:
+def _let_pass(outside: str) -> None:
+    """Have everybody go through the folders that are the room's own, but for what is outside:
+    bubblewrap makes some for root only."""
+    own = Path("/").stat().st_dev
+    folders = ["/"]
+    while folders:
+        with os.scandir(folders.pop()) as entries:
+            for entry in entries:
+                is_own = entry.stat(follow_symlinks=False).st_dev == own
+                if is_own and entry.is_dir(follow_symlinks=False) and entry.path != outside:
+                    Path(entry).chmod(0o755)
+                    folders.append(entry.path)
+
+
+def _mount_memory(target: str, kilobytes: int, mode: str) -> None:
     os.makedirs(target, exist_ok=True)  # noqa: PTH103
     flags = kernel.MS_NOSUID | kernel.MS_NODEV | kernel.MS_NOEXEC
-    kernel.mount("tmpfs", target, "tmpfs", flags, f"size={kilobytes}k,mode=755")
+    kernel.mount("tmpfs", target, "tmpfs", flags, f"size={kilobytes}k,mode={mode}")
 
 
 def _flags_of(target: str) -> int:

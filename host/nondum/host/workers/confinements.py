@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import base64
 import contextlib
+import logging
 import os
 import stat
 import zlib
@@ -18,12 +19,16 @@ from typing import Any, Protocol
 from nondum.host.confinement import bubblewrap, landlock, refusals
 from nondum.host.confinement.bubblewrap import Ground
 from nondum.host.confinement.filters import Rule
+from nondum.host.confinement.users import FIRST_USER, USERS, NewNamespace, Users
 from nondum.host.inside import room
 from nondum.host.workers.spec import WorkerSpec, base_interpreter
 from nondum.wheelhouse.confinement import Level
 
+log = logging.getLogger(__name__)
+
 BOOTSTRAP = bubblewrap.INSIDE / "bootstrap.py"
 _ALL = (Path("/"),)
+_LISTED = stat.S_IROTH | stat.S_IXOTH
 _CHANGES_GROUND = frozenset({"network", "gpu"})
 SHARED_MB = 64
 """Size of /dev/shm."""
@@ -40,8 +45,6 @@ INSTRUMENTS = (
 """Where no room can be made for a worker, what one that declares devices may open."""
 SETTINGS = tuple(f"/proc/{name}" for name in ("sys", "sysrq-trigger", "irq", "bus", "fs", "acpi"))
 """What root may write by being root, capabilities or not: `core_pattern` runs programs."""
-FIRST_USER, USERS = 61184, 4336
-"""Ids of users that no account has: those that systemd gives out likewise (DynamicUser=)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +57,8 @@ class Entry:
     """See `nondum.host.inside.room`; None: it stays where it is."""
     ruleset: int | None = None
     """Landlock's, by descriptor."""
+    user: int | None = None
+    """The user of the machine that the worker is, if not the host's."""
 
 
 class Confinement(Protocol):
@@ -62,6 +67,8 @@ class Confinement(Protocol):
     level: Level
     has_keeper: bool
     """Whether its interpreter is process 1 of a namespace, and hears orders as long as it runs."""
+    has_users: bool
+    """Whether its interpreter is in a namespace whose users are mapped from outside."""
     without: frozenset[str]
     """Walls that are left out, so that each can be seen to matter; none, outside tests."""
 
@@ -69,8 +76,13 @@ class Confinement(Protocol):
         """What a worker's interpreter is started with, or that of a spare, of any worker."""
         ...
 
-    def command(self, ground: Ground, orders: int) -> list[str]:
-        """The command that starts it; `orders` is the descriptor that it hears at."""
+    def command(
+        self, ground: Ground, orders: int, namespace: NewNamespace | None = None
+    ) -> list[str]:
+        """The command that starts it; `orders` is the descriptor that it hears at.
+
+        `namespace` is given if it `has_users`.
+        """
         ...
 
     def entry(self, spec: WorkerSpec, ground: Ground) -> AbstractContextManager[Entry]:
@@ -84,6 +96,7 @@ class Unconfined:
 
     level = Level.NONE
     has_keeper = False
+    has_users = False
     without: frozenset[str] = frozenset()
 
     def __init__(self, *, without: Collection[str] = ()) -> None:
@@ -93,7 +106,9 @@ class Unconfined:
         """The interpreter, wherever it is."""
         return Ground(spec.python if spec else base_interpreter(), _ALL)
 
-    def command(self, ground: Ground, orders: int) -> list[str]:
+    def command(
+        self, ground: Ground, orders: int, namespace: NewNamespace | None = None
+    ) -> list[str]:
         """The interpreter itself."""
         return _interpreter(ground, orders)
 
@@ -110,6 +125,7 @@ class Held:
 
     level = Level.RESTRICTED
     has_keeper = False
+    has_users = False
 
     def __init__(self, *, without: Collection[str] = (), abi: int | None = None) -> None:
         """`abi` is what is used of Landlock, if not all that the kernel has."""
@@ -120,7 +136,9 @@ class Held:
         """The interpreter, wherever it is."""
         return Ground(spec.python if spec else base_interpreter(), _ALL)
 
-    def command(self, ground: Ground, orders: int) -> list[str]:
+    def command(
+        self, ground: Ground, orders: int, namespace: NewNamespace | None = None
+    ) -> list[str]:
         """The interpreter itself."""
         return _interpreter(ground, orders)
 
@@ -138,8 +156,6 @@ class Held:
             groups |= refusals.WITH_THE_HOSTS_USER
             groups |= refusals.TRUNCATION if self._abi < landlock.TRUNCATES else {}
         nodes = (*(_instruments() if spec.index.devices else ()), *_nodes(spec))
-        if user is not None:
-            os.chown(spec.scratch, user, user)
         walls = {
             "user": user,
             "groups": sorted(_groups_of(nodes)),
@@ -148,7 +164,7 @@ class Held:
             "filter": calls_refused(groups, self.without),
         }
         if "landlock" in self.without or not self._abi:
-            yield Entry(walls)
+            yield Entry(walls, user=user)
             return
         with landlock.ruleset(
             readable=(*spec.site_packages, *bubblewrap.prefixes(), *_more_files(spec)),
@@ -157,7 +173,7 @@ class Held:
             has_network=has_network,
             abi=self._abi,
         ) as ruleset:
-            yield Entry(walls, ruleset=ruleset)
+            yield Entry(walls, ruleset=ruleset, user=user)
 
 
 class Boxed:
@@ -167,12 +183,18 @@ class Boxed:
     has_keeper = True
 
     def __init__(
-        self, bwrap: str, places: tuple[Path, ...] = (), *, without: Collection[str] = ()
+        self,
+        bwrap: str,
+        places: tuple[Path, ...] = (),
+        *,
+        has_users: bool = False,
+        without: Collection[str] = (),
     ) -> None:
         """`places` are folders in which most workers' code and scratch are: a spare sees them until
-        it becomes one.
+        it becomes one. With `has_users`, which takes root, each worker is a user of its own.
         """
         self._bwrap, self._places = bwrap, places
+        self.has_users, self._users = has_users, Users()
         self.without = frozenset(without)
 
     def ground(self, spec: WorkerSpec | None) -> Ground:
@@ -186,9 +208,11 @@ class Boxed:
             return usual
         return Ground(spec.python, folders, permissions)
 
-    def command(self, ground: Ground, orders: int) -> list[str]:
+    def command(
+        self, ground: Ground, orders: int, namespace: NewNamespace | None = None
+    ) -> list[str]:
         """Bubblewrap, with the interpreter in it."""
-        return bubblewrap.command(self._bwrap, ground, orders, without=self.without)
+        return bubblewrap.command(self._bwrap, ground, orders, namespace, without=self.without)
 
     @contextlib.contextmanager
     def entry(self, spec: WorkerSpec, ground: Ground) -> Iterator[Entry]:
@@ -198,6 +222,8 @@ class Boxed:
         if "network" in spec.permissions:  # abstract names of sockets belong to the network
             groups = {**groups, "sockets": refusals.SOCKETS_OF_THE_HOST[True]}
         mounts_too = {*kept, "mounts"}
+        nodes = tuple(_nodes(spec))
+        user = self._user(spec)
         given = {
             "outside": bubblewrap.OUTSIDE,
             "seen_outside": bubblewrap.seen_outside(ground),
@@ -205,11 +231,17 @@ class Boxed:
             "code": [str(folder) for folder in spec.site_packages],
             "protects_code": "code" not in kept,
             "scratch": str(spec.scratch),
-            "nodes": list(_nodes(spec)),
+            "nodes": list(nodes),
             "shared_mb": SHARED_MB,
             "sealed": [] if "settings" in kept else SETTINGS,
-            "protected": [] if "system" in kept else ["/", "/dev", room.DEVICES],
+            "protected": [
+                *([] if "system" in kept else ["/", "/dev", room.DEVICES]),
+                *([] if "nodes" in kept else bubblewrap.NODES),
+            ],
+            "inotify_instances": room.INOTIFY_INSTANCES if "inotify" not in kept else 128,
             "is_last": "user namespaces" not in kept,
+            "user": user,
+            "groups": sorted(_groups_of(nodes)),
             "changes_user": "user" not in kept,
             "keeper_filter": calls_refused(refusals.GROUPS, mounts_too),
         }
@@ -219,7 +251,17 @@ class Boxed:
             "may_gain_privileges": "new privileges" in kept,
             "filter": calls_refused(groups, kept),
         }
-        yield Entry(walls, room=given)
+        yield Entry(walls, room=given, user=user)
+
+    def _user(self, spec: WorkerSpec) -> int | None:
+        """The worker's own, unless its code is root's alone, by the umask of who installed it."""
+        if not self.has_users:
+            return None
+        closed = [folder for folder in spec.site_packages if not _is_listed(folder)]
+        if closed:
+            log.warning("%s has the host's user: only that may read %s", spec.component, closed[0])
+            return None
+        return self._users.of(spec.scratch)
 
 
 def changes_user(confinement: Confinement) -> bool:
@@ -240,11 +282,12 @@ def user_for(spec: WorkerSpec) -> int | None:
 
 
 def _groups_of(nodes: Collection[str]) -> set[int]:
-    """Groups, other than root's, that may open some of these nodes: `dialout`, `video`, …"""
+    """Groups, other than root's, that may open some of these nodes, or of those that are in these
+    folders: `dialout`, `video`, …"""
     found = set()
-    for node in nodes:
+    for node in (each for name in nodes for each in (Path(name), *Path(name).glob("*"))):
         with contextlib.suppress(OSError):
-            about = Path(node).stat()
+            about = node.stat()
             if about.st_mode & stat.S_IRGRP and not stat.S_ISDIR(about.st_mode):
                 found.add(about.st_gid)
     return found - {0}
@@ -258,6 +301,11 @@ def _is_open(folder: Path) -> bool:
         return above and bool(real.stat().st_mode & stat.S_IROTH)
     except OSError:
         return False
+
+
+def _is_listed(folder: Path) -> bool:
+    """Whether everybody who sees a folder may list it and go in."""
+    return folder.stat().st_mode & _LISTED == _LISTED
 
 
 def _interpreter(ground: Ground, orders: int) -> list[str]:

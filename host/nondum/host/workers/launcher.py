@@ -6,6 +6,7 @@ own, resource limits, no new privileges, and nothing inherited but the link.
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import logging
 import os
@@ -16,7 +17,7 @@ from typing import Any, Protocol
 
 from nondum.host.cgroups import Cages
 from nondum.host.confinement.bubblewrap import Ground
-from nondum.host.workers import problems
+from nondum.host.workers import problems, scratch
 from nondum.host.workers.confinements import Confinement, Entry, Unconfined
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spare import ROOM, ROOM_BYTES, Spare
@@ -82,6 +83,8 @@ class WorkerLauncher:
             spec.scratch.mkdir(parents=True, exist_ok=True, mode=0o700)
             ground = self._confinement.ground(spec)
             with self._confinement.entry(spec, ground) as entry:
+                if os.geteuid() == 0:
+                    await asyncio.to_thread(scratch.give, spec.scratch, entry.user or 0)
                 told = parameters(spec, entry)
                 for started in (self._taken(), None):
                     if started is not None and not started.serves(ground):
@@ -91,7 +94,7 @@ class WorkerLauncher:
                     try:
                         spare.limit(spec.limits)
                         if spare.become(told, sock, entry.ruleset):
-                            return spare.process()
+                            return spare.process(entry.user)
                     except OSError:
                         await spare.end()
                         raise

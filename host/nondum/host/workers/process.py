@@ -26,8 +26,11 @@ class WorkerProcess:
         popen: subprocess.Popen[bytes],
         cage: Cage | None = None,
         keeper: Keeper | None = None,
+        user: int | None = None,
     ) -> None:
         """`keeper`, which it takes over, is that of a worker in a room of its own."""
+        self.user = user
+        """The user of the machine that it is, if not the host's."""
         self._popen = popen
         self._keeper = keeper
         self.cage = cage

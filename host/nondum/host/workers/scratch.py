@@ -34,6 +34,26 @@ def used_bytes(folder: Path, pids: Collection[int] = ()) -> int:
     return used
 
 
+def give(folder: Path, user: int) -> None:
+    """Have a folder, and all that is in it, belong to a user and its group; takes root.
+
+    The folder is given last, and nothing is done if it is that user's. What has several names is
+    left alone, since one of them may be elsewhere; what is too deep to be gone through is deleted.
+    No worker may run in it meanwhile. Raises `OSError`.
+    """
+    if folder.stat().st_uid == user:
+        return
+    try:
+        for _, folders, files, at in os.fwalk(folder):
+            for name in (*folders, *files):
+                found = os.stat(name, dir_fd=at, follow_symlinks=False)
+                if stat.S_ISDIR(found.st_mode) or found.st_nlink == 1:
+                    os.chown(name, user, user, dir_fd=at, follow_symlinks=False)
+    except RecursionError:
+        empty(folder)
+    os.chown(folder, user, user)
+
+
 def empty(folder: Path) -> None:
     """Delete all that is in a folder, however deep it is; nothing there is fine.
 

@@ -19,6 +19,7 @@ from typing import IO, Any
 
 from nondum.host.cgroups import Cage, CageLimits, Cages
 from nondum.host.confinement.bubblewrap import Ground
+from nondum.host.confinement.users import NewNamespace
 from nondum.host.printable import printable
 from nondum.host.waiting import until_done
 from nondum.host.workers.confinements import Confinement
@@ -49,15 +50,19 @@ class Spare:
         self.said = ""
         """The last line that it said before it ended without having become a worker."""
         self._has_keeper = confinement.has_keeper
+        self._namespace: NewNamespace | None = None
         self._orders, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         if self._has_keeper:  # whose a message is comes with it
             self._orders.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
         try:
             with theirs:
-                command = confinement.command(ground, theirs.fileno())
-                self.popen = _started(command, theirs.fileno(), owner, confinement.without)
+                if confinement.has_users:
+                    self._namespace = NewNamespace()
+                self.popen = self._begin(confinement, theirs.fileno(), owner)
         except OSError:
             self._orders.close()
+            if self._namespace is not None:
+                self._namespace.close()
             raise
 
     @classmethod
@@ -69,15 +74,27 @@ class Spare:
         The kernel takes some 20 ms to put a process into a control group: a thread waits for it.
         """
         spare = cls(confinement, ground, owner)
-        if cages is not None:
-            caging = asyncio.create_task(asyncio.to_thread(spare._be_caged, cages))
+        if cages is not None or confinement.has_users:
+            settling = asyncio.create_task(asyncio.to_thread(spare.settle, cages))
             try:
-                await until_done(caging)
-                caging.result()
+                await until_done(settling)
+                settling.result()
             except BaseException:
                 await spare.end()
                 raise
         return spare
+
+    def settle(self, cages: Cages | None = None) -> None:
+        """Give it a cage, and the users that its room has, if it is to have any. Blocks.
+
+        Call it once. Raises `OSError`.
+        """
+        if cages is not None:
+            self.cage = cages.make("worker", CageLimits())
+            self.cage.add(self.popen.pid)
+        if self._namespace is not None:
+            namespace, self._namespace = self._namespace, None
+            namespace.map_users()
 
     def serves(self, ground: Ground) -> bool:
         """Whether it is there still, and stands on that ground."""
@@ -106,20 +123,20 @@ class Spare:
             return False
         return True
 
-    def process(self) -> WorkerProcess:
-        """The worker that it has become.
+    def process(self, user: int | None = None) -> WorkerProcess:
+        """The worker that it has become, as that user if not as the host's.
 
         Call it once, on the loop. Raises `OSError`; then it is still to be closed.
         """
         if self._has_keeper:
             keeper = Keeper(self._orders)
             try:
-                return WorkerProcess(self.popen, self.cage, keeper)
+                return WorkerProcess(self.popen, self.cage, keeper, user)
             except OSError:
                 keeper.close()
                 raise
         self._orders.close()
-        return WorkerProcess(self.popen, self.cage)
+        return WorkerProcess(self.popen, self.cage, user=user)
 
     async def end(self) -> None:
         """`close` it without holding up the loop, whoever is cancelled meanwhile."""
@@ -128,6 +145,8 @@ class Spare:
     def close(self) -> None:
         """End it unused. Blocks until it has ended."""
         self._orders.close()
+        if self._namespace is not None:
+            self._namespace.close()
         with contextlib.suppress(ProcessLookupError):  # its room may not be finished: all of it
             os.killpg(self.popen.pid, signal.SIGKILL)
         self.popen.wait()
@@ -138,9 +157,16 @@ class Spare:
             if pipe is not None:
                 pipe.close()
 
-    def _be_caged(self, cages: Cages) -> None:
-        self.cage = cages.make("worker", CageLimits())
-        self.cage.add(self.popen.pid)
+    def _begin(self, confinement: Confinement, orders: int, owner: str) -> subprocess.Popen[bytes]:
+        namespace = self._namespace
+        command = confinement.command(self.ground, orders, namespace)
+        if namespace is None:
+            return _started(command, (orders,), owner, confinement.without)
+        try:
+            inherited = (orders, *namespace.descriptors)
+            return _started(command, inherited, owner, confinement.without)
+        finally:
+            namespace.started()
 
 
 def _last_line(pipe: IO[bytes] | None) -> str:
@@ -153,7 +179,7 @@ def _last_line(pipe: IO[bytes] | None) -> str:
 
 
 def _started(
-    command: list[str], orders: int, owner: str, without: Collection[str]
+    command: list[str], inherited: tuple[int, ...], owner: str, without: Collection[str]
 ) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
         command,
@@ -161,7 +187,7 @@ def _started(
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         bufsize=0,
-        pass_fds=(orders,),
+        pass_fds=inherited,
         start_new_session="session" not in without,  # no terminal reaches it
         cwd="/",
         env={

@@ -21,6 +21,7 @@ from nondum.host.workers.gauge import Gauge
 from nondum.host.workers.index import mismatches
 from nondum.host.workers.launcher import Launcher
 from nondum.host.workers.leftovers import end_leftovers
+from nondum.host.workers.lending import Lending
 from nondum.host.workers.news import Claims, parse_count, parse_news, parse_progress
 from nondum.host.workers.output import Output, Valve
 from nondum.host.workers.process import WorkerProcess, names_of
@@ -69,6 +70,7 @@ class Worker:
         """Names by which a node may have been made for it, to be removed with it."""
         self._granted: dict[str, dict[str, str]] = {}
         """Need → name → node that it has by that name."""
+        self._lending = Lending(process.user)
         self._tail: deque[str] = deque(maxlen=TAIL_LINES)
         self._ending: asyncio.Task[None] | None = None
         self._watchdog: asyncio.TimerHandle | None = None
@@ -225,8 +227,8 @@ class Worker:
         if self._process.cage is not None:
             self._process.cage.end()
         end_leftovers(self.spec.scratch)
-        for need in tuple(self._reached):
-            withdrawn(self.spec.component, need)
+        for name in tuple(self._reached):
+            self._withdraw(name)
         if problem.code == problems.SCRATCH_FULL:  # the next worker is to have room, and the host
             scratch.empty(self.spec.scratch)
 
@@ -255,7 +257,7 @@ class Worker:
         """Have one node where the worker can open it; where that is."""
         own = device["node"]
         self._reached.add(name)
-        node = await asyncio.to_thread(reachable, self.spec.component, name, own)
+        node = await asyncio.to_thread(self._reachable, name, own)
         if self._granted.setdefault(need, {}).get(name) != own:
             self._granted[need][name] = own
             try:
@@ -268,7 +270,18 @@ class Worker:
         """Take one node away."""
         await self._process.revoke(name)
         self._reached.discard(name)
-        await asyncio.to_thread(withdrawn, self.spec.component, name)
+        await asyncio.to_thread(self._withdraw, name)
+
+    def _reachable(self, name: str, own: str) -> str:
+        """The node that it may open, for one of the machine's. Blocks."""
+        node = reachable(self.spec.component, name, own)
+        self._lending.lend(name, node)
+        return node
+
+    def _withdraw(self, name: str) -> None:
+        """Undo that. Blocks."""
+        self._lending.take_back(name)
+        withdrawn(self.spec.component, name)
 
     async def _reading(self) -> Reading:
         is_flowing = any(isinstance(claim, StreamFlowing) for claim in self.claims)

@@ -1,0 +1,132 @@
+"""Users of the machine that are workers' alone: whose is which, and how a room comes to have them.
+
+The kernel counts some things by user, whatever namespace a process is in: descriptors under way
+over unix sockets, memory of pipes, watches of epoll. A room whose user namespace maps these users
+to themselves can have its worker become one of them. Writing such a map takes a process that may be
+any user outside (user_namespaces(7)): a daemon that is root.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import select
+import zlib
+from pathlib import Path
+
+FIRST_USER, USERS = 61184, 4336
+"""Ids of users that no account has: those that systemd gives out likewise (DynamicUser=)."""
+_USERS = f"0 0 1\n{FIRST_USER} {FIRST_USER} {USERS}\n"
+_GROUPS = f"0 0 {FIRST_USER + USERS}\n"
+"""The groups of devices are among them: `dialout`, `video`, …"""
+MADE_S = 10.0
+"""How long bubblewrap may take to make a user namespace."""
+_TOLD_BYTES = 4096
+
+
+def is_workers(user: int) -> bool:
+    """Whether an id is that of a worker."""
+    return user in range(FIRST_USER, FIRST_USER + USERS)
+
+
+class Users:
+    """Gives each scratch folder a user that no other one has. The folder's owner is what is kept
+    of it, so that what a worker has written is its own again after a restart of the daemon."""
+
+    def __init__(self) -> None:
+        self._given: dict[Path, int] = {}
+
+    def of(self, scratch: Path) -> int:
+        """The user of the worker with that scratch folder, `…/PAYLOAD/COMPONENT`, which is there.
+
+        Raises `OSError`: the folder cannot be looked at, or all users are taken.
+        """
+        self._given = {at: user for at, user in self._given.items() if at.exists()}
+        if scratch not in self._given:
+            taken = {*self._given.values(), *_owners(scratch)}
+            own = scratch.stat().st_uid
+            self._given[scratch] = (
+                own
+                if is_workers(own) and own not in taken
+                else _free(zlib.crc32(os.fsencode(scratch)), taken)
+            )
+        return self._given[scratch]
+
+
+def _owners(scratch: Path) -> set[int]:
+    """Of the other scratch folders."""
+    found = set()
+    for folder in scratch.parents[1].glob("*/*"):
+        with contextlib.suppress(FileNotFoundError):  # removed just now
+            if folder != scratch:
+                found.add(folder.lstat().st_uid)
+    return found
+
+
+def _free(start: int, taken: set[int]) -> int:
+    """The first that is not taken, from some place on: hosts of one machine begin elsewhere."""
+    for step in range(USERS):
+        user = FIRST_USER + (start + step) % USERS
+        if user not in taken:
+            return user
+    raise OSError(f"all {USERS} users of workers are taken")
+
+
+class NewNamespace:
+    """A user namespace that bubblewrap makes, and waits for the ids of (`--userns-block-fd`)."""
+
+    def __init__(self) -> None:
+        """Raises `OSError`."""
+        self._tells, told = os.pipe()
+        try:
+            waits, self._goes = os.pipe()
+        except OSError:
+            os.close(self._tells)
+            os.close(told)
+            raise
+        self.descriptors = (told, waits)
+        """What bubblewrap is to inherit."""
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """What bubblewrap is told."""
+        told, waits = self.descriptors
+        return "--info-fd", str(told), "--userns-block-fd", str(waits)
+
+    def started(self) -> None:
+        """Bubblewrap has been started, or could not be."""
+        for descriptor in self.descriptors:
+            os.close(descriptor)
+
+    def map_users(self) -> None:
+        """Have its users be those of workers, and root; then it is left. Call it once. Blocks.
+
+        Bubblewrap may have ended meanwhile. Raises `OSError`.
+        """
+        try:
+            process = self._process()
+            if process is not None:
+                (process / "uid_map").write_text(_USERS)
+                (process / "gid_map").write_text(_GROUPS)
+                os.write(self._goes, b"!")
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """Leave it without ids."""
+        os.close(self._tells)
+        os.close(self._goes)
+
+    def _process(self) -> Path | None:
+        """The one in the namespace, as bubblewrap tells it; None if that ended before."""
+        told, poll = b"", select.poll()
+        poll.register(self._tells, select.POLLIN)
+        while not told.endswith(b"}\n"):  # its other end stays open as long as that process waits
+            if not poll.poll(MADE_S * 1000):
+                raise TimeoutError(f"bubblewrap has made no user namespace in {MADE_S:g} s")
+            more = os.read(self._tells, _TOLD_BYTES)
+            if not more:
+                return None
+            told += more
+        return Path("/proc") / str(json.loads(told)["child-pid"])
