@@ -22,7 +22,7 @@ def run(lab: Lab) -> str:
     host = lab.booted_once()
     machine = host.machine
     host.forget()
-    keyboard = machine.plug_device("usb-kbd")
+    keyboard = machine.plug_device("usb-kbd", port="1")
     device = machine.until(
         "its name", lambda: machine.attempt("ls /dev/input/by-id/*event-kbd").out.strip() or None
     )
@@ -33,7 +33,7 @@ def run(lab: Lab) -> str:
     _stopped(host, times=1)
     machine.unplug(keyboard)
     machine.until("a warning", lambda: _is_warned(machine) or None)
-    keyboard = machine.plug_device("usb-kbd")
+    keyboard = machine.plug_device("usb-kbd", port="1")
     machine.until("no warning", lambda: None if _is_warned(machine) else True)
     _stopped(host, times=2)
     machine.pull(stick)
