@@ -2,7 +2,7 @@
 
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.errands import Errand, Handler, Lease
-from nondum.transport.peers.events import DialFailed, Loss, PeerEvent, PeerLost, PeerUp
+from nondum.transport.peers.events import DialFailed, LinksFailed, Loss, PeerEvent, PeerLost, PeerUp
 from nondum.transport.peers.failures import CallFailed, PeerRefused, PeerUnreachable
 from nondum.transport.peers.identity import Identity, Security
 from nondum.transport.peers.keys import HostKeys, PeerKey, fingerprint, load_or_create
@@ -20,6 +20,7 @@ __all__ = [
     "HostKeys",
     "Identity",
     "Lease",
+    "LinksFailed",
     "Loss",
     "PeerEvent",
     "PeerKey",
