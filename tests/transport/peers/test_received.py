@@ -44,6 +44,7 @@ HANDSHAKE = 1024
 """More than the bytes that a connection begins with."""
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 @pytest.mark.parametrize("is_greeted", [True, False], ids=["peer", "before its greeting"])
 async def test_message_without_end_of_an_admitted_host_is_cut(is_greeted: bool) -> None:
     base, rover, other = identity("base"), identity("rover"), identity("other")
@@ -72,6 +73,7 @@ async def test_message_without_end_of_an_admitted_host_is_cut(is_greeted: bool) 
         assert good.key in there.node.peers
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 @pytest.mark.parametrize("is_greeted", [True, False], ids=["peer", "before its greeting"])
 async def test_message_without_end_of_a_dialled_host_is_cut(is_greeted: bool) -> None:
     base, rover = identity("base"), identity("rover")
