@@ -148,7 +148,7 @@ class Host:
         async with asyncio.timeout(PATIENCE_S):
             while True:
                 event = await self.events.get()
-                if isinstance(event, kind) and key in (None, event.key):
+                if isinstance(event, kind) and key in (None, getattr(event, "key", None)):
                     return event
 
 

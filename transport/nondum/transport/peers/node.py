@@ -102,6 +102,11 @@ class PeerNode:
         return {key: session.admission for key, session in self._roster.sessions.items()}
 
     @property
+    def links_pid(self) -> int | None:
+        """The process that holds the sockets of its links; None while there is none."""
+        return self._sockets.pid
+
+    @property
     def strangers(self) -> int:
         """How many connections are not a peer's yet."""
         return self._sockets.strangers

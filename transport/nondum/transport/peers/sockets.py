@@ -63,6 +63,10 @@ class Sockets(Protocol):
     """Connections to other hosts. `await listen(…)`, and `await close()` it."""
 
     @property
+    def pid(self) -> int | None:
+        """The process that holds them; None while there is none."""
+
+    @property
     def strangers(self) -> int:
         """How many accepted connections are not a peer's yet."""
 

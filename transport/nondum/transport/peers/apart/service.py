@@ -127,12 +127,10 @@ class Service:
         return served
 
     def _on_refusal(self, refusal: Refusal) -> None:
-        if not self._pipe.is_crowded:  # strangers must not fill the memory while the daemon hangs
-            reason = refusal.reason.value
-            self._pipe.send("refused", reason, refusal.address, refusal.key, refusal.told)
+        self.tell("refused", refusal.reason.value, refusal.address, refusal.key, refusal.told)
 
     def tell(self, *fields: Any) -> None:
-        """Tell the daemon something; what it does not keep up with, is not read from others."""
+        """Tell the daemon something; where it does not keep up, nothing more is read."""
         self._pipe.send(*fields)
         if self._pipe.is_crowded and self._here is not None:
             self._here.hold()

@@ -67,8 +67,7 @@ class SocketsApart:
         """See `MakeSockets`."""
         self._me, self._trust, self._owner, self._start = me, trust, owner, start
         self._loop = asyncio.get_running_loop()
-        self.process: Process | None = None
-        """None while there is none."""
+        self._process: Process | None = None
         self.strangers = 0
         """How many accepted connections are not a peer's yet, as was told last."""
         self._addresses: tuple[str, ...] = ()
@@ -82,6 +81,11 @@ class SocketsApart:
         self._ticking: asyncio.TimerHandle | None = None
         self._again: asyncio.Task[None] | None = None
         self._is_closed = False
+
+    @property
+    def pid(self) -> int | None:
+        """The process that holds them; None while there is none."""
+        return self._process.pid if self._process is not None else None
 
     @property
     def is_crowded(self) -> bool:
@@ -120,8 +124,8 @@ class SocketsApart:
             self._again.cancel()
             await asyncio.wait({self._again})
         self.tell("close")
-        if self.process is not None:
-            await self.process.ended(GRACE_S)
+        if self._process is not None:
+            await self._process.ended(GRACE_S)
         await self._give_up(0.0)
 
     def tell(self, *fields: Any) -> None:
@@ -138,7 +142,7 @@ class SocketsApart:
         ours, theirs = pipe_sockets()
         with theirs:
             try:
-                self.process = self._start(theirs)
+                self._process = self._start(theirs)
             except OSError as error:
                 ours.close()
                 raise _not_started(str(error)) from error
@@ -181,7 +185,7 @@ class SocketsApart:
             self._ticking.cancel()
         if self._pipe is not None:
             self._pipe.close()
-        process, self.process, self._pipe = self.process, None, None
+        process, self._process, self._pipe = self._process, None, None
         return await process.ended(grace_s) if process is not None else ""
 
     def _on_died(self, told: str = "") -> None:
