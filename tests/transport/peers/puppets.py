@@ -20,7 +20,7 @@ class Puppet:
     def __init__(self, pipe: socket.socket) -> None:
         self.heard: list[list[Any]] = []
         self.is_closed = asyncio.Event()
-        self._pipe = Pipe(pipe.dup(), self._hear, self.is_closed.set)
+        self._pipe = Pipe(pipe.dup(), self._hear, lambda _: self.is_closed.set())
 
     async def ended(self, grace_s: float) -> str:
         self._pipe.close()

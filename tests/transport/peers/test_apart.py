@@ -20,6 +20,7 @@ from tests.transport.peers.bad_ends import bad_dealer, hello_of
 from tests.transport.peers.hosts import (
     PATIENCE_S,
     Host,
+    Servant,
     host,
     identity,
     raises,
@@ -35,9 +36,11 @@ from nondum.transport.peers import (
     Identity,
     LinksFailed,
     PeerKey,
+    PeerNode,
     PeerRefused,
     PeerUnreachable,
     PeerUp,
+    Refusal,
     Trust,
 )
 from nondum.transport.peers.apart import sockets
@@ -187,10 +190,10 @@ async def test_host_that_was_trusted_among_thousands_is_let_in() -> None:
 async def test_address_that_is_taken_is_told_and_another_may_be_tried() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
-        node = hosts.PeerNode(
+        node = PeerNode(
             identity("base"),
             Trust(),
-            hosts.Servant(),
+            Servant(),
             on_event=lambda _: None,
             sockets=hosts.SOCKETS,
         )
@@ -259,7 +262,7 @@ async def test_news_of_a_connection_that_was_cut_is_late_and_no_violation(
         puppet.say("connected", 1)
         puppet.say("data", 1, b"late")
         puppet.say("refused", "silent", "10.0.0.7:1", "", "no peer: silent")
-        await there.told(hosts.Refusal)
+        await there.told(Refusal)
         assert len(puppets.started) == 1
 
 

@@ -10,9 +10,9 @@ import sys
 from nondum.host.workers.process import WorkerProcess, exit_words
 
 MEMORY_BYTES = 512 * 1024**2
-"""Of its data (setrlimit(2), RLIMIT_DATA). It begins with some 50 MB; a connection whose peer reads
-nothing, or whose messages nobody takes in, may have 40 MB more (`listener.HIGH_WATER` of the longest
-messages, and what is on its way between the processes)."""
+"""Of its data (setrlimit(2), RLIMIT_DATA). It begins with some 35 MB. A connection whose peer reads
+nothing may have 40 MB more: `HIGH_WATER` and `WINDOW` of the longest messages; one whose messages
+the daemon does not take in, 32 MB."""
 
 
 class LinksProcess:

@@ -37,21 +37,21 @@ class Pipe:
         self,
         sock: socket.socket,
         on_packet: Callable[[list[Any]], None],
-        on_closed: Callable[[], None],
+        on_closed: Callable[[ProtocolViolation | None], None],
         on_room: Callable[[], None] = lambda: None,
     ) -> None:
         """Own `sock` and begin to read, on the running loop.
 
         `on_packet` may raise `ProtocolViolation`, which closes the pipe. `on_closed` is called once
-        when the other end is gone or broke the protocol, not after `close`; `on_room` when nothing
-        waits any more after it was crowded.
+        when the other end is gone (None) or broke the protocol, not after `close`; `on_room` when
+        nothing waits any more after it was crowded.
         """
         self._on_packet, self._on_closed, self._on_room = on_packet, on_closed, on_room
         self._waiting: deque[bytes] = deque()
         self._waiting_bytes = 0
         self._was_crowded = False
         self._packets = SocketPackets(sock, LONGEST, max_handles=0)
-        self._packets.open(self._receive, lambda _violation: on_closed())
+        self._packets.open(self._receive, on_closed)
 
     @property
     def is_crowded(self) -> bool:
@@ -90,12 +90,11 @@ class Pipe:
             if not isinstance(fields, list):
                 raise violation()
             self._on_packet(fields)
-        except ProtocolViolation:
+        except ProtocolViolation as violated:
             self.close()
-            self._on_closed()
+            self._on_closed(violated)
 
 
 def violation() -> ProtocolViolation:
     """What is raised at a packet that has no place."""
-    told = "the process of the links to other hosts does not keep to its protocol"
-    return ProtocolViolation(Problem("LINKS_PACKET", told))
+    return ProtocolViolation(Problem("PACKET_KIND", "a packet has no place there"))

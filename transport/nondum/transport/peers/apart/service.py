@@ -49,7 +49,7 @@ class Service:
             lambda _problem: None,  # where these fail, this process ends
             lambda: self._awake.read(self._loop.time()),
         )
-        self._pipe = Pipe(sock, self._on_packet, lambda: self._end(is_asked=False), self._on_room)
+        self._pipe = Pipe(sock, self._on_packet, lambda _: self._end(is_asked=False), self._on_room)
 
     async def run(self) -> None:
         """Serve until the daemon says that it is enough, or is gone."""

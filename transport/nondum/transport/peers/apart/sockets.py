@@ -13,7 +13,7 @@ import socket
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol, TypeAlias
 
-from nondum.sdk.errors import NondumError, Problem
+from nondum.sdk.errors import NondumError, Problem, ProtocolViolation
 from nondum.sdk.wire_fields import read_problem
 from nondum.transport.peers import trust_file
 from nondum.transport.peers.apart.pipe import WINDOW, Pipe, pipe_sockets, violation
@@ -146,7 +146,7 @@ class SocketsApart:
             except OSError as error:
                 ours.close()
                 raise _not_started(str(error)) from error
-        self._pipe = Pipe(ours, self._on_packet, self._on_died)
+        self._pipe = Pipe(ours, self._on_packet, self._on_closed)
         self._since_s, self._unanswered = self._loop.time(), 0
         self._tell_trust()
         keys = self._me.keys
@@ -187,6 +187,9 @@ class SocketsApart:
             self._pipe.close()
         process, self._process, self._pipe = self._process, None, None
         return await process.ended(grace_s) if process is not None else ""
+
+    def _on_closed(self, violated: ProtocolViolation | None) -> None:
+        self._on_died(f"breaks the protocol ({violated.problems[0].message})" if violated else "")
 
     def _on_died(self, told: str = "") -> None:
         """The process is gone, or is not what it should be: every connection is over."""
