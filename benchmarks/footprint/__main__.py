@@ -41,6 +41,7 @@ def _measured(folder: Path, seconds: float) -> results.Footprint:
         await_rest(pid, timeout_s=PATIENCE_S)
         with_worker = probe.memory(pid)
     return results.Footprint(
+        apart=_apart(folder),
         machine=f"{platform.machine()}, {os.cpu_count()} processors, load {os.getloadavg()[0]:.0f}",
         is_emulated=False,
         start_s=min(wall_s for wall_s, _ in starts),
@@ -49,6 +50,15 @@ def _measured(folder: Path, seconds: float) -> results.Footprint:
         idle=idle,
         with_worker=with_worker,
     )
+
+
+def _apart(folder: Path) -> dict[str, list[int]]:
+    """Memory of a host whose links to peers are a process's of their own."""
+    (folder / "slots/stick").rename(folder / "stick")
+    with running(folder, apart=True) as (pid, _):
+        time.sleep(SETTLED_S)
+        await_rest(pid, timeout_s=PATIENCE_S)
+        return probe.memory(pid)
 
 
 def _start(folder: Path) -> tuple[float, float]:

@@ -25,16 +25,19 @@ allow_unsigned = true
 [peers]
 enabled = true
 listen = ["tcp://127.0.0.1:0"]
+process = {process}
 """
 
 
 @contextmanager
-def running(folder: Path) -> Iterator[tuple[int, float]]:
+def running(folder: Path, *, apart: bool = False) -> Iterator[tuple[int, float]]:
     """A host that has said that it is ready (sd_notify(3)): its process, and how many seconds that
-    took. `folder` has a short path (unix(7)), and keeps its state from one to the next."""
+    took. `folder` has a short path (unix(7)), and keeps its state from one to the next; `apart` has
+    the links to peers be a process's of their own."""
     ready = folder / "ready"
     ready.unlink(missing_ok=True)
-    (folder / "host.toml").write_text(CONFIGURATION.format(folder=folder), encoding="utf-8")
+    configuration = CONFIGURATION.format(folder=folder, process=str(apart).lower())
+    (folder / "host.toml").write_text(configuration, encoding="utf-8")
     command = [sys.executable, "-m", "nondum.host.cli", "host", "run", "--user"]
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as told:
         told.bind(str(ready))

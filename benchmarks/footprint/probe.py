@@ -19,6 +19,7 @@ PROC = Path("/proc")
 KINDS = {
     "nondum.host.mind.planner_child": "planner",
     "nondum.host.lifecycle.child": "drive child",
+    "nondum.host.peers.links": "links",
     "bootstrap.py": "worker",
 }
 """What is in the command of each kind of process, keepers apart, whose program tells them."""

@@ -17,6 +17,8 @@ ROWS: Sequence[tuple[str, str, Shown]] = (
     ("the spare worker", "", lambda f: f"{f.mb_of('worker'):.1f} MB"),
     ("planners, all of them", "", lambda f: f"{f.mb_of('planner'):.1f} MB"),
     ("a child for drives, waiting", "", lambda f: f"{f.mb_of('drive child'):.1f} MB"),
+    ("the links to peers, in a process of their own", "", lambda f: _mb(f.apart_mb("links"))),
+    ("… and the idle daemon then", "≤ 60 MB", lambda f: _mb(f.apart_mb("daemon"))),
     ("processor at idle, the daemon", "≤ 1 %", lambda f: f"{f.idle['cpu_percent']:.2f} %"),
     ("processor at idle, all", "", lambda f: f"{f.idle['cpu_percent_all']:.2f} %"),
     ("wake-ups at idle, the daemon", "", lambda f: f"{f.idle['wakeups_per_s']:.1f} a second"),
@@ -32,6 +34,10 @@ ROWS: Sequence[tuple[str, str, Shown]] = (
         lambda f: f"{f.start_cpu_s / f.yardstick_s:.1f} of {f.yardstick_s:.2f} s",
     ),
 )
+
+
+def _mb(megabytes: float | None) -> str:
+    return "not measured" if megabytes is None else f"{megabytes:.1f} MB"
 
 
 def write() -> str:

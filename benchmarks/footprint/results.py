@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,8 @@ class Footprint:
     """`probe.look` at the host alone."""
     with_worker: dict[str, list[int]]
     """`probe.memory` with the worker, in kB."""
+    apart: dict[str, list[int]] = field(default_factory=dict)
+    """That of the host alone, with a process for its links to peers; empty where nobody looked."""
 
     @property
     def daemon_mb(self) -> float:
@@ -37,6 +39,10 @@ class Footprint:
     def worker_mb(self) -> float:
         """That of the worker: the greatest of them, the other being the spare."""
         return float(max(self.with_worker["worker"])) * 1024 / 1e6
+
+    def apart_mb(self, kind: str) -> float | None:
+        """That of the processes of a kind, beside a process for links to peers."""
+        return sum(self.apart[kind]) * 1024 / 1e6 if self.apart else None
 
     def mb_of(self, kind: str) -> float:
         """That of all processes of a kind beside the idle daemon."""

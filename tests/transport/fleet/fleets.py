@@ -88,7 +88,7 @@ class Member:
                 while self._read < len(self.events):
                     event = self.events[self._read]
                     self._read += 1
-                    if isinstance(event, kind) and key in (None, event.key):
+                    if isinstance(event, kind) and key in (None, getattr(event, "key", None)):
                         return event
                 self._news.clear()
                 await self._news.wait()

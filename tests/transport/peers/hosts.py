@@ -7,16 +7,18 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import json
 import subprocess
 import sys
 import time
 from collections import defaultdict
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
+from nondum.host.peers.links.process import LinksProcess
 from nondum.sdk.errors import Problem
 from nondum.sdk.wire import Body
 from nondum.transport.peers import (
@@ -36,10 +38,19 @@ from nondum.transport.peers import (
     Refusal,
     Trust,
 )
+from nondum.transport.peers.apart.sockets import SocketsApart
+from nondum.transport.peers.here import SocketsHere
+from nondum.transport.peers.sockets import MakeSockets
 
 ROOT = Path(__file__).parents[3]
 PATIENCE_S = 60.0
 E = TypeVar("E", bound=PeerEvent)
+KINDS: Mapping[str, MakeSockets] = {
+    "in the daemon": SocketsHere,
+    "apart": functools.partial(SocketsApart, start=LinksProcess),
+}
+SOCKETS: MakeSockets = SocketsHere
+"""Of each `host`; the fixture `each_kind_of_sockets` exchanges it."""
 
 
 @dataclass
@@ -137,7 +148,7 @@ class Host:
         async with asyncio.timeout(PATIENCE_S):
             while True:
                 event = await self.events.get()
-                if isinstance(event, kind) and key in (None, event.key):
+                if isinstance(event, kind) and key in (None, getattr(event, "key", None)):
                     return event
 
 
@@ -155,7 +166,13 @@ async def host(
 ) -> AsyncIterator[Host]:
     """A host that listens, until the end of the block."""
     servant = Servant()
-    node = PeerNode(me, trust or Trust(), servant, on_event=lambda event: found.hear(event))
+    node = PeerNode(
+        me,
+        trust or Trust(),
+        servant,
+        on_event=lambda event: found.hear(event),
+        sockets=SOCKETS,
+    )
     found = Host(node, servant)
     try:
         (found.address,) = await node.start([address])

@@ -61,6 +61,7 @@ def certified(name: str, days: float = 30) -> Identity:
     return Identity(name, keys, found.to_bytes())
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 async def test_hosts_of_one_fleet_need_no_pairing() -> None:
     base, rover = certified("base"), certified("rover")
     async with host(base, FLEET_TRUST) as there, host(rover, FLEET_TRUST) as here:
@@ -70,6 +71,7 @@ async def test_hosts_of_one_fleet_need_no_pairing() -> None:
         assert there.node.peers[here.key].name == "rover"
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 async def test_stranger_is_turned_away_at_the_handshake() -> None:
     base = identity("base")
     async with host(base) as there, host(identity("rover"), trusting(base)) as here:
@@ -80,6 +82,7 @@ async def test_stranger_is_turned_away_at_the_handshake() -> None:
         assert there.node.refusals.latest[0].key == here.key
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 async def test_turned_away_host_is_let_in_once_it_is_paired() -> None:
     """libzmq itself would never try again."""
     base, rover = identity("base"), identity("rover")
@@ -130,6 +133,7 @@ async def test_certificate_that_ends_ends_the_link() -> None:
     await node.close()
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 async def test_revoked_peer_is_cut_while_it_talks() -> None:
     async with two_hosts() as (rover, base):
         call = rover.node.call(base.key, "wait", {}, deadline_s=60)
@@ -144,6 +148,7 @@ async def test_revoked_peer_is_cut_while_it_talks() -> None:
         assert rover.key not in base.node.peers
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 async def test_revoked_connection_is_shut_even_if_its_host_does_not_listen() -> None:
     base, rover = identity("base"), identity("rover")
     async with host(base, trusting(rover)) as there:
@@ -157,6 +162,7 @@ async def test_revoked_connection_is_shut_even_if_its_host_does_not_listen() -> 
             ended.close(0)
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 async def test_wrong_server_key_is_counted_at_both_ends() -> None:
     base, rover = identity("base"), identity("rover")
     async with host(base, trusting(rover)) as there, host(rover, trusting(base)) as here:
@@ -177,6 +183,7 @@ async def test_host_without_keys_is_turned_away() -> None:
         assert there.node.refusals.counts.keys() <= {Reason.MISMATCH, Reason.GARBAGE}
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 @pytest.mark.parametrize(
     "noise",
     [b"GET / HTTP/1.1\r\n\r\n" * 20, b"\xff" * 400, b"\0" * 400, os.urandom(4096)],
@@ -252,6 +259,7 @@ async def test_message_before_the_greeting_is_garbage() -> None:
         assert not there.node.peers
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 async def test_name_of_another_in_the_greeting_is_no_proof() -> None:
     base, rover, victim = identity("base"), identity("rover"), identity("victim")
     async with host(base, trusting(rover, victim)) as there:
@@ -261,6 +269,7 @@ async def test_name_of_another_in_the_greeting_is_no_proof() -> None:
         assert not there.node.peers
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 async def test_longer_message_than_allowed_cuts_the_sender_alone() -> None:
     base, rover, other = identity("base"), identity("rover"), identity("other")
     async with host(base, trusting(rover, other)) as there, host(other, trusting(base)) as good:
@@ -282,6 +291,7 @@ async def test_version_that_nobody_speaks_is_told() -> None:
             await there.counted(Reason.VERSION)
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 async def test_development_mode_is_explicit_and_stays_on_this_machine() -> None:
     rover, base = Identity("rover", None), Identity("base", None)
     async with host(base) as there, host(rover) as here:
@@ -349,6 +359,7 @@ async def test_judge_that_fails_turns_away_and_goes_on(caplog: pytest.LogCapture
     context.term()
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 async def test_self_test_leaves_no_trace() -> None:
     async with host(identity("base")) as there:
         assert there.node.refusals.counts == {}

@@ -44,6 +44,7 @@ async def test_peers_are_told_by_the_names_that_they_were_paired_under() -> None
         assert base.node.peers[rover.key].name == "rover"
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 async def test_a_thousand_calls_at_once_come_back_to_their_callers() -> None:
     async with two_hosts() as (rover, base):
 
@@ -70,6 +71,7 @@ async def test_a_broken_handler_is_told_and_harms_nothing(caplog: pytest.LogCapt
     assert "broken" in caplog.text
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 async def test_progress_is_heard_before_the_answer() -> None:
     async with two_hosts() as (rover, base):
         call = rover.node.call(base.key, "count", {"to": 5}, deadline_s=5)
@@ -93,6 +95,7 @@ async def test_notice_arrives_unanswered() -> None:
         assert heard == {"from": "rover", "method": "moved", "to": 3}
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 async def test_cancelled_caller_cancels_the_errand() -> None:
     async with two_hosts() as (rover, base):
         task = asyncio.ensure_future(wait(rover, base))

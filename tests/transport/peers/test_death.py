@@ -46,6 +46,7 @@ async def pair() -> AsyncIterator[tuple[Host, Child]]:
             yield here, other
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 async def test_departure_is_announced() -> None:
     rover, base = identity("rover"), identity("base")
     async with host(rover, trusting(base)) as here:
@@ -55,6 +56,7 @@ async def test_departure_is_announced() -> None:
         assert (await here.told(PeerLost)).reason is Loss.DEPARTED
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 async def test_killed_peer_is_lost_and_calls_to_it_fail(pair: tuple[Host, Child]) -> None:
     here, other = pair
     call = here.node.call(other.key, "wait", {}, deadline_s=600)
@@ -64,6 +66,7 @@ async def test_killed_peer_is_lost_and_calls_to_it_fail(pair: tuple[Host, Child]
     assert other.key not in here.node.peers
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 async def test_stopped_peer_is_lost_and_comes_back(pair: tuple[Host, Child]) -> None:
     here, other = pair
     call = here.node.call(other.key, "wait", {}, deadline_s=600)
@@ -148,6 +151,7 @@ async def test_only_a_held_errand_outlives_its_deadline(lease: Lease, clock: Vir
             assert there.servant.ended.empty()
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 async def test_broken_connection_is_resumed_and_nothing_runs_twice() -> None:
     async with two_hosts() as (rover, base):
         call = rover.node.call(base.key, "wait", {"tag": "once"}, deadline_s=60)

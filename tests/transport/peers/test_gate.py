@@ -21,10 +21,11 @@ from nondum.transport.peers import (
     PeerUp,
     Reason,
     Trust,
+    here,
     node,
 )
 from nondum.transport.peers.certificate import new_fleet
-from nondum.transport.peers.gate import Acquaintance, Gate, TurnedAway
+from nondum.transport.peers.gate import Acquaintance, Gate, TurnedAway, judge
 from nondum.transport.peers.messages import Hello, Notice, Ping, encode
 from nondum.transport.peers.zap import DOMAIN, Knock, parse
 
@@ -34,7 +35,7 @@ FLEET, _ = new_fleet()
 
 
 def judged(knock: Knock, trust: Trust = TRUST, keys: HostKeys | None = ME) -> Reason | None:
-    return Gate(Identity("base", keys), trust, lambda: datetime.now(UTC)).judge(knock)
+    return judge(knock, Identity("base", keys), trust)
 
 
 def knock(
@@ -192,7 +193,8 @@ async def test_message_under_another_key_than_the_links_is_not_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Two peers may choose one routing id: the second takes the place of the first as it goes."""
-    monkeypatch.setattr(node, "BEAT_S", 3600.0)  # what is over is looked for no more
+    for module in (node, here):  # what is over is looked for no more
+        monkeypatch.setattr(module, "BEAT_S", 3600.0)
     base, rover, other = identity("base"), identity("rover"), identity("other")
     async with host(base, trusting(rover, other)) as there, asyncio.timeout(PATIENCE_S):
         with raw_dealer(there, rover, routing_id=b"chosen") as first:

@@ -26,12 +26,12 @@ from tests.transport.peers.hosts import (
 )
 
 from nondum.transport import tcp
-from nondum.transport.peers import Identity, Loss, PeerLost, PeerUp, Reason, drained, node
+from nondum.transport.peers import Identity, Loss, PeerLost, PeerUp, Reason, drained, here
 from nondum.transport.peers.dial import Attempt
-from nondum.transport.peers.link import AcceptedRoute
+from nondum.transport.peers.here import LOOK_S
 from nondum.transport.peers.messages import MAX_MESSAGE, Welcome, encode
-from nondum.transport.peers.node import LOOK_S
 from nondum.transport.peers.received import MOST_AHEAD, Received
+from nondum.transport.peers.routes import AcceptedRoute, DialledRoute
 
 pytestmark = pytest.mark.anyio
 
@@ -44,6 +44,7 @@ HANDSHAKE = 1024
 """More than the bytes that a connection begins with."""
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 @pytest.mark.parametrize("is_greeted", [True, False], ids=["peer", "before its greeting"])
 async def test_message_without_end_of_an_admitted_host_is_cut(is_greeted: bool) -> None:
     base, rover, other = identity("base"), identity("rover"), identity("other")
@@ -72,6 +73,7 @@ async def test_message_without_end_of_an_admitted_host_is_cut(is_greeted: bool) 
         assert good.key in there.node.peers
 
 
+@pytest.mark.usefixtures("each_kind_of_sockets")
 @pytest.mark.parametrize("is_greeted", [True, False], ids=["peer", "before its greeting"])
 async def test_message_without_end_of_a_dialled_host_is_cut(is_greeted: bool) -> None:
     base, rover = identity("base"), identity("rover")
@@ -139,7 +141,7 @@ async def test_what_waits_while_this_host_hangs_is_not_taken_for_a_message_witho
     at_once: int, clock: VirtualClock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its time stands still, so that it does not take its peer for lost."""
-    monkeypatch.setattr(node, "LOOK_S", 0.0)  # each turn of the loop
+    monkeypatch.setattr(here, "LOOK_S", 0.0)  # each turn of the loop
     monkeypatch.setattr(drained, "AT_ONCE", at_once)
     async with two_hosts() as (rover, base):
         (route,) = base.node.accepted
@@ -232,7 +234,9 @@ def bytes_received(route: object) -> int:
 
 def accounts_of(one: Host) -> Iterator[Received]:
     for route in (*one.node.accepted, *one.node.dialled):
-        assert isinstance(route, AcceptedRoute | Attempt)
+        if isinstance(route, Attempt):
+            route = route.route
+        assert isinstance(route, AcceptedRoute | DialledRoute)
         assert route.received is not None
         yield route.received
 

@@ -54,6 +54,8 @@ def show_why(session: Session) -> None:
         render.as_json(view)
         return
     click.echo(f"links are secured by {view['security']}")
+    if view["process"] is not None:
+        click.echo(f"links are held by a process of their own ({view['process']})")
     for problem in view["problems"]:
         render.sentence(problem, colour="red", mark="problem: ")
     for host in view["hosts"]:

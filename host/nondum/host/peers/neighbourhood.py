@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Mapping
 from typing import Any
 
@@ -40,12 +41,15 @@ from nondum.host.workers.workers import Workers
 from nondum.transport.discovery import Hint
 from nondum.transport.fleet import FleetEvent, Mesh
 from nondum.transport.peers import (
+    LinksFailed,
     PeerLost,
     PeerRefused,
     Refusal,
     Security,
     Trust,
 )
+
+log = logging.getLogger(__name__)
 
 
 class Neighbourhood:
@@ -110,6 +114,7 @@ class Neighbourhood:
             hints=self._hints,
             network=lambda: self.finder.status if self.finder else None,
             refusals=self.fleet.refusals,
+            links_pid=lambda: self.fleet.links_pid if isinstance(self.fleet, Mesh) else None,
         )
         bridge = Bridge(self._listens, port=config.peers.stream_port)
         self._streams = StreamDesk(bridge, workers.streams, self.peering, self.fleet, self._hints)
@@ -240,8 +245,12 @@ class Neighbourhood:
 
     def _on_fleet(self, event: FleetEvent) -> None:
         self.view.on_fleet(event)
-        if isinstance(event, Refusal):
-            self._strangers.turned_away(event)
+        match event:
+            case Refusal():
+                self._strangers.turned_away(event)
+            case LinksFailed(problem):
+                log.warning("%s", problem)
+                self._mind().people.tell(str(problem))
         self.peering.on_fleet(event)
         if isinstance(event, PeerLost):
             self._streams.lose(event.key)

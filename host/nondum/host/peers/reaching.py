@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from nondum.host.config import HostConfig, PeersSection
 from nondum.host.peers.finder import PeerFinder
+from nondum.host.peers.links.process import LinksProcess
 from nondum.transport.discovery import interfaces as network
 from nondum.transport.fleet import FleetEvent, Mesh
-from nondum.transport.peers import Handler, Identity, Trust
+from nondum.transport.peers import Handler, Identity, SocketsHere, Trust
+from nondum.transport.peers.apart.sockets import SocketsApart
 
 if TYPE_CHECKING:  # zenoh is an extra
     from nondum.transport.fleet.zenoh import ZenohFleet
 
+_APART = functools.partial(SocketsApart, start=LinksProcess)
 ON_LOOPBACK = ("tcp://127.0.0.1:0",)
 
 
@@ -29,8 +33,15 @@ def fleet_of(
     """The other hosts, not started yet. Raises `PeerRefused`."""
     router = config.router
     if not router.endpoints:
-        listen = listens(config.peers)
-        return Mesh(identity, trust, handler, on_event=on_event, listen=listen, find=find)
+        return Mesh(
+            identity,
+            trust,
+            handler,
+            on_event=on_event,
+            listen=listens(config.peers),
+            find=find,
+            sockets=_APART if config.peers.process else SocketsHere,
+        )
     from nondum.transport.fleet.zenoh import ZenohFleet
     from nondum.transport.fleet.zenoh_line import RouterAccess
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -54,9 +55,11 @@ class PeersView:
         hints: Callable[[], Iterable[Hint]],
         network: Callable[[], DiscoveryStatus | None],
         refusals: Refusals,
+        links_pid: Callable[[], int | None],
     ) -> None:
         self._security, self._snapshot, self._peers, self._trust = security, snapshot, peers, trust
         self._hints, self._network, self._refusals = hints, network, refusals
+        self._links_pid = links_pid
         self._past: dict[PeerKey, _Past] = {}
         self._loop = asyncio.get_running_loop()
 
@@ -91,12 +94,14 @@ class PeersView:
         return sorted([*here, *absent], key=lambda row: (row["state"], row["peer"]))
 
     async def why(self, arguments: Arguments) -> Row:
-        """All that bears on who is here and who is not: `security`, `hosts`, `interfaces`,
-        `static`, `refused` (counts), `latest` refusals, `problems`."""
-        network = self._network()
+        """All that bears on who is here and who is not: `security`, `process` (of the links, where
+        they have one), `hosts`, `interfaces`, `static`, `refused` (counts), `latest` refusals,
+        `problems`."""
+        network, links_pid = self._network(), self._links_pid()
         now_s = self._loop.time()
         return {
             "security": self._security.value,
+            "process": links_pid if links_pid != os.getpid() else None,
             "hosts": [self._why(key) for key in sorted(self._every_key())],
             "interfaces": [_aged(asdict(row), now_s) for row in network.interfaces]
             if network

@@ -42,7 +42,7 @@ class Exporter:
         self._grants: dict[str, Outgoing] = {}
         self._claimed: dict[bytes, Outgoing] = {}
         self.refusals = Refusals(lambda refusal: log.info("a reader was refused: %s", refusal))
-        self._arrivals = Arrivals(self.refusals, self._on_closed)
+        self._arrivals = Arrivals(self.refusals.add, self._on_closed)
         self._zap: ZapHandler | None = None
         self._listener: Drained | None = None
         self._ears: Watch | None = None

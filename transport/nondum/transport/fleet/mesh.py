@@ -13,11 +13,13 @@ from nondum.transport.fleet.seam import FleetEvent, Peer
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.errands import Handler
 from nondum.transport.peers.events import DialFailed, PeerEvent, PeerLost, PeerUp
+from nondum.transport.peers.here import SocketsHere
 from nondum.transport.peers.identity import Identity, Security
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.node import PeerNode, fresh_epoch
 from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.refusals import Refusals
+from nondum.transport.peers.sockets import MakeSockets
 from nondum.transport.peers.trust import Standing, Trust
 
 
@@ -48,10 +50,12 @@ class Mesh:
         listen: Sequence[str] = ("tcp://*:0",),
         find: Find | None = None,
         clock: Callable[[], datetime] = lambda: datetime.now(UTC),
+        sockets: MakeSockets = SocketsHere,
     ) -> None:
         """Made on the running loop. Without `find`, hosts meet by `meet` only.
 
-        `clock` tells the time of day, which only certificates need.
+        `clock` tells the time of day, which only certificates need; `sockets` makes what its links
+        go over.
         """
         self.epoch = fresh_epoch()
         self.addresses: tuple[str, ...] = ()
@@ -66,6 +70,7 @@ class Mesh:
             pulse=Pulse(self._catalogues.state, self._catalogues.heard),
             epoch=self.epoch,
             clock=clock,
+            sockets=sockets,
         )
         self._meeting = Meeting(identity.key, self._node, self.is_welcome)
         self._finder: Finder | None = None
@@ -84,6 +89,11 @@ class Mesh:
     def security(self) -> Security:
         """How links are secured."""
         return self._node.security
+
+    @property
+    def links_pid(self) -> int | None:
+        """The process that holds the sockets of its links; None while there is none."""
+        return self._node.links_pid
 
     @property
     def refusals(self) -> Refusals:

@@ -109,7 +109,6 @@ class ZenohNode:
             handler,
             self.refusals,
             on_event,
-            lambda _link: None,
             Pulse(),
             terms=TERMS,
         )

@@ -2,8 +2,9 @@
 
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.errands import Errand, Handler, Lease
-from nondum.transport.peers.events import DialFailed, Loss, PeerEvent, PeerLost, PeerUp
+from nondum.transport.peers.events import DialFailed, LinksFailed, Loss, PeerEvent, PeerLost, PeerUp
 from nondum.transport.peers.failures import CallFailed, PeerRefused, PeerUnreachable
+from nondum.transport.peers.here import SocketsHere
 from nondum.transport.peers.identity import Identity, Security
 from nondum.transport.peers.keys import HostKeys, PeerKey, fingerprint, load_or_create
 from nondum.transport.peers.node import PeerNode
@@ -20,6 +21,7 @@ __all__ = [
     "HostKeys",
     "Identity",
     "Lease",
+    "LinksFailed",
     "Loss",
     "PeerEvent",
     "PeerKey",
@@ -32,6 +34,7 @@ __all__ = [
     "Refusal",
     "Refusals",
     "Security",
+    "SocketsHere",
     "Trust",
     "fingerprint",
     "load_or_create",

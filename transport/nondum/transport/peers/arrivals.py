@@ -9,7 +9,7 @@ import zmq
 
 from nondum.transport.peers.accepted import AcceptedConnections
 from nondum.transport.peers.monitor import SocketEvent
-from nondum.transport.peers.refusals import Reason, Refusal, Refusals
+from nondum.transport.peers.refusals import Reason, Refusal
 
 # From zmq.h: ZMQ_PROTOCOL_ERROR_ZMTP_CRYPTOGRAPHIC and …_MECHANISM_MISMATCH.
 _OTHER_KEYS = frozenset({0x11000001, 0x11000002})
@@ -20,13 +20,14 @@ class Arrivals:
 
     def __init__(
         self,
-        refusals: Refusals,
+        on_refusal: Callable[[Refusal], None],
         on_closed: Callable[[int], None],
         awake_s: Callable[[], float] | None = None,
     ) -> None:
-        """`on_closed` is told the descriptor of every connection that ended; `awake_s` tells how
-        long the loop has run: while it stands still, no one can show who it is."""
-        self._refusals, self._on_closed = refusals, on_closed
+        """`on_refusal` is told of all that became no peer's, `on_closed` the descriptor of every
+        connection that ended; `awake_s` tells how long the loop has run: while it stands still, no
+        one can show who it is."""
+        self._on_refusal, self._on_closed = on_refusal, on_closed
         self._awake_s = awake_s or asyncio.get_running_loop().time
         self._connections = AcceptedConnections()
         self._explained = 0
@@ -74,4 +75,4 @@ class Arrivals:
 
     def _count(self, reason: Reason, end: str = "") -> None:
         now_s = asyncio.get_running_loop().time()
-        self._refusals.add(Refusal(reason, end, "", f"no peer: {reason.value}", now_s))
+        self._on_refusal(Refusal(reason, end, "", f"no peer: {reason.value}", now_s))

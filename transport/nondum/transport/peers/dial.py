@@ -12,15 +12,14 @@ import random
 from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
-import zmq
-
 from nondum.sdk.errors import Problem
 from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.events import DialFailed
+from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import PeerKey
-from nondum.transport.peers.link import DialledRoute, Link
-from nondum.transport.peers.monitor import HANDSHAKE_FAILED, SocketEvent
-from nondum.transport.peers.received import Received
+from nondum.transport.peers.link import Link, Route
+from nondum.transport.peers.refusals import Reason
+from nondum.transport.peers.sockets import Receiver
 
 HEAD_START_S = 0.05
 """What addresses of the link alone come behind the others: a link by one of them would break
@@ -32,54 +31,56 @@ ANSWER_S = 8.0
 GREETING_S = 12.0
 """… and so much more to be greeted: the other end's loop has let it in, so it is only slow."""
 
-OnData: TypeAlias = Callable[[Link, list[zmq.Frame]], None]
+Connect: TypeAlias = Callable[[PeerKey, str, Receiver], Route]
+"""Begins one connection to an address. Raises `PeerRefused` (ADDRESS_MALFORMED)."""
 
 
 class Attempt:
-    """One connection to one address, which may become a link."""
+    """One connection to one address, which may become a link: the route of that link."""
 
-    def __init__(self, dial: Dial, socket: zmq.Socket[bytes], address: str) -> None:
+    def __init__(self, dial: Dial, connect: Connect, address: str) -> None:
         self.dial, self.address = dial, address
         self.is_connected = False
         self.is_settled = False
         """Whether it became a peer's link."""
         self.link: Link | None = None
         """Once it is authenticated."""
-        self._route = DialledRoute(socket, address, self._on_data, self._on_event)
+        self.route = connect(dial.key, address, self)
 
     def send(self, data: bytes) -> Sent:
         """Send without waiting."""
-        return self._route.send(data)
+        return self.route.send(data)
 
     def cut(self, linger_ms: int = 0) -> None:
         """End it, and have the dial try again."""
-        self._route.cut(linger_ms)
+        self.route.cut(linger_ms)
         self.dial.over(self, None)
-
-    @property
-    def received(self) -> Received | None:
-        """The account of what came over the connection, once there is one."""
-        return self._route.received
-
-    def drain(self) -> bool:
-        """Take in what has come; whether nothing is left that waits."""
-        return self._route.drain()
 
     def drop(self) -> None:
         """End it without a word."""
-        self._route.cut()
+        self.route.cut()
 
-    def _on_data(self, frames: list[zmq.Frame]) -> None:
+    def connected(self) -> None:
+        """The other end has proved its key."""
+        self.is_connected = True
+        self.dial.won(self)
+
+    def received(self, data: bytes) -> None:
+        """A message came."""
         if self.link is not None:
-            self.dial.on_data(self.link, frames)
+            self.dial.on_data(self.link, data)
 
-    def _on_event(self, event: SocketEvent) -> None:
-        if event.kind == zmq.EVENT_HANDSHAKE_SUCCEEDED:
-            self.is_connected = True
-            self.dial.won(self)
-        else:
-            self._route.drain()
-            self.dial.over(self, _why(event))
+    def misused(self, reason: Reason) -> None:
+        """What came is no message of a host's."""
+        if self.link is not None:
+            self.dial.on_misused(self.link, reason)
+
+    def doubtful(self) -> None:
+        """Not told of dialled ones: their end is."""
+
+    def over(self, problem: Problem | None) -> None:
+        """It has failed, or its connection broke."""
+        self.dial.over(self, problem)
 
 
 class Dial:
@@ -90,19 +91,21 @@ class Dial:
         key: PeerKey,
         addresses: Sequence[str],
         *,
-        connect: Callable[[PeerKey], zmq.Socket[bytes]],
+        connect: Connect,
         is_wanted: Callable[[PeerKey], bool],
         on_won: Callable[[Attempt], None],
         on_over: Callable[[Attempt], None],
-        on_data: OnData,
+        on_data: Callable[[Link, bytes], None],
+        on_misused: Callable[[Link, Reason], None],
         on_event: Callable[[DialFailed], None],
     ) -> None:
-        """`connect` makes a socket; `is_wanted` is false while there is another link already.
+        """`is_wanted` is false while there is another link already.
 
-        `on_won` is told of an authenticated connection, `on_over` of its end.
+        `on_won` is told of an authenticated connection, `on_over` of its end; `on_data` and
+        `on_misused` of what came over one that has a link.
         """
         self.key, self.addresses = key, tuple(addresses)
-        self.on_data = on_data
+        self.on_data, self.on_misused = on_data, on_misused
         self._connect, self._is_wanted = connect, is_wanted
         self._on_won, self._on_over, self._on_event = on_won, on_over, on_event
         self._loop = asyncio.get_running_loop()
@@ -192,9 +195,9 @@ class Dial:
     def _attempt(self, addresses: Sequence[str]) -> None:
         for address in addresses:
             try:
-                self._attempts.append(Attempt(self, self._connect(self.key), address))
-            except zmq.ZMQError as error:
-                self._tell(address, _unusable(error))
+                self._attempts.append(Attempt(self, self._connect, address))
+            except PeerRefused as unusable:
+                self._tell(address, unusable.problems[0])
 
     def _give_up(self) -> None:
         if any(one.is_connected and not one.is_settled for one in self._attempts):
@@ -216,23 +219,3 @@ def is_of_link(address: str) -> bool:
     (True, False)
     """
     return address.startswith("tcp://[fe80:")
-
-
-def _why(event: SocketEvent) -> Problem | None:
-    if event.kind == zmq.EVENT_HANDSHAKE_FAILED_AUTH:
-        return Problem(
-            "PEER_TURNED_AWAY",
-            "the peer does not let this host's key in",
-            fix="pair the two hosts, or look at the peer's revoked keys",
-        )
-    if event.kind & HANDSHAKE_FAILED:
-        return Problem(
-            "PEER_MISMATCH",
-            "the handshake broke off: another key than the one announced, or no keys at all",
-            fix="look at `security` and the fingerprints on both hosts",
-        )
-    return Problem("PEER_SILENT", "nobody answers there")
-
-
-def _unusable(error: zmq.ZMQError) -> Problem:
-    return Problem("ADDRESS_MALFORMED", f"the address cannot be dialled: {error}")

@@ -39,6 +39,7 @@ class Drained:
         self._descriptor = socket.fileno()
         self._again: asyncio.Handle | None = None
         self.is_closed = False
+        self._is_held = False
         self._loop.add_reader(self._descriptor, self.drain)
         self._look_again()
 
@@ -70,17 +71,32 @@ class Drained:
             self._again.cancel()
         self._socket.close(linger_ms)
 
+    def hold(self) -> None:
+        """Take nothing in until `release`: what comes waits in ZeroMQ, and then at the sender."""
+        if not self._is_held and not self.is_closed:
+            self._is_held = True
+            self._loop.remove_reader(self._descriptor)
+
+    def release(self) -> None:
+        """Take in again what comes."""
+        if self._is_held and not self.is_closed:
+            self._is_held = False
+            self._loop.add_reader(self._descriptor, self.drain)
+            self._look_again()
+
     def _look_again(self) -> None:
         """Drain on the loop's next turn if something came while nobody looked."""
         if (
             self._again is None
+            and not self._is_held
             and not self._socket.closed
             and int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN
         ):
             self._again = self._loop.call_soon(self.drain)
 
     def drain(self) -> bool:
-        """Take in what has come, `AT_ONCE` at most; whether nothing is left that waits.
+        """Take in what has come, `AT_ONCE` at most; whether nothing is left that waits, as far as
+        anybody looked.
 
         Also called when the end of a connection is told before what came over it, by the monitor.
         """
@@ -90,6 +106,8 @@ class Drained:
         for _ in range(AT_ONCE):
             if self.is_closed:
                 return True
+            if self._is_held:
+                return False
             try:
                 frames = self._socket.recv_multipart(zmq.DONTWAIT, copy=False)
             except zmq.Again:

@@ -55,4 +55,11 @@ class DialFailed:
     problem: Problem
 
 
-PeerEvent: TypeAlias = PeerUp | PeerLost | DialFailed | Refusal
+@dataclass(frozen=True, slots=True)
+class LinksFailed:
+    """All links broke at once, for a fault of this host's; they come back by themselves."""
+
+    problem: Problem
+
+
+PeerEvent: TypeAlias = PeerUp | PeerLost | DialFailed | Refusal | LinksFailed

@@ -75,25 +75,6 @@ class Gate:
         self.identity, self._clock = identity, clock
         self.trust = trust
 
-    def judge(self, knock: Knock) -> Reason | None:
-        """Whether a connection may go on to greet: None, or why not."""
-        if knock.domain != DOMAIN:
-            return Reason.WRONG_DOMAIN
-        if self.identity.security is Security.DEVELOPMENT:
-            is_here = knock.mechanism == "NULL" and is_loopback(knock.address)
-            return None if is_here else Reason.MISMATCH
-        if knock.mechanism != "CURVE":
-            return Reason.MISMATCH
-        if knock.key == self.identity.key:
-            return Reason.DUPLICATE
-        match self.trust.standing(PeerKey(knock.key)):
-            case Standing.REVOKED:
-                return Reason.REVOKED
-            case Standing.UNKNOWN:
-                return Reason.UNKNOWN_KEY
-            case Standing.ADMITTED | Standing.MUST_CERTIFY:
-                return None
-
     def is_revoked(self, key: PeerKey) -> bool:
         """Whether a message under this key may no longer be read."""
         return key in self.trust.revoked
@@ -134,6 +115,26 @@ class Gate:
 
 
 _REASONS = {"KEY_REVOKED": Reason.REVOKED, "KEY_UNKNOWN": Reason.UNKNOWN_KEY}
+
+
+def judge(knock: Knock, me: Identity, trust: Trust) -> Reason | None:
+    """Whether a connection to a host may go on to greet: None, or why not."""
+    if knock.domain != DOMAIN:
+        return Reason.WRONG_DOMAIN
+    if me.security is Security.DEVELOPMENT:
+        is_here = knock.mechanism == "NULL" and is_loopback(knock.address)
+        return None if is_here else Reason.MISMATCH
+    if knock.mechanism != "CURVE":
+        return Reason.MISMATCH
+    if knock.key == me.key:
+        return Reason.DUPLICATE
+    match trust.standing(PeerKey(knock.key)):
+        case Standing.REVOKED:
+            return Reason.REVOKED
+        case Standing.UNKNOWN:
+            return Reason.UNKNOWN_KEY
+        case Standing.ADMITTED | Standing.MUST_CERTIFY:
+            return None
 
 
 def entry(reason: Reason | None) -> Entry:

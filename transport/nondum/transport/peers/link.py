@@ -7,19 +7,17 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
-import zmq
-
 from nondum.sdk.errors import Problem
-from nondum.transport import tcp
-from nondum.transport.peers.drained import Drained, Sent
+from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.messages import Message, encode
-from nondum.transport.peers.monitor import SocketEvent, Watch
-from nondum.transport.peers.received import Received
 from nondum.transport.peers.suspicion import Watched
 
 if TYPE_CHECKING:
     from nondum.transport.peers.session import Session
+
+LINGER_MS = 200
+"""How long the last words over a link may take."""
 
 
 class Route(Protocol):
@@ -68,6 +66,8 @@ class Link:
         self.is_over = False
         self.on_refused: Callable[[Problem], None] | None = None
         """Told why, when a link that this host began is turned away."""
+        self.on_peer: Callable[[], None] | None = None
+        """Told when an accepted link becomes a peer's."""
         self.round_trip_s: float | None = None
         self._pinged = 0
         self._pinged_s = now_s
@@ -118,79 +118,3 @@ class Link:
         if not self.is_over:
             self.is_over = True
             self.route.cut(linger_ms)
-
-
-class AcceptedRoute:
-    """Over the listening socket, by the routing id that ZeroMQ gave the connection."""
-
-    def __init__(
-        self, listener: Drained, routing_id: bytes, descriptor: int, *, is_sealed: bool
-    ) -> None:
-        """`is_sealed` where CURVE secures it."""
-        self._listener, self._routing_id, self.descriptor = listener, routing_id, descriptor
-        self.received = Received(descriptor, is_sealed=is_sealed)
-        """The account of what came."""
-        self.address = self.received.end
-
-    def drain(self) -> bool:
-        """Take in what has come over the socket; whether nothing is left that waits."""
-        return self._listener.drain()
-
-    def send(self, data: bytes) -> Sent:
-        """Send without waiting."""
-        return self._listener.send([self._routing_id, data])
-
-    def cut(self, linger_ms: int = 0) -> None:
-        """Shut the connection down, in `linger_ms`."""
-        loop = asyncio.get_running_loop()
-        loop.call_later(linger_ms / 1000, tcp.cut, self.descriptor, self.address)
-
-
-class DialledRoute:
-    """Over a socket of its own. Raises `zmq.ZMQError` for an address that cannot be dialled."""
-
-    def __init__(
-        self,
-        socket: zmq.Socket[bytes],
-        address: str,
-        on_data: Callable[[list[zmq.Frame]], None],
-        on_event: Callable[[SocketEvent], None],
-    ) -> None:
-        """`on_event` is told of all but the beginning of a connection."""
-        self.address = address
-        self.received: Received | None = None
-        """The account of what came over the connection, once there is one."""
-        self._on_data, self._on_event = on_data, on_event
-        self._is_sealed = int(socket.getsockopt(zmq.MECHANISM)) == zmq.CURVE
-        self._ears = Watch(socket, self._take_event)
-        self._socket = Drained(socket, self._take)
-        try:
-            socket.connect(address)
-        except zmq.ZMQError:
-            self.cut()
-            raise
-
-    def send(self, data: bytes) -> Sent:
-        """Send without waiting."""
-        return self._socket.send([data])
-
-    def drain(self) -> bool:
-        """Take in what has come, if only just before the end; whether nothing is left."""
-        return self._socket.drain()
-
-    def cut(self, linger_ms: int = 0) -> None:
-        """Close the socket."""
-        self._ears.close()
-        self._socket.close(linger_ms)
-
-    def _take(self, frames: list[zmq.Frame]) -> None:
-        if self.received is not None:
-            self.received.delivered(frames)
-        self._on_data(frames)
-
-    def _take_event(self, event: SocketEvent) -> None:
-        if event.kind == zmq.EVENT_CONNECTED:
-            # Also where ZeroMQ dials again by itself: that is another connection.
-            self.received = Received(event.value, is_sealed=self._is_sealed)
-        else:
-            self._on_event(event)

@@ -44,7 +44,9 @@ from nondum.transport.peers.pairing_state import (
     PairingState,
     Waiting,
 )
-from nondum.transport.peers.refusals import Refusal, Refusals
+from nondum.transport.peers.refusals import Reason, Refusal, Refusals
+from nondum.transport.peers.routes import DialledRoute
+from nondum.transport.peers.sockets import Receiver
 
 BEAT_S = 0.25
 LINGER_MS = 500
@@ -131,11 +133,12 @@ class PairingHost:
         self._dial = Dial(
             key,
             addresses,
-            connect=self._dialling,
+            connect=self._connect,
             is_wanted=lambda _: self._try is None and not self._is_over,
             on_won=self._on_won,
             on_over=self._on_attempt_over,
             on_data=self._on_answered,
+            on_misused=self._on_misused,
             on_event=self._on_dial_failed,
         )
 
@@ -205,10 +208,10 @@ class PairingHost:
 
     # Asking
 
-    def _dialling(self, key: PeerKey) -> zmq.Socket[bytes]:
+    def _connect(self, key: PeerKey, address: str, receiver: Receiver) -> DialledRoute:
         socket = dialling(self._context, self._keys, key)
         socket.setsockopt(zmq.MAXMSGSIZE, MAX_BYTES)
-        return socket
+        return DialledRoute(socket, address, receiver)
 
     def _on_won(self, attempt: Attempt) -> None:
         key = attempt.dial.key
@@ -218,13 +221,13 @@ class PairingHost:
         elif begun := self._begin(Role.ASKING, attempt.link, None):
             attempt.link.send(encode(pairing.ask(begun.pairing)))
 
-    def _on_answered(self, link: Link, frames: list[zmq.Frame]) -> None:
-        if self._try is None or self._try.link is not link:
-            return
-        if len(frames) == 1:
+    def _on_answered(self, link: Link, data: bytes) -> None:
+        if self._try is not None and self._try.link is link:
             assert link.proved is not None
-            self._hear(frames[0].bytes, link.proved)
-        else:
+            self._hear(data, link.proved)
+
+    def _on_misused(self, link: Link, _reason: Reason) -> None:
+        if self._try is not None and self._try.link is link:
             self._give_up(_BROKEN, Ending.BROKEN)
 
     def _on_attempt_over(self, attempt: Attempt) -> None:
@@ -371,8 +374,9 @@ def _sent_too_much(current: Try) -> bool:
     if current.asker is not None:
         state = tcp.state(current.asker.descriptor)
         return state is not None and state.bytes_received > MOST_SENT
-    assert isinstance(current.link.route, Attempt)
-    received = current.link.route.received
+    attempt = current.link.route
+    assert isinstance(attempt, Attempt) and isinstance(attempt.route, DialledRoute)
+    received = attempt.route.received
     return received is not None and received.ahead(received.read()) > MOST_SENT
 
 

@@ -17,11 +17,12 @@ from nondum.transport.peers.arrivals import Arrivals
 from nondum.transport.peers.drained import Drained
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import HostKeys, PeerKey
-from nondum.transport.peers.link import AcceptedRoute, Link
+from nondum.transport.peers.link import Link
 from nondum.transport.peers.listener import Context, listening
 from nondum.transport.peers.monitor import Watch
 from nondum.transport.peers.pairing_messages import MAX_BYTES
 from nondum.transport.peers.refusals import Reason, Refusal, Refusals
+from nondum.transport.peers.routes import AcceptedRoute
 from nondum.transport.peers.zap import DOMAIN, Entry, Knock, ZapHandler
 
 MOST_SENT = 16 * 1024
@@ -52,7 +53,7 @@ class Door:
         """`address` as ZeroMQ binds it. Raises `PeerRefused` (ZAP_TAKEN, ADDRESS_UNUSABLE)."""
         self._own_key, self._on_data = keys.public, on_data
         self._refusals = refusals
-        self._arrivals = Arrivals(refusals, lambda _: None)
+        self._arrivals = Arrivals(refusals.add, lambda _: None)
         self._zap = ZapHandler(context, self._judge)
         socket = listening(context, keys)
         socket.setsockopt(zmq.MAXMSGSIZE, MAX_BYTES)
@@ -72,8 +73,9 @@ class Door:
 
     def link(self, asker: Asker) -> Link:
         """A link to who has asked in earnest."""
-        self._arrivals.became_peer(asker.descriptor)
-        route = AcceptedRoute(self._listener, asker.id, asker.descriptor, is_sealed=True)
+        on_peer, proved = self._arrivals.became_peer, asker.proved
+        route = AcceptedRoute(self._listener, asker.id, asker.descriptor, on_peer, proved)
+        route.became_peer()
         now_s = asyncio.get_running_loop().time()
         return Link(route, asker.proved, now_s, dialled=False)
 

@@ -14,7 +14,7 @@ from nondum.transport.peers.events import Loss, PeerEvent, PeerLost, PeerUp
 from nondum.transport.peers.failures import PeerUnreachable
 from nondum.transport.peers.gate import Acquaintance, Gate, TurnedAway
 from nondum.transport.peers.keys import PeerKey, fingerprint
-from nondum.transport.peers.link import Link
+from nondum.transport.peers.link import LINGER_MS, Link
 from nondum.transport.peers.messages import (
     VERSIONS,
     Bye,
@@ -37,8 +37,6 @@ from nondum.transport.peers.trust import Admission
 
 ACQUAINTANCES = 1024
 """Peers that are remembered while they are away."""
-LINGER_MS = 200
-"""How long the last words over a link may take."""
 
 _TERMS = Terms()
 
@@ -53,18 +51,16 @@ class Roster:
         handler: Handler,
         refusals: Refusals,
         on_event: Callable[[PeerEvent], None],
-        on_peer_link: Callable[[Link], None],
         pulse: Pulse,
         terms: Terms = _TERMS,
         allowance: Allowance = USUAL,
     ) -> None:
-        """`on_peer_link` is told of every accepted link that became a peer's; `terms` say when a
-        link is dead; `allowance` is every peer's."""
+        """`terms` say when a link is dead; `allowance` is every peer's."""
         self.gate, self.epoch = gate, epoch
         self.dials: dict[PeerKey, Dial] = {}
         self._allowance = allowance
         self._handler, self._refusals = handler, refusals
-        self._on_event, self._on_peer_link, self._pulse = on_event, on_peer_link, pulse
+        self._on_event, self._pulse = on_event, pulse
         self._sessions: dict[PeerKey, Session] = {}
         self._known: dict[PeerKey, Acquaintance] = {}
         self._orphans: set[Errand] = set()
@@ -274,7 +270,8 @@ class Roster:
                 admission, known = self._meet(link, message)
                 link.version = agreed_version(message)
                 link.tell(Welcome(self._hello(known, link.version)))
-                self._on_peer_link(link)
+                if link.on_peer is not None:
+                    link.on_peer()
             case Welcome(hello) if link.dialled:
                 admission, known = self._meet(link, hello)
                 link.version = agreed_version(hello)

@@ -96,6 +96,18 @@ CODES = (
         "one of the two is a copy: take the key file away there, and start it anew",
     ),
     Code(
+        "LINKS_DIED",
+        "The process that holds the links to other hosts (`process` under [peers]) has ended, for "
+        "want of memory or else. It is started again, and the links come back.",
+        "if it happens again, see the daemon's log and `nondum peers --why`: a host may send far "
+        "too much",
+    ),
+    Code(
+        "LINKS_START",
+        "The process that is to hold the links to other hosts does not start.",
+        "see the daemon's log; or set `process = false` under [peers]",
+    ),
+    Code(
         "METHOD_UNKNOWN",
         "This host does not know the call.",
         "run the same version of nondum on both hosts",
