@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import click
 
-from nondum.host.cli import render
+from nondum.host.cli import live, render
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.table import table
 
@@ -14,7 +15,7 @@ LAST_TOLD = 5
 
 
 @click.command()
-@click.option("--follow", "-f", is_flag=True, help="Show it again whenever it changes.")
+@live.follow_option(live.REDRAWN)
 @json_option
 @click.pass_obj
 def status(session: Session, follow: bool) -> None:
@@ -37,8 +38,7 @@ def status(session: Session, follow: bool) -> None:
         if session.as_json:
             render.as_json_line(view)
         else:
-            click.clear()
-            show(view)
+            live.redraw(partial(show, view))
 
 
 def show(view: dict[str, Any]) -> None:
