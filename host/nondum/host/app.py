@@ -12,7 +12,7 @@ import signal
 from collections.abc import Awaitable, Callable, Coroutine, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from nondum.host import heap, verbs
+from nondum.host import heap, machine, verbs
 from nondum.host.announcements import announced
 from nondum.host.catalogue import backups, opening
 from nondum.host.catalogue.catalogue import Catalogue
@@ -215,6 +215,7 @@ async def _run(
         vouched,
         feedback.to_dict,
         executor.trust.summary,
+        lambda: machine.look(folders.root, config.install.reserve_mb),
     )
     trust = TrustOrders(executor.trust, bus.emit)
     stop_all, translate_s = _stop_all(neighbours, stopping), config.planning.translate_s

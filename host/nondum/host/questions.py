@@ -15,6 +15,7 @@ from nondum.host.confinement.level import Standing
 from nondum.host.control.arguments import Arguments
 from nondum.host.devices import view
 from nondum.host.feedback.state import NOTHING
+from nondum.host.machine import Machine
 from nondum.host.mind.mind import Mind
 from nondum.host.news import News
 from nondum.host.rows import (
@@ -69,8 +70,12 @@ class Questions:
     trusted: Callable[[], Row | None] = lambda: None
     """The active trust file, in a few words; None: there is none."""
 
+    machine: Callable[[], Machine] = Machine
+    """Looks at the machine that this host runs on; blocks."""
+
     async def status(self, arguments: Arguments) -> Row:
         """The host, its payloads and its goals at a glance."""
+        machine = await asyncio.to_thread(self.machine)
         snapshot, places = self.catalogue.snapshot(), self.places()
         return {
             "host": snapshot.host,
@@ -84,6 +89,7 @@ class Questions:
             ],
             "trust": self.trusted(),
             "feedback": self.shown(),
+            "machine": machine.to_dict(),
             "confinement": self.standing.to_dict(),
             "payloads": [
                 payload_row(

@@ -21,7 +21,8 @@ LAST_TOLD = 5
 def status(session: Session, follow: bool) -> None:
     """The host, its payloads and its goals at a glance.
 
-    A payload's age is the time since it was built, as it says.
+    Of the machine, what it tells: battery, the disk that the state is on, the hottest sensor, and
+    the load of the last minute. A payload's age is the time since it was built, as it says.
 
     With --follow and --json, each line is all that there is to see: components, streams, plan and
     tree too.
@@ -44,8 +45,9 @@ def status(session: Session, follow: bool) -> None:
 def show(view: dict[str, Any]) -> None:
     """Print a status for people."""
     click.echo(f"host {view['host']}  revision {view['revision']}  {view['state']}")
+    _show_machine(view["machine"])
     _show_feedback(view["feedback"])
-    for warning in view["warnings"]:
+    for warning in (*view["machine"]["warnings"], *view["warnings"]):
         render.sentence(warning, colour="yellow", mark="warning: ")
     _show_trust(view["trust"])
     _show_confinement(view["confinement"])
@@ -64,6 +66,11 @@ def show(view: dict[str, Any]) -> None:
         click.echo()
     for told in view["told"][-LAST_TOLD:]:
         render.sentence(told["text"], mark="> ")
+
+
+def _show_machine(machine: dict[str, Any]) -> None:
+    if told := render.machine(machine):
+        render.sentence(", ".join(told), mark="machine: ")
 
 
 def _show_feedback(shown: dict[str, Any]) -> None:
