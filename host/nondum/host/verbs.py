@@ -56,6 +56,7 @@ def answering(
         "mount": orders.mount,
         "plan": questions.plan,
         "retry": orders.retry,
+        "say": orders.say,
         "status": questions.status,
         "store": questions.store,
         "streams": questions.streams,

@@ -56,6 +56,7 @@ Commands:
   place       Payloads that run on another host, and where one is to run.
   plan        The plan that is being carried out.
   retry       Try again what was refused or quarantined.
+  say         Say something to the robot, as if it had heard it.
   status      The host, its payloads and its goals at a glance.
   stop        Stop this host and its peers at once.
   store       The wheels that this host keeps.

@@ -46,6 +46,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "place": ("place", "Payloads that run on another host, and where one is to run."),
     "plan": ("mind", "The plan that is being carried out."),
     "retry": ("act", "Try again what was refused or quarantined."),
+    "say": ("act", "Say something to the robot, as if it had heard it."),
     "status": ("status", "The host, its payloads and its goals at a glance."),
     "stop": ("act", "Stop this host and its peers at once."),
     "store": ("body", "The wheels that this host keeps."),

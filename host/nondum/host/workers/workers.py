@@ -204,6 +204,10 @@ class Workers:
         task.add_done_callback(self._calls.pop)
         return call
 
+    def busy(self) -> frozenset[str]:
+        """The components that carry something out now, for whichever host."""
+        return frozenset(call.component for call in self._calls.values())
+
     def halt_all(self) -> None:
         """Ask every behaviour to end. Returns at once; halting is bounded."""
         for call in tuple(self._calls.values()):
