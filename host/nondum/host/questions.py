@@ -153,7 +153,9 @@ class Questions:
 
     async def streams(self, arguments: Arguments) -> list[Row]:
         """Who sends what to whom."""
-        return [stream_row(stream) for stream in self.workers.streams.listing()]
+        rates = self.workers.rates()
+        listing = self.workers.streams.listing()
+        return [stream_row(stream, rates.get(stream.stream)) for stream in listing]
 
     async def facts(self, arguments: Arguments) -> list[Row]:
         """What is believed; or, `parked`, what waits for objects that are not there."""

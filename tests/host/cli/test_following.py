@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from tests.kit.beacon import BEACON_ID
 from tests.kit.running_host import RunningHost
+from tests.kit.until import until as until_seen
 
 
 def rows(process: subprocess.Popen[str]) -> Iterator[Any]:
@@ -82,3 +83,16 @@ def test_following_begins_with_what_asking_prints(daemon: RunningHost, verb: str
 def test_a_time_that_is_none_is_refused_with_examples(daemon: RunningHost, ago: str) -> None:
     for verb in ("journal", "logs"):
         daemon.run(verb, f"--since={ago}").refused(2, "10min")
+
+
+def test_a_stream_that_flows_has_a_rate(daemon: RunningHost) -> None:
+    daemon.run("goal", "shine", "--wait").ok()
+
+    def rate_hz() -> float | None:
+        (row,) = daemon.ask("streams")
+        return row["rate_hz"]
+
+    assert 0 < until_seen("there is a rate", rate_hz) < 200
+    assert "/s" in daemon.run("streams").ok().out
+    daemon.run("halt", "--now").ok()
+    until_seen("there is none", lambda: rate_hz() is None)

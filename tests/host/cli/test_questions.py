@@ -47,7 +47,7 @@ ROWS: dict[str, set[str]] = {
     },
     "logs": {"component", "when", "level", "message"},
     "store": {"wheel", "bytes", "used_by", "sha256"},
-    "streams": {"stream", "type", "component", "flowing", "consumers"},
+    "streams": {"stream", "type", "component", "flowing", "rate_hz", "consumers"},
     "units": {"unit", "type", "component", "ready", "xyz", "rpy", "mount", "warnings"},
 }
 VIEWS: dict[str, set[str]] = {
@@ -117,8 +117,8 @@ UNIT                   TYPE   COMPONENT  READY  XYZ  RPY  MOUNT
 panther__beacon__lamp  light  beacon     yes    -    -    unknown
 """
 STREAMS = """\
-STREAM                       TYPE    COMPONENT  FLOWING  CONSUMERS
-panther__beacon__brightness  scalar  beacon     no       -
+STREAM                       TYPE    COMPONENT  FLOWING  RATE  CONSUMERS
+panther__beacon__brightness  scalar  beacon     no       -     -
 """
 FACTS = """\
 FACT                                        SINCE  SOURCE                                      VALUE
