@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from dataclasses import dataclass
@@ -39,6 +40,7 @@ from nondum.sdk.errors import GoalRefused, NondumError, Problem
 TOLD = 50
 """How many of the last sentences told to people are shown."""
 MOST_JOURNAL_ROWS = 100_000
+LONGEST_EVERY_S = 3600
 LONGEST_AGO_S = 100 * 366 * 86_400
 LOOK_S = 0.5
 """What is followed is looked at no more often: goals and facts take their time."""
@@ -314,10 +316,14 @@ class Questions:
             yield self.mind.views.tree()
 
     async def watch(self, arguments: Arguments) -> AsyncIterator[Row]:
-        """Everything at a glance, now and whenever the host looks different."""
+        """Everything at a glance, now and whenever the host looks different; with `every_s`, at
+        least so often."""
+        every_s = arguments.number("every_s", 0, at_least=0, at_most=LONGEST_EVERY_S)
         version = None
         while True:
-            version = await self.changed(version)
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(every_s or None):
+                    version = await self.changed(version)
             yield {
                 **await self.status(arguments),
                 "components": await self.components(arguments),

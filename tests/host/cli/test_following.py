@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from tests.kit.beacon import BEACON_ID
 from tests.kit.running_host import RunningHost
+from tests.kit.screen import terminal
 from tests.kit.until import until as until_seen
 
 
@@ -77,6 +78,28 @@ def test_following_begins_with_what_asking_prints(daemon: RunningHost, verb: str
     with daemon.started(verb, "--follow") as process:
         assert process.stdout is not None
         assert process.stdout.readline().split()[:2] == first.split()[:2]
+
+
+@pytest.mark.parametrize("colour", [{}, {"NO_COLOR": "1"}], ids=["colour", "no colour"])
+@pytest.mark.parametrize("verb", ["goals", "facts", "status"])
+def test_on_a_terminal_it_is_drawn_in_one_place(
+    daemon: RunningHost, verb: str, colour: dict[str, str]
+) -> None:
+    told = {"goals": "WORDS", "facts": "FACT", "status": "host panther"}[verb]
+    seen = {"goals": "active", "facts": "lit panther", "status": "active"}[verb]
+    command = ("--control", daemon.control, verb, "--follow")
+    with terminal(*command, columns=120, lines=100, **colour) as person:
+        person.until(told)
+        daemon.run("goal", "shine").ok()
+        shown = person.until(seen)
+        assert sum(line.startswith(told) for line in shown) == 1
+        assert not (colour and person.screen.coloured)
+    daemon.run("halt", "--now").ok()
+
+
+def test_what_does_not_fit_a_terminal_is_counted(daemon: RunningHost) -> None:
+    with terminal("--control", daemon.control, "facts", "-f", lines=6) as person:
+        assert person.until("FACT", "more lines")[0].startswith("FACT")
 
 
 @pytest.mark.parametrize("ago", ["soon", "-3min", "0s", "10 fortnights"])

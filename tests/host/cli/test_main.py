@@ -63,6 +63,7 @@ Commands:
   streams     Who sends what to whom, and what is sent.
   tree        The behaviour tree as it is being ticked, and why.
   units       What the robot has to act with.
+  watch       One live screen: what is wrong, goals, plan, parts, streams.
   why         Why the robot does what it does, or why it cannot.
 
   Exits with 0: done, 1: refused or failed, 2: wrong usage or bad input, 3: problems found, 4: no

@@ -53,6 +53,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "streams": ("streams", "Who sends what to whom, and what is sent."),
     "tree": ("tree", "The behaviour tree as it is being ticked, and why."),
     "units": ("body", "What the robot has to act with."),
+    "watch": ("watch", "One live screen: what is wrong, goals, plan, parts, streams."),
     "why": ("mind", "Why the robot does what it does, or why it cannot."),
 }
 
