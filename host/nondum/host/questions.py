@@ -226,7 +226,7 @@ class Questions:
         entries = await self.catalogue.journal(
             subject=arguments.optional_text("subject"),
             after=after,
-            since=since and Since(self.catalogue.boot, since),
+            since=Since(self.catalogue.boot, since) if since else None,
             limit=MOST_JOURNAL_ROWS if after else limit,
         )
         return [journal_row(entry) for entry in entries]

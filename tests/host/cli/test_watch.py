@@ -24,7 +24,13 @@ TITLES = ["TROUBLE", "GOALS", "PLAN", "PARTS", "STREAMS", "TOLD"]
 
 def view(**more: Any) -> dict[str, Any]:
     """What a host shows that has nothing."""
-    machine = {"batteries": [], "disk": None, "temperatures": [], "load": None, "warnings": []}
+    machine: dict[str, Any] = {
+        "batteries": [],
+        "disk": None,
+        "temperatures": [],
+        "load": None,
+        "warnings": [],
+    }
     lists = ("payloads", "drives", "goals", "components", "streams", "told")
     return {
         "host": "rover",

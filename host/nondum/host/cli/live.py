@@ -36,23 +36,25 @@ REDRAWN = "Show it again whenever it changes, in the same place on a terminal."
 APPENDED = "Then go on with what comes, until Ctrl-C."
 
 
-class Ago(click.ParamType):
-    """A time until now, in whole seconds."""
-
-    name = "time"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """Read what a person typed."""
-        seconds = seconds_of(str(value))
-        if seconds is None:
-            self.fail(f"{value!r} is no time: say for example 30s, 10min, 2h or 1d", param, ctx)
-        return seconds
-
-
 def since_option(command: _F) -> _F:
     """Add `--since`."""
-    help = "Only what is not older, for example 30s, 10min, 2h or 1d."
-    return click.option("--since", "since_s", type=Ago(), metavar="TIME", help=help)(command)
+    return click.option(
+        "--since",
+        "since_s",
+        metavar="TIME",
+        callback=_ago,
+        help="Only what is not older, for example 30s, 10min, 2h or 1d.",
+    )(command)
+
+
+def _ago(ctx: click.Context, param: click.Parameter, value: str | None) -> int | None:
+    if value is None:
+        return None
+    seconds = seconds_of(value)
+    if seconds is None:
+        wrong = f"{value!r} is no time: say for example 30s, 10min, 2h or 1d"
+        raise click.BadParameter(wrong, ctx, param)
+    return seconds
 
 
 def seconds_of(text: str) -> int | None:

@@ -41,7 +41,7 @@ def journal(
               nondum journal --subject org.example.window-opener
     """
     rows_wanted = limit or (MOST_ROWS if since_s else USUAL_ROWS)
-    asked = {"subject": subject, "limit": rows_wanted, "since_s": since_s}
+    asked: dict[str, Any] = {"subject": subject, "limit": rows_wanted, "since_s": since_s}
     if follow:
         for row in session.follow("follow_journal", **asked):
             render.as_json_line(row) if session.as_json else _show_entry(row)
