@@ -12,8 +12,9 @@ import signal
 from collections.abc import Awaitable, Callable, Coroutine, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from nondum.host import heap, verbs
+from nondum.host import heap, machine, verbs
 from nondum.host.announcements import announced
+from nondum.host.answering import Answering
 from nondum.host.catalogue import backups, opening
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import Safety
@@ -196,7 +197,8 @@ async def _run(
     places = neighbours.placement.places if neighbours else dict
     vouched = executor.trust.vouched
     take = _take(neighbours, mind, stopping)
-    conversation = Conversation(mind, workers.plugins, workers.pids, take)
+    answering = Answering(mind, lambda: catalogue.snapshot().payloads, workers.busy)
+    conversation = Conversation(mind, workers.plugins, workers.pids, take, answering.answer)
     feedback: Feedback = feedback_parts.made(
         config.feedback,
         folders.root,
@@ -220,11 +222,23 @@ async def _run(
         vouched,
         feedback.to_dict,
         executor.trust.summary,
+        lambda: machine.look(folders.root, config.install.reserve_mb),
     )
     trust = TrustOrders(executor.trust, bus.emit)
     stop_button = StopButton(config.stop, lambda: _pressed(mind, stop_all))
     stop_all, translate_s = _stop_all(neighbours, stopping), config.planning.translate_s
-    orders = Orders(catalogue, mind, workers, news, bus, stopping, stop_all, translate_s)
+    orders = Orders(
+        catalogue,
+        mind,
+        workers,
+        news,
+        bus,
+        stopping,
+        stop_all,
+        answering.answer,
+        take,
+        translate_s,
+    )
     goal_files = GoalFiles(
         catalogue.snapshot, mind, orders.translated, bus.emit, on_change=feedback.wake
     )

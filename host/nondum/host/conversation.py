@@ -1,7 +1,8 @@
 """What people are told is spoken, and what they say is heard, by components that can do that.
 
-A sentence that is heard is a goal in words, as if it had been typed; it is never translated, for
-nobody is asked to confirm it. Who listens is told what can be said, and again when that changes.
+A sentence that is heard is a question to the robot about itself, or else a goal in words, as if it
+had been typed; it is never translated, for nobody is asked to confirm it. Who listens is told what
+can be said, and again when that changes.
 """
 
 from __future__ import annotations
@@ -44,6 +45,8 @@ class Speaking(Protocol):
 
 Take: TypeAlias = Callable[[str], Awaitable[str]]
 """What a person said → what becomes of it, in words. Raises `GoalRefused`."""
+Reply: TypeAlias = Callable[[str], Awaitable[str | None]]
+"""What a person asked → the answer, which people have been told; None: it is no question."""
 
 
 class Conversation:
@@ -55,11 +58,13 @@ class Conversation:
         plugins: Callable[[], Mapping[str, Speaking]],
         processes: Callable[[], Mapping[str, int]],
         take: Take,
+        answer: Reply,
     ) -> None:
         """`plugins` are those that run now, by component, `processes` their ids: one that does not
         listen is asked again when its component has a new process. `take` makes goals of words,
-        here or elsewhere."""
+        here or elsewhere, `answer` says what there is to say to a question."""
         self._mind = mind
+        self._answer = answer
         self._take = take
         self._plugins = plugins
         self._processes = processes
@@ -82,7 +87,9 @@ class Conversation:
                     task.cancel()
 
     async def heard(self, component: str, words: str) -> None:
-        """Want what a person has said; tell people where that cannot be."""
+        """Answer or want what a person has said; tell people where that cannot be."""
+        if await self._answer(words) is not None:
+            return
         try:
             told = await self._take(words)
         except GoalRefused as refused:

@@ -12,6 +12,7 @@ from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import MountPose, PayloadRecord, Safety, Snapshot, Step
 from nondum.host.control.arguments import Arguments, Triple
 from nondum.host.control.server import Handing
+from nondum.host.conversation import Reply, Take
 from nondum.host.events import ForgetAsked, MountSet, RetryAsked, SafeModeLeft
 from nondum.host.lifecycle import going_back, installed
 from nondum.host.lifecycle.bus import Bus
@@ -48,6 +49,10 @@ class Orders:
     stopping: Stopping
     stop_all: Callable[[], Awaitable[Stopped]]
     """Stops this host, and the peers that go by what is said here."""
+    answer: Reply
+    """Answers what people ask about the robot itself."""
+    take: Take
+    """Makes goals of words as if they had been heard."""
     translate_s: float
     """Time that components have to translate words."""
 
@@ -56,13 +61,16 @@ class Orders:
 
         Words that match no phrase are translated; with `yes` the goal is given as it was
         understood, else the answer has `understood` only, for the person to confirm. Words that
-        stop the robot do, and the answer has `stopped` only. Raises `GoalRefused`.
+        stop the robot do, and the answer has `stopped` only; a question about itself is answered,
+        with `answer` only. Raises `GoalRefused`.
         """
         words, pddl = arguments.optional_text("words"), arguments.optional_text("pddl")
         if (words is None) == (pddl is None):
             raise GoalRefused(Problem("GOAL_AMISS", "a goal is given in words, or in PDDL"))
         if words is not None and is_stop(words):
             return {"stopped": (await self.stop_all()).to_dict()}
+        if words is not None and (answer := await self.answer(words)) is not None:
+            return {"answer": answer}
         kind = cast(GoalKind | None, arguments.choice("kind", "achieve", "maintain"))
         highest = HIGHEST_PRIORITY
         priority = arguments.number("priority", 0, at_least=-highest, at_most=highest)
@@ -82,6 +90,15 @@ class Orders:
         await self._until(lambda snapshot: self._is_kept(given, snapshot))
         row = {**given.to_dict(), "holds": False}
         return row | ({"understood": understood.to_dict()} if understood else {})
+
+    async def say(self, arguments: Arguments) -> Row:
+        """Take words as if they had been heard: `answer` says what becomes of them.
+
+        Raises `GoalRefused`.
+        """
+        words = arguments.text("words")
+        answer = await self.answer(words)
+        return {"answer": answer if answer is not None else await self.take(words)}
 
     async def halt(self, arguments: Arguments) -> Row:
         """Halt a goal, or everything: the goals that were open, the behaviours that ran."""

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from dataclasses import dataclass
-from typing import cast
+from typing import TypeVar, cast
 
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.catalogue.records import PayloadRecord, Step
+from nondum.host.catalogue.journal import Since
+from nondum.host.catalogue.records import Moment, PayloadRecord, Step
 from nondum.host.confinement.level import Standing
 from nondum.host.control.arguments import Arguments
 from nondum.host.devices import view
 from nondum.host.feedback.state import NOTHING
+from nondum.host.machine import Machine
 from nondum.host.mind.mind import Mind
 from nondum.host.news import News
 from nondum.host.rows import (
@@ -36,8 +40,13 @@ from nondum.sdk.errors import GoalRefused, NondumError, Problem
 TOLD = 50
 """How many of the last sentences told to people are shown."""
 MOST_JOURNAL_ROWS = 100_000
+LONGEST_EVERY_S = 3600
+LONGEST_AGO_S = 100 * 366 * 86_400
+LOOK_S = 0.5
+"""What is followed is looked at no more often: goals and facts take their time."""
 
 Version = tuple[int, int]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +72,12 @@ class Questions:
     trusted: Callable[[], Row | None] = lambda: None
     """The active trust file, in a few words; None: there is none."""
 
+    machine: Callable[[], Machine] = Machine
+    """Looks at the machine that this host runs on; blocks."""
+
     async def status(self, arguments: Arguments) -> Row:
         """The host, its payloads and its goals at a glance."""
+        machine = await asyncio.to_thread(self.machine)
         snapshot, places = self.catalogue.snapshot(), self.places()
         return {
             "host": snapshot.host,
@@ -78,6 +91,7 @@ class Questions:
             ],
             "trust": self.trusted(),
             "feedback": self.shown(),
+            "machine": machine.to_dict(),
             "confinement": self.standing.to_dict(),
             "payloads": [
                 payload_row(
@@ -141,7 +155,9 @@ class Questions:
 
     async def streams(self, arguments: Arguments) -> list[Row]:
         """Who sends what to whom."""
-        return [stream_row(stream) for stream in self.workers.streams.listing()]
+        rates = self.workers.rates()
+        listing = self.workers.streams.listing()
+        return [stream_row(stream, rates.get(stream.stream)) for stream in listing]
 
     async def facts(self, arguments: Arguments) -> list[Row]:
         """What is believed; or, `parked`, what waits for objects that are not there."""
@@ -188,24 +204,15 @@ class Questions:
         return {**self.mind.views.composition(), "devices": devices, "waiting": waiting}
 
     async def journal(self, arguments: Arguments) -> list[Row]:
-        """What happened, oldest first."""
-        limit = arguments.number("limit", 200, at_least=1, at_most=MOST_JOURNAL_ROWS)
-        subject = arguments.optional_text("subject")
-        entries = await self.catalogue.journal(subject=subject, limit=limit)
-        return [journal_row(entry) for entry in entries]
+        """What happened, oldest first; with `since_s`, in so many seconds until now."""
+        return await self._journal(arguments)
 
     async def logs(self, arguments: Arguments) -> list[Row]:
-        """What components have written, by time. Raises `NondumError` (COMPONENT_UNKNOWN)."""
-        logs, named = self.workers.logs, arguments.optional_text("component")
-        known = {*logs.components(), *(c.id for c in self.catalogue.snapshot().components)}
-        if named is not None and named not in known:
-            raise NondumError(unknown("component", named, known))
-        rows = [
-            {"component": name, "when": line.at.wall_s, "level": line.level, "message": line.text}
-            for name in ([named] if named else logs.components())
-            for line in logs.of(name)
-        ]
-        return sorted(rows, key=lambda row: cast(float, row["when"]))
+        """What components have written, by time; with `since_s`, in so many seconds until now.
+
+        Raises `NondumError` (COMPONENT_UNKNOWN).
+        """
+        return self._logs(arguments)
 
     async def store(self, arguments: Arguments) -> list[Row]:
         """The wheels that are kept, and which payloads need them."""
@@ -213,7 +220,83 @@ class Questions:
         rows = await self.stored()
         return [{**row, "used_by": [ids.get(key, key) for key in row["used_by"]]} for row in rows]
 
+    async def _journal(self, arguments: Arguments, *, after: int = 0) -> list[Row]:
+        limit = arguments.number("limit", 200, at_least=1, at_most=MOST_JOURNAL_ROWS)
+        since = _moment(arguments)
+        entries = await self.catalogue.journal(
+            subject=arguments.optional_text("subject"),
+            after=after,
+            since=Since(self.catalogue.boot, since) if since else None,
+            limit=MOST_JOURNAL_ROWS if after else limit,
+        )
+        return [journal_row(entry) for entry in entries]
+
+    def _logs(self, arguments: Arguments, *, after: int = 0) -> list[Row]:
+        logs, named = self.workers.logs, arguments.optional_text("component")
+        known = {*logs.components(), *(c.id for c in self.catalogue.snapshot().components)}
+        if named is not None and named not in known:
+            raise NondumError(unknown("component", named, known))
+        since = _moment(arguments)
+        rows = [
+            {"component": name, "when": line.at.wall_s, "level": line.level, "message": line.text}
+            for name in ([named] if named else logs.components())
+            for line in logs.of(name, after)
+            if since is None or line.at.monotonic_s >= since.monotonic_s
+        ]
+        return sorted(rows, key=lambda row: cast(float, row["when"]))
+
     # Following
+
+    async def follow_journal(self, arguments: Arguments) -> AsyncIterator[Row]:
+        """An entry after the other: what `journal` answers, and what comes."""
+        after, loss = 0, self.catalogue.loss
+        while True:
+            commits = self.catalogue.commits
+            if loss is not self.catalogue.loss:  # another file, which counts from 1 again
+                after, loss = 0, self.catalogue.loss
+            for row in await self._journal(arguments, after=after):
+                after = cast(int, row["id"])
+                yield row
+            await self.catalogue.committed(commits)
+
+    async def follow_logs(self, arguments: Arguments) -> AsyncIterator[Row]:
+        """A line after the other: what `logs` answers, and what comes.
+
+        To who reads more slowly than lines come, those are lost that are not kept any more. Raises
+        `NondumError` (COMPONENT_UNKNOWN).
+        """
+        after = 0
+        while True:
+            version = self.workers.logs.version
+            for row in self._logs(arguments, after=after):
+                yield row
+            after = version
+            await self.workers.logs.changed(version)
+
+    async def follow_goals(self, arguments: Arguments) -> AsyncIterator[Row]:
+        """What can be asked for and what was, now and whenever it is something else."""
+        shown = None
+        async for found in self._each_change(lambda: self.goals(arguments)):
+            if found != shown:
+                shown = found
+                yield found
+
+    async def follow_facts(self, arguments: Arguments) -> AsyncIterator[list[Row]]:
+        """What is believed, now and whenever it is something else but for its age."""
+        shown = None
+        async for rows in self._each_change(lambda: self.facts(arguments)):
+            ageless = [{**row, "age_s": None} for row in rows]
+            if ageless != shown:
+                shown = ageless
+                yield rows
+
+    async def _each_change(self, look: Callable[[], Awaitable[T]]) -> AsyncIterator[T]:
+        """What is seen of the mind now, and after each change of it; `LOOK_S` apart at least."""
+        version = -1
+        while True:
+            version = await self.mind.changed(version)
+            yield await look()
+            await asyncio.sleep(LOOK_S)
 
     async def follow_goal(self, arguments: Arguments) -> AsyncIterator[Row]:
         """A goal, now and whenever the host looks different. Raises `GoalRefused`."""
@@ -233,10 +316,14 @@ class Questions:
             yield self.mind.views.tree()
 
     async def watch(self, arguments: Arguments) -> AsyncIterator[Row]:
-        """Everything at a glance, now and whenever the host looks different."""
+        """Everything at a glance, now and whenever the host looks different; with `every_s`, at
+        least so often."""
+        every_s = arguments.number("every_s", 0, at_least=0, at_most=LONGEST_EVERY_S)
         version = None
         while True:
-            version = await self.changed(version)
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(every_s or None):
+                    version = await self.changed(version)
             yield {
                 **await self.status(arguments),
                 "components": await self.components(arguments),
@@ -259,6 +346,12 @@ class Questions:
                 task.cancel()
             await asyncio.gather(*waiting, return_exceptions=True)
         return self.mind.version, self.news.version
+
+
+def _moment(arguments: Arguments) -> Moment | None:
+    """The moment that is `since_s` seconds ago, by both clocks; None: no such bound is given."""
+    ago_s = arguments.number("since_s", 0, at_least=0, at_most=LONGEST_AGO_S)
+    return Moment(time.monotonic() - ago_s, time.time() - ago_s) if ago_s else None
 
 
 def _gone_back(payload: PayloadRecord) -> str:

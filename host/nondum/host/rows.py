@@ -165,13 +165,14 @@ def offered_row(component: PeerComponent, host: str) -> Row:
     }
 
 
-def stream_row(stream: StreamStatus) -> Row:
-    """A stream: who sends it, and to whom."""
+def stream_row(stream: StreamStatus, rate_hz: float | None = None) -> Row:
+    """A stream: who sends it, how often as far as that is known, and to whom."""
     return {
         "stream": stream.stream,
         "type": stream.type,
         "component": stream.component,
         "flowing": stream.is_flowing,
+        "rate_hz": rate_hz if stream.is_flowing else None,
         "consumers": list(stream.readers),
     }
 

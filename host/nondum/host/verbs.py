@@ -56,6 +56,7 @@ def answering(
         "mount": orders.mount,
         "plan": questions.plan,
         "retry": orders.retry,
+        "say": orders.say,
         "status": questions.status,
         "store": questions.store,
         "streams": questions.streams,
@@ -74,8 +75,12 @@ def following(
     questions: Questions, orders: Orders, neighbours: Neighbourhood | None
 ) -> dict[str, Follow]:
     """Verbs that go on answering."""
-    verbs: dict[str, Callable[[Arguments], AsyncIterator[Row]]] = {
+    verbs: dict[str, Callable[[Arguments], AsyncIterator[Any]]] = {
+        "follow_facts": questions.follow_facts,
         "follow_goal": questions.follow_goal,
+        "follow_goals": questions.follow_goals,
+        "follow_journal": questions.follow_journal,
+        "follow_logs": questions.follow_logs,
         "follow_tree": questions.follow_tree,
         "install": orders.install,
         "rollback": orders.rollback,

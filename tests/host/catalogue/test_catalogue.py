@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from nondum.host.catalogue import database, journal
 from nondum.host.catalogue.catalogue import Catalogue
+from nondum.host.catalogue.journal import Since
 from nondum.host.catalogue.opening import Instead
 from nondum.host.catalogue.records import (
     ComponentRecord,
@@ -228,6 +229,33 @@ async def test_journal_is_told_by_subject_and_in_order(tmp_path: Path) -> None:
         assert [e.id for e in odd] == [2, 4]
         assert odd[0] == replace(entry("s1"), id=2)
         assert [e.id for e in await catalogue.journal(after=4)] == [5]
+
+
+@pytest.mark.anyio
+async def test_entries_of_this_run_are_judged_by_the_clock_that_nobody_sets(tmp_path: Path) -> None:
+    """The time was set while it ran: what came before is of 1970."""
+    async with opened(tmp_path) as catalogue:
+        before = [
+            replace(entry(name), boot=boot, at=Moment(monotonic_s, wall_s))
+            for name, boot, monotonic_s, wall_s in (
+                ("old", catalogue.boot, 10.0, 100.0),
+                ("recent", catalogue.boot, 90.0, 180.0),
+                ("last run, old", "before", 95.0, 1e9),
+                ("last run, recent", "before", 5.0, 2e9),
+            )
+        ]
+        await catalogue.commit(FULL, before)
+        found = await catalogue.journal(since=Since(catalogue.boot, Moment(50.0, 1.9e9)))
+        assert [e.subject for e in found] == ["recent", "last run, recent"]
+
+
+@pytest.mark.anyio
+async def test_who_waits_for_the_journal_hears_of_each_commit(tmp_path: Path) -> None:
+    async with opened(tmp_path) as catalogue:
+        before = catalogue.commits
+        waiting = asyncio.create_task(catalogue.committed(before))
+        await catalogue.commit(FULL, (entry(),))
+        assert await waiting > before
 
 
 @pytest.mark.anyio

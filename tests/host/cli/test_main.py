@@ -56,12 +56,14 @@ Commands:
   place       Payloads that run on another host, and where one is to run.
   plan        The plan that is being carried out.
   retry       Try again what was refused or quarantined.
+  say         Say something to the robot, as if it had heard it.
   status      The host, its payloads and its goals at a glance.
   stop        Stop this host and its peers at once.
   store       The wheels that this host keeps.
   streams     Who sends what to whom, and what is sent.
   tree        The behaviour tree as it is being ticked, and why.
   units       What the robot has to act with.
+  watch       One live screen: what is wrong, goals, plan, parts, streams.
   why         Why the robot does what it does, or why it cannot.
 
   Exits with 0: done, 1: refused or failed, 2: wrong usage or bad input, 3: problems found, 4: no

@@ -239,3 +239,23 @@ def test_an_interrupted_installation_leaves_nothing(daemon: RunningHost) -> None
         process.send_signal(signal.SIGINT)
         assert process.wait(timeout=60) == 130
         until_alone(daemon)
+
+
+@pytest.mark.parametrize("verb", ["say", "goal"])
+def test_a_question_typed_is_answered_and_no_goal(daemon: RunningHost, verb: str) -> None:
+    before = daemon.run("goals", "--json").ok().json["given"]
+    assert daemon.run(verb, "What can you do?").ok().out == "I can greet people and shine.\n"
+    told = daemon.run(verb, "panther,", "what are you doing", "--json").ok().json
+    assert told == {"answer": "I do nothing: nobody has asked for anything."}
+    assert daemon.run("goals", "--json").ok().json["given"] == before
+    assert told["answer"] in [row["text"] for row in daemon.ask("status")["told"]]
+
+
+def test_what_is_said_is_a_goal_or_stops_or_is_refused(daemon: RunningHost) -> None:
+    told = daemon.run("say", "shine").ok().out
+    assert told.startswith("that is goal ")
+    daemon.until_goal(told.split()[-1], "holds")
+    doing = daemon.run("say", "what are you doing").ok().out
+    assert doing == "I was asked to shine, and I do, with beacon.\n"
+    assert daemon.run("say", "stop").ok().out.startswith("stopped: 1 goal")
+    daemon.run("say", "sing").refused(1, "PHRASE_UNKNOWN")

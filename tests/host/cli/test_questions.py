@@ -47,7 +47,7 @@ ROWS: dict[str, set[str]] = {
     },
     "logs": {"component", "when", "level", "message"},
     "store": {"wheel", "bytes", "used_by", "sha256"},
-    "streams": {"stream", "type", "component", "flowing", "consumers"},
+    "streams": {"stream", "type", "component", "flowing", "rate_hz", "consumers"},
     "units": {"unit", "type", "component", "ready", "xyz", "rpy", "mount", "warnings"},
 }
 VIEWS: dict[str, set[str]] = {
@@ -61,6 +61,7 @@ VIEWS: dict[str, set[str]] = {
         "warnings",
         "trust",
         "feedback",
+        "machine",
         "peers",
         "payloads",
         "drives",
@@ -93,6 +94,7 @@ PAYLOAD_KEYS = {
 
 STATUS = """\
 host panther  revision N  ready
+machine: AS IT IS
 warning: payloads without a signature are accepted (allow_unsigned)
 confinement of workers: LEVEL
 
@@ -115,8 +117,8 @@ UNIT                   TYPE   COMPONENT  READY  XYZ  RPY  MOUNT
 panther__beacon__lamp  light  beacon     yes    -    -    unknown
 """
 STREAMS = """\
-STREAM                       TYPE    COMPONENT  FLOWING  CONSUMERS
-panther__beacon__brightness  scalar  beacon     no       -
+STREAM                       TYPE    COMPONENT  FLOWING  RATE  CONSUMERS
+panther__beacon__brightness  scalar  beacon     no       -     -
 """
 FACTS = """\
 FACT                                        SINCE  SOURCE                                      VALUE
@@ -172,6 +174,8 @@ def normalised(text: str) -> str:
     text = re.sub(r"AGE +(?=STATE|UNITS)|(?<=  )\d+ d +", "AGE  ", text)
     text = re.sub(r"(confinement of workers:) .*", r"\1 LEVEL", text)
     text = re.sub(r"^shown: .*\n", "", text, flags=re.MULTILINE)  # it is another one soon
+    bad = r"(?:warning: the (?:machine|disk|battery) is .*\n)*"
+    text = re.sub(rf"machine: .*\n{bad}", "machine: AS IT IS\n", text)
     levels = "sandboxed|restricted|none"
     text = re.sub(rf"(?<=lamp   )(?:{levels}) +", "LEVEL        ", text)
     return re.sub(r"(revision|world model  —|people  —) \d+", r"\1 N", text)

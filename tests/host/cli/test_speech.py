@@ -9,6 +9,7 @@ from tests.kit.beacon import BEACON
 from tests.kit.payloads import Part
 from tests.kit.running_host import running
 
+from nondum.planning.asking import ASKED
 from nondum.planning.stop_words import STOPS
 
 ECHO = """
@@ -91,7 +92,7 @@ def test_listener_learns_what_can_be_said_and_when_that_changes(tmp_path: Path) 
         host.plug(host.drive("pupil", Part("pupil", PUPIL)))
         host.until("the pupil is ready", lambda view: are_ready(view, 1))
         host.plug(host.drive("beacon", Part("beacon", BEACON)))
-        learnt = sorted([*STOPS, "greet {class}", "shine [for {text}]"])
+        learnt = sorted([*STOPS, *ASKED, "greet {class}", "shine [for {text}]"])
         host.until_told(f"pupil heard {' '.join(['learnt', *learnt, 'people', 'person'])!r}")
         lamp = BEACON.replace("shine [for {words:text}]", "light up")
         host.plug(host.drive("lamp", Part("lamp", lamp)))
@@ -106,6 +107,40 @@ def test_robot_is_stopped_by_voice(tmp_path: Path) -> None:
         host.plug(host.drive("guard", Part("guard", GUARD)))
         host.until_told("guard heard 'Stop!': stopped: 1 goal and 1 behaviour halted")
         host.until_goal(id, "halted")
+
+
+CURIOUS = """
+'''Asks until it hears the answer, and says that it has.'''
+import asyncio
+from nondum.sdk import hookimpl
+
+spoken = asyncio.Queue()
+asked = []
+
+@hookimpl
+async def speak(ctx, text):
+    spoken.put_nowait(text)
+
+@hookimpl
+async def listen(ctx):
+    if not asked:
+        asked.append("Panther, what can you do?")
+        return {"words": asked[0]}
+    while not (await spoken.get()).startswith("I can "):
+        pass
+    return {"words": "learnt it"}
+"""
+
+
+def test_robot_that_is_asked_says_what_it_can_do(tmp_path: Path) -> None:
+    with running(tmp_path, name="panther") as host:
+        host.plug(host.drive("beacon", Part("beacon", BEACON)))
+        host.until("the beacon is ready", lambda view: are_ready(view, 1))
+        host.plug(host.drive("curious", Part("curious", CURIOUS)))
+        host.until_told("I can greet people and shine.")
+        host.until_told("curious heard 'learnt it': PHRASE_UNKNOWN")
+        goals = host.view["goals"]
+    assert not goals
 
 
 def are_ready(view: View, count: int) -> bool:

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import json
-import os
-import pty
 import subprocess
 from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
-import click
 import pytest
 from tests.host.cli import pictures
 from tests.host.cli.btcpp import refusals
 from tests.host.cli.dot import read_dot
 from tests.kit.beacon import BEACON_ID, BRIGHTNESS, LAMP
-from tests.kit.command_line import command, quiet_environment
 from tests.kit.running_host import RunningHost
+from tests.kit.screen import terminal
 
 
 @pytest.fixture
@@ -80,33 +76,10 @@ def _with_steps(process: subprocess.Popen[str]) -> Iterator[list[dict[str, Any]]
 
 
 def test_watching_on_a_terminal_draws_in_one_place(daemon: RunningHost) -> None:
-    with _terminal("--control", daemon.control, "tree", "--watch") as terminal:
-        first = _until(terminal, b"sentences told")
-        assert first.startswith("\x1b[H")
+    with terminal("--control", daemon.control, "tree", "--watch", lines=60) as person:
+        person.until("✓ nondum", "sentences told")
         daemon.run("goal", "shine").ok()
-        shown = _until(terminal, b"kept since")
-        assert "\x1b[2J" not in shown  # nothing is blanked, so nothing flickers
-        assert BEACON_ID not in click.unstyle(shown)
+        shown = person.until("kept since")
+        assert sum("✓ people  —" in line for line in shown) == 1
+        assert BEACON_ID not in "\n".join(shown)
     daemon.run("halt", "--now").ok()
-
-
-@contextmanager
-def _terminal(*arguments: Any) -> Iterator[int]:
-    """The end of a terminal that a person looks at, while a command runs at the other one."""
-    ours, theirs = pty.openpty()
-    environment = quiet_environment() | {"TERM": "xterm", "COLUMNS": "80", "LINES": "60"}
-    process = subprocess.Popen(command(*arguments), stdout=theirs, stderr=theirs, env=environment)
-    os.close(theirs)
-    with process:
-        try:
-            yield ours
-        finally:
-            process.kill()
-    os.close(ours)
-
-
-def _until(terminal: int, words: bytes) -> str:
-    shown = b""
-    while words not in shown:
-        shown += os.read(terminal, 65536)
-    return shown.decode(errors="replace")

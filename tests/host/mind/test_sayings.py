@@ -7,6 +7,7 @@ import json
 from tests.planning.strangers import ROVER
 
 from nondum.host.mind.sayings import SAYINGS_BYTES, sayings
+from nondum.planning.asking import ASKED
 from nondum.planning.contribution import Contribution
 from nondum.planning.merge import merge
 from nondum.planning.phrases import Phrasebook, phrasebook
@@ -38,20 +39,20 @@ def test_patterns_are_told_with_all_names_that_fit() -> None:
         book("[please] find {c:class} [in {words:text}]", classes=("person", "dog"), labels=labels)
     )
     assert told == {
-        "phrases": [*STOPS, "[please] find {class} [in {text}]"],
+        "phrases": [*STOPS, *ASKED, "[please] find {class} [in {text}]"],
         "names": {"class": ["dog", "people", "person", "persons"]},
     }
 
 
 def test_phrase_without_a_name_for_a_slot_cannot_be_said() -> None:
     told = sayings(book("find {c:class}", "meet {t:target}", classes=("dog",)))
-    assert told == {"phrases": [*STOPS, "find {class}"], "names": {"class": ["dog"]}}
+    assert told == {"phrases": [*STOPS, *ASKED, "find {class}"], "names": {"class": ["dog"]}}
 
 
 def test_names_that_no_packet_has_room_for_are_left_out() -> None:
     classes = tuple(f"thing-number-{n}-of-very-many" for n in range(2000))
     told = sayings(book("find {c:class}", classes=classes))
-    assert told["phrases"] == [*STOPS, "find {class}"]
+    assert told["phrases"] == [*STOPS, *ASKED, "find {class}"]
     assert SAYINGS_BYTES / 4 < len(json.dumps(told)) <= SAYINGS_BYTES + 100
 
 
@@ -65,6 +66,6 @@ def test_phrases_are_left_out_when_names_do_not_suffice() -> None:
 def test_hosts_are_spoken_to_by_name_where_there_are_several() -> None:
     told = sayings(book("find {c:class}", classes=("dog",)), ["big-mule", "rover"])
     assert told == {
-        "phrases": [f"[{{addressee}}] {said}" for said in (*STOPS, "find {class}")],
+        "phrases": [f"[{{addressee}}] {said}" for said in (*STOPS, *ASKED, "find {class}")],
         "names": {"class": ["dog"], "addressee": ["big mule", "rover"]},
     }

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nondum.host.events import FactForgotten, FactKnown, StreamFlowing, WorkerLogged
-from nondum.host.workers.news import MAX_CLAIMS, Claims, parse_news, parse_progress
+from nondum.host.workers.news import MAX_CLAIMS, Claims, parse_news, parse_progress, parse_rates
 from nondum.sdk.errors import ProtocolViolation
 
 PLAIN = st.recursive(
@@ -37,6 +37,13 @@ def test_progress_is_between_nothing_and_all(body: dict[str, Any]) -> None:
     except ProtocolViolation:
         return
     assert 0.0 <= fraction <= 1.0
+
+
+def test_rates_are_those_of_its_own_streams_that_can_be() -> None:
+    told = {"s": 9.5, "other": 1, "t": float("nan"), "u": -1, "v": True, "w": 10**400, "x": "1"}
+    own = {"s", "t", "u", "v", "w", "x"}
+    assert parse_rates(own, {"rates": told}) == {"s": 9.5}
+    assert parse_rates(own, {"rates": [["s", 1]]}) == parse_rates(own, {}) == {}
 
 
 def test_each_kind_is_read() -> None:

@@ -18,6 +18,7 @@ from typing import ParamSpec, TypeVar
 
 from nondum.host.catalogue import database, journal, opening
 from nondum.host.catalogue.backups import Backups
+from nondum.host.catalogue.journal import Since
 from nondum.host.catalogue.opening import Instead, Loss, Opened
 from nondum.host.catalogue.records import JournalEntry, Moment, Snapshot
 from nondum.host.catalogue.reserve import Reserve
@@ -52,6 +53,9 @@ class Catalogue:
         """Names this run of the daemon in the journal."""
         self.loss = opened.loss
         """What became of a file that could not be used, if there was one."""
+        self.commits = 0
+        """Rises whenever there is more in the journal."""
+        self._next = asyncio.Event()
         self.unwritten: Problem | None = None
         """Why the state is newer than what is on disk; None: it is not."""
 
@@ -108,10 +112,22 @@ class Catalogue:
         self._take(after)
 
     async def journal(
-        self, *, subject: str | None = None, after: int = 0, limit: int = 200
+        self,
+        *,
+        subject: str | None = None,
+        after: int = 0,
+        since: Since | None = None,
+        limit: int = 200,
     ) -> tuple[JournalEntry, ...]:
-        """The last entries, oldest first: about one subject, or with ids above `after`."""
-        return await self._run(journal.read, self._connection, subject, after, limit)
+        """The last entries, oldest first: about one subject, with ids above `after`, not older than
+        `since`."""
+        return await self._run(journal.read, self._connection, subject, after, since, limit)
+
+    async def committed(self, since: int) -> int:
+        """Wait until `commits` is not `since`, and give it."""
+        while self.commits == since:
+            await self._next.wait()
+        return self.commits
 
     async def close(self) -> None:
         """Finish what was asked for and close the file."""
@@ -120,6 +136,9 @@ class Catalogue:
 
     def _wrote(self, after: HostState) -> None:
         self._owed.clear()
+        self.commits += 1
+        self._next.set()
+        self._next = asyncio.Event()
         self._written = after
         self.unwritten = None
         self._take(after)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from nondum.host.catalogue import rows
-from nondum.host.catalogue.records import JournalEntry
+from nondum.host.catalogue.records import JournalEntry, Moment
 
 KEEP = 20_000
 """So many of the last entries are kept unless somebody says otherwise: some eight megabytes."""
@@ -17,6 +17,17 @@ BATCH = 200
 """So many of the oldest are let go together."""
 PROBLEMS_LIMIT = 50
 """Problems of one entry: a payload may have thousands, and its record has them all."""
+
+
+@dataclass(frozen=True, slots=True)
+class Since:
+    """A moment in the past, for entries of this run of the daemon and of others.
+
+    Of this run's entries the clock that nobody sets counts: a robot may learn the time late.
+    """
+
+    boot: str
+    at: Moment
 
 
 def append(connection: sqlite3.Connection, entries: Sequence[JournalEntry], keep: int) -> None:
@@ -32,13 +43,19 @@ def append(connection: sqlite3.Connection, entries: Sequence[JournalEntry], keep
 
 
 def read(
-    connection: sqlite3.Connection, subject: str | None, after: int, limit: int
+    connection: sqlite3.Connection,
+    subject: str | None,
+    after: int,
+    since: Since | None,
+    limit: int,
 ) -> tuple[JournalEntry, ...]:
-    """The last `limit` entries with an id above `after`, oldest first."""
+    """The last `limit` entries with an id above `after`, not older than `since`, oldest first."""
+    boot, at = (since.boot, since.at) if since else (None, Moment(0.0, 0.0))
     found = connection.execute(
         "SELECT * FROM journal WHERE id > ? AND (? IS NULL OR subject = ?) "
+        "AND (? IS NULL OR CASE boot WHEN ? THEN monotonic_s >= ? ELSE wall_s >= ? END) "
         "ORDER BY id DESC LIMIT ?",
-        (after, subject, subject, limit),
+        (after, subject, subject, boot, boot, at.monotonic_s, at.wall_s, limit),
     )
     return tuple(rows.entry(row) for row in reversed(found.fetchall()))
 

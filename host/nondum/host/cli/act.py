@@ -62,6 +62,9 @@ def goal(
     if "stopped" in given:
         _show_stopped(session, given["stopped"])
         return 0
+    if "answer" in given:
+        _show_answer(session, given)
+        return 0
     if "id" not in given:
         given = _confirmed(session, said or "", given["understood"], priority)
     elif "understood" in given and not session.as_json:
@@ -73,6 +76,31 @@ def goal(
     else:
         _show_goal(given)
     return EXIT_REFUSED if given["state"] in ("suspended", "halted") else 0
+
+
+@click.command()
+@click.argument("words", nargs=-1, required=True, shell_complete=complete.goal_words)
+@json_option
+@click.pass_obj
+def say(session: Session, words: tuple[str, ...]) -> None:
+    """Say something to the robot, as if it had heard it.
+
+    It answers "what can you do" and "what are you doing", also where nothing is plugged in. "Stop"
+    stops it; all else is a goal, for it or for the one peer that can have it. What it answers is
+    spoken, too, where something speaks.
+
+    \b
+    Examples: nondum say what can you do
+              nondum say "what are you doing"
+    """
+    _show_answer(session, session.ask("say", timeout_s=None, words=" ".join(words)))
+
+
+def _show_answer(session: Session, given: dict[str, Any]) -> None:
+    if session.as_json:
+        render.as_json(given)
+    else:
+        render.sentence(given["answer"])
 
 
 def _confirmed(

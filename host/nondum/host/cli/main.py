@@ -46,12 +46,14 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "place": ("place", "Payloads that run on another host, and where one is to run."),
     "plan": ("mind", "The plan that is being carried out."),
     "retry": ("act", "Try again what was refused or quarantined."),
+    "say": ("act", "Say something to the robot, as if it had heard it."),
     "status": ("status", "The host, its payloads and its goals at a glance."),
     "stop": ("act", "Stop this host and its peers at once."),
     "store": ("body", "The wheels that this host keeps."),
     "streams": ("streams", "Who sends what to whom, and what is sent."),
     "tree": ("tree", "The behaviour tree as it is being ticked, and why."),
     "units": ("body", "What the robot has to act with."),
+    "watch": ("watch", "One live screen: what is wrong, goals, plan, parts, streams."),
     "why": ("mind", "Why the robot does what it does, or why it cannot."),
 }
 

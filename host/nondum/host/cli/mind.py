@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from nondum.host.cli import complete, render
+from nondum.host.cli import complete, live, render
 from nondum.host.cli.advise import (
     in_a_sentence,
     row,
@@ -35,9 +36,10 @@ GLANCES = 3
     "--why", metavar="FACT", help="Only this fact, true or not, and all that bears on it."
 )
 @click.option("--parked", is_flag=True, help="What waits for objects that are not there now.")
+@live.follow_option(live.REDRAWN)
 @json_option
 @click.pass_obj
-def facts(session: Session, why: str | None, parked: bool) -> None:
+def facts(session: Session, why: str | None, parked: bool, follow: bool) -> None:
     """What the robot believes, and why.
 
     A fact's age is the time since somebody first said so. With --why: who speaks for it and against
@@ -45,18 +47,29 @@ def facts(session: Session, why: str | None, parked: bool) -> None:
 
     \b
     Examples: nondum facts
+              nondum facts --follow
               nondum facts --parked
               nondum facts --why "(ready panther__eye__camera)"
     """
     if why is not None and parked:
         raise click.UsageError("--why is of one fact, --parked of those that wait: choose one")
+    if why is not None and follow:
+        raise click.UsageError("--follow is of all facts, --why of one: choose one")
     if why is not None:
         _explain(session, session.ask("fact", fact=why))
         return
-    rows = session.ask("facts", parked=parked)
-    if session.as_json:
-        render.as_json(rows)
+    if follow:
+        for rows in session.follow("follow_facts", parked=parked):
+            if session.as_json:
+                render.as_json_line(rows)
+            else:
+                live.redraw(partial(_show_facts, rows, parked))
         return
+    rows = session.ask("facts", parked=parked)
+    render.as_json(rows) if session.as_json else _show_facts(rows, parked)
+
+
+def _show_facts(rows: list[dict[str, Any]], parked: bool) -> None:
     shown = [{**row, "since": render.age(row["age_s"])} for row in rows]
     last = "absent" if parked else "value"
     table(shown, ["fact", "since", "source", last], empty=_NOTHING[parked])
@@ -97,20 +110,31 @@ def _ago(word: dict[str, Any]) -> str:
 
 
 @click.command()
+@live.follow_option(live.REDRAWN)
 @json_option
 @click.pass_obj
-def goals(session: Session) -> None:
+def goals(session: Session, follow: bool) -> None:
     """What can be asked for now, and what was.
 
     NOW says whether it holds, can be had as far as anyone can see, or cannot, and then what is
     missing; FROM names the components that brought the words.
 
-    Example: nondum goals
+    \b
+    Examples: nondum goals
+              nondum goals --follow
     """
-    view = session.ask("goals")
-    if session.as_json:
-        render.as_json(view)
+    if follow:
+        for view in session.follow("follow_goals"):
+            if session.as_json:
+                render.as_json_line(view)
+            else:
+                live.redraw(partial(_show_goals, view))
         return
+    view = session.ask("goals")
+    render.as_json(view) if session.as_json else _show_goals(view)
+
+
+def _show_goals(view: dict[str, Any]) -> None:
     shown = [{**row, "now": _outlook(row)} for row in view["can"]]
     table(shown, ["words", "goal", "kind", "now", "from"], empty="nothing can be asked for yet")
     for problem in view["problems"]:

@@ -6,10 +6,11 @@ from typing import Any
 
 import click
 
-from nondum.host.cli import complete, render
+from nondum.host.cli import complete, live, render
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.table import cell, table
 
+USUAL_ROWS, MOST_ROWS = 200, 100_000
 _LEFT_OUT = frozenset({"payload", "digest", "component"})
 """Details that a table has no room for: the subject says the same in words."""
 
@@ -22,27 +23,46 @@ _LEFT_OUT = frozenset({"payload", "digest", "component"})
 )
 @click.option(
     "--limit",
-    default=200,
-    show_default=True,
-    type=click.IntRange(1, 100_000),
-    help="The last so many rows.",
+    type=click.IntRange(1, MOST_ROWS),
+    help="The last so many rows [default: 200; with --since all].",
 )
+@live.since_option
+@live.follow_option(live.APPENDED)
 @json_option
 @click.pass_obj
-def journal(session: Session, subject: str | None, limit: int) -> None:
+def journal(
+    session: Session, subject: str | None, limit: int | None, since_s: int | None, follow: bool
+) -> None:
     """What happened on this host, oldest first.
 
     \b
     Examples: nondum journal --limit 20
+              nondum journal --since 10min --follow
               nondum journal --subject org.example.window-opener
     """
-    rows = session.ask("journal", subject=subject, limit=limit)
+    rows_wanted = limit or (MOST_ROWS if since_s else USUAL_ROWS)
+    asked: dict[str, Any] = {"subject": subject, "limit": rows_wanted, "since_s": since_s}
+    if follow:
+        for row in session.follow("follow_journal", **asked):
+            render.as_json_line(row) if session.as_json else _show_entry(row)
+        return
+    rows = session.ask("journal", **asked)
     if session.as_json:
         render.as_json(rows)
         return
     shown = [{**row, "when": render.clock(row["when"]), "detail": _detail(row)} for row in rows]
     columns = ["when", "subject", "event", "step", "detail"]
-    table(shown, columns, empty="the journal says nothing of it" if subject else "it is empty")
+    if since_s:
+        empty = "nothing happened since"
+    else:
+        empty = "the journal says nothing of it" if subject else "it is empty"
+    table(shown, columns, empty=empty)
+
+
+def _show_entry(row: dict[str, Any]) -> None:
+    """An entry as a line: what is still to come has no columns yet."""
+    said = [row["subject"], row["event"], row["step"], _detail(row)]
+    render.sentence("  ".join(filter(None, said)), mark=f"{render.clock(row['when'])}  ")
 
 
 def _detail(row: dict[str, Any]) -> str:
@@ -58,22 +78,35 @@ def _detail(row: dict[str, Any]) -> str:
 
 @click.command()
 @click.argument("component", required=False, shell_complete=complete.components)
+@live.since_option
+@live.follow_option(live.APPENDED)
 @json_option
 @click.pass_obj
-def logs(session: Session, component: str | None) -> None:
+def logs(session: Session, component: str | None, since_s: int | None, follow: bool) -> None:
     """What components have written.
+
+    The last thousand lines of each are kept. Who follows more slowly than lines come misses some.
 
     \b
     Examples: nondum logs
+              nondum logs --since 10min --follow
               nondum logs window-opener
     """
-    rows = session.ask("logs", component=component)
+    if follow:
+        for row in session.follow("follow_logs", component=component, since_s=since_s):
+            render.as_json_line(row) if session.as_json else _show_line(row)
+        return
+    rows = session.ask("logs", component=component, since_s=since_s)
     if session.as_json:
         render.as_json(rows)
         return
     if not rows:
         click.echo("nothing was written")
     for row in rows:
-        colour = {"error": "red", "critical": "red", "warning": "yellow"}.get(row["level"].lower())
-        where = f"{render.clock(row['when'])}  {row['component']}  {row['level']}  "
-        render.sentence(row["message"], colour=colour, mark=where)
+        _show_line(row)
+
+
+def _show_line(row: dict[str, Any]) -> None:
+    colour = {"error": "red", "critical": "red", "warning": "yellow"}.get(row["level"].lower())
+    where = f"{render.clock(row['when'])}  {row['component']}  {row['level']}  "
+    render.sentence(row["message"], colour=colour, mark=where)

@@ -92,3 +92,31 @@ def progress(made: Mapping[str, Any] | None) -> str:
     if made and made["phase"] == "queued":
         return f"queued behind {made['total']}"
     return f"{made['phase']} {100 * made['fraction']:.0f} %" if made else ""
+
+
+def machine(told: Mapping[str, Any]) -> list[str]:
+    """How the machine is, a few words for each thing that it tells.
+
+    >>> machine(
+    ...     {
+    ...         "batteries": [{"name": "BAT0", "percent": 81, "state": "discharging"}],
+    ...         "disk": {"free_mb": 12_000},
+    ...         "temperatures": [{"celsius": 41.0}, {"celsius": 47.5}],
+    ...         "load": {"one_min": 0.42},
+    ...     }
+    ... )
+    ['battery 81 % (discharging)', 'disk 12.6 GB free', '48 °C', 'load 0.42']
+    """
+    words = [f"battery {_fullness(battery)}" for battery in told["batteries"]]
+    if told["disk"]:
+        words.append(f"disk {size(told['disk']['free_mb'] << 20)} free")
+    if told["temperatures"]:
+        words.append(f"{max(zone['celsius'] for zone in told['temperatures']):.0f} °C")
+    if told["load"]:
+        words.append(f"load {told['load']['one_min']:.2f}")
+    return words
+
+
+def _fullness(battery: Mapping[str, Any]) -> str:
+    percent, state = battery["percent"], battery["state"]
+    return state if percent is None else f"{percent} % ({state})"

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import click
 
-from nondum.host.cli import render
+from nondum.host.cli import live, render
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.table import table
 
@@ -14,13 +15,14 @@ LAST_TOLD = 5
 
 
 @click.command()
-@click.option("--follow", "-f", is_flag=True, help="Show it again whenever it changes.")
+@live.follow_option(live.REDRAWN)
 @json_option
 @click.pass_obj
 def status(session: Session, follow: bool) -> None:
     """The host, its payloads and its goals at a glance.
 
-    A payload's age is the time since it was built, as it says.
+    Of the machine, what it tells: battery, the disk that the state is on, the hottest sensor, and
+    the load of the last minute. A payload's age is the time since it was built, as it says.
 
     With --follow and --json, each line is all that there is to see: components, streams, plan and
     tree too.
@@ -37,15 +39,15 @@ def status(session: Session, follow: bool) -> None:
         if session.as_json:
             render.as_json_line(view)
         else:
-            click.clear()
-            show(view)
+            live.redraw(partial(show, view))
 
 
 def show(view: dict[str, Any]) -> None:
     """Print a status for people."""
     click.echo(f"host {view['host']}  revision {view['revision']}  {view['state']}")
+    _show_machine(view["machine"])
     _show_feedback(view["feedback"])
-    for warning in view["warnings"]:
+    for warning in (*view["machine"]["warnings"], *view["warnings"]):
         render.sentence(warning, colour="yellow", mark="warning: ")
     _show_trust(view["trust"])
     _show_confinement(view["confinement"])
@@ -64,6 +66,11 @@ def show(view: dict[str, Any]) -> None:
         click.echo()
     for told in view["told"][-LAST_TOLD:]:
         render.sentence(told["text"], mark="> ")
+
+
+def _show_machine(machine: dict[str, Any]) -> None:
+    if told := render.machine(machine):
+        render.sentence(", ".join(told), mark="machine: ")
 
 
 def _show_feedback(shown: dict[str, Any]) -> None:

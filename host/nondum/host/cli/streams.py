@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nondum.host.cli import complete, render
-from nondum.host.cli.body import show
 from nondum.host.cli.connection import Session, json_option
-from nondum.host.cli.table import cell
+from nondum.host.cli.table import cell, table
 from nondum.host.printable import printable
 
 if TYPE_CHECKING:
@@ -38,6 +37,8 @@ LONGEST_FIELD = 60
 def streams(session: Session, stream: str | None, count: int | None) -> None:
     """Who sends what to whom, and what is sent.
 
+    RATE is messages a second of late, as the component itself counts them.
+
     A message is shown by its stamp (seconds since the host was switched on), its frame, its number,
     and its small fields. Slow readers get the newest: numbers may be left out.
 
@@ -49,10 +50,19 @@ def streams(session: Session, stream: str | None, count: int | None) -> None:
     if stream is None:
         if count is not None:
             raise click.UsageError("--count is of use with --follow only")
-        columns = ["stream", "type", "component", "flowing", "consumers"]
-        show(session, session.ask("streams"), columns, "no streams")
+        columns = ["stream", "type", "component", "flowing", "rate", "consumers"]
+        rows = session.ask("streams")
+        if session.as_json:
+            render.as_json(rows)
+        else:
+            table([with_rate(row) for row in rows], columns, empty="no streams")
     else:
         asyncio.run(_follow(session, stream, count))
+
+
+def with_rate(row: dict[str, Any]) -> dict[str, Any]:
+    """A stream's row with its rate as people read it."""
+    return {**row, "rate": row["rate_hz"] and f"{row['rate_hz']:.3g}/s"}
 
 
 async def _follow(session: Session, stream: str, count: int | None) -> None:

@@ -10,6 +10,7 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import TypeAlias
 
+from nondum.planning.asking import ASKED
 from nondum.planning.pattern import Optional, Part, Slot, Word
 from nondum.planning.phrase import KnownPhrase
 from nondum.planning.phrases import Phrasebook
@@ -27,13 +28,14 @@ Sayings: TypeAlias = dict[str, object]
 def sayings(book: Phrasebook, hosts: Sequence[str] = ()) -> Sayings:
     """`phrases`: patterns that can be said now; `names`: slot → words that may be said there.
 
-    What stops the robot comes first. Slots are called by the types of what they name. A phrase
-    without a name for one of its slots cannot be said. Where there are several hosts, each can be
-    addressed first. What a packet has no room for is left out, names first.
+    What stops the robot comes first, then what it is asked about itself. Slots are called by the
+    types of what they name. A phrase without a name for one of its slots cannot be said. Where
+    there are several hosts, each can be addressed first. What a packet has no room for is left out,
+    names first.
     """
     names: dict[str, list[str]] = {}
     addressee = f"[{{{ADDRESSEE}}}] " if hosts else ""
-    phrases: dict[str, None] = dict.fromkeys(f"{addressee}{said}" for said in STOPS)
+    phrases: dict[str, None] = dict.fromkeys(f"{addressee}{said}" for said in (*STOPS, *ASKED))
     for phrase in book.phrases:
         slots = {slot: _names(book, slot) for slot in phrase.binding_slots()}
         if all(slots.values()):

@@ -15,6 +15,8 @@ MAX_WORD = 256
 """Characters in a predicate, an object or a log level."""
 
 MAX_COUNT = 2**31
+MAX_RATE_HZ = 1e6
+"""Messages a second; no worker gets so many through."""
 MAX_TEXT = 16 * 1024
 """Characters of one message that are kept."""
 MAX_CLAIMS = 4096
@@ -65,6 +67,19 @@ class Claims:
 
 def _size(news: FactKnown) -> int:
     return sum(map(len, news.arguments)) + (len(pack(news.value)) if news.value else 0)
+
+
+def parse_rates(outputs: Collection[str], body: Mapping[str, Any]) -> dict[str, float]:
+    """Messages a second of each of a worker's own streams, as its heartbeat tells.
+
+    What cannot be so is left out: people are shown it, and nothing goes by it.
+    """
+    told = body.get("rates")
+    return {
+        stream: float(rate_hz)
+        for stream, rate_hz in (told.items() if isinstance(told, Mapping) else ())
+        if stream in outputs and type(rate_hz) in (int, float) and 0 <= rate_hz <= MAX_RATE_HZ
+    }
 
 
 def parse_news(

@@ -22,7 +22,7 @@ from nondum.host.workers.index import mismatches
 from nondum.host.workers.launcher import Launcher
 from nondum.host.workers.leftovers import end_leftovers
 from nondum.host.workers.lending import Lending
-from nondum.host.workers.news import Claims, parse_count, parse_news, parse_progress
+from nondum.host.workers.news import Claims, parse_count, parse_news, parse_progress, parse_rates
 from nondum.host.workers.output import Output, Valve
 from nondum.host.workers.process import WorkerProcess, names_of
 from nondum.host.workers.spec import Timing, WorkerSpec
@@ -63,6 +63,8 @@ class Worker:
         """What it says is so."""
         self._streams: frozenset[str] = frozenset()
         self._beats = 0
+        self.rates: dict[str, float] = {}
+        """Messages a second of each of its streams, as its last heartbeat says."""
         self._beaten = asyncio.Event()
         self._loop = asyncio.get_running_loop()
         self._calls: dict[int, Call] = {}
@@ -346,6 +348,8 @@ class Worker:
         call = self._calls.get(call_id) if call_id is not None else None
         match name:
             case "heartbeat" | "pong":
+                if name == "heartbeat":
+                    self.rates = parse_rates(self._streams, body)
                 self._beats += 1
                 self._beaten.set()
             case "established":

@@ -204,6 +204,17 @@ class Workers:
         task.add_done_callback(self._calls.pop)
         return call
 
+    def rates(self) -> dict[str, float]:
+        """Stream → messages a second of late, as the workers say."""
+        told: dict[str, float] = {}
+        for worker in self._running():
+            told |= worker.rates
+        return told
+
+    def busy(self) -> frozenset[str]:
+        """The components that carry something out now, for whichever host."""
+        return frozenset(call.component for call in self._calls.values())
+
     def halt_all(self) -> None:
         """Ask every behaviour to end. Returns at once; halting is bounded."""
         for call in tuple(self._calls.values()):

@@ -29,6 +29,8 @@ class OutputPort:
         self.stream = stream
         """The stream's object name."""
         self.producer = Producer(kind)
+        self.sent = 0
+        """Messages so far, whoever took them."""
         self._message_class = MESSAGES[kind]
         self._on_flow = on_flow
         self._users = 0
@@ -52,6 +54,7 @@ class OutputPort:
                 f"not {type(message).__name__}"
             )
         self.producer.send(message)
+        self.sent += 1
         loop = asyncio.get_running_loop()
         now_s = loop.time()
         self._pace = self._pace.after(now_s) if self._pace is not None else Pace(now_s)

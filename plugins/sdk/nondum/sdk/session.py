@@ -105,7 +105,8 @@ class Session:
 
     async def _beat(self) -> None:
         while True:
-            self.tell("heartbeat", {})
+            rates = self._place.rates(asyncio.get_running_loop().time())
+            self.tell("heartbeat", {"rates": rates} if rates else {})
             await asyncio.sleep(HEARTBEAT_S)
 
     def _on_event(self, name: str, body: Body, _call_id: int | None) -> None:

@@ -109,6 +109,8 @@ class Workplace:
         """(predicate, object, …) → value of that fact."""
         self.outputs: dict[str, OutputPort] = {}
         """By stream object."""
+        self._counted: tuple[float | None, Mapping[str, int]] = (None, {})
+        """When `rates` was asked for before, and what had been sent by then."""
         self._inputs: dict[str, InputPort] = {}
         self._optional_inputs: dict[tuple[str, str], InputPort] = {}
 
@@ -167,6 +169,16 @@ class Workplace:
     def remount(self, mounts: Mapping[str, Any]) -> None:
         """Take over the mount table `{frame: [parent, xyz, xyzw]}`."""
         self.frames = FrameTree.from_wire(mounts)
+
+    def rates(self, now_s: float) -> dict[str, float]:
+        """Messages a second of each stream that was sent on since this was asked before."""
+        before_s, before = self._counted
+        sent = {output.stream: output.sent for output in self.outputs.values() if output.sent}
+        self._counted = (now_s, sent)
+        news = {stream: count - before.get(stream, 0) for stream, count in sent.items()}
+        if before_s is None or now_s <= before_s:
+            return {}
+        return {stream: count / (now_s - before_s) for stream, count in news.items() if count}
 
     def close(self) -> None:
         """End all streams."""

@@ -1,0 +1,40 @@
+"""A robot knows when it is asked about itself, and takes nothing else for that."""
+
+from __future__ import annotations
+
+import pytest
+
+from nondum.planning.asking import ASKED, Question, question_in
+from nondum.planning.stop_words import is_stop
+
+
+def test_what_listeners_are_told_to_hear_is_understood_and_stops_nothing() -> None:
+    assert [question_in(said) for said in ASKED] == list(Question)
+    assert not any(map(is_stop, ASKED))
+
+
+@pytest.mark.parametrize(
+    ("said", "question"),
+    [
+        ("What can you do?", Question.ABILITIES),
+        ("please tell me what you can do", Question.ABILITIES),
+        ("Hey robot, what can I say now", Question.ABILITIES),
+        ("big mule, what can you do for me?", Question.ABILITIES),
+        ("big-mule what are you up to", Question.ACTIVITY),
+        ("what are you doing right now", Question.ACTIVITY),
+        ("What's going on?", Question.ACTIVITY),
+    ],
+)
+def test_people_ask_in_many_ways(said: str, question: Question) -> None:
+    assert question_in(said, "big-mule") is question
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        *("", "what", "tell me", "what can you see", "what are you doing to the people"),
+        *("rover, what can you do", "do what you can do", "where are you", "follow me"),
+    ],
+)
+def test_sentences_that_say_more_are_for_phrases(said: str) -> None:
+    assert question_in(said, "big-mule") is None
