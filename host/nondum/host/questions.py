@@ -21,6 +21,7 @@ from nondum.host.rows import (
     drive_row,
     gone_back,
     host_state,
+    input_row,
     journal_row,
     offered_row,
     payload_row,
@@ -107,6 +108,8 @@ class Questions:
             for c in snapshot.components
         ]
         for row in own:
+            found = (row["problem"], *map(str, self.workers.faults(row["component"])))
+            row["problem"] = "; ".join(filter(None, found))
             row["confinement"] = str(self.workers.launcher.level) if row["pid"] else None
         return own + [
             offered_row(offered, peer.name)
@@ -142,6 +145,11 @@ class Questions:
     async def streams(self, arguments: Arguments) -> list[Row]:
         """Who sends what to whom."""
         return [stream_row(stream) for stream in self.workers.streams.listing()]
+
+    async def inputs(self, arguments: Arguments) -> list[Row]:
+        """The optional inputs, and what feeds each."""
+        streams = self.workers.streams
+        return [input_row(choice, streams.sources()) for choice in streams.inputs()]
 
     async def facts(self, arguments: Arguments) -> list[Row]:
         """What is believed; or, `parked`, what waits for objects that are not there."""
@@ -241,6 +249,7 @@ class Questions:
                 **await self.status(arguments),
                 "components": await self.components(arguments),
                 "streams": await self.streams(arguments),
+                "inputs": await self.inputs(arguments),
                 "plan": self.mind.views.plan(),
                 "tree": self.mind.views.tree(),
             }

@@ -5,7 +5,8 @@
   (:types
     host class target place unit stream - object
     camera detector tracker base pointer sensor speaker microphone arm gripper light - unit
-    image depth points detections twist pose audio text scalar - stream)
+    image depth points detections twist pose audio text scalar - stream
+    gps-fix imu-data laser-scan battery-state occupancy-grid key-values - stream)
   (:predicates
     (self ?h - host)                             ; H the host that plans
     (on ?u - unit ?h - host)                     ; H the unit is part of that body
@@ -24,4 +25,4 @@
     (pointing ?h - host ?t - target)
     (found ?c - class ?h - host)
     (reported ?c - class ?h - host))
-  (:valued bearing-known))
+  (:valued bearing-known - bearing))

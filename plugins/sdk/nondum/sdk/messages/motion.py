@@ -55,7 +55,7 @@ class Pose(Message):
 
     def faults(self) -> Iterator[str]:
         """An orientation that is no rotation."""
-        if not _is_unit(self.orientation):
+        if not is_unit(self.orientation):
             yield "the orientation is not a quaternion of length 1"
 
 
@@ -95,11 +95,12 @@ class Bearing(Message):
 
     def faults(self) -> Iterator[str]:
         """A direction that is no unit vector, or a negative deviation."""
-        if not _is_unit(self.direction):
+        if not is_unit(self.direction):
             yield "the direction is not a vector of length 1"
         if self.sigma_rad < 0:
             yield f"sigma_rad {self.sigma_rad} is negative"
 
 
-def _is_unit(values: tuple[float, ...]) -> bool:
+def is_unit(values: tuple[float, ...]) -> bool:
+    """Whether a vector or quaternion has length 1."""
     return abs(math.hypot(*values) - 1) <= UNIT_LENGTH_TOLERANCE

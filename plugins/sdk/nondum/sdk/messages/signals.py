@@ -1,4 +1,4 @@
-"""Sound, words, single numbers and clouds of points."""
+"""Sound, words, numbers by name and alone, and clouds of points."""
 
 from __future__ import annotations
 
@@ -58,6 +58,32 @@ class Scalar(Message):
     value: float
     unit: str
     """SI symbol: `V`, `°C`, `Sv/h`; `1` where there is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class KeyValue:
+    """One value by name (diagnostic_msgs/KeyValue)."""
+
+    key: str
+    value: str
+    """For people and logs. A number that others work with is a `Scalar`, which has a unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class KeyValues(Message):
+    """Values by name (diagnostic_msgs/DiagnosticStatus): what has no message type of its own."""
+
+    TYPE: ClassVar[str] = "key-values"
+    header: Header
+    values: tuple[KeyValue, ...]
+
+    def faults(self) -> Iterator[str]:
+        """A key that is empty or stands there twice."""
+        keys = [value.key for value in self.values]
+        if "" in keys:
+            yield "a key is empty"
+        if len(set(keys)) != len(keys):
+            yield "a key stands there twice"
 
 
 @dataclass(frozen=True, slots=True)
