@@ -6,6 +6,7 @@ import pytest
 from tests.kit.workers import HOST, WorkersUnderTest
 
 from nondum.host.events import FactKnown, WorkerExited, WorkerFaulted
+from nondum.host.workers.faults import MOST, Faults
 from nondum.planning.running import RunState
 from nondum.sdk.description import Behaviour, Output, Unit
 from nondum.sdk.errors import Problem
@@ -99,3 +100,13 @@ async def test_mistakes_go_with_the_worker(tested: WorkersUnderTest) -> None:
     await faulted(tested, BY_HAND % "3")
     await tested.workers.stop("gps")
     assert tested.workers.faults("gps") == ()
+
+
+async def test_mistakes_without_end_are_not_all_kept() -> None:
+    faults = Faults()
+    told = [
+        faults.take(WorkerFaulted("gps", (Problem("MESSAGE_FIELD", "x", where=f"a.py:{line}"),)))
+        for line in range(3 * MOST)
+    ]
+    assert sum(told) == MOST
+    assert [problem.where for problem in faults] == [f"a.py:{MOST - n}" for n in (3, 2, 1)]

@@ -42,10 +42,11 @@ class Pose(Message):
     position: Vector
     """m, in the header's frame"""
     orientation: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    """Of the child in the header's frame: x, y, z, w, of length 1."""
     child_frame_id: str = ""
     """The frame that is there; empty where only a place is meant."""
     twist: Twist | None = None
-    """The child's velocity, in the child's own axes."""
+    """The child's velocity, in the child's own axes, m/s and rad/s."""
 
     @property
     def yaw_rad(self) -> float:
@@ -68,7 +69,7 @@ class Bearing(Message):
     direction: Vector
     """Unit vector."""
     sigma_rad: float
-    """Standard deviation of the direction."""
+    """Standard deviation of the direction, rad."""
 
     @classmethod
     def from_angles(

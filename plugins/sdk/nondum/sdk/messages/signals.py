@@ -22,9 +22,13 @@ class Audio(Message):
     SAMPLE_BYTES: ClassVar[Mapping[str, int]] = {"s16le": 2, "f32le": 4}
     header: Header
     rate_hz: int
+    """Frames a second."""
     channels: int
+    """Samples of one frame."""
     encoding: str
+    """`s16le` or `f32le`."""
     data: Buffer
+    """Whole frames, channels interleaved."""
 
     def faults(self) -> Iterator[str]:
         """Unknown encoding, no rate, no channels, or half a frame of samples."""
@@ -45,6 +49,7 @@ class Text(Message):
     TYPE: ClassVar[str] = "text"
     header: Header
     text: str
+    """The words."""
     language: str = "en"
     """BCP 47."""
 
@@ -56,6 +61,7 @@ class Scalar(Message):
     TYPE: ClassVar[str] = "scalar"
     header: Header
     value: float
+    """In `unit`."""
     unit: str
     """SI symbol: `V`, `°C`, `Sv/h`; `1` where there is none."""
 
@@ -65,6 +71,7 @@ class KeyValue:
     """One value by name (diagnostic_msgs/KeyValue)."""
 
     key: str
+    """Its name, once in a message."""
     value: str
     """For people and logs. A number that others work with is a `Scalar`, which has a unit."""
 
@@ -76,6 +83,7 @@ class KeyValues(Message):
     TYPE: ClassVar[str] = "key-values"
     header: Header
     values: tuple[KeyValue, ...]
+    """In the order in which people are to see them."""
 
     def faults(self) -> Iterator[str]:
         """A key that is empty or stands there twice."""
@@ -95,6 +103,7 @@ class Points(Message):
     POINT_BYTES: ClassVar[int] = 12
     header: Header
     data: Buffer
+    """x, y, z of each point, float32 little-endian, m."""
 
     def array(self) -> np.ndarray[Any, np.dtype[Any]]:
         """View the points as numpy array (N, 3) of float32 without copying."""

@@ -28,19 +28,19 @@ class LaserScan(Message):
     RANGE_BYTES: ClassVar[int] = 4
     header: Header
     angle_min_rad: float
-    """Angle of the first ray."""
+    """Angle of the first ray, rad."""
     angle_increment_rad: float
-    """From one ray to the next; negative where it turns right."""
+    """From one ray to the next, rad; negative where it turns right."""
     range_min_m: float
-    """Shorter ranges are to be left out."""
+    """m; shorter ranges are to be left out."""
     range_max_m: float
-    """Longer ranges are to be left out: infinity is nothing within reach."""
+    """m; longer ranges are to be left out: infinity is nothing within reach."""
     data: Buffer
     """Ranges, float32 little-endian, in metres; NaN: none."""
     time_increment_s: float = 0.0
-    """Seconds from one ray to the next."""
+    """s, from one ray to the next."""
     scan_time_s: float = 0.0
-    """Seconds from one sweep to the next."""
+    """s, from one sweep to the next."""
 
     def ranges(self) -> np.ndarray[Any, np.dtype[Any]]:
         """View the ranges as numpy array of float32 without copying."""
@@ -87,7 +87,7 @@ class OccupancyGrid(Message):
     BUFFER: ClassVar[str | None] = "data"
     header: Header
     resolution_m: float
-    """Side of a cell."""
+    """Side of a cell, m."""
     width: int
     """Cells along x."""
     height: int
