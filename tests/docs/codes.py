@@ -51,7 +51,7 @@ PUT_TOGETHER = frozenset(
             for file in ("MANIFEST", "TRUST")
             for kind in ("KEY", "TOML", "TWICE", "VALUE")
         ),
-        *(f"{kind}_UNKNOWN" for kind in ("COMPONENT", "PAYLOAD", "STREAM", "UNIT")),
+        *(f"{kind}_UNKNOWN" for kind in ("COMPONENT", "INPUT", "PAYLOAD", "STREAM", "UNIT")),
         *(f"CGROUP_{kind}_MISSING" for kind in ("CPU", "MEMORY", "PIDS")),
     }
 )

@@ -7,17 +7,16 @@ Each document begins with words of its own; what follows `MARK` comes from here.
 
 from __future__ import annotations
 
-import ast
 import inspect
 import json
-import textwrap
 from collections.abc import Callable, Iterator
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, get_type_hints
 
 import click
-from tests.docs import codes
+from tests.docs import codes, sdk_reference
+from tests.docs.dataclass_fields import field_docs
 
 from nondum.host import config
 from nondum.host.cli import explain
@@ -67,7 +66,7 @@ def configuration() -> str:
     rows: dict[str, list[str]] = {}
     for section, key, default in config.documented():
         kind = type(getattr(config.HostConfig(), section))
-        meaning = _field_docs(kind)[key]
+        meaning = field_docs(kind)[key]
         rows.setdefault(section, []).append(f"| `{key}` | {_shown(default)} | {meaning} |")
     return "\n".join(_section(section, found) for section, found in rows.items())
 
@@ -79,7 +78,7 @@ def configuration_keys() -> str:
     for section, key, default in config.documented():
         name, shown = f"{section}.{key}", as_toml(default)
         told[name] = {
-            "meaning": _field_docs(type(getattr(config.HostConfig(), section)))[key],
+            "meaning": field_docs(type(getattr(config.HostConfig(), section)))[key],
             "kind": config.KINDS[hints[section][key]],
             "unit": keys_of.unit_of(key),
             "default": shown,
@@ -101,6 +100,9 @@ def hook_signatures() -> str:
 
 
 DOCUMENTS: dict[str, Callable[[], str]] = {
+    "bench.md": sdk_reference.bench,
+    "core-words.md": sdk_reference.core_words,
+    "messages.md": sdk_reference.messages,
     "cli.md": commands,
     "configuration.md": configuration,
     "hooks.md": hook_signatures,
@@ -128,18 +130,6 @@ def _section(name: str, rows: list[str]) -> str:
     kind = type(getattr(config.HostConfig(), name))
     heads = ["| key | default | |", "|---|---|---|"]
     return "\n".join([f"## [{name}]\n", f"{inspect.getdoc(kind)}\n", *heads, *rows, ""])
-
-
-def _field_docs(kind: type[Any]) -> dict[str, str]:
-    """What stands under each field of a dataclass."""
-    (body,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
-    assert isinstance(body, ast.ClassDef)
-    docs = {}
-    for field, below in zip(body.body, body.body[1:], strict=False):
-        if isinstance(field, ast.AnnAssign) and isinstance(below, ast.Expr):
-            assert isinstance(field.target, ast.Name)
-            docs[field.target.id] = " ".join(ast.literal_eval(below.value).split())
-    return docs
 
 
 def _shown(default: Any) -> str:

@@ -5,15 +5,19 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterator
+from dataclasses import fields
 from pathlib import Path
 
 import click
 import pytest
+from tests.docs.dataclass_fields import field_docs
 from tests.docs.reference import DOCS, DOCUMENTS, KEYS, MARK, all_commands, configuration_keys
+from tests.docs.sdk_reference import core_words, message_classes
 
 from nondum.host import config
 from nondum.host.cli.main import cli
 from nondum.host.configuration import reference
+from nondum.planning.core import core
 from nondum.sdk import hooks
 
 ROOT = DOCS.parent
@@ -66,6 +70,18 @@ def test_every_hook_is_documented() -> None:
         if hasattr(getattr(hooks, name), f"{hooks.PROJECT}_spec") and not name.startswith("_")
     }
     assert specified == {*hooks.DESCRIBING, *hooks.ACTING}
+
+
+@pytest.mark.parametrize("cls", message_classes(), ids=lambda cls: cls.__name__)
+def test_every_field_of_a_message_says_what_it_holds(cls: type[object]) -> None:
+    told = field_docs(cls)
+    assert [f.name for f in fields(cls) if f.name != "header" and not told.get(f.name)] == []  # type: ignore[arg-type]  # all are dataclasses
+
+
+def test_every_word_of_the_core_has_a_meaning() -> None:
+    written = core_words()
+    assert all(f"| `({p.name} " in written for p in core().predicates)
+    assert all(f"`{t.name}`" in written for t in core().types)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

@@ -132,6 +132,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_S}/messages/fields.py": (f"{_TS}/test_messages.py",),
     "planning/nondum/planning/parse.py": ("tests/planning/test_parse.py",),
     f"{_H}/workers/index.py": (f"{_TH}/workers/test_index.py",),
+    f"{_H}/workers/faults.py": (f"{_TH}/workers/test_faults.py",),
     f"{_H}/workers/news.py": (f"{_TH}/workers/test_news.py", f"{_TH}/test_news.py"),
     f"{_H}/workers/excess.py": (
         f"{_TH}/workers/test_excesses.py::test_too_much_ends_that_worker_alone",

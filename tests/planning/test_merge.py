@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from importlib import resources
 from itertools import permutations
 
 import pytest
 from tests.planning.fragments import HOST, brings
 
 from nondum.planning.contribution import Contribution
+from nondum.planning.core import core, core_value_types
 from nondum.planning.domain import Merged
 from nondum.planning.merge import merge
-from nondum.sdk.description import Behaviour, PluginDescription, Unit
+from nondum.planning.parse import parse_fragment
+from nondum.planning.syntax import DomainFragment
+from nondum.sdk.description import Behaviour, Fragment, PluginDescription, Unit
 from nondum.sdk.errors import Problem
+from nondum.sdk.messages import MESSAGES
+from nondum.sdk.valued import value_types
 
 
 def merged(*contributions: Contribution) -> Merged:
@@ -214,6 +220,18 @@ ALONE = {
         "dose",
         "'dose' in :valued is no predicate",
     ),
+    "value of no message type": (
+        "(:predicates (seen ?h - host)) (:valued seen - pos)",
+        "E-TYPE",
+        "seen",
+        "the value of 'seen' is of no message type: pos",
+    ),
+    "value of two types": (
+        "(:predicates (seen ?h - host)) (:valued seen - (either pose twist))",
+        "E-TYPE",
+        "seen",
+        "of no message type: (either pose twist)",
+    ),
     "object of another component": (
         "(:constants rover__camera__lens - camera)",
         "E-OWNED",
@@ -400,6 +418,12 @@ CONFLICTS = {
         "E-PRED-TYPE",
         "argument 1: place here, base in a 1.0",
     ),
+    "types of values": (
+        "(:predicates (seen ?h - host)) (:valued seen - pose)",
+        "(:predicates (seen ?h - host)) (:valued seen - gps-fix)",
+        "E-PRED-TYPE",
+        "predicate 'seen': its value is a gps-fix here, a pose in a 1.0",
+    ),
     "parents": (
         "(:types rotor - base)",
         "(:types rotor - arm)",
@@ -577,3 +601,33 @@ def test_local_name_and_types_of_objects_are_kept() -> None:
     assert result.objects["rover__cam__frames"].local == "frames"
     assert result.objects["rover__cam__frames"].types == ("image",)
     assert list(result.objects_of("unit")) == ["rover__cam__lens"]
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)], ids=["untyped first", "typed first"])
+def test_who_says_no_type_of_a_value_agrees(order: tuple[int, int]) -> None:
+    declared = "(:predicates (seen ?h - host)) (:valued seen{})"
+    both = [brings(name, declared.format(t)) for name, t in (("a", ""), ("b", " - pose"))]
+    domain = merged(*(both[i] for i in order)).domain
+    assert domain.predicates["seen"].valued
+    assert domain.predicates["seen"].value_type == "pose"
+
+
+def test_workers_read_the_types_of_values_as_planning_does() -> None:
+    texts = {
+        "core": (resources.files("nondum.planning") / "nondum-core.pddl").read_text("utf-8"),
+        "odd": "(define (domain d) (:predicates (A ?h) (b ?h) (c ?h)) ; (:valued c - text)\n"
+        "(:valued A b\n - Pose c))",
+    }
+    for name, text in texts.items():
+        parsed = parse_fragment(text, name)
+        assert isinstance(parsed, DomainFragment)
+        planned = {word.name: word.types[0] for word in parsed.valued if word.types}
+        assert value_types([Fragment(name, text)]) == planned
+        assert planned
+
+
+def test_core_words_carry_messages() -> None:
+    assert core_value_types() == {"bearing-known": "bearing"}
+    streams = {t.name for t in core().types if t.types == ("stream",)}
+    assert streams <= MESSAGES.keys()
+    assert MESSAGES.keys() - streams == {"bearing"}  # which is only said

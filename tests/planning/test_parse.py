@@ -37,7 +37,7 @@ DOMAIN = """\
   (:constants depot - room)
   (:predicates (at ?t - truck ?r - (either room vehicle)) (Locked ?r))
   (:functions (total-cost) - number)
-  (:valued locked)
+  (:valued locked - pose)
   (:functional at)
   (:action move
     :parameters (?t - truck ?from ?to - room)
@@ -69,7 +69,8 @@ def test_domain_is_read_whole() -> None:
     ]
     assert [str(c) for c in parsed.constants] == ["depot - room"]
     assert str(parsed.predicates[0]) == "(at ?t - truck ?r - (either room vehicle))"
-    assert [name.name for name in parsed.valued + parsed.functional] == ["locked", "at"]
+    assert [str(name) for name in parsed.valued] == ["locked - pose"]
+    assert [name.name for name in parsed.functional] == ["at"]
     [move] = parsed.actions
     assert [p.types for p in move.parameters] == [("truck",), ("room",), ("room",)]
     assert str(move.precondition) == "(and (at ?t ?from) (not (locked ?to)) (not (= ?from ?to)))"

@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 from tests.planning.strangers import ROVER, components, planner, task
 
+from nondum.host.optional_inputs import choose, sockets_of, sources_of
 from nondum.planning.goal import goal_text
 from nondum.planning.merge import merge
 from nondum.planning.phrases import phrasebook
-from nondum.sdk.description import PluginDescription
+from nondum.sdk.description import Output, PluginDescription, Unit
 from nondum.sdk.planner import Plan
 from nondum.sdk.plugin import describe, load
 from nondum.wheelhouse import manifest
@@ -94,3 +95,31 @@ def test_words_become_the_plan_that_is_meant(
     assert isinstance(answer, Plan)
     steps = [grounded.actions[step].name.split()[0] for step in answer.steps]
     assert [step.partition(".")[2] for step in steps] == schemas
+
+
+GPS = PluginDescription(
+    "a-gps", "1", units=(Unit("receiver", "sensor", outputs=(Output("fix", "pose"),)),)
+)
+"""A pose, but not of the base: what a stranger wrote, and was wired as the cameras' odometry."""
+
+
+@pytest.mark.parametrize("reader", ["recorded-camera", "thermal-camera", "visual-tracker"])
+@pytest.mark.parametrize("has_base", [False, True])
+def test_pose_of_a_gps_is_nobodys_odometry(
+    reader: str, has_base: bool, shipped: dict[str, PluginDescription]
+) -> None:
+    there = {"a-gps": GPS} | ({"mobile-base": shipped["mobile-base"]} if has_base else {})
+    flowing = [s for name, plugin in there.items() for s in sources_of("rover", name, plugin)]
+    sockets = [s for s in sockets_of(reader, shipped[reader]) if s.slot == "odometry"]
+    (choice,) = choose(sockets, flowing, {})
+    assert (choice.source.component if choice.source else None) == (
+        "mobile-base" if has_base else None
+    )
+    assert not choice.is_ambiguous
+
+
+def test_every_optional_input_of_a_shipped_payload_says_of_what(
+    shipped: dict[str, PluginDescription],
+) -> None:
+    sockets = [s for name, plugin in shipped.items() for s in sockets_of(name, plugin)]
+    assert [socket.name for socket in sockets if not socket.of] == []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
@@ -15,16 +16,23 @@ from hypothesis import strategies as st
 from nondum.sdk import (
     MESSAGES,
     Audio,
+    BatteryState,
     Bearing,
     BoundingBox2D,
     CameraModel,
     Depth,
     Detection,
     Detections,
+    GpsFix,
     Header,
     Image,
+    ImuData,
+    KeyValue,
+    KeyValues,
+    LaserScan,
     Message,
     MessageInvalid,
+    OccupancyGrid,
     Points,
     Pose,
     Scalar,
@@ -77,12 +85,33 @@ messages: st.SearchStrategy[Message] = st.one_of(
     st.builds(Text, headers, texts, texts),
     st.builds(Scalar, headers, floats, texts),
     st.builds(Points, headers, st.binary().map(lambda data: data * 12)),
+    st.builds(
+        GpsFix,
+        headers,
+        st.floats(-90, 90),
+        st.floats(-180, 180),
+        st.none() | floats,
+        st.none() | st.just((1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 4.0)),
+        st.sampled_from(GpsFix.STATUS),
+    ),
+    st.builds(ImuData, headers, st.none() | rotations(), st.none() | vectors, st.none() | vectors),
+    st.builds(BatteryState, headers, st.floats(0, 60), st.none() | floats),
+    st.builds(
+        LaserScan,
+        *(headers, floats, floats, st.just(0.1), st.just(30.0)),
+        st.binary().map(lambda data: data * 4),
+    ),
+    st.builds(
+        OccupancyGrid, headers, st.just(0.05), st.just(2), st.just(3), st.just(b"\0\xffd\0\0\0")
+    ),
+    st.builds(KeyValues, headers, st.builds(KeyValue, texts, texts).map(lambda one: (one,))),
     st.builds(Audio, headers, st.just(8000), st.just(1), st.just("s16le"), st.just(b"abcd")),
 )
 
 
-@given(messages)
+@given(messages.filter(lambda message: not list(message.faults())))
 def test_what_is_sent_arrives(message: Message) -> None:
+    message.check()
     header, buffer = message.to_wire()
     arrived = unpack(pack([header, None if buffer is None else bytes(buffer)]))
     assert message_from_wire(message.TYPE, *arrived) == message
@@ -104,6 +133,16 @@ def test_damaged_headers_give_a_message_or_a_refusal(message: Message, data: st.
 
 def image_header(**changes: Any) -> dict[str, Any]:
     header, _ = Image(Header(1.0), 2, 3, "rgb8", 9, bytes(18)).to_wire()
+    return {**header, **changes}
+
+
+def scan_header(**changes: Any) -> dict[str, Any]:
+    header, _ = LaserScan(Header(1.0), -1.5, 0.01, 0.1, 30.0, b"").to_wire()
+    return {**header, **changes}
+
+
+def grid_header(**changes: Any) -> dict[str, Any]:
+    header, _ = OccupancyGrid(Header(1.0), 0.05, 2, 3, bytes(6)).to_wire()
     return {**header, **changes}
 
 
@@ -133,6 +172,18 @@ def image_header(**changes: Any) -> dict[str, Any]:
         ("bearing", {"header": {}, "direction": [1, 1, 0], "sigma_rad": 0}, None, "length 1"),
         ("bearing", {"header": {}, "direction": [1, 0, 0], "sigma_rad": -1}, None, "negative"),
         ("points", {"header": {}}, bytes(13), "within a point"),
+        ("gps-fix", {"header": {}, "latitude_deg": 91.0, "longitude_deg": 0.0}, None, "-90..90"),
+        ("gps-fix", {"header": {}, "latitude_deg": 0, "longitude_deg": 181}, None, "-180..180"),
+        ("battery-state", {"header": {}, "voltage_v": 12, "fraction": 80}, None, "within 0..1"),
+        ("battery-state", {"header": {}, "voltage_v": 12, "status": "ok"}, None, "none of"),
+        ("imu-data", {"header": {}, "orientation": [0, 0, 0, 0]}, None, "length 1"),
+        ("imu-data", {"header": {}, "angular_velocity_covariance": [-1] * 9}, None, "negative"),
+        ("laser-scan", scan_header(), bytes(7), "within a range"),
+        ("laser-scan", scan_header(range_min_m=40.0), bytes(8), "is not within 0..30.0"),
+        ("occupancy-grid", grid_header(), bytes(5), "expected 6 bytes, found 5"),
+        ("occupancy-grid", grid_header(resolution_m=0.0), bytes(6), "is not positive"),
+        ("key-values", {"header": {}, "values": [{"key": "", "value": "a"}]}, None, "empty"),
+        ("key-values", {"header": {}, "values": [{"key": "a", "value": "b"}] * 2}, None, "twice"),
     ],
 )
 def test_wrong_messages_are_refused(
@@ -202,6 +253,86 @@ def test_points_share_their_array() -> None:
     assert np.array_equal(points.array(), array)
     with pytest.raises(ValueError, match=r"shape \(N, 3\)"):
         Points.from_array(Header(), array.reshape(3, 2))
+
+
+def test_scans_and_maps_share_their_arrays() -> None:
+    ranges, cells = np.arange(5, dtype="f4"), np.array([[0, -1], [100, 0], [3, 4]], "i1")
+    limits = {"range_min_m": 0.1, "range_max_m": 30.0}
+    scan = LaserScan.from_ranges(
+        Header(), ranges, angle_min_rad=-1.0, angle_increment_rad=0.5, **limits
+    )
+    grid = OccupancyGrid.from_array(Header(), cells, 0.05, (0.0, 0.0, 0.0))
+    scan.check()
+    grid.check()
+    assert np.array_equal(scan.ranges(), ranges)
+    assert (grid.width, grid.height) == (2, 3)
+    assert np.array_equal(grid.array(), cells)
+    with pytest.raises(ValueError, match="shape"):
+        OccupancyGrid.from_array(Header(), cells.astype("f4"), 0.05, (0.0, 0.0, 0.0))
+    with pytest.raises(ValueError, match="shape"):
+        LaserScan.from_ranges(
+            Header(), cells, angle_min_rad=-1.0, angle_increment_rad=0.5, **limits
+        )
+
+
+CAMERA = CameraModel(1, 1, 1.0, 1.0, 0.0, 0.0)
+FOUND = Detection("a", 1.0, BoundingBox2D(0, 0, 1, 1))
+POSE = Pose(Header(), (0.0, 0.0, 0.0))
+IMAGE = Image(Header(), 1, 2, "mono8", 2, b"xy")
+SCALAR = Scalar(Header(), 1.0, "1")
+
+
+def but(whole: Any, **changes: Any) -> Any:
+    """The same with fields of whatever type: what an author writes."""
+    return replace(whole, **changes)
+
+
+@pytest.mark.parametrize(
+    ("made", "where", "told"),
+    [
+        (but(POSE, position=(1.0, 2.0)), "pose.position", "expected 3 values, found 2"),
+        (but(POSE, position="x"), "pose.position", "expected a tuple, found 'x'"),
+        (but(POSE, position=(0, 0, "1")), "pose.position[2]", "expected a number, found '1'"),
+        (but(POSE, position=(0, 0, math.nan)), "pose.position[2]", "finite number, found nan"),
+        (but(POSE, header=but(Header(), stamp_s="now")), "pose.header.stamp_s", "found 'now'"),
+        (but(POSE, header=None), "pose.header", "expected a Header, found NoneType"),
+        (but(POSE, twist=3), "pose.twist", "expected a Twist, found int"),
+        (but(Text(Header(), ""), text=b"a"), "text.text", "expected text, found bytes"),
+        (but(SCALAR, value=True), "scalar.value", "expected a number, found True"),
+        (but(SCALAR, value=None), "scalar.value", "found NoneType"),
+        (but(IMAGE, height=1.0), "image.height", "expected a whole number, found float"),
+        (but(IMAGE, data="xy"), "image.data", "expected bytes, found 'xy'"),
+        (but(IMAGE, data=memoryview(b"wxyz")[::2]), "image.data", "in one piece"),
+        (but(IMAGE, camera=but(CAMERA, fx="1")), "image.camera.fx", "expected a number"),
+        (
+            Detections(Header(), (FOUND, but(FOUND, score="x")), 1, 1),
+            "detections.detections[1].score",
+            "expected a number",
+        ),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_wrong_fields_are_told_of_what_was_made(made: Message, where: str, told: str) -> None:
+    with pytest.raises(MessageInvalid) as caught:
+        made.check()
+    (problem,) = caught.value.problems
+    assert (problem.code, problem.where) == ("MESSAGE_FIELD", where)
+    assert told in problem.message
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    Twist(Header(), (np.float32(1.5), np.float64(2.0), np.int64(3))).check()  # type: ignore[arg-type]  # what authors write
+    Detections(Header(), (), np.int32(4), 4).check()  # type: ignore[arg-type]  # the same
+
+
+def test_pixels_are_not_looked_at() -> None:
+    class Untouched(bytes):
+        def __iter__(self) -> Any:
+            raise AssertionError("somebody reads the pixels")
+
+        __getitem__ = __iter__  # type: ignore[assignment]  # the same
+
+    Image(Header(), 2, 2, "mono8", 2, Untouched(4)).check()
 
 
 def test_numpy_numbers_are_written_plainly() -> None:

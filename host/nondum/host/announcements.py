@@ -15,6 +15,7 @@ from nondum.host.events import (
     DriveRead,
     DriveUnreadable,
     Event,
+    InputAmbiguous,
     PayloadActivated,
     PayloadDistrusted,
     PayloadDoubted,
@@ -36,6 +37,7 @@ from nondum.host.events import (
     TrustChanged,
     TrustFileRefused,
     WheelsStored,
+    WorkerFaulted,
     WorkerStrained,
 )
 from nondum.sdk.errors import Problem
@@ -81,7 +83,7 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return f"{name} runs here for {event.host}, not there: {event.why}"
         case DriveFlapping() | DriveLeftAlone():
             return _joined(event.problems)
-        case WorkerStrained():
+        case WorkerStrained() | WorkerFaulted() | InputAmbiguous():
             return _joined(event.problems)
         case PayloadDistrusted():
             name = _name(event.payload, snapshot)

@@ -403,7 +403,7 @@ class _Listener:
     """Tells mind and workers what the bus tells."""
 
     def __init__(self, catalogue: Catalogue, mind: Mind, workers: Workers) -> None:
-        self._catalogue, self._mind = catalogue, mind
+        self._catalogue, self._mind, self._workers = catalogue, mind, workers
         self._mounts = TellingMounts(workers.remount, mind.after_tick)
 
     def on_event(self, event: Event) -> None:
@@ -411,6 +411,7 @@ class _Listener:
         if isinstance(event, HostStarted | Recomposed):
             snapshot = self._catalogue.snapshot()
             self._mounts.see(mounts_of_all(snapshot))
+            self._workers.streams.connect(dict(snapshot.connections))
             self._mind.see(snapshot)
             if isinstance(event, HostStarted):
                 self._mind.restore(of_people(snapshot.goals))

@@ -567,6 +567,22 @@ class WorkerStrained(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class WorkerFaulted(Event):
+    """A worker's plugin made a mistake that is not its end: it goes on. Each is told once."""
+
+    component: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class InputAmbiguous(Event):
+    """Several streams fit an optional input, and nobody has said which it is to get."""
+
+    component: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class TrialFailed(Event):
     """A worker ended that was tried beside the one in force: its release does not work."""
 
@@ -812,6 +828,16 @@ class MountSet(Event):
     unit: str
     xyz: tuple[float, float, float]
     rpy: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class InputConnected(Event):
+    """A person said which stream an optional input is to get."""
+
+    input: str
+    """`component.unit.slot`"""
+    stream: str
+    """Empty: the host picks again."""
 
 
 @dataclass(frozen=True, slots=True)

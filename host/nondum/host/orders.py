@@ -13,7 +13,7 @@ from nondum.host.catalogue.records import MountPose, PayloadRecord, Safety, Snap
 from nondum.host.control.arguments import Arguments, Triple
 from nondum.host.control.server import Handing
 from nondum.host.conversation import Reply, Take
-from nondum.host.events import ForgetAsked, MountSet, RetryAsked, SafeModeLeft
+from nondum.host.events import ForgetAsked, InputConnected, MountSet, RetryAsked, SafeModeLeft
 from nondum.host.lifecycle import going_back, installed
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.mind import translation
@@ -23,6 +23,7 @@ from nondum.host.mind.goals import GivenGoal
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.translation import Understood
 from nondum.host.news import News
+from nondum.host.optional_inputs import Socket
 from nondum.host.rows import Row, gone_back, is_at_rest, payload_row, unknown
 from nondum.host.stopping import Stopped, Stopping
 from nondum.host.workers.workers import Workers
@@ -132,6 +133,40 @@ class Orders:
         await self._until(lambda snapshot: snapshot.mount(unit) == pose)
         row = {"unit": unit, "xyz": list(pose.xyz), "rpy": list(pose.rpy)}
         return {**row, "warnings": list(implausible(pose))}
+
+    async def connect(self, arguments: Arguments) -> Row:
+        """Connect a stream to an optional input for good; without one the host picks again.
+
+        Raises `NondumError` (INPUT_UNKNOWN, STREAM_UNKNOWN, INPUT_STREAM).
+        """
+        name, stream = arguments.text("input"), arguments.optional_text("stream") or ""
+        sockets = {choice.socket.name: choice.socket for choice in self.workers.streams.inputs()}
+        before = dict(self.catalogue.snapshot().connections)
+        if name not in sockets and (stream or name not in before):
+            raise NondumError(unknown("input", name, {*sockets, *before}))
+        if stream:
+            self._check_fits(sockets[name], stream)
+        if stream != before.get(name, ""):
+            self.bus.emit(InputConnected(name, stream))
+            await self._until(lambda now: dict(now.connections).get(name, "") == stream)
+        return {"input": name, "stream": stream or None, "was": before.get(name)}
+
+    def _check_fits(self, socket: Socket, stream: str) -> None:
+        sources = {source.stream: source for source in self.workers.streams.sources()}
+        fitting = [name for name, source in sources.items() if socket.takes(source)]
+        if stream not in sources:
+            raise NondumError(unknown("stream", stream, fitting))
+        if stream not in fitting:
+            have = f"a stream of type {sources[stream].type} of {sources[stream].component}"
+            raise NondumError(
+                Problem(
+                    "INPUT_STREAM",
+                    f"{stream} cannot feed the input {socket.name}",
+                    need=f"a stream of type {socket.type} of another component",
+                    have=have,
+                    fix=f"there is: {', '.join(fitting) or 'none'}",
+                )
+            )
 
     async def retry(self, arguments: Arguments) -> Row:
         """Try again what was refused or quarantined: a payload, by id or component.

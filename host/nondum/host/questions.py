@@ -25,6 +25,7 @@ from nondum.host.rows import (
     drive_row,
     gone_back,
     host_state,
+    input_row,
     journal_row,
     offered_row,
     payload_row,
@@ -121,6 +122,8 @@ class Questions:
             for c in snapshot.components
         ]
         for row in own:
+            found = (row["problem"], *map(str, self.workers.faults(row["component"])))
+            row["problem"] = "; ".join(filter(None, found))
             row["confinement"] = str(self.workers.launcher.level) if row["pid"] else None
         return own + [
             offered_row(offered, peer.name)
@@ -158,6 +161,11 @@ class Questions:
         rates = self.workers.rates()
         listing = self.workers.streams.listing()
         return [stream_row(stream, rates.get(stream.stream)) for stream in listing]
+
+    async def inputs(self, arguments: Arguments) -> list[Row]:
+        """The optional inputs, and what feeds each."""
+        streams = self.workers.streams
+        return [input_row(choice, streams.sources()) for choice in streams.inputs()]
 
     async def facts(self, arguments: Arguments) -> list[Row]:
         """What is believed; or, `parked`, what waits for objects that are not there."""
@@ -328,6 +336,7 @@ class Questions:
                 **await self.status(arguments),
                 "components": await self.components(arguments),
                 "streams": await self.streams(arguments),
+                "inputs": await self.inputs(arguments),
                 "plan": self.mind.views.plan(),
                 "tree": self.mind.views.tree(),
             }

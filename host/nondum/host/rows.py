@@ -17,6 +17,7 @@ from nondum.host.catalogue.records import (
     Step,
 )
 from nondum.host.news import Progress
+from nondum.host.optional_inputs import Choice, Source
 from nondum.host.streams import StreamStatus
 from nondum.host.trust.vouched import NOBODY, Vouched
 from nondum.sdk.errors import Problem
@@ -175,6 +176,34 @@ def stream_row(stream: StreamStatus, rate_hz: float | None = None) -> Row:
         "rate_hz": rate_hz if stream.is_flowing else None,
         "consumers": list(stream.readers),
     }
+
+
+def input_row(choice: Choice, sources: Iterable[Source]) -> Row:
+    """An optional input: what it asks for, what feeds it and why, and what else could."""
+    socket = choice.socket
+    return {
+        "input": socket.name,
+        "type": socket.type,
+        "of": socket.of or None,
+        "stream": choice.source.stream if choice.source else None,
+        "why": _why(choice),
+        "connected": choice.chosen or None,
+        "ambiguous": choice.is_ambiguous,
+        "could_be": [source.stream for source in sources if socket.takes(source)],
+    }
+
+
+def _why(choice: Choice) -> str:
+    socket = choice.socket
+    wanted = f"a {socket.type} of a {socket.of}" if socket.of else f"any {socket.type}"
+    if choice.chosen:
+        waits = "" if choice.source else f"; waits for {choice.chosen}"
+        return f"connected by a person{waits}"
+    if choice.source is None:
+        return f"waits for {wanted}"
+    if choice.others:
+        return f"{wanted}: the first by name of {1 + len(choice.others)}"
+    return wanted
 
 
 def journal_row(entry: JournalEntry) -> Row:

@@ -1,9 +1,9 @@
 """Which stream is wired to which input, and why: the host introduces, workers do the rest.
 
 An action's stream parameters are wired for as long as the action runs; the plan chose them.
-Optional inputs are in no plan: each gets the first stream by name that flows, is of its type, and
-comes from another component of this host, and is wired anew whenever that changes. A stream of
-another host is wired by whoever reaches it (`Remote`), and only where a plan asks for it.
+Optional inputs are in no plan: `optional_inputs` says what each gets; they are wired anew whenever
+that changes. A stream of another host is wired by whoever reaches it (`Remote`), and only where a
+plan asks for it.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ import asyncio
 import itertools
 import logging
 from collections import Counter
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from socket import socket as Connection
 from typing import Protocol
 
-from nondum.planning.contribution import object_name
+from nondum.host.optional_inputs import Choice, Socket, Source, choose, sockets_of, sources_of
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, Problem, WorkerFailed
 from nondum.sdk.messages import MESSAGES
@@ -26,26 +26,6 @@ from nondum.sdk.signature import parse_signature
 from nondum.transport import StreamBroker, Wire, WorkerLink
 
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True, order=True)
-class Source:
-    """A stream that a component can produce."""
-
-    stream: str
-    """Object name."""
-    type: str
-    component: str
-
-
-@dataclass(frozen=True, slots=True)
-class Socket:
-    """An optional input."""
-
-    component: str
-    unit: str
-    slot: str
-    type: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,14 +79,17 @@ class _Member:
 class Streams:
     """All streams of a host and their wires. Its methods run on the loop."""
 
-    def __init__(self, host: str) -> None:
-        self._host = host
+    def __init__(self, host: str, on_ambiguous: Callable[[Choice], None] = lambda _: None) -> None:
+        """`on_ambiguous` is told of an optional input that several streams begin to fit."""
+        self._host, self._on_ambiguous = host, on_ambiguous
         self._broker = StreamBroker()
         self._members: dict[str, _Member] = {}
         self._flowing: set[str] = set()
         self._required: Counter[Wire] = Counter()
         self._wires: dict[Wire, asyncio.Task[None]] = {}
         self._disconnecting: set[asyncio.Task[None]] = set()
+        self._connected: Mapping[str, str] = {}
+        self._choices: tuple[Choice, ...] = ()
         self._taps = itertools.count(1)
         self._remote: Remote | None = None
 
@@ -116,8 +99,8 @@ class Streams:
 
     def join(self, component: str, link: WorkerLink, description: PluginDescription) -> None:
         """A component's worker runs: its outputs and inputs are there."""
-        sources = tuple(_sources(self._host, component, description))
-        sockets = tuple(_sockets(component, description))
+        sources = tuple(sources_of(self._host, component, description))
+        sockets = tuple(sockets_of(component, description))
         self._members[component] = _Member(link, description, sources, sockets)
         self._settle()
 
@@ -135,6 +118,12 @@ class Streams:
         else:
             self._flowing.discard(stream)
         self._settle()
+
+    def connect(self, connected: Mapping[str, str]) -> None:
+        """Go by what people have said from now on: name of an optional input → stream."""
+        if connected != self._connected:
+            self._connected = dict(connected)
+            self._settle()
 
     @asynccontextmanager
     async def wired(
@@ -168,6 +157,14 @@ class Streams:
             )
             for source in (*self._sources(), *sorted(remote.values()))
         )
+
+    def inputs(self) -> tuple[Choice, ...]:
+        """Every optional input of every running component, by name, and what feeds it."""
+        return self._choices
+
+    def sources(self) -> tuple[Source, ...]:
+        """Every stream that a running component can produce, by name."""
+        return tuple(self._sources())
 
     def senders(self) -> dict[int, str]:
         """Inode of each socket that a worker was given for a stream → who sends to it."""
@@ -250,11 +247,20 @@ class Streams:
             for wire in self._required
             if wire.consumer in present and (wire.producer in present or _is_remote(wire))
         }
-        wanted.update(optional_wires(sockets, flowing))
+        self._choose(choose(sockets, flowing, self._connected))
+        wanted.update(choice.wire for choice in self._choices if choice.wire is not None)
         for wire in sorted(self._wires.keys() - wanted):
             self._disconnect(wire)
         for wire in sorted(wanted - self._wires.keys()):
             self._connect(wire)
+
+    def _choose(self, choices: tuple[Choice, ...]) -> None:
+        """Take over choices, and tell of those that were not ambiguous in this way before."""
+        before = {(c.socket, c.source, c.others) for c in self._choices}
+        self._choices = choices
+        for choice in choices:
+            if choice.is_ambiguous and (choice.socket, choice.source, choice.others) not in before:
+                self._on_ambiguous(choice)
 
     def _connect(self, wire: Wire) -> None:
         consumer = self._members[wire.consumer].link
@@ -289,38 +295,6 @@ class Streams:
         task = asyncio.create_task(self._broker.disconnect(wire, producer, consumer))
         self._disconnecting.add(task)
         task.add_done_callback(self._disconnecting.discard)
-
-
-def optional_wires(sockets: Iterable[Socket], flowing: Iterable[Source]) -> Iterator[Wire]:
-    """What feeds each optional input: the first source by name that fits."""
-    offered = sorted(flowing)
-    for socket in sockets:
-        fitting = (
-            source
-            for source in offered
-            if source.type == socket.type and source.component != socket.component
-        )
-        if (source := next(fitting, None)) is not None:
-            yield Wire(
-                source.stream,
-                source.type,
-                source.component,
-                socket.component,
-                socket.unit,
-                socket.slot,
-            )
-
-
-def _sources(host: str, component: str, description: PluginDescription) -> Iterator[Source]:
-    for unit in description.units:
-        for output in unit.outputs:
-            yield Source(object_name(host, component, output.name), output.type, component)
-
-
-def _sockets(component: str, description: PluginDescription) -> Iterator[Socket]:
-    for unit in description.units:
-        for slot in unit.inputs:
-            yield Socket(component, unit.name, slot.name, slot.type)
 
 
 def _parameter_types(description: PluginDescription, behaviour: str) -> dict[str, str]:

@@ -40,6 +40,7 @@ def answering(
     verbs: dict[str, Callable[[Arguments], Awaitable[Any]]] = {
         "behaviours": questions.behaviours,
         "components": questions.components,
+        "connect": orders.connect,
         "composition": questions.composition,
         "devices": questions.devices,
         "devices_why": questions.devices_why,
@@ -49,6 +50,7 @@ def answering(
         "goal": orders.goal,
         "goals": questions.goals,
         "halt": orders.halt,
+        "inputs": questions.inputs,
         "journal": questions.journal,
         "known_devices": questions.known_devices,
         "leave_safe_mode": orders.leave_safe_mode,

@@ -132,9 +132,21 @@ def _join_signatures(
             known,
             parameters=_wider(known, claim, kind, graph, report),
             valued=known.valued or claim.valued,
+            value_type=_value_type(known, claim, kind, report),
             functional=known.functional or claim.functional,
             origins=known.origins + claim.origins,
         )
+
+
+def _value_type(known: Predicate, claim: Predicate, kind: str, report: Report) -> str:
+    """The type of message that both say the value is (E-PRED-TYPE); who says none agrees."""
+    if known.value_type and claim.value_type and known.value_type != claim.value_type:
+        message = (
+            f"{kind} {claim.name!r}: its value is a {claim.value_type} here,"
+            f" a {known.value_type} in {_places(known.origins)}"
+        )
+        report.problem("E-PRED-TYPE", message, _place(claim.origins[0]), "choose another name")
+    return known.value_type or claim.value_type
 
 
 def _wider(

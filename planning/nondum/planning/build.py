@@ -139,7 +139,7 @@ class Builder(Transformer[Token, Any]):
     def _named(self, children: list[Any]) -> _Section:
         return self._section(children, self._typed(children[1:]))
 
-    types = constants = objects = _named
+    types = constants = objects = valued = _named
 
     def _listed(self, children: list[Any]) -> _Section:
         return self._section(children, tuple(children[1:]))
@@ -153,7 +153,7 @@ class Builder(Transformer[Token, Any]):
     def _names(self, children: list[Token]) -> _Section:
         return self._section(children, tuple(Term(str(t), self._place(t)) for t in children[1:]))
 
-    valued = functional = _names
+    functional = _names
 
     def _single(self, children: list[Any]) -> _Section:
         return self._section(children, children[1])

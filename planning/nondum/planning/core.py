@@ -38,12 +38,19 @@ def core_graph() -> TypeGraph:
 @lru_cache(maxsize=1)
 def core_predicates() -> dict[str, Predicate]:
     """The core's predicates by name."""
-    valued = {name.name for name in core().valued}
+    valued = {name.name: name.types for name in core().valued}
     return {
         declared.name: Predicate.declared(
             declared,
             Origin("", CORE_NAME, CORE_VERSION, declared.place),
             valued=declared.name in valued,
+            value_type=" ".join(valued.get(declared.name, ())),
         )
         for declared in core().predicates
     }
+
+
+@lru_cache(maxsize=1)
+def core_value_types() -> dict[str, str]:
+    """The types of message that the values of the core's facts are."""
+    return {name: p.value_type for name, p in core_predicates().items() if p.value_type}

@@ -36,6 +36,8 @@ class Predicate:
     parameters: tuple[tuple[str, ...], ...]
     valued: bool = False
     """A typed value travels beside the fact."""
+    value_type: str = ""
+    """The type of message that the value is; empty: of any."""
     functional: bool = False
     """At most one last argument for each of the others."""
     origins: tuple[Origin, ...] = field(default=(), compare=False)
@@ -47,11 +49,12 @@ class Predicate:
         origin: Origin,
         *,
         valued: bool = False,
+        value_type: str = "",
         functional: bool = False,
     ) -> Predicate:
         """The predicate that a declaration speaks of."""
         types = tuple(types_or_root(parameter.types) for parameter in declaration.parameters)
-        return cls(declaration.name, types, valued, functional, (origin,))
+        return cls(declaration.name, types, valued, value_type, functional, (origin,))
 
     @property
     def arity(self) -> int:

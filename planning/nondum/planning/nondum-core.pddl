@@ -5,7 +5,8 @@
   (:types
     host class target place unit stream - object
     camera detector tracker base pointer sensor speaker microphone arm gripper light - unit
-    image depth points detections twist pose audio text scalar - stream)
+    image depth points detections twist pose audio text scalar - stream
+    gps-fix imu-data laser-scan battery-state occupancy-grid key-values - stream)
   (:predicates
     (self ?h - host)                             ; H the host that plans
     (on ?u - unit ?h - host)                     ; H the unit is part of that body
@@ -20,8 +21,8 @@
     (shows ?s - stream ?c - class)               ; P the stream tells about such things
     (steers ?s - twist ?h - host ?c - class)     ; P obeying it keeps that body towards such a thing
     (bearing-known ?t - target ?h - host)        ; P with a bearing, its frame and its stamp
-    (following ?h - host ?c - class)             ; P what goals ask for, from here on
-    (pointing ?h - host ?t - target)
-    (found ?c - class ?h - host)
-    (reported ?c - class ?h - host))
-  (:valued bearing-known))
+    (following ?h - host ?c - class)             ; P a goal: the body keeps near such a thing
+    (pointing ?h - host ?t - target)             ; P a goal: something of that body points at it
+    (found ?c - class ?h - host)                 ; P a goal: that body has seen such a thing
+    (reported ?c - class ?h - host))             ; P a goal: that body has told people of it
+  (:valued bearing-known - bearing))

@@ -303,8 +303,9 @@ class DomainFragment:
     constants: tuple[TypedName, ...] = ()
     predicates: tuple[PredicateDeclaration, ...] = ()
     functions: tuple[PredicateDeclaration, ...] = ()
-    valued: tuple[Term, ...] = ()
-    """Names of predicates that carry a value beside the fact: `(:valued bearing-known)`."""
+    valued: tuple[TypedName, ...] = ()
+    """Names of predicates that carry a value beside the fact, and of which type of message it is,
+    where that is said: `(:valued bearing-known - bearing)`."""
     functional: tuple[Term, ...] = ()
     """Names of predicates with one last argument for each of the others: `(:functional at)`."""
     derived: tuple[DerivedDeclaration, ...] = ()

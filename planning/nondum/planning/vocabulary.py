@@ -9,8 +9,15 @@ from nondum.planning.caret import nearest
 from nondum.planning.core import core_graph, core_predicates
 from nondum.planning.domain import Origin, Predicate
 from nondum.planning.scope import Report, Scope
-from nondum.planning.syntax import DomainFragment, PredicateDeclaration, TypedName, type_text
+from nondum.planning.syntax import (
+    DomainFragment,
+    PredicateDeclaration,
+    Term,
+    TypedName,
+    type_text,
+)
 from nondum.planning.typegraph import ROOT, TypeGraph
+from nondum.sdk.messages import MESSAGES
 
 TYPES_LIMIT = 500
 """Types that one component may declare."""
@@ -93,14 +100,15 @@ def cycle_text(cycle: tuple[str, ...]) -> str:
 
 def predicates_of(domains: Sequence[DomainFragment], scope: Scope) -> tuple[Predicate, ...]:
     """The predicates beyond the core's (E-UNDECL, E-PRED-ARITY, E-PRED-TYPE)."""
-    valued = set(_marked("valued", domains, scope))
-    functional = set(_marked("functional", domains, scope))
+    valued = _valued(domains, scope)
+    functional = {name.name for name in _marked("functional", domains, scope)}
     found: dict[str, Predicate] = {}
     for declared in (predicate for domain in domains for predicate in domain.predicates):
         predicate = Predicate.declared(
             checked(declared, scope),
             scope.report.origin(declared.place),
             valued=declared.name in valued,
+            value_type=valued.get(declared.name, ""),
             functional=declared.name in functional,
         )
         known = core_predicates().get(declared.name) or found.get(declared.name)
@@ -148,12 +156,28 @@ def _compare(
             scope.report.problem("E-PRED-TYPE", message, declared.place, "choose another name")
 
 
-def _marked(section: str, domains: Sequence[DomainFragment], scope: Scope) -> Iterator[str]:
+def _valued(domains: Sequence[DomainFragment], scope: Scope) -> dict[str, str]:
+    """Valued predicate → the type of message that its value is, or nothing (E-UNDECL, E-TYPE)."""
+    found: dict[str, str] = {}
+    for name in _marked("valued", domains, scope):
+        assert isinstance(name, TypedName)
+        types = name.types
+        if len(types) > 1 or (types and types[0] not in MESSAGES):
+            message = f"the value of {name.name!r} is of no message type: {type_text(types)}"
+            scope.report.problem("E-TYPE", message, name.place, nearest(types[0], MESSAGES))
+        else:
+            found[name.name] = types[0] if types else ""
+    return found
+
+
+def _marked(
+    section: str, domains: Sequence[DomainFragment], scope: Scope
+) -> Iterator[Term | TypedName]:
     declared = {predicate.name for domain in domains for predicate in domain.predicates}
     for domain in domains:
         for name in domain.valued if section == "valued" else domain.functional:
             if name.name in declared - core_predicates().keys():
-                yield name.name
+                yield name
             else:
                 message = f"{name.name!r} in :{section} is no predicate that this plugin declares"
                 fix = nearest(name.name, declared)

@@ -24,7 +24,7 @@ def units() -> tuple[Unit, ...]:
             "camera",
             "camera",
             outputs=(Output("image", "image"),),
-            inputs=(Input("odometry", "pose"),),
+            inputs=(Input("odometry", "pose", of="base"),),
         ),
     )
 

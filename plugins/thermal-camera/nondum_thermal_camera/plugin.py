@@ -25,7 +25,7 @@ def units() -> tuple[Unit, ...]:
             "thermal-eye",
             "camera",
             outputs=(Output("warmth", "image"),),
-            inputs=(Input("odometry", "pose"),),
+            inputs=(Input("odometry", "pose", of="base"),),
         ),
     )
 

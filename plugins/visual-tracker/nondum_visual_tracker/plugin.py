@@ -45,7 +45,10 @@ def units() -> tuple[Unit, ...]:
             "tracker",
             "tracker",
             outputs=(Output("steering", "twist"),),
-            inputs=(Input("odometry", "pose"), Input("depth", "depth")),
+            inputs=(
+                Input("odometry", "pose", of="base"),
+                Input("depth", "depth", of="camera"),
+            ),
         ),
     )
 

@@ -157,6 +157,7 @@ FULL = HostState(
             "spot__eye__camera", (0.1, 0.0, 1.0), (0.0, 0.2, 0.0), "person"
         )
     },
+    connections={"eye.camera.odometry": "spot__base__odometry"},
     highwater={"org.example.eye": Highwater(7, "digest-k1")},
     rollbacks={"org.example.eye": Rollback("digest-k1", 7, 9)},
     goals={"3": GoalRecord("3", "look at the lamp", "(seen lamp)", "achieve", -2)},
@@ -407,11 +408,13 @@ async def test_file_of_another_version_is_left_alone(tmp_path: Path) -> None:
     assert refused.value.code == "CATALOGUE_VERSION"
 
 
+OF_6 = replace(FULL, connections={})
 OF_5 = replace(
-    FULL, devices={}, known_devices={}, components={"eye": component(device=None, nodes=())}
+    OF_6, devices={}, known_devices={}, components={"eye": component(device=None, nodes=())}
 )
+THE_7 = "DROP TABLE connections;"
 THE_6 = (
-    "ALTER TABLE highwater RENAME TO highest; CREATE TABLE highwater (fleet TEXT NOT NULL,"
+    f"{THE_7} ALTER TABLE highwater RENAME TO highest; CREATE TABLE highwater (fleet TEXT NOT NULL,"
     " payload_id TEXT NOT NULL, release INTEGER NOT NULL, digest TEXT NOT NULL,"
     " owner TEXT NOT NULL, PRIMARY KEY (fleet, payload_id)) STRICT;"
     "INSERT INTO highwater SELECT 'red', payload_id, release, digest, owner FROM highest;"
@@ -441,7 +444,8 @@ OLDER = {
     2: (f"{THE_4} DROP TABLE former;", replace(OF_4, former={})),
     3: (THE_4, OF_4),
     4: (THE_5, OF_5),
-    5: (THE_6, FULL),
+    5: (THE_6, OF_6),
+    6: (THE_7, OF_6),
 }
 """Schema → what makes it of the present one, and what it can hold of `FULL`."""
 

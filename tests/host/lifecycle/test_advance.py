@@ -235,6 +235,22 @@ def test_persons_mount_outlives_the_component() -> None:
     assert state.mounts[unit].origin == "person"
 
 
+def test_what_a_person_connected_outlives_the_component() -> None:
+    name = "eye.camera.odometry"
+    said = events.InputConnected(name, "spot__base__odometry")
+    state, _ = after(said, events.DriveRemoved("a"), state=active())
+    assert state.connections == {name: "spot__base__odometry"}
+    state, _ = after(events.InputConnected(name, ""), state=state)
+    assert state.connections == {}
+
+
+def test_connecting_an_input_is_a_recomposition() -> None:
+    before = active()
+    state, _ = after(events.InputConnected("eye.camera.odometry", "s"), state=before)
+    assert state.revision == before.revision + 1
+    assert state.snapshot().connections == (("eye.camera.odometry", "s"),)
+
+
 def test_initial_components_come_first() -> None:
     state = active()
     installed = way_to_active("k2", "i", "base", payload_id="org.y")

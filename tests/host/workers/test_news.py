@@ -8,24 +8,27 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.host.events import FactForgotten, FactKnown, StreamFlowing, WorkerLogged
+from nondum.host.events import FactForgotten, FactKnown, StreamFlowing, WorkerFaulted, WorkerLogged
 from nondum.host.workers.news import MAX_CLAIMS, Claims, parse_news, parse_progress, parse_rates
-from nondum.sdk.errors import ProtocolViolation
+from nondum.sdk.errors import MessageInvalid, ProtocolViolation
 
 PLAIN = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=8),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner),
     max_leaves=8,
 )
-KEYS = st.sampled_from(["predicate", "arguments", "value", "stream", "flowing", "level", "message"])
-NAMES = st.sampled_from(["know", "forget", "flow", "log", "boast"])
+OTHERS = ("stream", "flowing", "level", "message")
+KEYS = st.sampled_from(
+    ["problem", "predicate", "arguments", "value", "stream", "flowing", "level", "message"]
+)
+NAMES = st.sampled_from(["know", "forget", "flow", "log", "fault", "boast"])
 
 
 @given(NAMES, st.dictionaries(KEYS, PLAIN))
 def test_anything_is_parsed_or_a_violation(name: str, body: dict[str, Any]) -> None:
     try:
         news = parse_news("guest", {"s"}, name, body)
-    except ProtocolViolation:
+    except (ProtocolViolation, MessageInvalid):
         return
     assert news.component == "guest"
 
@@ -71,16 +74,56 @@ FLOW = {"stream": "s", "flowing": True}
         pytest.param("forget", {**FACT, "predicate": ""}, "EVENT_INVALID", id="empty"),
         pytest.param("forget", {**FACT, "arguments": ["a" * 257]}, "EVENT_INVALID", id="long"),
         pytest.param("know", {**FACT, "arguments": ["a\n"]}, "EVENT_INVALID", id="unprintable"),
-        pytest.param("know", {**FACT, "value": {"a": 1}}, "RESULT_INVALID", id="no value"),
         pytest.param("flow", {**FLOW, "stream": "other"}, "RESULT_INVALID", id="other's stream"),
         pytest.param("flow", {**FLOW, "flowing": 1}, "EVENT_INVALID", id="almost true"),
         pytest.param("log", {"level": "info"}, "EVENT_INVALID", id="no message"),
+        pytest.param("fault", {"problem": "x"}, "EVENT_INVALID", id="no problem"),
+        pytest.param("fault", {"problem": {"code": "a b"}}, "EVENT_INVALID", id="no code"),
     ],
 )
 def test_what_is_no_news_is_refused(name: str, body: dict[str, Any], code: str) -> None:
     with pytest.raises(ProtocolViolation) as violation:
         parse_news("guest", {"s"}, name, body)
     assert violation.value.code == code
+
+
+WRONG = ["pose", {"header": {}, "position": [1.0, 2.0]}]
+
+
+@pytest.mark.parametrize(
+    ("value", "types", "code"),
+    [
+        ({"a": 1}, {}, "MESSAGE_FIELD"),
+        (WRONG, {}, "MESSAGE_FIELD"),
+        (["no such type", {}], {}, "MESSAGE_TYPE"),
+        (["scalar", {"header": {}, "value": 1.0, "unit": "V"}], {"p": "pose"}, "MESSAGE_TYPE"),
+    ],
+)
+def test_wrong_value_of_a_fact_names_the_predicate(
+    value: Any, types: dict[str, str], code: str
+) -> None:
+    with pytest.raises(MessageInvalid) as wrong:
+        parse_news("guest", (), "know", {**FACT, "value": value}, types)
+    assert wrong.value.code == code
+    assert "value of p " in wrong.value.problems[0].message
+
+
+def test_value_of_the_declared_type_is_taken() -> None:
+    value = ["scalar", {"header": {}, "value": 1.0, "unit": "V"}]
+    news = parse_news("guest", (), "know", {**FACT, "value": value}, {"p": "scalar"})
+    assert isinstance(news, FactKnown)
+    assert news.value == value
+
+
+def test_mistake_that_a_worker_tells_of_is_bounded_and_under_its_name() -> None:
+    said = {"code": "MESSAGE_FIELD", "message": "a\x1b" + "b" * 9999, "where": "plugin.py:3"}
+    news = parse_news("guest", (), "fault", {"problem": said})
+    assert isinstance(news, WorkerFaulted)
+    (problem,) = news.problems
+    assert problem.code == "MESSAGE_FIELD"
+    assert problem.where == "guest (plugin.py:3)"
+    assert len(problem.message) < 600
+    assert "\x1b" not in problem.message
 
 
 @pytest.mark.parametrize("body", [{}, {"fraction": 1}, {"fraction": "1", "text": ""}])

@@ -18,7 +18,7 @@ from nondum.host.catalogue.records import ComponentRecord, JournalEntry, Rollbac
 from nondum.host.catalogue.state import HostState
 from nondum.sdk.errors import ConfigRefused, Problem
 
-SCHEMA = 6
+SCHEMA = 7
 
 _UPGRADES = {
     1: "CREATE TABLE goals (id TEXT PRIMARY KEY, text TEXT NOT NULL, pddl TEXT NOT NULL,"
@@ -66,6 +66,7 @@ _UPGRADES = {
     "INSERT OR REPLACE INTO latest SELECT payload_id, digest, release, below FROM rollbacks"
     " ORDER BY rowid;"
     "DROP TABLE rollbacks; ALTER TABLE latest RENAME TO rollbacks;",
+    6: "CREATE TABLE connections (input TEXT PRIMARY KEY, stream TEXT NOT NULL) STRICT;",
 }
 """Schema → what makes the next one of it."""
 
@@ -175,6 +176,7 @@ def load(connection: sqlite3.Connection, host: str) -> HostState:
             known.identity: known for known in map(rows.known_device, every("known_devices"))
         },
         mounts={m.unit: m for m in map(rows.mount, every("mounts"))},
+        connections={row["input"]: row["stream"] for row in every("connections")},
         goals={g.id: g for g in map(rows.goal, every("goals"))},
         former={f.key: f for f in map(rows.former, every("former")) if f is not None},
         highwater={row["payload_id"]: rows.highwater(row) for row in every("highwater")},
@@ -231,6 +233,7 @@ def _write_state(connection: sqlite3.Connection, before: HostState, after: HostS
         ("goals", "id", before.goals, after.goals, rows.goal_row),
         ("former", "payload_id", before.former, after.former, rows.former_row),
         ("tries", "subject", _tries(before), _tries(after), _try_row),
+        ("connections", "input", _connections(before), _connections(after), _connection_row),
     )
     for table, key, old, new, as_row in simple:
         _difference(connection, table, key, old, new, as_row)
@@ -267,6 +270,15 @@ def _tries(state: HostState) -> dict[str, tuple[str, int]]:
 def _try_row(one: tuple[str, int]) -> rows.Row:
     subject, deaths = one
     return {"subject": subject, "deaths": deaths}
+
+
+def _connections(state: HostState) -> dict[str, tuple[str, str]]:
+    return {name: (name, stream) for name, stream in state.connections.items()}
+
+
+def _connection_row(one: tuple[str, str]) -> rows.Row:
+    name, stream = one
+    return {"input": name, "stream": stream}
 
 
 def _write_components(connection: sqlite3.Connection, before: HostState, after: HostState) -> None:

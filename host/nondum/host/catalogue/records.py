@@ -395,6 +395,8 @@ class Snapshot:
     known_devices: tuple[KnownDevice, ...] = ()
     """Those that were here, whether they are or not; last seen last."""
     mounts: tuple[MountPose, ...] = ()
+    connections: tuple[tuple[str, str], ...] = ()
+    """Optional inputs, and the streams that people have connected to them."""
     rollbacks: tuple[str, ...] = ()
     """Digests of the releases that people went back to."""
     goals: tuple[GoalRecord, ...] = ()

@@ -118,6 +118,11 @@ CREATE TABLE mounts (
     origin  TEXT NOT NULL
 ) STRICT;
 
+CREATE TABLE connections (               -- what people have said optional inputs are to get
+    input   TEXT PRIMARY KEY,            -- component.unit.slot
+    stream  TEXT NOT NULL
+) STRICT;
+
 CREATE TABLE highwater (                 -- never pruned
     payload_id  TEXT PRIMARY KEY,
     release     INTEGER NOT NULL,        -- the newest, for whatever fleet

@@ -45,6 +45,8 @@ class HostState:
     known_devices: Mapping[str, KnownDevice] = field(default_factory=dict)
     """Identity → a device that was ever here, as far as is remembered; last seen last."""
     mounts: Mapping[str, MountPose] = field(default_factory=dict)
+    connections: Mapping[str, str] = field(default_factory=dict)
+    """Name of an optional input → the stream that a person has connected to it."""
     highwater: Mapping[str, Highwater] = field(default_factory=dict)
     """Payload id → newest release, for whatever fleet it was."""
     rollbacks: Mapping[str, Rollback] = field(default_factory=dict)
@@ -81,6 +83,7 @@ class HostState:
             devices=tuple(self.devices.values()),
             known_devices=tuple(self.known_devices.values()),
             mounts=tuple(self.mounts.values()),
+            connections=tuple(sorted(self.connections.items())),
             rollbacks=tuple(rollback.digest for rollback in self.rollbacks.values()),
             goals=tuple(self.goals.values()),
             former=tuple(self.former.values()),

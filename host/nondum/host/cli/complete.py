@@ -32,6 +32,7 @@ components = names("components", "component", "state")
 units = names("units", "unit", "type")
 peers = names("peers", "peer", "state")
 streams = names("streams", "stream", "type")
+inputs = names("inputs", "input", "type")
 
 
 def goal_ids(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:

@@ -32,9 +32,30 @@ LONGEST_FIELD = 60
 @click.option(
     "--count", "-n", type=click.IntRange(min=1), help="With --follow: stop after so many messages."
 )
+@click.option("--inputs", is_flag=True, help="Show the optional inputs only.")
+@click.option(
+    "--connect",
+    metavar="INPUT STREAM",
+    nargs=2,
+    shell_complete=complete.inputs,
+    help="Have an optional input get this stream and no other, until --disconnect.",
+)
+@click.option(
+    "--disconnect",
+    metavar="INPUT",
+    shell_complete=complete.inputs,
+    help="Let the host pick what an optional input gets.",
+)
 @json_option
 @click.pass_obj
-def streams(session: Session, stream: str | None, count: int | None) -> None:
+def streams(
+    session: Session,
+    stream: str | None,
+    count: int | None,
+    inputs: bool,
+    connect: tuple[str, str] | None,
+    disconnect: str | None,
+) -> None:
     """Who sends what to whom, and what is sent.
 
     RATE is messages a second of late, as the component itself counts them.
@@ -42,22 +63,52 @@ def streams(session: Session, stream: str | None, count: int | None) -> None:
     A message is shown by its stamp (seconds since the host was switched on), its frame, its number,
     and its small fields. Slow readers get the newest: numbers may be left out.
 
+    Plans say which streams actions read. Optional inputs are in no plan: each gets a stream of its
+    type that tells of what it asks for; where several do, --connect decides, and is remembered.
+
     \b
     Examples: nondum streams
               nondum streams --follow panther__eye__image --count 10
               nondum streams --follow panther__eye__image --json
+              nondum streams --connect eye.camera.odometry panther__base__odometry
     """
-    if stream is None:
-        if count is not None:
-            raise click.UsageError("--count is of use with --follow only")
-        columns = ["stream", "type", "component", "flowing", "rate", "consumers"]
-        rows = session.ask("streams")
-        if session.as_json:
-            render.as_json(rows)
-        else:
-            table([with_rate(row) for row in rows], columns, empty="no streams")
-    else:
+    if count is not None and stream is None:
+        raise click.UsageError("--count is of use with --follow only")
+    if sum(map(bool, (stream, inputs, connect, disconnect))) > 1:
+        raise click.UsageError("one of --follow, --inputs, --connect, --disconnect at a time")
+    if connect is not None:
+        _connect(session, *connect)
+    elif disconnect is not None:
+        _connect(session, disconnect, None)
+    elif stream is not None:
         asyncio.run(_follow(session, stream, count))
+    else:
+        _show(session, with_streams=not inputs)
+
+
+def _show(session: Session, *, with_streams: bool) -> None:
+    if with_streams:
+        columns = ["stream", "type", "component", "flowing", "rate", "consumers"]
+        found = session.ask("streams")
+        if session.as_json:
+            render.as_json(found)
+            return
+        table([with_rate(row) for row in found], columns, empty="no streams")
+    rows = session.ask("inputs")
+    if rows and with_streams:
+        click.echo()
+    if rows or not with_streams:
+        show(session, rows, ["input", "stream", "why"], "no optional inputs")
+
+
+def _connect(session: Session, name: str, stream: str | None) -> None:
+    connected = session.ask("connect", input=name, stream=stream)
+    if session.as_json:
+        render.as_json(connected)
+    elif stream is None:
+        click.echo(f"{name}: the host picks again what it gets")
+    else:
+        click.echo(f"{name} gets {stream} from now on, and nothing else")
 
 
 def with_rate(row: dict[str, Any]) -> dict[str, Any]:

@@ -54,6 +54,7 @@ RULES: Mapping[type[Event], _Rule] = {
     events.DeviceChanged: component_rules.on_device_changed,
     events.DeviceRemoved: component_rules.on_device_removed,
     events.MountSet: component_rules.on_mount_set,
+    events.InputConnected: component_rules.on_input_connected,
     events.GoalGiven: goal_rules.on_goal_given,
     events.GoalReached: goal_rules.on_goal_over,
     events.GoalEnded: goal_rules.on_goal_over,
@@ -99,7 +100,7 @@ def settle(turn: Turn, before: HostState) -> Outcome:
     rebuilding.settle(turn, before)
     if turn.state.components != before.components or turn.state.devices != before.devices:
         claims.settle(turn, before.devices)
-    parts = ("components", "mounts", "former")
+    parts = ("components", "mounts", "connections", "former")
     is_recomposed = any(getattr(turn.state, part) != getattr(before, part) for part in parts)
     if is_recomposed or peer_rules.offers(turn.state) != peer_rules.offers(before):
         turn.change(revision=before.revision + 1)

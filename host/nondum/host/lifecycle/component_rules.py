@@ -10,6 +10,7 @@ from nondum.host.events import (
     DeviceAppeared,
     DeviceChanged,
     DeviceRemoved,
+    InputConnected,
     MountSet,
     PayloadFailed,
     RetryAsked,
@@ -64,6 +65,13 @@ def on_mount_set(turn: Turn, event: MountSet) -> None:
     turn.events.append(event)
     pose = MountPose(event.unit, event.xyz, event.rpy, "person")
     turn.change(mounts={**turn.state.mounts, event.unit: pose})
+
+
+def on_input_connected(turn: Turn, event: InputConnected) -> None:
+    """Keep, or drop, what a person said about an optional input; it outlives the component."""
+    turn.events.append(event)
+    kept = {name: s for name, s in turn.state.connections.items() if name != event.input}
+    turn.change(connections=kept | ({event.input: event.stream} if event.stream else {}))
 
 
 def on_device_appeared(turn: Turn, event: DeviceAppeared) -> None:

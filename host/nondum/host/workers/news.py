@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
 from typing import Any, TypeAlias
 
-from nondum.host.events import FactForgotten, FactKnown, StreamFlowing, WorkerLogged
+from nondum.host.events import (
+    FactForgotten,
+    FactKnown,
+    StreamFlowing,
+    WorkerFaulted,
+    WorkerLogged,
+)
 from nondum.host.printable import printable, printable_text
 from nondum.sdk.errors import MessageInvalid, Problem, ProtocolViolation
 from nondum.sdk.messages import value_from_wire
@@ -24,7 +32,13 @@ MAX_CLAIMS = 4096
 MAX_CLAIMED_BYTES = 4 * 1024 * 1024
 """Size of their values altogether, as they travel."""
 
-News: TypeAlias = FactKnown | FactForgotten | StreamFlowing | WorkerLogged
+MAX_SAID = 512
+"""Characters of a part of what a worker says is wrong with it."""
+NOTHING: Mapping[str, str] = {}
+
+News: TypeAlias = FactKnown | FactForgotten | StreamFlowing | WorkerFaulted | WorkerLogged
+
+_CODE = re.compile(r"[A-Z][A-Z0-9_-]{2,40}")
 
 
 class Claims:
@@ -83,16 +97,25 @@ def parse_rates(outputs: Collection[str], body: Mapping[str, Any]) -> dict[str, 
 
 
 def parse_news(
-    component: str, outputs: Collection[str], name: str, body: Mapping[str, Any]
+    component: str,
+    outputs: Collection[str],
+    name: str,
+    body: Mapping[str, Any],
+    value_types: Mapping[str, str] = NOTHING,
 ) -> News:
-    """Make the host's event of a worker's, whose own streams are `outputs`.
+    """Make the host's event of a worker's, whose own streams are `outputs`; `value_types` has the
+    declared type of message of valued predicates.
 
-    Raises `ProtocolViolation` (EVENT_UNKNOWN, EVENT_INVALID, RESULT_INVALID).
+    Raises `ProtocolViolation` (EVENT_UNKNOWN, EVENT_INVALID, RESULT_INVALID), and
+    `MessageInvalid` for a wrong value of a fact, which is no reason to end the worker.
     """
     match name, body:
         case "know", {"predicate": str(predicate), "arguments": list(arguments), **rest}:
             objects = tuple(_word(argument) for argument in arguments)
-            return FactKnown(component, _word(predicate), objects, _value(rest))
+            value = _value(_word(predicate), rest, value_types)
+            return FactKnown(component, predicate, objects, value)
+        case "fault", {"problem": dict(problem)}:
+            return WorkerFaulted(component, (_fault(component, problem),))
         case "forget", {"predicate": str(predicate), "arguments": list(arguments)}:
             objects = tuple(_word(argument) for argument in arguments)
             return FactForgotten(component, _word(predicate), objects)
@@ -102,7 +125,7 @@ def parse_news(
             return StreamFlowing(component, stream, flowing)
         case "log", {"level": str(level), "message": str(message)}:
             return WorkerLogged(component, _word(level), printable_text(message[:MAX_TEXT]))
-        case (("know" | "forget" | "flow" | "log"), _):
+        case (("know" | "forget" | "flow" | "fault" | "log"), _):
             raise _violation("EVENT_INVALID", f"event {name!r} lacks what it tells")
     raise _violation("EVENT_UNKNOWN", f"no event of a worker is called {name!r}")
 
@@ -129,15 +152,40 @@ def _word(value: object) -> str:
     return value
 
 
-def _value(rest: Mapping[str, Any]) -> Any:
+def _value(predicate: str, rest: Mapping[str, Any], value_types: Mapping[str, str]) -> Any:
     if "value" not in rest:
         return None
     try:
-        value_from_wire(rest["value"])
+        value = value_from_wire(rest["value"])
     except MessageInvalid as error:
-        problems = (Problem("RESULT_INVALID", p.message) for p in error.problems)
-        raise ProtocolViolation(*problems) from error
+        raise MessageInvalid(*(_of_fact(predicate, p) for p in error.problems)) from error
+    declared = value_types.get(predicate, value.TYPE)
+    if declared != value.TYPE:
+        told = "it is of another type than its fragment declares"
+        problem = Problem("MESSAGE_TYPE", told, need=declared, have=value.TYPE)
+        raise MessageInvalid(_of_fact(predicate, problem))
     return rest["value"]
+
+
+def _of_fact(predicate: str, problem: Problem) -> Problem:
+    field = f"{problem.where}: " if problem.where else ""
+    return replace(
+        problem, message=f"the value of {predicate} is left out: {field}{problem.message}"
+    )
+
+
+def _fault(component: str, said: Mapping[str, Any]) -> Problem:
+    """A worker's own words on what is wrong with it, bounded, under its name."""
+    code, message, where = (
+        str(said.get(key, ""))[:MAX_SAID] for key in ("code", "message", "where")
+    )
+    need, have = (str(said.get(key) or "")[:MAX_SAID] for key in ("need", "have"))
+    if not _CODE.fullmatch(code):
+        raise _violation("EVENT_INVALID", "event 'fault' names no code")
+    place = f"{component} ({printable(where)})" if where else component
+    return Problem(
+        code, printable(message), where=place, need=printable(need), have=printable(have)
+    )
 
 
 def _violation(code: str, message: str) -> ProtocolViolation:

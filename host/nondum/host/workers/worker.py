@@ -10,13 +10,20 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from nondum.host.cgroups import Usage
-from nondum.host.events import BehaviourProgressed, Event, StreamFlowing, WorkerLogged
+from nondum.host.events import (
+    BehaviourProgressed,
+    Event,
+    StreamFlowing,
+    WorkerFaulted,
+    WorkerLogged,
+)
 from nondum.host.helper.grants import reachable, withdrawn
 from nondum.host.printable import printable
 from nondum.host.waiting import until_done
 from nondum.host.workers import problems, scratch
 from nondum.host.workers.call import Call
 from nondum.host.workers.excess import Reading, Watch
+from nondum.host.workers.faults import Faults
 from nondum.host.workers.gauge import Gauge
 from nondum.host.workers.index import mismatches
 from nondum.host.workers.launcher import Launcher
@@ -26,10 +33,19 @@ from nondum.host.workers.news import Claims, parse_count, parse_news, parse_prog
 from nondum.host.workers.output import Output, Valve
 from nondum.host.workers.process import WorkerProcess, names_of
 from nondum.host.workers.spec import Timing, WorkerSpec
+from nondum.planning.core import core_value_types
 from nondum.planning.running import RunState
 from nondum.sdk.description import PluginDescription
-from nondum.sdk.errors import LinkClosed, NondumError, Problem, ProtocolViolation, WorkerFailed
+from nondum.sdk.errors import (
+    LinkClosed,
+    MessageInvalid,
+    NondumError,
+    Problem,
+    ProtocolViolation,
+    WorkerFailed,
+)
 from nondum.sdk.link import Pending
+from nondum.sdk.valued import value_types
 from nondum.transport import WorkerLink, link_sockets
 
 OnCrowded: TypeAlias = Callable[[int], None]
@@ -61,6 +77,9 @@ class Worker:
         self.spec, self._timing, self._emit = spec, timing, emit
         self.claims = Claims()
         """What it says is so."""
+        self.faults = Faults()
+        """Mistakes of its plugin that did not end it."""
+        self._value_types = {**core_value_types(), **value_types(spec.index.fragments)}
         self._streams: frozenset[str] = frozenset()
         self._beats = 0
         self.rates: dict[str, float] = {}
@@ -363,10 +382,22 @@ class Worker:
                     event = BehaviourProgressed(call.component, call.behaviour, call.id, *progress)
                     self._emit(event)
             case _:
-                news = parse_news(self.spec.component, self._streams, name, body)
-                if isinstance(news, WorkerLogged):
-                    self._on_log(news)
-                    return
+                self._on_news(name, body)
+
+    def _on_news(self, name: str, body: dict[str, Any]) -> None:
+        try:
+            news = parse_news(self.spec.component, self._streams, name, body, self._value_types)
+        except MessageInvalid as error:  # one wrong value is left out, and the worker goes on
+            found = tuple(problems.located(self.spec.component, error))
+            news = WorkerFaulted(self.spec.component, found)
+            self._on_log(WorkerLogged(self.spec.component, "error", problems.words(error)))
+        match news:
+            case WorkerLogged():
+                self._on_log(news)
+            case WorkerFaulted():
+                if self.faults.take(news):
+                    self._emit(news)
+            case _:
                 self.claims.take(news)
                 self._emit(news)
 

@@ -12,7 +12,16 @@ from typing import Any, TypeAlias
 import pluggy
 
 from nondum.host.catalogue.records import Moment
-from nondum.host.events import Emit, Event, FactKnown, StreamFlowing, WorkerFailed, WorkerLogged
+from nondum.host.events import (
+    Emit,
+    Event,
+    FactKnown,
+    InputAmbiguous,
+    StreamFlowing,
+    WorkerFailed,
+    WorkerLogged,
+)
+from nondum.host.optional_inputs import Choice
 from nondum.host.streams import Streams
 from nondum.host.workers import problems
 from nondum.host.workers.call import Call
@@ -29,6 +38,7 @@ from nondum.host.workers.worker import Worker
 from nondum.planning.running import RunState
 from nondum.sdk import errors
 from nondum.sdk.description import PluginDescription
+from nondum.sdk.errors import Problem
 
 FactValue: TypeAlias = tuple[str, Sequence[str], Any]
 """Predicate, objects, and the value as it travels; None: it has none (any more)."""
@@ -58,7 +68,7 @@ class Workers:
         self.timing = timing or Timing()
         self._rounds = Rounds(self._running, self.emit, self.timing.look_s)
         self._going_round: asyncio.Task[None] | None = None
-        self.streams = Streams(host)
+        self.streams = Streams(host, self._on_ambiguous)
         self.search = Search(self.streams.senders, self.streams.ends)
         self.logs = Logs()
         self._host, self._emit = host, emit
@@ -266,6 +276,12 @@ class Workers:
             return ()
         return tuple(supervisor.worker.claims)
 
+    def faults(self, component: str) -> tuple[Problem, ...]:
+        """Mistakes of a component's plugin that its worker has outlived, the newest of them."""
+        supervisor = self._supervisors.get(component)
+        worker = supervisor.worker if supervisor is not None else None
+        return tuple(worker.faults) if worker is not None else ()
+
     def plugins(self) -> dict[str, Proxy]:
         """The plugins that run now, by component."""
         named = self._manager.list_name_plugin()
@@ -335,6 +351,9 @@ class Workers:
         if self._manager.has_plugin(component):
             self._manager.unregister(name=component)
         self.streams.leave(component)
+
+    def _on_ambiguous(self, choice: Choice) -> None:
+        self.emit(InputAmbiguous(choice.socket.component, (choice.problem(),)))
 
     def _found(self, component: str, payload: str) -> Supervisor | None:
         """The worker of a component that a payload has, or without one that which counts."""

@@ -7,6 +7,7 @@ worker process, so that what passes here passes there. Needs no Linux.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import threading
 from collections.abc import Callable, Coroutine, Mapping
 from pathlib import Path
@@ -204,8 +205,19 @@ class Bench:
     ) -> None:
         """Wait for something that the plugin tells; an `AssertionError` after `timeout_s`."""
         with self._changed:
-            if not self._changed.wait_for(is_so, timeout_s):
+            found = self._changed.wait_for(lambda: is_so() or self.side.faults, timeout_s)
+            self._fail_for_faults()
+            if not found:
                 raise AssertionError(f"waited {timeout_s} s in vain for {what}; logs: {self.logs}")
+
+    def expect_fault(self, code: str, timeout_s: float = TIMEOUT_S) -> Problem:
+        """Wait for a wrong message that the plugin sends or says; it fails the test no more."""
+        with self._changed:
+            self._changed.wait_for(lambda: self.side.faults, timeout_s)
+            found = [problem for problem in self.side.faults if problem.code == code]
+            assert found, f"no {code} was told, but: {self.side.faults}; logs: {self.logs}"
+            self.side.faults.remove(found[0])
+        return found[0]
 
     def attach(
         self,
@@ -232,6 +244,7 @@ class Bench:
         if self._thread.is_alive():
             try:
                 self._wait(self.side.stop())
+                self._fail_for_faults()
             finally:
                 self._loop.call_soon_threadsafe(self._loop.stop)
                 self._thread.join()
@@ -244,6 +257,13 @@ class Bench:
             return function()
 
         return self._wait(called())
+
+    def _fail_for_faults(self) -> None:
+        """Raise `AssertionError` for a wrong message that the test did not expect."""
+        if self.side.faults:
+            told = "\n".join(map(str, self.side.faults))
+            self.side.faults.clear()
+            raise AssertionError(f"the plugin made a wrong message:\n{told}")
 
     def _tell(self, event: str, body: Mapping[str, Any]) -> None:
         self.on_loop(lambda: self.side.link.send_event(event, body))
@@ -283,8 +303,9 @@ class WorkerFactory:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        for bench in self._benches:
-            bench.stop()
+        with contextlib.ExitStack() as stopping:  # all of them, whatever one of them says
+            for bench in self._benches:
+                stopping.callback(bench.stop)
 
 
 def _mount(host: str, xyz: Vector, rpy: Vector) -> list[Any]:

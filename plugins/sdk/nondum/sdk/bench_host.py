@@ -56,6 +56,8 @@ class HostSide:
         """Streams that flow, by object."""
         self.logs: list[tuple[str, str]] = []
         """Level and message of what was logged."""
+        self.faults: list[Problem] = []
+        """Wrong messages that the plugin has sent or said, with its lines."""
         self.outputs: dict[str, deque[Message]] = {}
         """Unread messages, by stream object."""
         self._runs: dict[int, Run] = {}
@@ -150,6 +152,8 @@ class HostSide:
             case "flow", _:
                 change = self.flowing.add if body["flowing"] else self.flowing.discard
                 change(body["stream"])
+            case "fault", _:
+                self.faults.append(Problem(**body["problem"]))
             case "log", _:
                 self.logs.append((body["level"], body["message"]))
         self._on_change()

@@ -13,7 +13,8 @@ from collections.abc import AsyncIterator, Coroutine, Mapping
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from nondum.sdk.errors import BehaviourFailed
+from nondum.sdk.errors import BehaviourFailed, MessageInvalid, Problem
+from nondum.sdk.faults import Faults
 from nondum.sdk.messages import Message, value_to_wire
 from nondum.sdk.ports import InputPort, OutputPort
 from nondum.sdk.workplace import Device, Workplace
@@ -24,8 +25,10 @@ _M = TypeVar("_M", bound=Message)
 class OutputStream:
     """An output slot, opened for sending."""
 
-    def __init__(self, port: OutputPort) -> None:
+    def __init__(self, port: OutputPort, faults: Faults) -> None:
         self._port = port
+        self.faults = faults
+        """Tells of wrong messages (the SDK's own)."""
 
     @property
     def stream(self) -> str:
@@ -37,8 +40,13 @@ class OutputStream:
 
         A consumer that is slow gets the newest message when it is ready again. Bulk data are copied
         (or sent) before this returns.
-        Raises `TypeError` for a message of another type, `MessageInvalid` for wrong values.
+        Raises `TypeError` for a message of another type, `MessageInvalid` for wrong fields or
+        values. Both are told to the host, with the author's line.
         """
+        self.faults.watch(self.pass_on, message)
+
+    def pass_on(self, message: Message) -> None:
+        """Send, and leave it to the caller to tell of what is wrong (the SDK's own)."""
         self._port.send(message)
 
 
@@ -96,6 +104,8 @@ class Context:
         predicates: frozenset[str] | None = None,
     ) -> None:
         self._workplace = workplace
+        self.faults = Faults(workplace.fault, log)
+        """Tells of wrong messages (the SDK's own)."""
         self._call_id = call_id
         self._predicates = predicates
         self._known: dict[tuple[str, ...], None] = {}
@@ -158,7 +168,7 @@ class Context:
         if port.stream not in self._outputs:
             port.open()
             self._opened.callback(port.release)
-            self._outputs[port.stream] = OutputStream(port)
+            self._outputs[port.stream] = OutputStream(port, self.faults)
         return self._outputs[port.stream]
 
     async def established(self) -> None:
@@ -174,11 +184,17 @@ class Context:
         """Say that a fact is true, with its value if the predicate is valued.
 
         Raises `ValueError` in a condition that does not declare the predicate, `MessageInvalid`
-        for a wrong value.
+        for a wrong value, or one of another type than the fragments declare (`:valued`). The host
+        is told of a wrong value, with the author's line.
         """
+        self.faults.watch(self.say, predicate, *objects, value=value)
+
+    def say(self, predicate: str, *objects: str, value: Message | None = None) -> None:
+        """Do as `know`, and leave it to the caller to tell of what is wrong (the SDK's own)."""
         self._may_say(predicate)
         body: dict[str, Any] = {"predicate": predicate, "arguments": list(objects)}
         if value is not None:
+            self._check_type(predicate, value)
             body["value"] = value_to_wire(value)
         self._known[predicate, *objects] = None
         self._workplace.tell("know", body, self._call_id)
@@ -228,6 +244,18 @@ class Context:
         if forget:
             for predicate, *objects in tuple(self._known):
                 self.forget(predicate, *objects)
+
+    def _check_type(self, predicate: str, value: Message) -> None:
+        declared = self._workplace.value_types.get(predicate)
+        if declared is not None and declared != value.TYPE:
+            raise MessageInvalid(
+                Problem(
+                    "MESSAGE_TYPE",
+                    f"the value of {predicate} is of another type than its fragment declares",
+                    need=declared,
+                    have=value.TYPE,
+                )
+            )
 
     def _may_say(self, predicate: str) -> None:
         if self._predicates is not None and predicate not in self._predicates:

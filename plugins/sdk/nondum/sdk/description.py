@@ -49,18 +49,24 @@ class Output:
 
     name: str
     type: str
-    """A stream type: image, depth, points, detections, twist, pose, audio, text, scalar."""
+    """A stream type: image, depth, points, detections, twist, pose, audio, text, scalar …"""
     always: bool = False
     """Produced from `start` on, not by a behaviour."""
+    of: str = ""
+    """The type of unit that the stream tells of, where it is not the unit that sends it: `base` for
+    odometry that a camera works out."""
 
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """An optional input of a unit, wired by the host to any flowing stream of its type on the same
-    body. (Required inputs are the stream parameters of actions.)"""
+    """An optional input of a unit, wired by the host to a flowing stream on the same body that has
+    its type and is of what it asks for. (Required inputs are the stream parameters of actions.)"""
 
     name: str
     type: str
+    of: str = ""
+    """The type of unit that the stream must tell of: `base` for the odometry of this body's base.
+    Empty: of anything; then a stream that only has the type may be the wrong one."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ import asyncio
 import logging
 from collections.abc import Callable
 
-from nondum.sdk.errors import NondumError, ProtocolViolation
+from nondum.sdk.errors import MessageInvalid, NondumError, ProtocolViolation
 from nondum.sdk.messages import MESSAGES, Message
 from nondum.sdk.pace import STALL_S, Pace
 from nondum.sdk.packets import Packets
@@ -103,6 +103,8 @@ class InputPort:
         self._stream = ""
         self._consumer: Consumer | None = None
         self._newest: Message | None = None
+        self._has_refused = False
+        """Whether it was told already that the producer sends what is no message of its type."""
         self._waiters: set[asyncio.Future[None]] = set()
 
     @property
@@ -113,7 +115,7 @@ class InputPort:
     def connect(self, stream: str, kind: str, packets: Packets) -> None:
         """Wire a stream, in place of the one before; owns `packets`."""
         self.disconnect()
-        self._stream = stream
+        self._stream, self._has_refused = stream, False
         self._consumer = Consumer(kind, packets, self._on_message, self._on_closed)
 
     def disconnect(self) -> None:
@@ -123,10 +125,14 @@ class InputPort:
         self._consumer = self._newest = None
 
     def newest(self) -> Message | None:
-        """The last message that arrived, taken out of its slot once; None when it was refused."""
+        """The last message that arrived, taken out of its slot once; a wrong one is passed over."""
         if self._consumer is not None:
             try:
                 self._newest = self._consumer.take() or self._newest
+            except MessageInvalid as error:  # it alone is left out
+                if not self._has_refused:
+                    log.warning("stream %s: message refused: %s", self._stream, error)
+                self._has_refused = True
             except NondumError as error:
                 log.warning("stream %s: message refused: %s", self._stream, error)
                 self.disconnect()

@@ -74,7 +74,8 @@ class ThreadOutputStream:
 
     def send(self, message: Message) -> None:
         """Hand a message to everyone who reads the stream (see `OutputStream.send`)."""
-        self._crossing.call(self._stream.send, message)
+        stream = self._stream
+        stream.faults.watch(stream.pass_on, message, carry=self._crossing.call)
 
 
 class ThreadInputStream(Generic[_M]):
@@ -161,7 +162,8 @@ class ThreadContext:
 
     def know(self, predicate: str, *objects: str, value: Message | None = None) -> None:
         """See `Context.know`."""
-        self._crossing.call(self._context.know, predicate, *objects, value=value)
+        context, carry = self._context, self._crossing.call
+        context.faults.watch(context.say, predicate, *objects, value=value, carry=carry)
 
     def forget(self, predicate: str, *objects: str) -> None:
         """See `Context.forget`."""

@@ -15,6 +15,10 @@ from nondum.sdk.errors import Problem, ProtocolViolation
 from nondum.sdk.geometry import FrameTree
 from nondum.sdk.messages import Message, value_from_wire
 from nondum.sdk.ports import InputPort, OutputPort
+from nondum.sdk.valued import value_types
+
+MOST_FAULTS = 100
+"""Mistakes that one worker tells of."""
 
 Tell = Callable[[str, Mapping[str, Any], int | None], None]
 
@@ -111,11 +115,15 @@ class Workplace:
         """By stream object."""
         self._counted: tuple[float | None, Mapping[str, int]] = (None, {})
         """When `rates` was asked for before, and what had been sent by then."""
+        self.value_types: Mapping[str, str] = {}
+        """Predicate → the type of message that its value is, as the plugin's fragments declare."""
+        self._told: set[tuple[str, str]] = set()
         self._inputs: dict[str, InputPort] = {}
         self._optional_inputs: dict[tuple[str, str], InputPort] = {}
 
     def declare(self, description: PluginDescription) -> None:
-        """Make the ports of all that the plugin declares."""
+        """Make the ports of all that the plugin declares, and know what its facts carry."""
+        self.value_types = value_types(description.fragments)
         for unit in description.units:
             for output in unit.outputs:
                 stream = self.place.outputs.get(output.name, output.name)
@@ -129,6 +137,18 @@ class Workplace:
             self.values[predicate, *arguments] = value_from_wire(value)
         for predicate, arguments in unset:
             self.values.pop((predicate, *arguments), None)
+
+    def fault(self, problem: Problem) -> bool:
+        """Tell the host of a mistake of the plugin's author; each is told once, by code and place.
+
+        Says whether it was told now.
+        """
+        key = problem.code, problem.where
+        if key in self._told or len(self._told) >= MOST_FAULTS:
+            return False
+        self._told.add(key)
+        self.tell("fault", {"problem": problem.to_dict()}, None)
+        return True
 
     def output(self, name: str) -> OutputPort:
         """The port of a stream object or output slot. Raises `LookupError`."""

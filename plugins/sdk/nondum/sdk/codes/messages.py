@@ -30,6 +30,21 @@ CODES = (
         "use the same version of nondum at both ends",
     ),
     Code(
+        "INPUT_AMBIGUOUS",
+        "Several streams fit an optional input of a component, and the host had to pick one.",
+        "say which it is to be: `nondum streams --connect INPUT STREAM`",
+    ),
+    Code(
+        "INPUT_STREAM",
+        "That stream cannot feed that input: it has another type, or is the component's own.",
+        "connect one of the streams that the message names",
+    ),
+    Code(
+        "INPUT_UNKNOWN",
+        "No running component has an optional input of that name.",
+        "see `nondum streams --inputs`",
+    ),
+    Code(
         "JPEG_FAILED",
         "An image could not be made into a JPEG.",
         "show another stream; tell the plugin's author what image it sends",
@@ -46,8 +61,8 @@ CODES = (
     ),
     Code(
         "MESSAGE_FIELD",
-        "A message lacks a field, or has one too many.",
-        "tell the plugin's author: docs/sdk.md lists the fields",
+        "A message lacks a field, has one too many, or one of another type or shape.",
+        "tell the plugin's author: docs/messages.md lists the fields",
     ),
     Code(
         "MESSAGE_TOO_LONG",
@@ -56,13 +71,13 @@ CODES = (
     ),
     Code(
         "MESSAGE_TYPE",
-        "There is no message type of that name.",
-        "use one of those in docs/sdk.md",
+        "There is no message type of that name, or another type is expected there.",
+        "tell the plugin's author: use one of those in docs/messages.md, and the one declared",
     ),
     Code(
         "MESSAGE_VALUE",
-        "A field of a message has a wrong type, shape or unit.",
-        "tell the plugin's author: docs/sdk.md says what each field holds",
+        "A field of a message holds a value that cannot be.",
+        "tell the plugin's author: docs/messages.md says what each field holds",
     ),
     Code(
         "PACKET_DESCRIPTORS",

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from nondum.sdk.messages.header import Header
     from nondum.sdk.messages.images import CameraModel, Depth, Image
     from nondum.sdk.messages.motion import Bearing, Pose, Quaternion, Twist, Vector
-    from nondum.sdk.messages.signals import Audio, Points, Scalar, Text
+    from nondum.sdk.messages.sensing import BatteryState, Covariance, GpsFix, ImuData
+    from nondum.sdk.messages.signals import Audio, KeyValue, KeyValues, Points, Scalar, Text
+    from nondum.sdk.messages.surroundings import LaserScan, OccupancyGrid
 
 _HOME = {
     "BoundingBox2D": "detections",
@@ -35,17 +37,39 @@ _HOME = {
     "Quaternion": "motion",
     "Twist": "motion",
     "Vector": "motion",
+    "BatteryState": "sensing",
+    "Covariance": "sensing",
+    "GpsFix": "sensing",
+    "ImuData": "sensing",
     "Audio": "signals",
+    "KeyValue": "signals",
+    "KeyValues": "signals",
     "Points": "signals",
     "Scalar": "signals",
     "Text": "signals",
+    "LaserScan": "surroundings",
+    "OccupancyGrid": "surroundings",
 }
 """The module of each name."""
-_STREAMED = (
-    *("Audio", "Bearing", "Depth", "Detections", "Image"),
-    *("Points", "Pose", "Scalar", "Text", "Twist"),
-)
-"""The classes that streams and facts are of; their types are their names in small letters."""
+_STREAMED = {
+    "audio": "Audio",
+    "battery-state": "BatteryState",
+    "bearing": "Bearing",
+    "depth": "Depth",
+    "detections": "Detections",
+    "gps-fix": "GpsFix",
+    "image": "Image",
+    "imu-data": "ImuData",
+    "key-values": "KeyValues",
+    "laser-scan": "LaserScan",
+    "occupancy-grid": "OccupancyGrid",
+    "points": "Points",
+    "pose": "Pose",
+    "scalar": "Scalar",
+    "text": "Text",
+    "twist": "Twist",
+}
+"""The classes that streams and facts are of, by type."""
 
 
 def _home_of(name: str) -> object:
@@ -65,24 +89,23 @@ class _Classes(Mapping[str, type[Message]]):
     """The streamed classes by type."""
 
     def __init__(self) -> None:
-        self._names = {name.lower(): name for name in _STREAMED}
         self._made: dict[str, type[Message]] = {}
 
     def __getitem__(self, kind: str) -> type[Message]:
         if kind not in self._made:
-            made = _home_of(self._names[kind])
+            made = _home_of(_STREAMED[kind])
             assert isinstance(made, type) and issubclass(made, Message)
             self._made[kind] = made
         return self._made[kind]
 
     def __contains__(self, kind: object) -> bool:
-        return kind in self._names
+        return kind in _STREAMED
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
+        return iter(_STREAMED)
 
     def __len__(self) -> int:
-        return len(self._names)
+        return len(_STREAMED)
 
 
 MESSAGES: Mapping[str, type[Message]] = _Classes()
@@ -123,16 +146,24 @@ def value_from_wire(data: object) -> Message:
 __all__ = [
     "MESSAGES",
     "Audio",
+    "BatteryState",
     "Bearing",
     "BoundingBox2D",
     "Buffer",
     "CameraModel",
+    "Covariance",
     "Depth",
     "Detection",
     "Detections",
+    "GpsFix",
     "Header",
     "Image",
+    "ImuData",
+    "KeyValue",
+    "KeyValues",
+    "LaserScan",
     "Message",
+    "OccupancyGrid",
     "Points",
     "Pose",
     "Quaternion",

@@ -16,9 +16,13 @@ class BoundingBox2D:
     """An upright box in the image, by its centre and size in pixels."""
 
     cx: float
+    """px, of its centre, to the right."""
     cy: float
+    """px, of its centre, down."""
     width: float
+    """px"""
     height: float
+    """px"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +34,7 @@ class Detection:
     score: float
     """0..1, higher is surer."""
     box: BoundingBox2D
+    """Where in the image."""
     id: str = ""
     """The same over time where the detector follows things; empty where it does not."""
 
@@ -41,9 +46,13 @@ class Detections(Message):
     TYPE: ClassVar[str] = "detections"
     header: Header
     detections: tuple[Detection, ...]
+    """In no particular order."""
     image_width: int
+    """px, of the image that was looked at."""
     image_height: int
+    """px"""
     camera: CameraModel | None = None
+    """The image's, for the direction of what was found."""
 
     def faults(self) -> Iterator[str]:
         """An empty image, scores outside 0..1, boxes without size."""

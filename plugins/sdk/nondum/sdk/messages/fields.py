@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ClassVar, Self, TypeAlias, Union, get_args, get_origin, get_type_hints
 
 from nondum.sdk.errors import MessageInvalid, Problem
+from nondum.sdk.messages.field_types import type_problems
 
 Buffer: TypeAlias = bytes | bytearray | memoryview
 """Bulk bytes of a message: contiguous, never changed once it is sent."""
@@ -61,7 +62,7 @@ class Message:
         except _Wrong as wrong:
             raise MessageInvalid(Problem("MESSAGE_FIELD", str(wrong), where=wrong.where)) from None
         message = cls(**values)
-        message.check()
+        message._check_values()  # the types were just read
         return message
 
     def faults(self) -> Iterator[str]:
@@ -69,7 +70,17 @@ class Message:
         yield from ()
 
     def check(self) -> None:
-        """Raise `MessageInvalid` (MESSAGE_VALUE) with every fault at once."""
+        """Check a message that was made here: its fields' types, then their values.
+
+        Bulk bytes are not looked at, but for their length. Raises `MessageInvalid` (MESSAGE_FIELD
+        for a wrong type or shape, MESSAGE_VALUE for a wrong value) with every fault at once.
+        """
+        wrong = type_problems(self)
+        if wrong:
+            raise MessageInvalid(*wrong)
+        self._check_values()
+
+    def _check_values(self) -> None:
         faults = tuple(self.faults())
         if faults:
             raise MessageInvalid(

@@ -23,11 +23,17 @@ class CameraModel:
     """
 
     width: int
+    """px"""
     height: int
+    """px"""
     fx: float
+    """Focal length along x, px."""
     fy: float
+    """Focal length along y, px."""
     cx: float
+    """x of the optical axis, px."""
     cy: float
+    """y of the optical axis, px."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,12 +138,17 @@ class Image(_Raster):
     }
     header: Header
     height: int
+    """px, 1..32768."""
     width: int
+    """px, 1..32768."""
     encoding: str
+    """`rgb8`, `bgr8`, `mono8` or `mono16` (little-endian)."""
     step: int
     """Bytes from one row to the next."""
     data: Buffer
+    """`step` × `height` bytes, rows from the top."""
     camera: CameraModel | None = None
+    """How pixels are directions; None where that is not known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,9 +162,14 @@ class Depth(_Raster):
     }
     header: Header
     height: int
+    """px, 1..32768."""
     width: int
+    """px, 1..32768."""
     encoding: str
+    """`16UC1` (millimetres) or `32FC1` (metres), little-endian."""
     step: int
     """Bytes from one row to the next."""
     data: Buffer
+    """`step` × `height` bytes, rows from the top."""
     camera: CameraModel | None = None
+    """How pixels are directions; None where that is not known."""

@@ -42,10 +42,11 @@ class Pose(Message):
     position: Vector
     """m, in the header's frame"""
     orientation: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    """Of the child in the header's frame: x, y, z, w, of length 1."""
     child_frame_id: str = ""
     """The frame that is there; empty where only a place is meant."""
     twist: Twist | None = None
-    """The child's velocity, in the child's own axes."""
+    """The child's velocity, in the child's own axes, m/s and rad/s."""
 
     @property
     def yaw_rad(self) -> float:
@@ -55,7 +56,7 @@ class Pose(Message):
 
     def faults(self) -> Iterator[str]:
         """An orientation that is no rotation."""
-        if not _is_unit(self.orientation):
+        if not is_unit(self.orientation):
             yield "the orientation is not a quaternion of length 1"
 
 
@@ -68,7 +69,7 @@ class Bearing(Message):
     direction: Vector
     """Unit vector."""
     sigma_rad: float
-    """Standard deviation of the direction."""
+    """Standard deviation of the direction, rad."""
 
     @classmethod
     def from_angles(
@@ -95,11 +96,12 @@ class Bearing(Message):
 
     def faults(self) -> Iterator[str]:
         """A direction that is no unit vector, or a negative deviation."""
-        if not _is_unit(self.direction):
+        if not is_unit(self.direction):
             yield "the direction is not a vector of length 1"
         if self.sigma_rad < 0:
             yield f"sigma_rad {self.sigma_rad} is negative"
 
 
-def _is_unit(values: tuple[float, ...]) -> bool:
+def is_unit(values: tuple[float, ...]) -> bool:
+    """Whether a vector or quaternion has length 1."""
     return abs(math.hypot(*values) - 1) <= UNIT_LENGTH_TOLERANCE

@@ -1,4 +1,4 @@
-"""Sound, words, single numbers and clouds of points."""
+"""Sound, words, numbers by name and alone, and clouds of points."""
 
 from __future__ import annotations
 
@@ -22,9 +22,13 @@ class Audio(Message):
     SAMPLE_BYTES: ClassVar[Mapping[str, int]] = {"s16le": 2, "f32le": 4}
     header: Header
     rate_hz: int
+    """Frames a second."""
     channels: int
+    """Samples of one frame."""
     encoding: str
+    """`s16le` or `f32le`."""
     data: Buffer
+    """Whole frames, channels interleaved."""
 
     def faults(self) -> Iterator[str]:
         """Unknown encoding, no rate, no channels, or half a frame of samples."""
@@ -45,6 +49,7 @@ class Text(Message):
     TYPE: ClassVar[str] = "text"
     header: Header
     text: str
+    """The words."""
     language: str = "en"
     """BCP 47."""
 
@@ -56,8 +61,37 @@ class Scalar(Message):
     TYPE: ClassVar[str] = "scalar"
     header: Header
     value: float
+    """In `unit`."""
     unit: str
     """SI symbol: `V`, `°C`, `Sv/h`; `1` where there is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class KeyValue:
+    """One value by name (diagnostic_msgs/KeyValue)."""
+
+    key: str
+    """Its name, once in a message."""
+    value: str
+    """For people and logs. A number that others work with is a `Scalar`, which has a unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class KeyValues(Message):
+    """Values by name (diagnostic_msgs/DiagnosticStatus): what has no message type of its own."""
+
+    TYPE: ClassVar[str] = "key-values"
+    header: Header
+    values: tuple[KeyValue, ...]
+    """In the order in which people are to see them."""
+
+    def faults(self) -> Iterator[str]:
+        """A key that is empty or stands there twice."""
+        keys = [value.key for value in self.values]
+        if "" in keys:
+            yield "a key is empty"
+        if len(set(keys)) != len(keys):
+            yield "a key stands there twice"
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +103,7 @@ class Points(Message):
     POINT_BYTES: ClassVar[int] = 12
     header: Header
     data: Buffer
+    """x, y, z of each point, float32 little-endian, m."""
 
     def array(self) -> np.ndarray[Any, np.dtype[Any]]:
         """View the points as numpy array (N, 3) of float32 without copying."""
