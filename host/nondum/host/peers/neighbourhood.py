@@ -120,6 +120,7 @@ class Neighbourhood:
                 keeper,
                 announce=self._announce_pairing,
                 candidates=self._hints,
+                known=lambda: {peer.key: peer.name for peer in self.fleet.peers.values()},
                 is_development=config.peers.development,
             ),
             self.view.known,
