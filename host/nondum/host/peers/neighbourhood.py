@@ -20,6 +20,7 @@ from nondum.host.peers.compute import Compute, probed
 from nondum.host.peers.desk import Desk
 from nondum.host.peers.finder import PeerFinder
 from nondum.host.peers.goals import Goals
+from nondum.host.peers.namesakes import Namesakes
 from nondum.host.peers.offered import Policy, policy_of
 from nondum.host.peers.pairing_desk import PairingDesk
 from nondum.host.peers.peering import Peering
@@ -79,7 +80,9 @@ class Neighbourhood:
             self._own_uses,
             self._on_taken,
         )
-        self._strangers = Strangers(emit, asyncio.get_running_loop().time)
+        clock = asyncio.get_running_loop().time
+        self._strangers = Strangers(emit, clock)
+        self._namesakes = Namesakes(clock, lambda: {hint.key for hint in self._hints()})
         self.desk = Desk()
         self.desk.add("behave", self.serving.behave, self.serving.orphaned)
         self.desk.hear("values", self.serving.values)
@@ -187,7 +190,9 @@ class Neighbourhood:
         """What every status says of it."""
         is_open = self.fleet.security is Security.DEVELOPMENT
         unsafe = ("peers need no keys: every host on this machine is one",) if is_open else ()
-        return (*unsafe, *map(str, self.keeper.warnings), *self._troubles)
+        own = self.finder.identity_problem if self.finder else None
+        problems = (*self.keeper.warnings, *self._namesakes.problems, *((own,) if own else ()))
+        return (*unsafe, *map(str, problems), *self._troubles)
 
     def answering(self) -> dict[str, Callable[[Arguments], Awaitable[Any]]]:
         """Verbs that answer once."""
@@ -241,6 +246,7 @@ class Neighbourhood:
 
     def _on_fleet(self, event: FleetEvent) -> None:
         self.view.on_fleet(event)
+        self._namesakes.on_fleet(event)
         if isinstance(event, Refusal):
             self._strangers.turned_away(event)
         self.peering.on_fleet(event)

@@ -11,7 +11,9 @@ from nondum.transport.peers.pairing_messages import Ending
 
 _ANEW = "begin anew on both hosts, `nondum peers pair`, where it was not meant"
 _BOTH = "run `nondum peers pair` on both hosts at the same time, on one network"
-_RENAME = "give one of the two another name, `name` under [host], start it again, and pair them then"
+_RENAME = (
+    "give one of the two another name, `name` under [host], start it again, and pair them then"
+)
 
 SAID_NO = Problem("PAIRING_REFUSED", "the person at this host said no")
 CLOSED = Problem("PAIRING_OVER", "pairing was given up at this host", fix=_BOTH)
