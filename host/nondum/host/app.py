@@ -188,6 +188,7 @@ async def _run(
             *of_peers,
         )
 
+    elsewhere = neighbours.goals if neighbours else None
     places = neighbours.placement.places if neighbours else dict
     vouched = executor.trust.vouched
     take = _take(neighbours, mind, stopping)
@@ -215,11 +216,23 @@ async def _run(
         vouched,
         feedback.to_dict,
         executor.trust.summary,
+        elsewhere,
     )
     trust = TrustOrders(executor.trust, bus.emit)
     stop_all, translate_s = _stop_all(neighbours, stopping), config.planning.translate_s
-    orders = Orders(catalogue, mind, workers, news, bus, stopping, stop_all, translate_s)
-    goal_files = GoalFiles(
+    orders = Orders(
+        catalogue,
+        mind,
+        workers,
+        news,
+        bus,
+        stopping,
+        stop_all,
+        translate_s,
+        lambda: goal_files,
+        elsewhere,
+    )
+    goal_files: GoalFiles = GoalFiles(
         catalogue.snapshot, mind, orders.translated, bus.emit, on_change=feedback.wake
     )
     bus.subscribe(goal_files.on_event)

@@ -55,6 +55,7 @@ def answering(
         "logs": questions.logs,
         "mount": orders.mount,
         "plan": questions.plan,
+        "resume": orders.resume,
         "retry": orders.retry,
         "status": questions.status,
         "store": questions.store,

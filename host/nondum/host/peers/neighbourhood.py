@@ -139,6 +139,7 @@ class Neighbourhood:
         self.desk.add("goal.ask", self.goals.serve_ask)
         self.desk.add("goal.give", self.goals.serve_give)
         self.desk.hear("goal.news", self.goals.hear_news)
+        self.desk.hear("goal.standing", self.goals.hear_standing)
         self.placement = placement
         placement.serve(self.desk)
         self._remote = RemoteCalls(self.peering, emit, self.peering.claims)
@@ -231,6 +232,7 @@ class Neighbourhood:
     async def close(self) -> None:
         """Say goodbye; what runs for peers, and at peers, is halted."""
         await self.placement.close()
+        await self.goals.close()
         await self._remote.close()
         await self._streams.close()
         await self.fleet.close()
