@@ -56,6 +56,11 @@ def of_people(goals: Iterable[GoalRecord]) -> Iterator[GoalRecord]:
     return (goal for goal in goals if "/" not in goal.id)
 
 
+def why_kept(snapshot: Snapshot) -> str:
+    """Why words of a person are no goal yet, in words."""
+    return coming_in(snapshot) or "nothing that is here understands it"
+
+
 class GoalFiles:
     """Subscribe `on_event`, and `run` it. Its methods run on the loop."""
 
@@ -100,6 +105,7 @@ class GoalFiles:
             wish, is_translated=is_translated, while_coming=while_coming
         )
         self._waiting.add(kept.id)
+        self._coming = coming_in(self._snapshot())
         self._news.set()
 
     def on_event(self, event: Event) -> None:
@@ -236,8 +242,7 @@ class GoalFiles:
             self._forget(wish)
             self._mind.halt(id=wish.id, why=str(problem))
             return
-        reason = coming or "nothing that is here understands it"
-        self._mind.queue.put(wish.id, GoalState.KEPT, reason, (problem,))
+        self._mind.queue.put(wish.id, GoalState.KEPT, why_kept(snapshot), (problem,))
         self._mind.wake()
 
     async def _until_news(self) -> None:

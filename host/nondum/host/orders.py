@@ -14,7 +14,7 @@ from nondum.host.control.arguments import Arguments, Triple
 from nondum.host.control.server import Handing
 from nondum.host.elsewhere import Elsewhere
 from nondum.host.events import ForgetAsked, MountSet, RetryAsked, SafeModeLeft
-from nondum.host.goal_files import GoalFiles
+from nondum.host.goal_files import GoalFiles, why_kept
 from nondum.host.lifecycle import going_back, installed
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.mind import translation
@@ -252,14 +252,15 @@ class Orders:
 
     def _kept(self, words: str, priority: int, refused: GoalRefused, arguments: Arguments) -> Row:
         """Keep words that mean nothing yet, where that is asked for. Raises `GoalRefused`."""
-        is_kept, coming = arguments.flag("keep"), coming_in(self.catalogue.snapshot())
+        snapshot, is_kept = self.catalogue.snapshot(), arguments.flag("keep")
+        coming = coming_in(snapshot)
         if refused.code not in NOT_YET or not (is_kept or coming):
             raise refused
         if not is_kept and not arguments.flag("wait"):
             told = f"nothing here understands {words!r} yet: {coming}"
             fix = "ask again in a moment, or have the words kept: `nondum goal --keep WORDS`"
             raise GoalRefused(Problem("PHRASE_EARLY", told, fix=fix)) from refused
-        given = self.mind.keep(words, priority=priority)
+        given = self.mind.keep(words, priority=priority, reason=why_kept(snapshot))
         self.goal_files().keep(given, is_translated=arguments.flag("yes"), while_coming=not is_kept)
         return self._row(given)
 

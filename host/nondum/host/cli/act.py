@@ -198,7 +198,7 @@ def _show_stopped(session: Session, halted: dict[str, Any]) -> None:
         render.sentence(behaviour, mark="halting ")
     for peer in halted["peers"]:
         click.echo(f"{peer} has stopped")
-    if not halted["goals"] and not halted["halted"]:
+    if not any(halted[what] for what in ("goals", "halted", "peers")):
         click.echo("nothing was asked for, nothing was running")
 
 

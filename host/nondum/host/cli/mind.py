@@ -125,7 +125,7 @@ def goals(session: Session) -> None:
 
 
 def _reason(row: dict[str, Any]) -> str:
-    how = f"`nondum goal --resume {row['id']}` takes it up again" if row["resumable"] else ""
+    how = f"to go on: nondum goal --resume {row['id']}" if row["resumable"] else ""
     return "; ".join(filter(None, (row["reason"], how)))
 
 

@@ -45,6 +45,7 @@ class GivenGoal:
     text: str
     """As the person gave it: words or PDDL."""
     pddl: str
+    """Empty: the words mean nothing yet."""
     kind: GoalKind
     priority: int
     number: int
@@ -61,7 +62,7 @@ class GivenGoal:
             "id": self.id,
             "goal": self.pddl,
             "text": self.text,
-            "kind": self.kind,
+            "kind": self.kind if self.pddl else "",
             "priority": self.priority,
             "state": self.state.value,
             "reason": self.reason,
@@ -125,12 +126,12 @@ class GoalQueue:
         self._forget_oldest()
         return goal
 
-    def keep(self, words: str, *, priority: int = 0) -> GivenGoal:
-        """Keep words that mean nothing yet."""
+    def keep(self, words: str, *, priority: int = 0, reason: str = "") -> GivenGoal:
+        """Keep words that mean nothing yet, for a reason."""
         self._given += 1
         id = str(self._given)
         self._goals[id] = GivenGoal(
-            id, words, "", "achieve", priority, self._given, state=GoalState.KEPT
+            id, words, "", "achieve", priority, self._given, GoalState.KEPT, reason
         )
         return self._goals[id]
 

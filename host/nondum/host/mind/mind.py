@@ -152,12 +152,12 @@ class Mind:
         self.wake()
         return given
 
-    def keep(self, words: str, *, priority: int = 0) -> GivenGoal:
+    def keep(self, words: str, *, priority: int = 0, reason: str = "") -> GivenGoal:
         """Keep words that mean nothing yet, as a goal that can be halted like any other.
 
         Whoever keeps them gives them under their id once they mean something.
         """
-        given = self.queue.keep(words, priority=priority)
+        given = self.queue.keep(words, priority=priority, reason=reason)
         self.people.tell(f"{words!r} is kept until it means something: that is goal {given.id}")
         self.wake()
         return given

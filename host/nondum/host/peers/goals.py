@@ -159,7 +159,8 @@ class Goals:
             self._mind().people.tell(f"{errand.caller.name} heard {said!r}: {stopped}")
             return {"stopped": True}
         words = self._words(errand)
-        given = self._mind().give(words=words, priority=_priority(errand))
+        priority = _priority(errand)
+        given = self._mind().give(words=words, priority=priority)
         self._givers[given.id] = errand.caller.name
         if self._telling is None or self._telling.done():
             self._telling = asyncio.create_task(self._tell_givers())
@@ -175,7 +176,7 @@ class Goals:
     def on_event(self, event: Event) -> None:
         """Tell those who gave a goal what became of it."""
         match event:
-            case PeerLeft(host):
+            case PeerLeft(host=host):
                 self._away.lose(host)
             case GoalReached(goal):
                 self._tell_giver(goal, "is reached", is_over=True)
