@@ -289,8 +289,12 @@ class PairingHost:
             raise PeerRefused(Problem("PAIRING_UNWANTED", told, where=f"{name} {fingerprint(key)}"))
 
     def _name_taken(self, key: PeerKey, name: str) -> Problem | None:
+        if name == self._name:
+            return pairing_problems.same_name(name)
         holder = self._holder(name)
-        return pairing_problems.name_taken(name, key, own_name=self._name, holder=holder)
+        if holder is not None and holder != key:
+            return pairing_problems.name_known(name, key, holder)
+        return None
 
     def _say_yes(self, current: Try) -> None:
         current.pairing, said = pairing.confirm(current.pairing, self._loop.time())

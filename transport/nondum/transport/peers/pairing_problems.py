@@ -54,13 +54,14 @@ def ended(why: Ending, name: str, *, own_name: str, is_confirmed: bool) -> Probl
     return replace(_ENDINGS[why], where=name)
 
 
-def name_taken(name: str, key: PeerKey, *, own_name: str, holder: PeerKey | None) -> Problem | None:
-    """Why a host of this name cannot be paired with; `holder` has that name already."""
-    if name == own_name:
-        told = f"both hosts are called {name}, and names are what hosts are known by"
-        return Problem("PAIRING_NAME", told, where=name, fix=_RENAME)
-    if holder in (None, key):
-        return None
+def same_name(name: str) -> Problem:
+    """Both hosts are called so."""
+    told = f"both hosts are called {name}, and names are what hosts are known by"
+    return Problem("PAIRING_NAME", told, where=name, fix=_RENAME)
+
+
+def name_known(name: str, key: PeerKey, holder: PeerKey) -> Problem:
+    """A host with a key is called as another one is that is known here."""
     told = f"another host called {name} is known here already, {fingerprint(holder)}"
     fix = f"{_RENAME}; if the other is gone for good: `nondum peers forget {fingerprint(holder)}`"
     return Problem("PAIRING_NAME", told, where=name, have=fingerprint(key), fix=fix)
