@@ -6,6 +6,7 @@ import os
 import re
 import signal
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -246,3 +247,42 @@ def test_goal_that_is_heard_goes_to_the_peer_that_can_have_it(pair: Hosts, tmp_p
     mule.until_told("rover: 'blink' is reached")
     say(said, "blink")
     mule.until_told(f"'blink': that is goal {int(number) + 1} of rover")
+
+
+def test_goal_that_is_typed_goes_where_one_that_is_heard_would(pair: Hosts, tmp_path: Path) -> None:
+    rover, mule = pair
+    rover.bring("light", beacon(tmp_path / "log", type="pointer"))
+    until_shared(mule, "beacon@rover")
+    for words in ("rover, blink", "blink"):
+        given = mule.run("goal", words, "--wait", "--json").ok().json
+        assert (given["host"], given["is_elsewhere"], given["text"]) == ("rover", True, "blink")
+        assert (given["goal"], given["state"], given["holds"]) == ("(seen rover)", "reached", True)
+        rover.until_goal(given["id"], "reached")
+    assert [row["state"] for row in mule.ask("goals")["elsewhere"]][-2:] == ["reached"] * 2
+    assert not [row for row in mule.ask("goals")["given"] if row["text"].endswith("blink")]
+    assert rover.ask("goal", words="rover, blink")["host"] == "rover"
+
+
+def test_word_that_stops_may_be_typed_for_one_host(pair: Hosts, tmp_path: Path) -> None:
+    rover, mule = pair
+    rover.bring("light", beacon(tmp_path / "log", type="pointer"))
+    until_shared(mule, "beacon@rover")
+    goal = rover.want("(lit rover)")
+    rover.until_goal(goal, "holds")
+    assert mule.ask("goal", words="rover, stop")["stopped"]["peers"] == ["rover"]
+    rover.until_goal(goal, "halted")
+    assert mule.ask("goal", words="mule, halt")["stopped"]["peers"] == []
+
+
+def test_goal_of_a_host_that_is_gone_is_not_known_any_more(tmp_path: Path) -> None:
+    with neighbours(tmp_path, "rover", "mule") as (rover, mule):
+        part = beacon(tmp_path / "log", type="pointer")
+        source = part.source.replace("lasting=True,", 'lasting=True, phrase="shine",')
+        rover.bring("light", replace(part, source=source))
+        until_shared(mule, "beacon@rover")
+        given = mule.run("goal", "rover,", "shine", "--wait", "--json").ok().json
+        assert (given["state"], given["holds"]) == ("active", True)
+        rover.kill()
+        mule.until_told("the host rover is gone")
+        (row,) = mule.ask("goals")["elsewhere"]
+        assert (row["id"], row["state"], row["holds"]) == (given["id"], "unknown", False)

@@ -194,6 +194,7 @@ async def _run(
             *of_peers,
         )
 
+    elsewhere = neighbours.goals if neighbours else None
     places = neighbours.placement.places if neighbours else dict
     vouched = executor.trust.vouched
     take = _take(neighbours, mind, stopping)
@@ -222,6 +223,7 @@ async def _run(
         vouched,
         feedback.to_dict,
         executor.trust.summary,
+        elsewhere,
         lambda: machine.look(folders.root, config.install.reserve_mb),
     )
     trust = TrustOrders(executor.trust, bus.emit)
@@ -238,8 +240,10 @@ async def _run(
         answering.answer,
         take,
         translate_s,
+        lambda: goal_files,
+        elsewhere,
     )
-    goal_files = GoalFiles(
+    goal_files: GoalFiles = GoalFiles(
         catalogue.snapshot, mind, orders.translated, bus.emit, on_change=feedback.wake
     )
     bus.subscribe(goal_files.on_event)

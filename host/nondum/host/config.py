@@ -24,6 +24,8 @@ from nondum.sdk.errors import ConfigRefused, Problem
 from nondum.wheelhouse import confinement
 from nondum.wheelhouse.confinement import Level
 
+REACHED_BY = ("listen", "static", "development")
+"""Keys of [peers] that say how other hosts are reached."""
 SYSTEM_FILE = Path("/etc/nondum/host.toml")
 _REFERENCE = re.compile(r"[\w.]+:\w+")
 _AT_LINE = re.compile(r"at line (\d+)")
@@ -163,7 +165,8 @@ class PeersSection:
     """Other hosts: whether they are looked for, and what they may have of this one."""
 
     enabled: bool = True
-    """Listen for other hosts, and look for them."""
+    """Listen for other hosts, and look for them. With `--user` `false`, unless `--peer` is given,
+    or the file sets `listen`, `static`, `development` or a router."""
     listen: tuple[str, ...] = ("tcp://*:7410",)
     """Where this host listens; port 0 picks one."""
     stream_port: int = 0
@@ -291,7 +294,9 @@ def parse(text: str, where: str, defaults: HostConfig) -> HostConfig:
             problems.append(_wrong(f"[{name}]", "a table", table, places.of(name)))
         else:
             sections[name] = _section(name, sections[name], table, places, problems)
-    if sections["router"].endpoints:
+    has_router = bool(sections["router"].endpoints)
+    sections["peers"] = _wanted(sections["peers"], data.get("peers"), has_router=has_router)
+    if has_router:
         sections["peers"] = _unproved(sections["peers"], data.get("peers"))
     problems.extend(_contradictions(HostConfig(**sections), places))
     problems.extend(feedback_section.problems(sections["feedback"], places))
@@ -313,6 +318,14 @@ def documented() -> Iterator[tuple[str, str, Any]]:
         kind = get_type_hints(HostConfig)[section.name]
         for key in fields(kind):
             yield section.name, key.name, None if key.default is MISSING else key.default
+
+
+def _wanted(peers: PeersSection, table: object, *, has_router: bool) -> PeersSection:
+    """With `--user` peers are off by default; a file that says how they are to be reached wants
+    them on, unless it says itself that they are off."""
+    said = table.keys() if isinstance(table, dict) else set()
+    is_wanted = has_router or not said.isdisjoint(REACHED_BY)
+    return replace(peers, enabled=True) if is_wanted and "enabled" not in said else peers
 
 
 def _unproved(peers: PeersSection, table: object) -> PeersSection:

@@ -1,7 +1,8 @@
 """Goals that payloads bring: given when a payload comes into force, and over when it is withdrawn.
 
 Words that mean nothing yet, since the payload that knows them is not here, are tried again with
-every recomposition. A daemon that starts gives them anew, as it brings up anew what is plugged in.
+every recomposition; so are words that people have had kept. A daemon that starts gives those of
+payloads anew, as it brings up anew what is plugged in.
 """
 
 from __future__ import annotations
@@ -16,8 +17,10 @@ from nondum.host.catalogue.records import GoalRecord, Snapshot, Step
 from nondum.host.events import Emit, Event, GoalEnded, HostStarted, PayloadActivated
 from nondum.host.feedback.concerns import refusal
 from nondum.host.feedback.state import Concern, State
+from nondum.host.mind.goals import GivenGoal, GoalState
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.translation import Understood
+from nondum.host.rows import coming_in
 from nondum.sdk.errors import GoalRefused, Problem
 
 log = logging.getLogger(__name__)
@@ -31,21 +34,31 @@ Translate: TypeAlias = Callable[[str, GoalRefused], Awaitable[Understood]]
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """One line of a goal.txt."""
+    """One line of a goal.txt, or words of a person."""
 
     id: str
-    """Of the goal that is made of it: `<payload id>/<line>`."""
+    """Of the goal that is made of it: `<payload id>/<line>`, or a number."""
     payload: str
-    """Key of the payload."""
+    """Key of the payload; empty: a person said it."""
     payload_id: str
     words: str
     problem: Problem | None = None
     """Why it is not a goal yet."""
+    priority: int = 0
+    is_translated: bool = True
+    """Whether it counts as what components take it to mean: a person was not asked."""
+    while_coming: bool = False
+    """It is given up once nothing is being brought in that could make it mean something."""
 
 
 def of_people(goals: Iterable[GoalRecord]) -> Iterator[GoalRecord]:
     """Those that were not brought by payloads: their ids are numbers."""
     return (goal for goal in goals if "/" not in goal.id)
+
+
+def why_kept(snapshot: Snapshot) -> str:
+    """Why words of a person are no goal yet, in words."""
+    return coming_in(snapshot) or "nothing that is here understands it"
 
 
 class GoalFiles:
@@ -66,6 +79,8 @@ class GoalFiles:
         """Goal id → the wish that it was made of."""
         self._waiting: set[str] = set()
         """Goal ids of the wishes that are no goals yet."""
+        self._coming = ""
+        """What was being brought in when it was looked at last, see `coming_in`."""
         self._news = asyncio.Event()
 
     @property
@@ -80,8 +95,18 @@ class GoalFiles:
                 payload=wish.payload_id,
             )
             for id, wish in self._wishes.items()
-            if id in self._waiting and wish.problem is not None
+            if id in self._waiting and wish.problem is not None and wish.payload
         )
+
+    def keep(self, kept: GivenGoal, *, is_translated: bool, while_coming: bool) -> None:
+        """Give a goal that the mind keeps as soon as its words mean something, see `Wish`."""
+        wish = Wish(kept.id, "", "", kept.text, priority=kept.priority)
+        self._wishes[kept.id] = replace(
+            wish, is_translated=is_translated, while_coming=while_coming
+        )
+        self._waiting.add(kept.id)
+        self._coming = coming_in(self._snapshot())
+        self._news.set()
 
     def on_event(self, event: Event) -> None:
         """Take in what has happened."""
@@ -91,6 +116,9 @@ class GoalFiles:
                     self._emit(GoalEnded(goal.id, _ANEW))
         if event.JOURNALLED and self._wishes:
             self._end_withdrawn()
+            coming, self._coming = self._coming, coming_in(self._snapshot())
+            if coming != self._coming:
+                self._news.set()  # what words wait for may have been refused
         if isinstance(event, PayloadActivated) and event.goals:
             self._begin(event)
 
@@ -117,7 +145,8 @@ class GoalFiles:
 
     def _end_withdrawn(self) -> None:
         active = {p.key for p in self._snapshot().payloads if p.step is Step.ACTIVE}
-        gone = [wish for wish in self._wishes.values() if wish.payload not in active]
+        brought = [wish for wish in self._wishes.values() if wish.payload]
+        gone = [wish for wish in brought if wish.payload not in active]
         for wish in gone:
             del self._wishes[wish.id]
             if wish.id in self._waiting:
@@ -137,43 +166,84 @@ class GoalFiles:
         wish = self._wishes.get(id)
         if wish is None:
             return
+        if not self._is_wished(wish):
+            self._forget(wish)
+            return
         try:
-            self._mind.give(words=wish.words, id=id)
+            self._mind.give(words=wish.words, priority=wish.priority, id=id)
         except GoalRefused as refused:
             if self._mind.composition is None:  # too early: there will be one
                 return
-            await self._try_translated(wish, refused)
+            if wish.is_translated:
+                await self._try_translated(wish, refused)
+            else:
+                self._refused(wish, refused.problems[0])
         else:
-            self._given(wish, f"{wish.payload_id} asks: {wish.words}")
+            self._given(wish, f"{_asker(wish)} asks: {wish.words}")
 
     async def _try_translated(self, wish: Wish, refused: GoalRefused) -> None:
         try:
             understood = await self._translate(wish.words, refused)
             if not self._is_wished(wish):
                 return
-            self._mind.give(pddl=understood.pddl, kind=understood.kind, said=wish.words, id=wish.id)
+            self._mind.give(
+                pddl=understood.pddl,
+                kind=understood.kind,
+                priority=wish.priority,
+                said=wish.words,
+                id=wish.id,
+            )
         except GoalRefused as error:
             self._refused(wish, error.problems[0])
         else:
-            self._given(wish, f"{wish.payload_id} asks: {wish.words}, {understood}")
+            self._given(wish, f"{_asker(wish)} asks: {wish.words}, {understood}")
 
     def _is_wished(self, wish: Wish) -> bool:
-        """Whether it is still; its drive may have been pulled, and another one plugged in."""
+        """Whether it is still; its drive may have been pulled, and another one plugged in, or a
+        person may have halted it."""
         now = self._wishes.get(wish.id)
-        return now is not None and now.payload == wish.payload
+        is_same = now is not None and now.payload == wish.payload
+        return is_same and (bool(wish.payload) or self._is_kept(wish.id))
+
+    def _is_kept(self, id: str) -> bool:
+        return any(goal.id == id and goal.state is GoalState.KEPT for goal in self._mind.queue)
+
+    def _forget(self, wish: Wish) -> None:
+        self._waiting.discard(wish.id)
+        self._wishes.pop(wish.id, None)
 
     def _given(self, wish: Wish, told: str) -> None:
         self._waiting.discard(wish.id)
+        if not wish.payload:
+            self._forget(wish)
         self._mind.people.tell(told)
         self._on_change()
 
     def _refused(self, wish: Wish, problem: Problem) -> None:
-        if not self._is_wished(wish) or self._wishes[wish.id].problem == problem:
+        if not self._is_wished(wish):
+            return
+        if not wish.payload:
+            self._still_kept(wish, problem)
+            return
+        if self._wishes[wish.id].problem == problem:
             return
         self._wishes[wish.id] = replace(wish, problem=problem)
         told = f"{wish.payload_id} asks {wish.words!r}, which cannot be wanted now: {problem}"
         self._mind.people.tell(told)
         self._on_change()
+
+    def _still_kept(self, wish: Wish, problem: Problem) -> None:
+        """Words of a person mean nothing yet: they wait, or are given up."""
+        snapshot, composition = self._snapshot(), self._mind.composition
+        assert composition is not None, "they were tried with it"
+        coming = coming_in(snapshot)
+        is_up_to_date = composition.revision >= snapshot.revision
+        if wish.while_coming and not coming and is_up_to_date:
+            self._forget(wish)
+            self._mind.halt(id=wish.id, why=str(problem))
+            return
+        self._mind.queue.put(wish.id, GoalState.KEPT, why_kept(snapshot), (problem,))
+        self._mind.wake()
 
     async def _until_news(self) -> None:
         """Wait for other wishes, and while any waits, for the mind to look different."""
@@ -186,3 +256,7 @@ class GoalFiles:
             for task in waits:
                 task.cancel()
             await asyncio.gather(*waits, return_exceptions=True)
+
+
+def _asker(wish: Wish) -> str:
+    return wish.payload_id or "a person"

@@ -13,18 +13,28 @@ from nondum.host.catalogue.records import MountPose, PayloadRecord, Safety, Snap
 from nondum.host.control.arguments import Arguments, Triple
 from nondum.host.control.server import Handing
 from nondum.host.conversation import Reply, Take
+from nondum.host.elsewhere import Elsewhere
 from nondum.host.events import ForgetAsked, InputConnected, MountSet, RetryAsked, SafeModeLeft
+from nondum.host.goal_files import GoalFiles, why_kept
 from nondum.host.lifecycle import going_back, installed
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.mind import translation
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.frames import implausible
-from nondum.host.mind.goals import GivenGoal
+from nondum.host.mind.goals import HIGHEST_PRIORITY, GivenGoal
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.translation import Understood
 from nondum.host.news import News
 from nondum.host.optional_inputs import Socket
-from nondum.host.rows import Row, gone_back, is_at_rest, payload_row, unknown
+from nondum.host.rows import (
+    Row,
+    coming_in,
+    gone_back,
+    is_at_rest,
+    own_goal_row,
+    payload_row,
+    unknown,
+)
 from nondum.host.stopping import Stopped, Stopping
 from nondum.host.workers.workers import Workers
 from nondum.planning.goal import GoalKind
@@ -33,7 +43,8 @@ from nondum.sdk.errors import ConfigRefused, GoalRefused, InstallFailed, NondumE
 from nondum.transport import link_sockets
 
 COMMIT_TIMEOUT_S = 5.0
-HIGHEST_PRIORITY = 1000
+NOT_YET = translation.UNMATCHED | {"GOAL_TOO_EARLY"}
+"""Refusals of words that may mean something once more has come."""
 
 _ZEROS: Triple = (0.0, 0.0, 0.0)
 
@@ -56,14 +67,20 @@ class Orders:
     """Makes goals of words as if they had been heard."""
     translate_s: float
     """Time that components have to translate words."""
+    goal_files: Callable[[], GoalFiles]
+    """Keeps words that mean nothing yet."""
+    elsewhere: Elsewhere | None = None
+    """The other hosts, if this one has to do with any."""
 
     async def goal(self, arguments: Arguments) -> Row:
         """Give a goal, in `words` or in `pddl` (then `said` are the words it was understood from).
 
-        Words that match no phrase are translated; with `yes` the goal is given as it was
-        understood, else the answer has `understood` only, for the person to confirm. Words that
-        stop the robot do, and the answer has `stopped` only; a question about itself is answered,
-        with `answer` only. Raises `GoalRefused`.
+        Words that only a peer can have, or that begin with its name, are given to it: `host` says
+        whose goal it is. Words that match no phrase are translated; with `yes` the goal is given as
+        it was understood, else the answer has `understood` only, for the person to confirm. With
+        `keep`, words that mean nothing yet are kept; with `wait`, while anything is being brought
+        in. Words that stop the robot do, and the answer has `stopped` only; a question about itself
+        is answered, with `answer` only. Raises `GoalRefused`.
         """
         words, pddl = arguments.optional_text("words"), arguments.optional_text("pddl")
         if (words is None) == (pddl is None):
@@ -76,12 +93,21 @@ class Orders:
         highest = HIGHEST_PRIORITY
         priority = arguments.number("priority", 0, at_least=-highest, at_most=highest)
         said, understood = arguments.optional_text("said"), None
+        if words is not None and self.elsewhere is not None:
+            peer, words = await self.elsewhere.whose(words)
+            if peer is not None:
+                return await self.elsewhere.give(peer, words, priority)
+            if is_stop(words):
+                return {"stopped": self.stopping.stop().to_dict()}
         try:
             given = self.mind.give(words=words, pddl=pddl, kind=kind, priority=priority, said=said)
         except GoalRefused as refused:
-            if words is None or self.mind.composition is None:
+            if words is None:
                 raise
-            understood = await self.translated(words, refused)
+            try:
+                understood = await self.translated(words, refused)
+            except GoalRefused as unknown:
+                return self._kept(words, priority, unknown, arguments)
             if not arguments.flag("yes"):
                 return {"understood": understood.to_dict()}
             self.mind.people.tell(f"{words!r} is {understood}")
@@ -89,7 +115,7 @@ class Orders:
                 pddl=understood.pddl, kind=understood.kind, priority=priority, said=words
             )
         await self._until(lambda snapshot: self._is_kept(given, snapshot))
-        row = {**given.to_dict(), "holds": False}
+        row = self._row(given)
         return row | ({"understood": understood.to_dict()} if understood else {})
 
     async def say(self, arguments: Arguments) -> Row:
@@ -100,6 +126,12 @@ class Orders:
         words = arguments.text("words")
         answer = await self.answer(words)
         return {"answer": answer if answer is not None else await self.take(words)}
+
+    async def resume(self, arguments: Arguments) -> Row:
+        """Take up a halted goal again, `id`. Raises `GoalRefused` (GOAL_NOT_HALTED, …)."""
+        given = self.mind.resume(arguments.text("id"))
+        await self._until(lambda snapshot: self._is_kept(given, snapshot))
+        return self._row(given)
 
     async def halt(self, arguments: Arguments) -> Row:
         """Halt a goal, or everything: the goals that were open, the behaviours that ran."""
@@ -252,6 +284,9 @@ class Orders:
     async def translated(self, words: str, refused: GoalRefused) -> Understood:
         """What components take words to mean that match no phrase. Raises `GoalRefused`."""
 
+        if self.mind.composition is None:
+            raise refused
+
         def composition() -> Composition:
             assert self.mind.composition is not None, "there is always another one"
             return self.mind.composition
@@ -263,6 +298,23 @@ class Orders:
             composition,
             deadline_s=self.translate_s,
         )
+
+    def _row(self, given: GivenGoal) -> Row:
+        return own_goal_row({**given.to_dict(), "holds": False}, self.catalogue.snapshot().host)
+
+    def _kept(self, words: str, priority: int, refused: GoalRefused, arguments: Arguments) -> Row:
+        """Keep words that mean nothing yet, where that is asked for. Raises `GoalRefused`."""
+        snapshot, is_kept = self.catalogue.snapshot(), arguments.flag("keep")
+        coming = coming_in(snapshot)
+        if refused.code not in NOT_YET or not (is_kept or coming):
+            raise refused
+        if not is_kept and not arguments.flag("wait"):
+            told = f"nothing here understands {words!r} yet: {coming}"
+            fix = "ask again in a moment, or have the words kept: `nondum goal --keep WORDS`"
+            raise GoalRefused(Problem("PHRASE_EARLY", told, fix=fix)) from refused
+        given = self.mind.keep(words, priority=priority, reason=why_kept(snapshot))
+        self.goal_files().keep(given, is_translated=arguments.flag("yes"), while_coming=not is_kept)
+        return self._row(given)
 
     def _is_kept(self, given: GivenGoal, snapshot: Snapshot) -> bool:
         """Whether a goal would survive the daemon, or has no need to."""

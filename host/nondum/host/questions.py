@@ -15,6 +15,7 @@ from nondum.host.catalogue.records import Moment, PayloadRecord, Step
 from nondum.host.confinement.level import Standing
 from nondum.host.control.arguments import Arguments
 from nondum.host.devices import view
+from nondum.host.elsewhere import Elsewhere
 from nondum.host.feedback.state import NOTHING
 from nondum.host.machine import Machine
 from nondum.host.mind.mind import Mind
@@ -28,6 +29,7 @@ from nondum.host.rows import (
     input_row,
     journal_row,
     offered_row,
+    own_goal_row,
     payload_row,
     peers_device_row,
     problems_of,
@@ -72,6 +74,8 @@ class Questions:
     """What people without a screen are shown."""
     trusted: Callable[[], Row | None] = lambda: None
     """The active trust file, in a few words; None: there is none."""
+    elsewhere: Elsewhere | None = None
+    """The other hosts, if this one has to do with any."""
 
     machine: Callable[[], Machine] = Machine
     """Looks at the machine that this host runs on; blocks."""
@@ -177,8 +181,12 @@ class Questions:
         return self.mind.views.fact(arguments.text("fact"))
 
     async def goals(self, arguments: Arguments) -> Row:
-        """What can be asked for, and what was."""
-        return await asyncio.to_thread(self.mind.views.goals())
+        """What can be asked for, and what was: `given` here, `elsewhere` to peers, by `host`."""
+        view = await asyncio.to_thread(self.mind.views.goals())
+        host = self.catalogue.snapshot().host
+        elsewhere = self.elsewhere.given() if self.elsewhere else []
+        own = [own_goal_row(row, host) for row in view["given"]]
+        return {**view, "given": own, "elsewhere": elsewhere}
 
     async def plan(self, arguments: Arguments) -> Row:
         """The plan that is carried out."""
@@ -307,14 +315,22 @@ class Questions:
             await asyncio.sleep(LOOK_S)
 
     async def follow_goal(self, arguments: Arguments) -> AsyncIterator[Row]:
-        """A goal, now and whenever the host looks different. Raises `GoalRefused`."""
+        """A goal, of this host or of the peer `host`, now and whenever it looks different.
+
+        Raises `GoalRefused`.
+        """
         id, version = arguments.text("id"), -1
+        own, host = self.catalogue.snapshot().host, arguments.optional_text("host")
+        if self.elsewhere is not None and host not in (None, own):
+            async for row in self.elsewhere.follow(host, id):
+                yield row
+            return
         while True:
             version = await self.mind.changed(version)
             given = next((row for row in self.mind.views.given() if row["id"] == id), None)
             if given is None:
                 raise GoalRefused(Problem("GOAL_UNKNOWN", f"there is no goal {id!r}"))
-            yield given
+            yield own_goal_row(given, own)
 
     async def follow_tree(self, arguments: Arguments) -> AsyncIterator[Row]:
         """The tree, now and whenever it looks different."""

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 from nondum.host.catalogue.records import (
     ComponentRecord,
     DriveRecord,
+    DriveState,
     JournalEntry,
     PayloadRecord,
     PeerComponent,
@@ -43,6 +44,31 @@ def host_state(snapshot: Snapshot, places: Mapping[str, str]) -> str:
 def is_at_rest(payload: PayloadRecord) -> bool:
     """Whether nothing is being done for a payload."""
     return payload.step in _AT_REST
+
+
+def own_goal_row(row: Row, host: str) -> Row:
+    """A goal of this host; rows of goals that were given to peers say that they are elsewhere."""
+    return {**row, "host": host, "is_elsewhere": False}
+
+
+def coming_in(snapshot: Snapshot) -> str:
+    """What is being brought in: "3 payloads are still being installed". Empty: nothing."""
+    payloads = sum(
+        not is_at_rest(payload) and payload.step is not Step.REMOVING
+        for payload in snapshot.payloads
+    )
+    drives = sum(drive.state is DriveState.READING for drive in snapshot.drives)
+    parts = (
+        _counted(payloads, "payload", "still being installed"),
+        _counted(drives, "drive", "still being read"),
+    )
+    return " and ".join(filter(None, parts))
+
+
+def _counted(number: int, noun: str, doing: str) -> str:
+    if not number:
+        return ""
+    return f"1 {noun} is {doing}" if number == 1 else f"{number} {noun}s are {doing}"
 
 
 def gone_back(snapshot: Snapshot) -> Iterator[PayloadRecord]:

@@ -57,6 +57,7 @@ def answering(
         "logs": questions.logs,
         "mount": orders.mount,
         "plan": questions.plan,
+        "resume": orders.resume,
         "retry": orders.retry,
         "say": orders.say,
         "status": questions.status,

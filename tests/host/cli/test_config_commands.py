@@ -59,6 +59,40 @@ def test_file_that_is_right_is_said_to_be(tmp_path: Path) -> None:
     assert "by default" in nondum("config", "check", "--user").ok().out
 
 
+def test_key_that_has_no_effect_while_peers_are_off_is_warned_of(tmp_path: Path) -> None:
+    file = written(tmp_path, '[peers]\nenabled = false\nstatic = ["10.0.0.7"]\n')
+    told = nondum("config", "check", "--json", file).ok().json
+    assert [(warning["code"], warning["where"]) for warning in told["warnings"]] == [
+        ("CONFIG_UNUSED", f"{file}:3")
+    ]
+    done = nondum("config", "check", file)
+    assert done.code == 0
+    assert f"CONFIG_UNUSED {file}:3" in done.err
+    assert "is right" in done.out
+
+
+@pytest.mark.parametrize(
+    ("text", "arguments", "is_on"),
+    [
+        ("", (), False),
+        ("[peers]\nplace = false\n", (), False),
+        ("", ("--peer", "10.0.0.7"), True),
+        ('[peers]\nstatic = ["10.0.0.7"]\n', (), True),
+        ('[peers]\nlisten = ["tcp://*:7500"]\n', (), True),
+        ("[peers]\ndevelopment = true\n", (), True),
+        ('[router]\nendpoints = ["tcp/10.0.0.1:7447"]\n', (), True),
+        ('[peers]\nenabled = false\nstatic = ["10.0.0.7"]\n', (), False),
+    ],
+)
+def test_host_of_a_user_has_peers_where_somebody_says_how_they_are_reached(
+    text: str, arguments: tuple[str, ...], is_on: bool, tmp_path: Path
+) -> None:
+    file = written(tmp_path, text)
+    shown = nondum("config", "show", "--user", "--config", file, *arguments, "--json").ok().json
+    found = {row["key"]: row["value"] for row in shown["settings"]}
+    assert found["peers.enabled"] is is_on
+
+
 def test_every_key_is_shown_with_who_says_it(tmp_path: Path) -> None:
     file = written(
         tmp_path,

@@ -51,7 +51,7 @@ ROWS: dict[str, set[str]] = {
     "units": {"unit", "type", "component", "ready", "xyz", "rpy", "mount", "warnings"},
 }
 VIEWS: dict[str, set[str]] = {
-    "goals": {"can", "phrases", "given", "problems"},
+    "goals": {"can", "phrases", "given", "elsewhere", "problems"},
     "plan": {"goal", "kind", "steps"},
     "status": {
         "host",

@@ -48,6 +48,25 @@ def test_newest_wish_to_maintain_wins(queue: GoalQueue) -> None:
     assert wanted(queue) == "2"
 
 
+def test_words_that_are_kept_wait_and_count_as_given_when_they_were_said(queue: GoalQueue) -> None:
+    kept = queue.keep("follow me")
+    later = give(queue, "maintain")
+    assert wanted(queue) == later
+    queue.give("follow me", "(followed)", "maintain", id=kept.id)
+    assert [goal.id for goal in queue] == [kept.id, later]
+    assert wanted(queue) == later
+    queue.put(later, GoalState.HALTED)
+    assert wanted(queue) == kept.id
+
+
+def test_goals_that_people_gave_can_be_resumed_while_they_are_halted(queue: GoalQueue) -> None:
+    ours, payloads = give(queue), queue.give("words", "(goal)", "achieve", id="org.example/1").id
+    assert not queue[ours].is_resumable
+    for id in (ours, payloads):
+        queue.put(id, GoalState.HALTED)
+    assert (queue[ours].is_resumable, queue[payloads].is_resumable) == (True, False)
+
+
 def test_suspended_goal_waits_for_something_new(queue: GoalQueue) -> None:
     first = give(queue, priority=1)
     give(queue)

@@ -60,3 +60,12 @@ async def test_words_that_are_not_taken_become_no_goal(
         goals.serve_give(asked(words))
     with pytest.raises(CallFailed, match=code):
         await goals.serve_ask(asked(words))
+
+
+@pytest.mark.parametrize("priority", [1001, -1001, True, "1", 1.5])
+async def test_goal_of_no_priority_that_there_is_is_refused(priority: Any) -> None:
+    goals = Goals("mule", no_mind, Nobody(), lambda: (), no_stop, accepts=True)
+    errand = asked("blink")
+    errand.args["priority"] = priority
+    with pytest.raises(CallFailed, match="CALL_MALFORMED"):
+        goals.serve_give(errand)

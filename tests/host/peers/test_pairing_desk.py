@@ -163,6 +163,23 @@ async def test_host_that_is_not_the_named_one_is_not_compared(pair: tuple[Host, 
     assert all(row["step"] == "waiting" for row in asked.rows)
 
 
+async def test_host_with_the_name_of_a_paired_one_is_refused_until_that_is_forgotten(
+    pair: tuple[Host, Host],
+) -> None:
+    rover, base = pair
+    before = HostKeys.generate().public
+    await rover.keeper.pair(before, "base")
+    rover.begins()
+    base.begins()
+    for one in pair:
+        assert (await one.sees("failed"))["problem"]["code"] == "PAIRING_NAME"
+        await one.leaves()
+    await rover.keeper.forget(before)
+    rover.begins()
+    base.begins()
+    await rover.sees("comparing")
+
+
 async def test_revoked_host_is_no_candidate(pair: tuple[Host, Host]) -> None:
     asking, asked = sorted(pair, key=lambda one: one.keeper.key)
     await asked.keeper.revoke(asking.keeper.key, "stolen")

@@ -69,6 +69,18 @@ def test_the_own_echo_is_nothing_and_another_life_under_the_own_key_is_a_problem
     assert "tcp://10.0.0.9:7410" in problem.message
 
 
+def test_without_keys_another_host_of_the_own_name_is_told_as_that() -> None:
+    own = PeerKey("development:rover")
+    here = HintBook(own, 1, lambda _: False, 0.0)
+    here.add(Hint(own, "rover", 2, ("tcp://127.0.0.1:7411",), Source.STATIC), 0.0)
+    problem = here.problem()
+    assert problem is not None
+    assert (problem.code, problem.where) == ("PEER_NAME_TAKEN", "rover")
+    assert "key" not in problem.fix
+    here.remove(own, Source.STATIC)
+    assert here.problem() is None
+
+
 def test_ten_thousand_invented_hosts_push_out_nobody_who_matters() -> None:
     here = book("friend")
     here.add(hint("friend"), 0.0)

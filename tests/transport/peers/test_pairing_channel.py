@@ -122,7 +122,9 @@ class End:
 
 @contextlib.asynccontextmanager
 async def end(
-    me: Identity | str, is_wanted: Callable[[PeerKey, str], bool] = lambda key, name: True
+    me: Identity | str,
+    is_wanted: Callable[[PeerKey, str], bool] = lambda key, name: True,
+    holder: Callable[[str], PeerKey | None] = lambda name: None,
 ) -> AsyncIterator[End]:
     """A host whose person has opened the window."""
     me = identity(me) if isinstance(me, str) else me
@@ -130,6 +132,7 @@ async def end(
         me,
         lambda state: found.hear(state),
         is_wanted=is_wanted,
+        holder=holder,
         on_refusal=lambda refusal: found.refused.put_nowait(refusal),
     )
     found = End(me, host)
@@ -319,6 +322,100 @@ async def test_window_closes_by_itself(
         await clock.advance(0.5)
         assert await rover.fails() == await base.fails() == "PAIRING_OVER"
         await refuses_connections(base.port)
+
+
+@pytest.mark.parametrize(
+    ("who_says_yes", "here", "there"),
+    [
+        ("nobody", "here or at base", "here or at rover"),
+        ("here", "no one at base", "and no one at this host"),
+    ],
+)
+async def test_end_of_the_window_tells_who_did_not_answer(
+    who_says_yes: str, here: str, there: str, clock: VirtualClock
+) -> None:
+    async with end("rover") as rover, end("base") as base:
+        await compared(rover, base)
+        if who_says_yes == "here":
+            rover.says_yes()
+            await clock.advance(channel.BEAT_S)
+        await clock.advance(pairing.WINDOW_S)
+        for one, told in ((rover, here), (base, there)):
+            problem = (await one.sees(Failed)).problem
+            assert problem.code == "PAIRING_OVER" and told in problem.message
+
+
+async def test_yes_holds_until_the_end_of_the_window(clock: VirtualClock) -> None:
+    """People take their time: what both hosts send meanwhile to learn of each other is no flood."""
+    async with end("rover") as rover, end("base") as base:
+        await compared(rover, base)
+        rover.says_yes()
+        await clock.advance(pairing.WINDOW_S - 1)
+        base.says_yes()
+        assert await rover.sees(Agreed) == Agreed(base.key, "base")
+        assert await base.sees(Agreed) == Agreed(rover.key, "rover")
+        assert not [s for s in (*rover.states, *base.states) if getattr(s, "problem", None)]
+
+
+async def test_yes_holds_for_a_later_try_with_the_same_host() -> None:
+    keys = HostKeys.generate()
+    async with end("rover") as rover:
+        async with end(Identity("base", keys)) as base:
+            first, _ = await compared(rover, base)
+            rover.says_yes()
+            port = base.port
+        gone = await rover.gives_up("PAIRING_OVER")
+        assert gone.problem is not None and "no one there had said yes" in gone.problem.message
+        async with end(Identity("base", keys)) as base:
+            rover.host.ask(keys.public, [f"tcp://127.0.0.1:{port}", base.address])
+            shown = await base.sees(Comparing)
+            assert shown.code != first.code
+            again = await rover.sees(Comparing, lambda state: state.code == shown.code)
+            assert again.is_confirmed
+            assert not isinstance(base.host.state, Agreed)
+            base.says_yes()
+            assert await rover.sees(Agreed) == Agreed(keys.public, "base")
+            await base.sees(Agreed)
+
+
+async def test_yes_to_one_host_is_none_to_another() -> None:
+    async with end("rover") as rover:
+        async with end("base") as base:
+            await compared(rover, base)
+            rover.says_yes()
+        await rover.gives_up("PAIRING_OVER")
+        async with end("base") as other:
+            rover.asks(other)
+            met = await rover.sees(Comparing, lambda state: state.key == other.key)
+            assert not met.is_confirmed
+
+
+async def test_hosts_of_one_name_are_refused_and_both_told() -> None:
+    async with end("rover") as asking, end("rover") as asked:
+        asking.asks(asked)
+        for one in (asking, asked):
+            problem = (await one.sees(Failed)).problem
+            assert (problem.code, problem.where) == ("PAIRING_NAME", "rover")
+            assert "name" in problem.fix
+        assert not any(isinstance(state, Comparing) for state in (*asking.states, *asked.states))
+
+
+@pytest.mark.parametrize("who", ["asking", "answering"])
+async def test_host_of_a_name_that_is_known_already_is_refused_and_both_told(who: str) -> None:
+    known = HostKeys.generate().public
+    async with end("rover", holder={"base": known}.get) as rover, end("base") as base:
+        rover.asks(base) if who == "asking" else base.asks(rover)
+        problem = (await rover.sees(Failed)).problem
+        assert (problem.code, problem.have) == ("PAIRING_NAME", fingerprint(base.key))
+        assert fingerprint(known) in problem.fix
+        assert (await base.sees(Failed)).problem.code == "PAIRING_NAME"
+
+
+async def test_host_that_is_known_may_be_paired_again() -> None:
+    me = identity("base")
+    async with end("rover", holder=lambda name: me.key) as rover, end(me) as base:
+        here, there = await compared(rover, base)
+        assert here.code == there.code
 
 
 async def test_end_of_the_window_tells_why_nobody_was_reached(clock: VirtualClock) -> None:

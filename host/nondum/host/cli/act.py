@@ -13,6 +13,8 @@ from nondum.host.cli.failure import EXIT_REFUSED
 from nondum.planning.stop_words import STOPS
 from nondum.sdk.errors import GoalRefused, Problem
 
+_NOT_HAD = ("suspended", "halted", "unknown")
+"""States of a goal that is not had as things are; of a peer that is gone, it is unknown."""
 _TRIPLE = (float, float, float)
 
 
@@ -29,6 +31,14 @@ _TRIPLE = (float, float, float)
 )
 @click.option("--yes", is_flag=True, help="Take a component's translation without asking.")
 @click.option("--wait", is_flag=True, help="Until it is reached, is held, or has no plan.")
+@click.option("--keep", is_flag=True, help="Keep words that mean nothing yet until they do.")
+@click.option(
+    "--resume",
+    "resumed",
+    metavar="ID",
+    shell_complete=complete.halted_ids,
+    help="Take up a goal again that was halted.",
+)
 @json_option
 @click.pass_obj
 def goal(
@@ -39,25 +49,47 @@ def goal(
     priority: int,
     yes: bool,
     wait: bool,
+    keep: bool,
+    resumed: str | None,
 ) -> int:
     """Give the robot a goal, in words or in PDDL.
 
     `nondum goals` says which words are understood now. Others may be translated by a component:
-    what it understood is shown, and given only once it is confirmed. With --wait, exits with 1 when
-    there is no plan; the goal then waits for what is missing, until it is halted.
+    what it understood is shown, and given only once it is confirmed. Words that a peer can have and
+    this host cannot, or that begin with its name, are given to the peer.
+
+    Words that mean nothing yet, since their payload is still being brought in, are kept with --keep
+    and given once they do; with --wait, while anything is being brought in. With --wait, exits with
+    1 when there is no plan; the goal then waits for what is missing, until it is halted.
 
     \b
     Examples: nondum goal follow me through the facility
               nondum goal --pddl "(reported person self)" --wait
+              nondum goal alpha, follow me
+              nondum goal --resume 3
     """
+    if resumed is not None:
+        if words or pddl is not None:
+            raise click.UsageError("--resume takes up a goal that was given: give no other")
+        return _shown(session, session.ask("resume", id=resumed), wait=wait)
     if bool(words) == (pddl is not None):
         raise click.UsageError("give the goal in words, or with --pddl")
     if maintain and pddl is None:
         raise click.UsageError("--maintain is of use with --pddl only: words say it themselves")
+    if keep and pddl is not None:
+        raise click.UsageError("--keep is of use with words only")
     kind = "maintain" if maintain else None
     said = " ".join(words) or None
     given = session.ask(
-        "goal", timeout_s=None, words=said, pddl=pddl, kind=kind, priority=priority, yes=yes
+        "goal",
+        timeout_s=None,
+        words=said,
+        pddl=pddl,
+        kind=kind,
+        priority=priority,
+        yes=yes,
+        keep=keep,
+        wait=wait,
     )
     if "stopped" in given:
         _show_stopped(session, given["stopped"])
@@ -69,13 +101,17 @@ def goal(
         given = _confirmed(session, said or "", given["understood"], priority)
     elif "understood" in given and not session.as_json:
         render.sentence(_understood(given["understood"]))
+    return _shown(session, given, wait=wait)
+
+
+def _shown(session: Session, given: dict[str, Any], *, wait: bool) -> int:
     if wait:
         given = _settled(session, given)
     if session.as_json:
         render.as_json(given)
     else:
         _show_goal(given)
-    return EXIT_REFUSED if given["state"] in ("suspended", "halted") else 0
+    return EXIT_REFUSED if given["state"] in _NOT_HAD else 0
 
 
 @click.command()
@@ -125,14 +161,16 @@ def _understood(understood: dict[str, Any]) -> str:
 
 def _settled(session: Session, given: dict[str, Any]) -> dict[str, Any]:
     latest = given
-    for latest in session.follow("follow_goal", id=given["id"]):
-        if latest["holds"] or latest["state"] in ("suspended", "halted"):
+    for latest in session.follow("follow_goal", id=given["id"], host=given.get("host")):
+        if latest["holds"] or latest["state"] in _NOT_HAD:
             break
     return latest
 
 
 def _show_goal(given: dict[str, Any]) -> None:
-    line = f"goal {given['id']}  {given['goal']}  {given['state']}  {given['reason']}"
+    of = f" of {given['host']}" if given.get("is_elsewhere") else ""
+    goal = given["goal"] or given["text"]
+    line = f"goal {given['id']}{of}  {goal}  {given['state']}  {given['reason']}"
     render.sentence(line.rstrip())
     for problem in given["problems"]:
         fix = f" → {problem['fix']}" if problem.get("fix") else ""
@@ -188,7 +226,7 @@ def _show_stopped(session: Session, halted: dict[str, Any]) -> None:
         render.sentence(behaviour, mark="halting ")
     for peer in halted["peers"]:
         click.echo(f"{peer} has stopped")
-    if not halted["goals"] and not halted["halted"]:
+    if not any(halted[what] for what in ("goals", "halted", "peers")):
         click.echo("nothing was asked for, nothing was running")
 
 

@@ -42,6 +42,12 @@ def goal_ids(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[Co
     return list(_items(pairs, incomplete))
 
 
+def halted_ids(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Completes ids of goals that can be resumed."""
+    given = _rows((_asked(ctx, "goals") or {}).get("given"))
+    return list(_items([(r["id"], r["text"]) for r in given if r["resumable"]], incomplete))
+
+
 def goal_words(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Completes the next word of what can be asked for now."""
     said = [word.lower() for word in ctx.params.get("words") or ()]

@@ -15,7 +15,14 @@ from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.failure import EXIT_PROBLEMS, tell_problem
 from nondum.host.cli.table import table
 from nondum.host.configuration import reference
-from nondum.host.configuration.effective import Asked, as_toml, effective, file_of, settings
+from nondum.host.configuration.effective import (
+    Asked,
+    as_toml,
+    effective,
+    file_of,
+    remarks,
+    settings,
+)
 from nondum.sdk.errors import ConfigRefused
 
 _F = TypeVar("_F", bound=Callable[..., Any])
@@ -75,7 +82,7 @@ def config() -> None:
 def check(session: Session, file: Path | None, user: bool) -> int:
     """Tell all that is wrong with a configuration file. Exits with 3 when something is.
 
-    Without FILE, it is the one that the service reads.
+    Keys without effect are warned of. Without FILE, it is the one that the service reads.
 
     \b
     Examples: nondum config check
@@ -86,6 +93,7 @@ def check(session: Session, file: Path | None, user: bool) -> int:
     try:
         chosen = effective(asked)
         _see_system_tree(chosen.host.system_tree)
+        warnings = tuple(remarks(asked))
     except ConfigRefused as refused:
         if session.as_json:
             told = [problem.to_dict() for problem in refused.problems]
@@ -95,8 +103,12 @@ def check(session: Session, file: Path | None, user: bool) -> int:
                 tell_problem(problem)
         return EXIT_PROBLEMS
     if session.as_json:
-        render.as_json({"ok": True, "file": str(read) if read else None, "problems": []})
+        told = [problem.to_dict() for problem in warnings]
+        file_read = str(read) if read else None
+        render.as_json({"ok": True, "file": file_read, "problems": [], "warnings": told})
     else:
+        for problem in warnings:
+            tell_problem(problem, as_warning=True)
         said = f"{read} is right" if read else "there is no file: all is as by default, and right"
         click.echo(said)
     return 0

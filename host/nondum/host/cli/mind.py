@@ -117,7 +117,8 @@ def goals(session: Session, follow: bool) -> None:
     """What can be asked for now, and what was.
 
     NOW says whether it holds, can be had as far as anyone can see, or cannot, and then what is
-    missing; FROM names the components that brought the words.
+    missing; FROM names the components that brought the words. Of goals that were given to peers,
+    HOST says whose they are.
 
     \b
     Examples: nondum goals
@@ -141,7 +142,15 @@ def _show_goals(view: dict[str, Any]) -> None:
         render.sentence(problem, colour="red")
     click.echo()
     columns = ["id", "text", "goal", "kind", "state", "reason"]
-    table(view["given"], columns, empty="no goal was given")
+    if view["elsewhere"]:
+        columns.insert(1, "host")
+    given = [{**row, "reason": _reason(row)} for row in (*view["given"], *view["elsewhere"])]
+    table(given, columns, empty="no goal was given")
+
+
+def _reason(row: dict[str, Any]) -> str:
+    how = f"to go on: nondum goal --resume {row['id']}" if row["resumable"] else ""
+    return "; ".join(filter(None, (row["reason"], how)))
 
 
 def _outlook(row: dict[str, Any]) -> str:

@@ -100,6 +100,8 @@ def _show(session: Session, rows: _Rows, row: Row, last: Row) -> None:
             else:
                 click.echo(f'to say yes: nondum peers pair --yes-code "{row["code"]}"')
         case "confirmed":
+            if last.get("code") != row["code"]:  # the other host came back, and knows no yes yet
+                _show_code(row)
             render.sentence(f"waiting for the person at {row['name']} to say yes")
 
 

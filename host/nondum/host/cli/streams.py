@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nondum.host.cli import complete, render
+from nondum.host.cli.body import show
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.table import cell, table
 from nondum.host.printable import printable

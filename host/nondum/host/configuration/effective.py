@@ -12,6 +12,7 @@ from typing import Any
 from nondum.host import config as host_config
 from nondum.host.config import HostConfig
 from nondum.host.configuration.places import Places
+from nondum.sdk.errors import Problem
 from nondum.wheelhouse.confinement import Level
 
 
@@ -78,6 +79,19 @@ def settings(asked: Asked) -> Iterator[Setting]:
         if places is not None and places.has(section, key):
             origin = places.of(section, key)
         yield Setting(section, key, value, said.get((section, key), origin))
+
+
+def remarks(asked: Asked) -> Iterator[Problem]:
+    """What is right and of no effect. Raises `ConfigRefused` like `effective`."""
+    chosen, file = effective(asked), file_of(asked)
+    if file is None or chosen.peers.enabled:
+        return
+    places = Places(str(file), host_config.read(file))
+    for key in host_config.REACHED_BY:
+        if places.has("peers", key):
+            told = f"[peers] {key} has no effect, for peers are off"
+            where, fix = places.of("peers", key), "set `enabled = true` under [peers]"
+            yield Problem("CONFIG_UNUSED", told, where=where, fix=fix)
 
 
 def plain(value: Any) -> Any:

@@ -10,6 +10,7 @@ from nondum.host.catalogue.records import GoalRecord
 from nondum.planning.goal import GoalKind
 from nondum.sdk.errors import GoalRefused, Problem
 
+HIGHEST_PRIORITY = 1000
 MAX_ENDED = 50
 """How many ended goals are remembered."""
 
@@ -17,6 +18,8 @@ MAX_ENDED = 50
 class GoalState(Enum):
     """Where a goal is."""
 
+    KEPT = "kept"
+    """Its words mean nothing yet; they are tried again whenever a payload has come."""
     QUEUED = "queued"
     """Waits for its turn, or for its first plan."""
     ACTIVE = "active"
@@ -42,6 +45,7 @@ class GivenGoal:
     text: str
     """As the person gave it: words or PDDL."""
     pddl: str
+    """Empty: the words mean nothing yet."""
     kind: GoalKind
     priority: int
     number: int
@@ -58,12 +62,18 @@ class GivenGoal:
             "id": self.id,
             "goal": self.pddl,
             "text": self.text,
-            "kind": self.kind,
+            "kind": self.kind if self.pddl else "",
             "priority": self.priority,
             "state": self.state.value,
             "reason": self.reason,
             "problems": [problem.to_dict() for problem in self.problems],
+            "resumable": self.is_resumable,
         }
+
+    @property
+    def is_resumable(self) -> bool:
+        """Whether a person can have it taken up again; payloads bring theirs again themselves."""
+        return self.state is GoalState.HALTED and "/" not in self.id
 
 
 def _number(id: str) -> int:
@@ -100,13 +110,30 @@ class GoalQueue:
     def give(
         self, text: str, pddl: str, kind: GoalKind, *, priority: int = 0, id: str = ""
     ) -> GivenGoal:
-        """Add a goal; with an `id` of its own it takes the place of the one before of that id."""
+        """Add a goal; with an `id` of its own it takes the place of the one before of that id.
+
+        What was kept counts as given when its words were said.
+        """
+        before = self._goals.get(id)
+        if before is not None and before.state is GoalState.KEPT:
+            goal = replace(before, text=text, pddl=pddl, kind=kind, state=GoalState.QUEUED)
+            self._goals[id] = goal = replace(goal, priority=priority, reason="", problems=())
+            return goal
         self._given += 1
         goal = GivenGoal(id or str(self._given), text, pddl, kind, priority, self._given)
         self._goals.pop(goal.id, None)
         self._goals[goal.id] = goal
         self._forget_oldest()
         return goal
+
+    def keep(self, words: str, *, priority: int = 0, reason: str = "") -> GivenGoal:
+        """Keep words that mean nothing yet, for a reason."""
+        self._given += 1
+        id = str(self._given)
+        self._goals[id] = GivenGoal(
+            id, words, "", "achieve", priority, self._given, GoalState.KEPT, reason
+        )
+        return self._goals[id]
 
     def restore(self, goals: Iterable[GoalRecord]) -> tuple[GivenGoal, ...]:
         """Take up the goals of an earlier run, under their ids; none that is here already."""
@@ -127,6 +154,7 @@ class GoalQueue:
             goal
             for goal in self._goals.values()
             if not goal.state.is_final
+            and goal.state is not GoalState.KEPT
             and (goal.state is not GoalState.SUSPENDED or is_worth_a_try(goal))
         ]
         return min(candidates, key=urgency, default=None)

@@ -152,6 +152,33 @@ class Mind:
         self.wake()
         return given
 
+    def keep(self, words: str, *, priority: int = 0, reason: str = "") -> GivenGoal:
+        """Keep words that mean nothing yet, as a goal that can be halted like any other.
+
+        Whoever keeps them gives them under their id once they mean something.
+        """
+        given = self.queue.keep(words, priority=priority, reason=reason)
+        self.people.tell(f"{words!r} is kept until it means something: that is goal {given.id}")
+        self.wake()
+        return given
+
+    def resume(self, id: str) -> GivenGoal:
+        """Take up a halted goal again, under its id, as the newest.
+
+        Raises `GoalRefused` (GOAL_UNKNOWN, GOAL_NOT_HALTED, or as when it is given).
+        """
+        goal = self.queue[id]
+        if not goal.is_resumable:
+            told = f"goal {id} is {goal.state.value}"
+            known = ", ".join(one.id for one in self.queue if one.is_resumable) or "none"
+            fix = f"goals that can be resumed: {known}"
+            raise GoalRefused(Problem("GOAL_NOT_HALTED", told, where=goal.text, fix=fix))
+        if not goal.pddl:  # it was kept, and has never meant anything
+            return self.give(words=goal.text, priority=goal.priority, id=id)
+        return self.give(
+            pddl=goal.pddl, kind=goal.kind, priority=goal.priority, said=goal.text, id=id
+        )
+
     def restore(self, goals: Iterable[GoalRecord]) -> None:
         """Go on with what an earlier run of the host had not done."""
         for goal in self.queue.restore(goals):

@@ -6,6 +6,7 @@ import asyncio
 import dataclasses
 
 from nondum.host.config import PeersSection
+from nondum.sdk.errors import Problem
 from nondum.transport.discovery import Announcement, Discovery, DiscoveryStatus, Hint
 from nondum.transport.fleet import Mesh
 from nondum.transport.peers import PeerRefused
@@ -44,6 +45,11 @@ class PeerFinder:
     def status(self) -> DiscoveryStatus:
         """What was announced and heard."""
         return self._discovery.status()
+
+    @property
+    def identity_problem(self) -> Problem | None:
+        """What a person must know of another host under this one's key or name."""
+        return self._discovery.identity_problem
 
     @property
     def hints(self) -> tuple[Hint, ...]:

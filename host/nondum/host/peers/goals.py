@@ -1,4 +1,4 @@
-"""Whose goal it is what a person said: this host's, or that of the one peer that can have it.
+"""Whose goal it is what a person said or typed: this host's, or that of the one peer that can.
 
 A compute node hears "search for people" and cannot go anywhere; the robot beside it can. Words that
 begin with a host's name are that host's, whatever others could do.
@@ -7,14 +7,18 @@ begin with a host's name are that host's, whatever others could do.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping, Sequence
+import contextlib
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from typing import Any
 
-from nondum.host.events import Event, GoalEnded, GoalReached, PlanMissing
+from nondum.host.events import Event, GoalEnded, GoalReached, PeerLeft, PlanMissing
+from nondum.host.mind.goals import HIGHEST_PRIORITY
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.offers import prospect
+from nondum.host.peers.given_away import GivenAway, standing
 from nondum.host.peers.remote_calls import Reaches
 from nondum.host.printable import printable
+from nondum.host.rows import Row
 from nondum.host.stopping import Stopped
 from nondum.planning.pattern import words_of
 from nondum.planning.stop_words import STOPS, is_stop
@@ -47,6 +51,8 @@ class Goals:
         self._accepts = accepts
         self._givers: dict[str, str] = {}
         """Goal → the peer that gave it."""
+        self._away = GivenAway()
+        self._telling: asyncio.Task[None] | None = None
 
     # What is heard here
 
@@ -58,16 +64,48 @@ class Goals:
         """
         if is_stop(words):
             return str(await self.stop_all())
-        addressed, rest = addressed_to(words, (self._host, *self._peers()))
-        if addressed == self._host and is_stop(rest):
+        peer, rest = await self.whose(words)
+        if peer is not None:
+            given = await self.give(peer, rest)
+            stopped = f"{peer} has stopped"
+            return stopped if "stopped" in given else f"that is goal {given['id']} of {peer}"
+        if is_stop(rest):
             return str(self._stop())
-        if addressed == self._host:
-            return self._given_here(rest)
+        return f"that is goal {self._mind().give(words=rest).id}"
+
+    async def whose(self, words: str) -> tuple[str | None, str]:
+        """The peer whose goal words are, None for this host; and the words without its name.
+
+        Raises `GoalRefused` (WHOSE_GOAL).
+        """
+        addressed, rest = addressed_to(words, (self._host, *self._peers()))
         if addressed is not None:
-            return await self._given_to(addressed, rest)
-        if not self._peers() or await self._prospect(words) == "can":
-            return self._given_here(words)
-        return await self._given_to_whoever_can(words)
+            return (None if addressed == self._host else addressed), rest
+        if not self._peers() or await self._prospect(words) in ("can", "holds"):
+            return None, words
+        return await self._able(words), words
+
+    async def give(self, peer: str, words: str, priority: int = 0) -> Row:
+        """Give a peer a goal: its row; or that it has `stopped`.
+
+        Raises `GoalRefused`, as the peer refuses it.
+        """
+        args = {"words": words, "priority": priority}
+        try:
+            given = await self._reach.call(peer, "goal.give", args, deadline_s=ASK_S)
+        except NondumError as error:
+            raise GoalRefused(*error.problems) from error
+        if "stopped" in given:
+            return {"stopped": Stopped((), (), (peer,)).to_dict()}
+        return self._away.add(peer, words, priority, given)
+
+    def given(self) -> list[Row]:
+        """The goals that were given to peers, as they were last heard of."""
+        return self._away.rows()
+
+    def follow(self, peer: str, id: str) -> AsyncIterator[Row]:
+        """One of them, now and whenever there is news of it. Raises `GoalRefused`."""
+        return self._away.follow(peer, id)
 
     async def stop_all(self) -> Stopped:
         """Stop this host at once, and then its peers: who says stop does not know who acts."""
@@ -77,24 +115,25 @@ class Goals:
 
     async def _stopped(self, peer: str) -> bool:
         try:
-            await self._given_to(peer, STOPS[0])
+            await self.give(peer, STOPS[0])
         except GoalRefused as refused:
             self._mind().people.tell(f"{peer} was not stopped: {refused.problems[0]}")
             return False
         return True
 
-    async def _given_to_whoever_can(self, words: str) -> str:
+    async def _able(self, words: str) -> str | None:
+        """The one peer that can have it; None: none can. Raises `GoalRefused` (WHOSE_GOAL)."""
         peers = self._peers()
         answers = await asyncio.gather(*(self._ask(peer, words) for peer in peers))
         for wish in ("can", "holds"):
             able = [peer for peer, now in zip(peers, answers, strict=True) if now == wish]
             if len(able) == 1:
-                return await self._given_to(able[0], words)
+                return able[0]
             if able:
                 told = f"{' and '.join(able)} could do that"
                 fix = f'say which: "{able[0]}, {words}"'
                 raise GoalRefused(Problem("WHOSE_GOAL", told, fix=fix))
-        return self._given_here(words)
+        return None
 
     async def _ask(self, peer: str, words: str) -> str:
         try:
@@ -102,19 +141,6 @@ class Goals:
             return str((await call).get("now", ""))
         except NondumError:
             return ""
-
-    async def _given_to(self, peer: str, words: str) -> str:
-        try:
-            call = self._reach.call(peer, "goal.give", {"words": words}, deadline_s=ASK_S)
-            given = await call
-        except NondumError as error:
-            raise GoalRefused(*error.problems) from error
-        if "stopped" in given:
-            return f"{peer} has stopped"
-        return f"that is goal {printable(str(given.get('goal')))} of {peer}"
-
-    def _given_here(self, words: str) -> str:
-        return f"that is goal {self._mind().give(words=words).id}"
 
     # What peers heard
 
@@ -133,14 +159,25 @@ class Goals:
             self._mind().people.tell(f"{errand.caller.name} heard {said!r}: {stopped}")
             return {"stopped": True}
         words = self._words(errand)
-        given = self._mind().give(words=words)
+        priority = _priority(errand)
+        given = self._mind().give(words=words, priority=priority)
         self._givers[given.id] = errand.caller.name
+        if self._telling is None or self._telling.done():
+            self._telling = asyncio.create_task(self._tell_givers())
         self._mind().people.tell(f"{errand.caller.name} heard {words!r}: that is goal {given.id}")
-        return {"goal": given.id, "text": given.text}
+        return {"goal": given.id, "text": given.text, "pddl": given.pddl, "kind": given.kind}
+
+    async def close(self) -> None:
+        """Tell no one any more."""
+        if self._telling is not None:
+            self._telling.cancel()
+            await asyncio.gather(self._telling, return_exceptions=True)
 
     def on_event(self, event: Event) -> None:
         """Tell those who gave a goal what became of it."""
         match event:
+            case PeerLeft(host=host):
+                self._away.lose(host)
             case GoalReached(goal):
                 self._tell_giver(goal, "is reached", is_over=True)
             case GoalEnded(goal, reason):
@@ -153,6 +190,22 @@ class Goals:
         if isinstance(text := args.get("text"), str):
             self._mind().people.tell(f"{peer}: {printable(text[:MAX_WORDS])}")
 
+    def hear_standing(self, peer: str, args: Mapping[str, Any]) -> None:
+        """A peer tells how a goal stands that was given from here."""
+        self._away.hear(peer, args)
+
+    async def _tell_givers(self) -> None:
+        """Tell how goals stand whenever that changes, as long as any is a peer's."""
+        version, told = -1, dict[str, Body]()
+        while self._givers:
+            version = await self._mind().changed(version)
+            for row in self._mind().views.given():
+                giver, now = self._givers.get(row["id"]), standing(row)
+                if giver is not None and told.get(row["id"]) != now:
+                    told[row["id"]] = now
+                    with contextlib.suppress(NondumError):  # it is gone, or busy
+                        self._reach.notify(giver, "goal.standing", now)
+
     def _tell_giver(self, goal: str, what: str, *, is_over: bool) -> None:
         giver = self._givers.get(goal)
         if giver is None:
@@ -160,10 +213,11 @@ class Goals:
         if is_over:
             del self._givers[goal]
         text = f"{self._mind().queue[goal].text!r} {what}"
-        try:
+        rows = (row for row in self._mind().views.given() if row["id"] == goal)
+        with contextlib.suppress(NondumError):  # it is gone, or busy: the goal is this host's now
             self._reach.notify(giver, "goal.news", {"text": text[:MAX_WORDS]})
-        except NondumError:
-            return  # it is gone, or busy: the goal is this host's own matter now
+            for row in rows:
+                self._reach.notify(giver, "goal.standing", standing(row))
 
     def _words(self, errand: Errand) -> str:
         words = errand.args.get("words")
@@ -185,6 +239,15 @@ class Goals:
         except GoalRefused:
             return ""
         return await asyncio.to_thread(prospect, composition, world.facts, world.bare_facts, goal)
+
+
+def _priority(errand: Errand) -> int:
+    """That of a goal that is given. Raises `CallFailed` (CALL_MALFORMED)."""
+    priority = errand.args.get("priority", 0)
+    if type(priority) is not int or abs(priority) > HIGHEST_PRIORITY:
+        most = HIGHEST_PRIORITY
+        raise CallFailed(Problem("CALL_MALFORMED", f"a priority is from -{most} to {most}"))
+    return priority
 
 
 def addressed_to(words: str, hosts: Sequence[str]) -> tuple[str | None, str]:

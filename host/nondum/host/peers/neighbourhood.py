@@ -21,6 +21,7 @@ from nondum.host.peers.compute import Compute, probed
 from nondum.host.peers.desk import Desk
 from nondum.host.peers.finder import PeerFinder
 from nondum.host.peers.goals import Goals
+from nondum.host.peers.namesakes import Namesakes
 from nondum.host.peers.offered import Policy, policy_of
 from nondum.host.peers.pairing_desk import PairingDesk
 from nondum.host.peers.peering import Peering
@@ -83,7 +84,9 @@ class Neighbourhood:
             self._own_uses,
             self._on_taken,
         )
-        self._strangers = Strangers(emit, asyncio.get_running_loop().time)
+        clock = asyncio.get_running_loop().time
+        self._strangers = Strangers(emit, clock)
+        self._namesakes = Namesakes(clock, lambda: {hint.key for hint in self._hints()})
         self.desk = Desk()
         self.desk.add("behave", self.serving.behave, self.serving.orphaned)
         self.desk.hear("values", self.serving.values)
@@ -125,6 +128,7 @@ class Neighbourhood:
                 keeper,
                 announce=self._announce_pairing,
                 candidates=self._hints,
+                known=lambda: {peer.key: peer.name for peer in self.fleet.peers.values()},
                 is_development=config.peers.development,
             ),
             self.view.known,
@@ -140,6 +144,7 @@ class Neighbourhood:
         self.desk.add("goal.ask", self.goals.serve_ask)
         self.desk.add("goal.give", self.goals.serve_give)
         self.desk.hear("goal.news", self.goals.hear_news)
+        self.desk.hear("goal.standing", self.goals.hear_standing)
         self.placement = placement
         placement.serve(self.desk)
         self._remote = RemoteCalls(self.peering, emit, self.peering.claims)
@@ -191,7 +196,9 @@ class Neighbourhood:
         """What every status says of it."""
         is_open = self.fleet.security is Security.DEVELOPMENT
         unsafe = ("peers need no keys: every host on this machine is one",) if is_open else ()
-        return (*unsafe, *map(str, self.keeper.warnings), *self._troubles)
+        own = self.finder.identity_problem if self.finder else None
+        problems = (*self.keeper.warnings, *self._namesakes.problems, *((own,) if own else ()))
+        return (*unsafe, *map(str, problems), *self._troubles)
 
     def answering(self) -> dict[str, Callable[[Arguments], Awaitable[Any]]]:
         """Verbs that answer once."""
@@ -230,6 +237,7 @@ class Neighbourhood:
     async def close(self) -> None:
         """Say goodbye; what runs for peers, and at peers, is halted."""
         await self.placement.close()
+        await self.goals.close()
         await self._remote.close()
         await self._streams.close()
         await self.fleet.close()
@@ -245,6 +253,7 @@ class Neighbourhood:
 
     def _on_fleet(self, event: FleetEvent) -> None:
         self.view.on_fleet(event)
+        self._namesakes.on_fleet(event)
         match event:
             case Refusal():
                 self._strangers.turned_away(event)

@@ -67,14 +67,16 @@ class PairingDesk:
         *,
         announce: Callable[[int | None], None],
         candidates: Callable[[], Iterable[Hint]],
+        known: Callable[[], Mapping[PeerKey, str]] = dict,
         address: str = "tcp://*:*",
         is_development: bool = False,
     ) -> None:
         """`announce` tells the network at which port this host can be asked, and when it cannot
-        any more (None); `candidates` gives what is known of others now. `address` is where to be
-        asked, as ZeroMQ binds it."""
+        any more (None); `candidates` gives what is known of others now, `known` the names of hosts
+        that are here. `address` is where to be asked, as ZeroMQ binds it."""
         self._address = address
         self._keeper, self._announce, self._candidates = keeper, announce, candidates
+        self._known = known
         self._is_development = is_development
         self._window: _Window | None = None
 
@@ -89,7 +91,9 @@ class PairingDesk:
             told = "somebody is pairing this host already"
             fix = "confirm there, or with `nondum peers pair --yes-code CODE`"
             raise PeerRefused(Problem("PAIRING_OPEN", told, fix=fix))
-        window = self._window = _Window(self._keeper, wanted, is_development=self._is_development)
+        window = self._window = _Window(
+            self._keeper, wanted, self._known, is_development=self._is_development
+        )
         try:
             self._announce(window.host.open(self._address))
             last: Row = {}
@@ -146,8 +150,15 @@ class PairingDesk:
 class _Window:
     """One window, from its opening to whom it brought."""
 
-    def __init__(self, keeper: TrustKeeper, wanted: str | None, *, is_development: bool) -> None:
-        self._keeper, self._wanted = keeper, wanted
+    def __init__(
+        self,
+        keeper: TrustKeeper,
+        wanted: str | None,
+        known: Callable[[], Mapping[PeerKey, str]],
+        *,
+        is_development: bool,
+    ) -> None:
+        self._keeper, self._wanted, self._known = keeper, wanted, known
         self._found: Mapping[PeerKey, Candidate] = {}
         self._asked: Candidate | None = None
         self._news = asyncio.Event()
@@ -156,7 +167,11 @@ class _Window:
         """As the host has it, but that whom it agreed with is first kept."""
         identity = keeper.identity(development=is_development)
         self.host = PairingHost(
-            identity, self._on_change, is_wanted=self._is_wanted, on_refusal=_log_refusal
+            identity,
+            self._on_change,
+            is_wanted=self._is_wanted,
+            holder=self._holder,
+            on_refusal=_log_refusal,
         )
 
     @property
@@ -248,6 +263,11 @@ class _Window:
             return False
         wanted = self._wanted
         return wanted is None or wanted in (name, key) or wanted.upper() == fingerprint(key)
+
+    def _holder(self, name: str) -> PeerKey | None:
+        """Who has a name already, among those that are here or paired."""
+        known = {**self._known(), **self._keeper.trust.paired}
+        return next((key for key, one in known.items() if one == name), None)
 
 
 def _candidates(hints: Iterable[Hint]) -> dict[PeerKey, Candidate]:

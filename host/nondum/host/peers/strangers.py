@@ -44,7 +44,9 @@ class Strangers:
         if len(self._known) >= MOST_KNOWN:
             del self._known[next(iter(self._known))]
         self._known[key] = None
-        who = fingerprint(PeerKey(refusal.key))
-        told = f"a host with the key {who} is not let in: {printable(refusal.told)}"
+        who, why = fingerprint(PeerKey(refusal.key)), refusal.told
+        if refusal.problem is not None:
+            why, fix = refusal.problem.message, refusal.problem.fix or fix
+        told = f"a host with the key {who} is not let in: {printable(why)}"
         problem = Problem("PEER_STRANGER", told, where=refusal.address, fix=fix)
         self._emit(PeerTurnedAway(who, (problem,)))

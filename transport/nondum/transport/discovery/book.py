@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from nondum.sdk.errors import Problem
+from nondum.transport.discovery.announcement import DEVELOPMENT
 from nondum.transport.discovery.hint import MAX_ADDRESSES, Hint, Source
 from nondum.transport.peers.keys import PeerKey, fingerprint
 from nondum.transport.token_bucket import TokenBucket
@@ -89,6 +90,8 @@ class HintBook:
 
     def remove(self, key: PeerKey, source: Source) -> Change:
         """Forget what a source said of a peer."""
+        if key == self._key and self.duplicate and self.duplicate.source is source:
+            self.duplicate = None
         by_source = self._heard.get(key, {})
         if source not in by_source:
             return Change()
@@ -104,9 +107,14 @@ class HintBook:
         other = self.duplicate
         if other is None:
             return None
+        at = ", ".join(other.addresses)
+        if self._key.startswith(DEVELOPMENT):
+            told = f"another host is called {other.name}, too, at {at}"
+            fix = "give one of the two another name, `name` under [host], and start it again"
+            return Problem("PEER_NAME_TAKEN", told, where=other.name, fix=fix)
         return Problem(
             "IDENTITY_DUPLICATE",
-            f"another host, {other.name}, has this host's key, at {', '.join(other.addresses)}",
+            f"another host, {other.name}, has this host's key, at {at}",
             where=fingerprint(self._key),
             fix="one of the two is a copy: take the key file away there, and start it anew",
         )

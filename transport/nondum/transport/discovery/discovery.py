@@ -118,6 +118,11 @@ class Discovery:
             problems=tuple(one for one in problems if one is not None),
         )
 
+    @property
+    def identity_problem(self) -> Problem | None:
+        """What a person must know of another host under this one's key or name."""
+        return self._book.problem()
+
     async def close(self) -> None:
         """Say goodbye, and let go of everything."""
         if self._again is not None:

@@ -15,7 +15,7 @@ import zmq
 
 from nondum.sdk.errors import NondumError, Problem
 from nondum.transport import tcp
-from nondum.transport.peers import pairing
+from nondum.transport.peers import pairing, pairing_problems
 from nondum.transport.peers.dial import ANSWER_S, Attempt, Dial
 from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.events import DialFailed
@@ -75,12 +75,14 @@ class PairingHost:
         on_change: Callable[[PairingState], None],
         *,
         is_wanted: Callable[[PeerKey, str], bool] = lambda key, name: True,
+        holder: Callable[[str], PeerKey | None] = lambda name: None,
         on_refusal: Callable[[Refusal], None] = lambda refusal: None,
     ) -> None:
         """`on_change` is told of every new state, the last of which is `Agreed` or `Failed`, and
         `on_refusal` of everybody who was turned away.
 
-        `is_wanted` says whether this host may be paired with a key that calls itself so.
+        `is_wanted` says whether this host may be paired with a key that calls itself so, `holder`
+        which host is known by a name already.
         Raises `PeerRefused` (PAIRING_DEVELOPMENT) for a host without keys.
         """
         if identity.keys is None:
@@ -88,7 +90,7 @@ class PairingHost:
             fix = "set `development = false` under [peers]"
             raise PeerRefused(Problem("PAIRING_DEVELOPMENT", told, fix=fix))
         self._name, self._keys = identity.name, identity.keys
-        self._on_change, self._is_wanted = on_change, is_wanted
+        self._on_change, self._is_wanted, self._holder = on_change, is_wanted, holder
         self.refusals = Refusals(on_refusal)
         self._loop = asyncio.get_running_loop()
         self._context: Context = zmq.Context()
@@ -96,6 +98,8 @@ class PairingHost:
         self._door: Door | None = None
         self._dial: Dial | None = None
         self._try: Try | None = None
+        self._confirmed: PeerKey | None = None
+        """Whose code the person here has said yes to: it is that host's also in a later try."""
         self._timers: list[asyncio.TimerHandle] = []
         self.state: PairingState = Idle()
 
@@ -155,20 +159,18 @@ class PairingHost:
             told = "this is not the code that is shown here"
             fix = "if both hosts show different codes, say no: somebody is between them"
             raise PeerRefused(Problem("PAIRING_CODE", told, need=shown.code, have=code, fix=fix))
-        self._try.pairing, said = pairing.confirm(self._try.pairing, self._loop.time())
-        for message in said:
-            self._try.link.send(encode(message))
-        self._moved(self._try)
+        self._confirmed = shown.key
+        self._say_yes(self._try)
 
     def refuse(self) -> None:
         """The person here says no, or wants no pairing any more."""
         if not self._is_over:
-            self._end(Failed(_SAID_NO), Ending.REFUSED)
+            self._end(Failed(pairing_problems.SAID_NO), Ending.REFUSED)
 
     async def close(self) -> None:
         """Close the window, if it is open still, and let go of everything."""
         if not self._is_over:
-            self._end(Failed(_CLOSED), Ending.OVER)
+            self._end(Failed(pairing_problems.CLOSED), Ending.OVER)
         ending = asyncio.ensure_future(asyncio.to_thread(self._context.term))
         try:
             await asyncio.shield(ending)
@@ -203,6 +205,9 @@ class PairingHost:
             _part(link, Ending.BUSY)
         elif not self._is_wanted(asker.proved, name):
             _part(link, Ending.UNWANTED)
+        elif problem := self._name_taken(asker.proved, name):
+            _part(link, Ending.NAME)
+            self._end(Failed(problem), None)
         elif self._begin(Role.ANSWERING, link, asker):
             self._hear(data, asker.proved)
 
@@ -228,11 +233,11 @@ class PairingHost:
 
     def _on_misused(self, link: Link, _reason: Reason) -> None:
         if self._try is not None and self._try.link is link:
-            self._give_up(_BROKEN, Ending.BROKEN)
+            self._give_up(pairing_problems.BROKEN, Ending.BROKEN)
 
     def _on_attempt_over(self, attempt: Attempt) -> None:
         if self._try is not None and self._try.link is attempt.link:
-            self._give_up(_VANISHED, None)
+            self._give_up(pairing_problems.VANISHED, None)
 
     def _on_dial_failed(self, event: DialFailed) -> None:
         if isinstance(self.state, Waiting):
@@ -268,6 +273,9 @@ class PairingHost:
                     return
                 case Commit(key, name, _):
                     self._check_wanted(key, name)
+                    if problem := self._name_taken(key, name):
+                        self._end(Failed(problem), Ending.NAME)
+                        return
             current.pairing, answers = pairing.receive(
                 current.pairing, said, proved, self._loop.time()
             )
@@ -283,10 +291,27 @@ class PairingHost:
             told = "another host answered than the one that is awaited, or a revoked one"
             raise PeerRefused(Problem("PAIRING_UNWANTED", told, where=f"{name} {fingerprint(key)}"))
 
+    def _name_taken(self, key: PeerKey, name: str) -> Problem | None:
+        if name == self._name:
+            return pairing_problems.same_name(name)
+        holder = self._holder(name)
+        if holder is not None and holder != key:
+            return pairing_problems.name_known(name, key, holder)
+        return None
+
+    def _say_yes(self, current: Try) -> None:
+        current.pairing, said = pairing.confirm(current.pairing, self._loop.time())
+        for message in said:
+            current.link.send(encode(message))
+        self._moved(current)
+
     def _moved(self, current: Try) -> None:
         """Show how far the try is."""
         found = current.pairing
         assert found.peer_key is not None
+        if found.step is Step.COMPARING and found.peer_key == self._confirmed:
+            self._say_yes(current)
+            return
         if found.step is Step.PAIRED:
             self._end(Agreed(found.peer_key, found.peer_name), None)
         elif found.step in (Step.COMPARING, Step.AWAITING_AGREED):
@@ -296,12 +321,17 @@ class PairingHost:
             self._become(Comparing(found.code, found.peer_name, found.peer_key, is_confirmed))
 
     def _other_ended(self, current: Try, why: Ending) -> None:
-        if why is Ending.REFUSED and current.pairing.has_told_nonce:
-            told = "the person at the other host said no: the codes differ, or it was not wanted"
-            problem = Problem("PAIRING_REFUSED", told, where=current.pairing.peer_name, fix=_ANEW)
+        found = current.pairing
+        problem = pairing_problems.ended(
+            why,
+            found.peer_name,
+            own_name=self._name,
+            is_confirmed=found.step is Step.AWAITING_AGREED,
+        )
+        if why is Ending.NAME or (why is Ending.REFUSED and found.has_told_nonce):
             self._end(Failed(problem), None)
         else:
-            self._give_up(_ENDINGS[why], None)
+            self._give_up(problem, None)
 
     def _give_up(self, problem: Problem, told: Ending | None) -> None:
         """The try came to nothing; the window stays open for others."""
@@ -335,11 +365,18 @@ class PairingHost:
         self._become(state)
 
     def _time_is_over(self) -> None:
-        last = self.state.problem if isinstance(self.state, Waiting) else None
-        told = f"the {pairing.WINDOW_S:.0f} seconds for pairing are over"
-        if last is not None:
-            told += f"; the last try ended with {last.code}: {last.message}"
-        self._end(Failed(Problem("PAIRING_OVER", told, fix=_BOTH)), Ending.OVER)
+        match self.state:
+            case Comparing(_, name, _, is_confirmed) if self._try is not None:
+                problem = pairing_problems.unanswered(
+                    name,
+                    is_confirmed=is_confirmed,
+                    is_confirmed_there=self._try.pairing.peer_agreed,
+                )
+            case Waiting(_, last):
+                problem = pairing_problems.unmet(last)
+            case _:
+                problem = pairing_problems.unmet(None)
+        self._end(Failed(problem), Ending.OVER)
 
     def _beat(self) -> None:
         """Look after what nobody tells of."""
@@ -350,11 +387,11 @@ class PairingHost:
             return
         is_slow = self._loop.time() - self._try.begun_s > ANSWER_S
         if self._try.link.send(encode(Beat())) is Sent.GONE:
-            self._give_up(_VANISHED, None)
+            self._give_up(pairing_problems.VANISHED, None)
         elif is_slow and not self._try.pairing.has_told_nonce:
-            self._give_up(_VANISHED, Ending.BROKEN)
+            self._give_up(pairing_problems.VANISHED, Ending.BROKEN)
         elif _sent_too_much(self._try):
-            self._give_up(_BROKEN, Ending.BROKEN)
+            self._give_up(pairing_problems.BROKEN, Ending.BROKEN)
 
     def _waiting(self, problem: Problem | None) -> Waiting:
         return Waiting(TRIES - self._window.tries, problem)
@@ -382,26 +419,3 @@ def _sent_too_much(current: Try) -> bool:
 
 def _digits(code: str) -> str:
     return "".join(code.split())
-
-
-_ANEW = "begin anew on both hosts, `nondum peers pair`, where it was not meant"
-_BOTH = "run `nondum peers pair` on both hosts at the same time, on one network"
-_SAID_NO = Problem("PAIRING_REFUSED", "the person at this host said no")
-_CLOSED = Problem("PAIRING_OVER", "pairing was given up at this host", fix=_BOTH)
-_VANISHED = Problem("PAIRING_VANISHED", "the other host is gone, or says nothing any more")
-_BROKEN = Problem("PAIRING_BROKEN", "the other host does not speak as nondum does")
-_ENDINGS = {
-    Ending.REFUSED: Problem("PAIRING_REFUSED", "the other host does not want to"),
-    Ending.BUSY: Problem("PAIRING_BUSY", "the other host is being paired with another one"),
-    Ending.UNWANTED: Problem(
-        "PAIRING_UNWANTED",
-        "the other host waits for another one, or has revoked this one's key",
-        fix="look at `nondum peers trust` there",
-    ),
-    Ending.TRIES: Problem(
-        "PAIRING_TRIES", "the other host has had too many tries", fix="begin anew on both hosts"
-    ),
-    Ending.OVER: Problem("PAIRING_OVER", "the other host has closed its window", fix=_BOTH),
-    Ending.BROKEN: Problem("PAIRING_BROKEN", "the other host did not understand this one"),
-}
-"""What is told of a try that the other end has ended."""

@@ -25,8 +25,9 @@ from nondum.transport.peers.refusals import Reason, Refusal, Refusals
 from nondum.transport.peers.routes import AcceptedRoute
 from nondum.transport.peers.zap import DOMAIN, Entry, Knock, ZapHandler
 
-MOST_SENT = 16 * 1024
-"""Bytes that a whole try may take, the handshake included; ten times what it needs."""
+MOST_SENT = 64 * 1024
+"""Bytes that a whole try may take, the handshake included; three times what it needs. The signs of
+life of a whole window, each some 40 bytes, are nearly all of that."""
 
 
 @dataclass(frozen=True, slots=True)

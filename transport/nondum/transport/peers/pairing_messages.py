@@ -31,6 +31,8 @@ class Ending(Enum):
     """It is in another try."""
     UNWANTED = "unwanted"
     """It waits for another host, or has revoked this one's key."""
+    NAME = "name"
+    """It has the same name, or knows another host of that name."""
     TRIES = "tries"
     OVER = "over"
     """Its person has closed the window, or the time has."""

@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
+from nondum.sdk.errors import Problem
+
 LATEST = 64
 """How many refusals are kept in detail."""
 
@@ -51,6 +53,8 @@ class Refusal:
     told: str
     at_s: float
     """On the loop's clock."""
+    problem: Problem | None = None
+    """What a greeting was answered with."""
 
 
 class Refusals:

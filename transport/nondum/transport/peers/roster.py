@@ -162,7 +162,8 @@ class Roster:
     ) -> None:
         """Cut a link for what came over it, tell the other end why, and count it."""
         key, told = link.proved or "", str(problem)
-        self._refusals.add(Refusal(reason, link.route.address, key, told, self._loop.time()))
+        now_s = self._loop.time()
+        self._refusals.add(Refusal(reason, link.route.address, key, told, now_s, problem))
         link.tell(Refused(problem))
         if link.session is not None:
             is_trust = reason is Reason.REVOKED
@@ -373,8 +374,8 @@ _FLOODING = Problem(
 def _name_taken(name: str, holder: PeerKey, newcomer: PeerKey) -> Problem:
     return Problem(
         "PEER_NAME_TAKEN",
-        f"two hosts are called {name}: {fingerprint(holder)} was here first, and "
+        f"two hosts are called {name}: {fingerprint(holder)} is here, and "
         f"{fingerprint(newcomer)} is not let in",
         where=name,
-        fix="give one of the hosts another name",
+        fix="give one of the hosts another name: `name` under [host]",
     )

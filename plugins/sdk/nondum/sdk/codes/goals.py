@@ -15,6 +15,11 @@ CODES = (
         "write a goal a line, in words: up to eight lines of 200 characters",
     ),
     Code(
+        "GOAL_NOT_HALTED",
+        "The goal cannot be resumed: it is not halted, or its payload gives it again by itself.",
+        "see `nondum goals` for those that can be",
+    ),
+    Code(
         "GOAL_TOO_EARLY",
         "The host does not know itself yet.",
         "ask again in a second",

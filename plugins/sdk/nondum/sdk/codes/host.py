@@ -60,6 +60,11 @@ CODES = (
         "look at its path and permissions, or name another with --config",
     ),
     Code(
+        "CONFIG_UNUSED",
+        "A key of the configuration has no effect.",
+        "set what it needs, as the message says, or leave it out",
+    ),
+    Code(
         "CONFIG_VALUE",
         "A value of the configuration is not what may stand there.",
         "correct it; docs/configuration.md says what is expected",

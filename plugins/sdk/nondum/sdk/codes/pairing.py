@@ -82,7 +82,7 @@ CODES = (
     Code(
         "PAIRING_BROKEN",
         "The other end does not pair as nondum does.",
-        "run the same version of nondum on both hosts, and begin anew",
+        "begin anew; if it breaks again, run the same version of nondum on both hosts",
     ),
     Code(
         "PAIRING_BUSY",
@@ -109,6 +109,11 @@ CODES = (
         "PAIRING_KEY",
         "Another host speaks than the one that began.",
         "begin anew over a network that you trust",
+    ),
+    Code(
+        "PAIRING_NAME",
+        "The two hosts have one name, or one of them knows another host of the other's name.",
+        "give one of them another name, `name` under [host], start it again, and pair them then",
     ),
     Code(
         "PAIRING_OPEN",

@@ -135,6 +135,11 @@ CODES = (
         "say it in other words, or give the goal with --pddl",
     ),
     Code(
+        "PHRASE_EARLY",
+        "No phrase fits the words yet, and payloads are still being brought in.",
+        "ask again in a moment, or have the words kept: `nondum goal --keep WORDS`",
+    ),
+    Code(
         "PHRASE_INVALID",
         "A phrase is declared wrongly.",
         "tell its author: docs/fragments.md tells how phrases are written",

@@ -1,0 +1,89 @@
+"""What people are told when a pairing comes to nothing, and what they can do about it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from nondum.sdk.errors import Problem
+from nondum.transport.peers import pairing
+from nondum.transport.peers.keys import PeerKey, fingerprint
+from nondum.transport.peers.pairing_messages import Ending
+
+_ANEW = "begin anew on both hosts, `nondum peers pair`, where it was not meant"
+_BOTH = "run `nondum peers pair` on both hosts at the same time, on one network"
+_RENAME = (
+    "give one of the two another name, `name` under [host], start it again, and pair them then"
+)
+
+SAID_NO = Problem("PAIRING_REFUSED", "the person at this host said no")
+CLOSED = Problem("PAIRING_OVER", "pairing was given up at this host", fix=_BOTH)
+VANISHED = Problem("PAIRING_VANISHED", "the other host is gone, or says nothing any more")
+BROKEN = Problem("PAIRING_BROKEN", "the other host does not speak as nondum does")
+
+_ENDINGS = {
+    Ending.REFUSED: Problem("PAIRING_REFUSED", "the other host does not want to"),
+    Ending.BUSY: Problem("PAIRING_BUSY", "the other host is being paired with another one"),
+    Ending.UNWANTED: Problem(
+        "PAIRING_UNWANTED",
+        "the other host waits for another one, or has revoked this one's key",
+        fix="look at `nondum peers trust` there",
+    ),
+    Ending.TRIES: Problem(
+        "PAIRING_TRIES", "the other host has had too many tries", fix="begin anew on both hosts"
+    ),
+    Ending.OVER: Problem("PAIRING_OVER", "the other host has closed its window", fix=_BOTH),
+    Ending.BROKEN: Problem("PAIRING_BROKEN", "the other host did not understand this one"),
+}
+
+
+def ended(why: Ending, name: str, *, own_name: str, is_confirmed: bool) -> Problem:
+    """Why the other end, which calls itself `name` (empty: it has not said), has given up a try.
+
+    `is_confirmed`: the person here had said yes.
+    """
+    if why is Ending.REFUSED and name:
+        told = "the person at the other host said no: the codes differ, or it was not wanted"
+        return Problem("PAIRING_REFUSED", told, where=name, fix=_ANEW)
+    if why is Ending.NAME:
+        told = f"the other host is called {own_name} too, or knows another host of that name"
+        return Problem("PAIRING_NAME", told, where=own_name, fix=_RENAME)
+    if why is Ending.OVER and is_confirmed:
+        told = f"{name} has closed its window, and no one there had said yes"
+        fix = "run `nondum peers pair` there again: the yes that was given here still holds"
+        return Problem("PAIRING_OVER", told, where=name, fix=fix)
+    return replace(_ENDINGS[why], where=name)
+
+
+def same_name(name: str) -> Problem:
+    """Both hosts are called so."""
+    told = f"both hosts are called {name}, and names are what hosts are known by"
+    return Problem("PAIRING_NAME", told, where=name, fix=_RENAME)
+
+
+def name_known(name: str, key: PeerKey, holder: PeerKey) -> Problem:
+    """A host with a key is called as another one is that is known here."""
+    told = f"another host called {name} is known here already, {fingerprint(holder)}"
+    fix = f"{_RENAME}; if the other is gone for good: `nondum peers forget {fingerprint(holder)}`"
+    return Problem("PAIRING_NAME", told, where=name, have=fingerprint(key), fix=fix)
+
+
+def unanswered(name: str, *, is_confirmed: bool, is_confirmed_there: bool) -> Problem:
+    """The time was over while the people compared the code."""
+    if is_confirmed:
+        who = f"no one at {name} has said yes"
+    elif is_confirmed_there:
+        who = f"the person at {name} has said yes, and no one at this host"
+    else:
+        who = f"no one has said yes, here or at {name}"
+    return Problem("PAIRING_OVER", f"{_TIME_IS_OVER}: {who}", where=name, fix=_BOTH)
+
+
+def unmet(last: Problem | None) -> Problem:
+    """The time was over and no code was shown; `last` is what became of the last try."""
+    if last is None:
+        return Problem("PAIRING_OVER", _TIME_IS_OVER, fix=_BOTH)
+    told = f"{_TIME_IS_OVER}; the last try ended with {last.code}: {last.message}"
+    return Problem("PAIRING_OVER", told, fix=last.fix or _BOTH)
+
+
+_TIME_IS_OVER = f"the {pairing.WINDOW_S:.0f} seconds for pairing are over"
