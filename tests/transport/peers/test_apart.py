@@ -49,8 +49,8 @@ from nondum.transport.peers import (
 )
 from nondum.transport.peers.accepted import AWAITED_S
 from nondum.transport.peers.apart import sockets
-from nondum.transport.peers.apart.pipe import CROWDED_BYTES, WINDOW, Pipe, pipe_sockets
-from nondum.transport.peers.apart.service import Service
+from nondum.transport.peers.apart.pipe import WINDOW, Pipe, pipe_sockets
+from nondum.transport.peers.apart.service import MOST_WAITING, Service
 from nondum.transport.peers.apart.sockets import SocketsApart
 from nondum.transport.peers.beats import BEAT_S
 from nondum.transport.peers.listener import HIGH_WATER
@@ -61,7 +61,7 @@ pytestmark = pytest.mark.anyio
 KEY = HostKeys.generate().public
 TEXT = "x" * 100_000
 LONG = encode(Notice("values", {"text": TEXT}))
-CROWD = CROWDED_BYTES // len(LONG) + 10
+CROWD = MOST_WAITING // len(LONG) + 10
 """Such messages that may wait for the other process; so many more lie in the kernel's buffers."""
 KERNELS = 160
 """Such messages that lie in the buffers of a TCP connection (tcp(7)), and room."""
@@ -165,7 +165,10 @@ async def test_peer_that_does_not_read_is_told_no_more_than_may_wait(clock: Virt
                 heard += len(await asyncio.to_thread(bad.recv)) > len(TEXT)
 
 
-async def test_daemon_keeps_little_for_a_process_that_stands_still() -> None:
+async def test_daemon_keeps_little_for_a_process_that_stands_still(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sockets, "MOST_WAITING", MOST_WAITING)  # less than one peer's messages
     async with two_hosts() as (rover, base):
         os.kill(pid_of(rover), signal.SIGSTOP)
         try:
@@ -234,7 +237,7 @@ async def test_strangers_have_time_only_while_the_loop_of_the_daemon_runs(
     """As its ticks tell. Here the process's end is on the loop of the test."""
     ours, theirs = pipe_sockets()
     heard: asyncio.Queue[list[Any]] = asyncio.Queue()
-    daemon = Pipe(ours, heard.put_nowait, lambda _: None)
+    daemon = Pipe(ours, heard.put_nowait, lambda _: None, MOST_WAITING)
     serving = asyncio.ensure_future(Service(theirs).run())
     daemon.send("trust", trust_file.to_text(Trust()), True)
     daemon.send("begin", "base", None)
