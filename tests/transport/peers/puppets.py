@@ -8,6 +8,7 @@ import socket
 from typing import Any
 
 from nondum.transport.peers.apart.pipe import Pipe
+from nondum.transport.peers.apart.service import MOST_WAITING
 
 ADDRESS = "tcp://127.0.0.1:7410"
 
@@ -20,7 +21,7 @@ class Puppet:
     def __init__(self, pipe: socket.socket) -> None:
         self.heard: list[list[Any]] = []
         self.is_closed = asyncio.Event()
-        self._pipe = Pipe(pipe.dup(), self._hear, lambda _: self.is_closed.set())
+        self._pipe = Pipe(pipe.dup(), self._hear, lambda _: self.is_closed.set(), MOST_WAITING)
 
     async def ended(self, grace_s: float) -> str:
         self._pipe.close()

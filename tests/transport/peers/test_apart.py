@@ -8,13 +8,14 @@ import os
 import signal
 import socket
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
 import zmq
 from tests.kit.clock import VirtualClock
 from tests.kit.processes import is_alive, until_gone
-from tests.kit.until import until, until_async
+from tests.kit.until import arrived, until, until_async
 from tests.transport.peers import hosts
 from tests.transport.peers.bad_ends import bad_dealer, hello_of
 from tests.transport.peers.hosts import (
@@ -35,17 +36,23 @@ from nondum.transport.peers import (
     HostKeys,
     Identity,
     LinksFailed,
+    Loss,
     PeerKey,
+    PeerLost,
     PeerNode,
     PeerRefused,
     PeerUnreachable,
     PeerUp,
     Refusal,
     Trust,
+    trust_file,
 )
+from nondum.transport.peers.accepted import AWAITED_S
 from nondum.transport.peers.apart import sockets
-from nondum.transport.peers.apart.pipe import CROWDED_BYTES, WINDOW
+from nondum.transport.peers.apart.pipe import WINDOW, Pipe, pipe_sockets
+from nondum.transport.peers.apart.service import MOST_WAITING, Service
 from nondum.transport.peers.apart.sockets import SocketsApart
+from nondum.transport.peers.beats import BEAT_S
 from nondum.transport.peers.listener import HIGH_WATER
 from nondum.transport.peers.messages import MAX_MESSAGE, Notice, encode
 
@@ -54,7 +61,7 @@ pytestmark = pytest.mark.anyio
 KEY = HostKeys.generate().public
 TEXT = "x" * 100_000
 LONG = encode(Notice("values", {"text": TEXT}))
-CROWD = CROWDED_BYTES // len(LONG) + 10
+CROWD = MOST_WAITING // len(LONG) + 10
 """Such messages that may wait for the other process; so many more lie in the kernel's buffers."""
 KERNELS = 160
 """Such messages that lie in the buffers of a TCP connection (tcp(7)), and room."""
@@ -75,6 +82,7 @@ async def test_links_of_a_host_come_back_after_their_process_was_killed(whose: i
         failed = (await one.told(LinksFailed)).problem
         assert failed.code == "LINKS_DIED"
         assert "SIGKILL" in failed.message
+        assert not (*one.node.accepted, *one.node.dialled)
         await until_async("it has another", lambda: one.node.links_pid not in (None, pid))
         await answers(*both)
 
@@ -113,7 +121,10 @@ async def test_process_over_its_memory_limit_ends_and_the_daemon_does_not(
             await up(good, there)
 
 
-async def test_process_reads_no_more_than_a_daemon_that_stands_still_can_take() -> None:
+async def test_process_reads_no_more_than_a_daemon_that_stands_still_can_take(
+    clock: VirtualClock,
+) -> None:
+    """Whose time stands still as well, so that it does not take its peer for lost."""
     base, rover = identity("base"), identity("rover")
     async with host(base, trusting(rover)) as there:
         with bad_dealer(there.address, rover, there) as bad:
@@ -126,16 +137,15 @@ async def test_process_reads_no_more_than_a_daemon_that_stands_still_can_take() 
                 bad.send(LONG)
                 sent += 1
             assert sent <= most
+            for _ in range(sent):  # nothing was lost
+                await arrived("a notice", there.servant.notices.get())
         assert is_alive(pid_of(there))
 
 
-async def test_peer_that_does_not_read_is_told_no_more_than_may_wait() -> None:
+async def test_peer_that_does_not_read_is_told_no_more_than_may_wait(clock: VirtualClock) -> None:
+    """While time stands still, or it would be lost for its silence."""
     base, deaf, other = identity("base"), identity("deaf"), identity("other")
-    async with (
-        host(base, trusting(deaf, other)) as there,
-        host(other, trusting(base)) as good,
-        asyncio.timeout(PATIENCE_S),
-    ):
+    async with host(base, trusting(deaf, other)) as there, host(other, trusting(base)) as good:
         good.node.dial(there.key, [there.address])
         await up(good, there)
         with bad_dealer(there.address, deaf, there, most_read=1) as bad:
@@ -150,9 +160,15 @@ async def test_peer_that_does_not_read_is_told_no_more_than_may_wait() -> None:
                 await answers(good, there)
             assert taken <= HIGH_WATER + WINDOW + KERNELS
             assert not notify(there, deaf.key)
+            heard = 0
+            while heard < taken:  # it reads after all
+                heard += len(await asyncio.to_thread(bad.recv)) > len(TEXT)
 
 
-async def test_daemon_keeps_little_for_a_process_that_stands_still() -> None:
+async def test_daemon_keeps_little_for_a_process_that_stands_still(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sockets, "MOST_WAITING", MOST_WAITING)  # less than one peer's messages
     async with two_hosts() as (rover, base):
         os.kill(pid_of(rover), signal.SIGSTOP)
         try:
@@ -163,6 +179,30 @@ async def test_daemon_keeps_little_for_a_process_that_stands_still() -> None:
         await answers(rover, base)
 
 
+async def test_connection_that_breaks_is_told_by_the_process() -> None:
+    base, rover = identity("base"), identity("rover")
+    async with host(base, trusting(rover)) as there:
+        with bad_dealer(there.address, rover, there) as bad:
+            bad.send(hello_of(rover))
+            await there.told(PeerUp)
+        assert (await there.told(PeerLost)).reason is Loss.DISCONNECTED
+
+
+async def test_host_that_is_dialled_before_there_is_a_process_is_reached(
+    clock: VirtualClock,
+) -> None:
+    """Without another attempt, for which time would have to pass."""
+    base, rover = identity("base"), identity("rover")
+    node = PeerNode(
+        rover, trusting(base), Servant(), on_event=lambda _: None, sockets=hosts.SOCKETS
+    )
+    async with host(base, trusting(rover)) as there:
+        node.dial(there.key, [there.address])
+        await node.start(["tcp://127.0.0.1:0"])
+        await arrived("they meet", there.linked[rover.key].wait())
+        await node.close()
+
+
 async def test_process_that_hangs_is_replaced(clock: VirtualClock) -> None:
     async with host(identity("base")) as there:
         os.kill(pid := pid_of(there), signal.SIGSTOP)
@@ -171,10 +211,56 @@ async def test_process_that_hangs_is_replaced(clock: VirtualClock) -> None:
         await until_gone(pid)
 
 
-async def test_process_ends_with_its_host() -> None:
+async def test_process_ends_with_its_host_and_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    how: list[str] = []
+
+    class Watched(LinksProcess):
+        async def ended(self, grace_s: float) -> str:
+            how.append(await super().ended(grace_s))
+            return how[-1]
+
+    monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketsApart, start=Watched))
     async with host(identity("base")) as there:
         pid = pid_of(there)
     assert not is_alive(pid)
+    assert how[0] == "exited with status 0"
+
+
+async def test_process_gains_no_privileges_and_is_refused_system_calls() -> None:
+    async with host(identity("base")) as there:
+        assert {"NoNewPrivs:\t1", "Seccomp:\t2"} <= status_of(pid_of(there))
+
+
+async def test_strangers_have_time_only_while_the_loop_of_the_daemon_runs(
+    clock: VirtualClock,
+) -> None:
+    """As its ticks tell. Here the process's end is on the loop of the test."""
+    ours, theirs = pipe_sockets()
+    heard: asyncio.Queue[list[Any]] = asyncio.Queue()
+    daemon = Pipe(ours, heard.put_nowait, lambda _: None, MOST_WAITING)
+    serving = asyncio.ensure_future(Service(theirs).run())
+    daemon.send("trust", trust_file.to_text(Trust()), True)
+    daemon.send("begin", "base", None)
+    daemon.send("listen", ["tcp://127.0.0.1:0"])
+    _, (address,) = await arrived("it listens", heard.get())
+    with socket.create_connection(("127.0.0.1", int(address.rpartition(":")[2]))):
+
+        async def ticked(seconds: float) -> list[Any]:
+            await clock.stand_still(seconds)
+            daemon.send("tick")
+            return await arrived("an answer", heard.get())
+
+        while await ticked(0.0) != ["tock", 1]:
+            pass
+        for _ in range(3):
+            assert await ticked(60.0) == ["tock", 1]
+        spent_s = 0.0
+        while (told := await ticked(BEAT_S)) == ["tock", 1] and spent_s < 2 * AWAITED_S:
+            spent_s += BEAT_S
+        assert told[:2] == ["refused", "silent"]
+    daemon.send("close")
+    await arrived("it ends", serving)
+    daemon.close()
 
 
 async def test_host_that_was_trusted_among_thousands_is_let_in() -> None:
@@ -273,6 +359,10 @@ def no_process(_pipe: socket.socket) -> LinksProcess:
 def pid_of(one: Host) -> int:
     assert one.node.links_pid is not None
     return one.node.links_pid
+
+
+def status_of(pid: int) -> set[str]:
+    return set(Path(f"/proc/{pid}/status").read_text(encoding="ascii").splitlines())
 
 
 def pushed(bad: zmq.Socket[bytes]) -> bool:

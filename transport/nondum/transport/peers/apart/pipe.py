@@ -16,8 +16,6 @@ LONGEST = MAX_MESSAGE + 1024
 """Bytes of a packet: a message, and what is said with it."""
 WINDOW = 64
 """Messages to one peer that may be between the daemon and ZeroMQ: at most 8 MiB."""
-CROWDED_BYTES = 1024 * 1024
-"""What may wait for the other end before whoever can wait should."""
 _BUFFER_BYTES = 4 * LONGEST
 """Asked for in the kernel, which gives what it will (socket(7), SO_SNDBUF)."""
 
@@ -38,15 +36,17 @@ class Pipe:
         sock: socket.socket,
         on_packet: Callable[[list[Any]], None],
         on_closed: Callable[[ProtocolViolation | None], None],
+        most_waiting: int,
         on_room: Callable[[], None] = lambda: None,
     ) -> None:
         """Own `sock` and begin to read, on the running loop.
 
         `on_packet` may raise `ProtocolViolation`, which closes the pipe. `on_closed` is called once
         when the other end is gone (None) or broke the protocol, not after `close`; `on_room` when
-        nothing waits any more after it was crowded.
+        nothing waits any more after it was crowded, by more than `most_waiting` bytes.
         """
         self._on_packet, self._on_closed, self._on_room = on_packet, on_closed, on_room
+        self._most_waiting = most_waiting
         self._waiting: deque[bytes] = deque()
         self._waiting_bytes = 0
         self._was_crowded = False
@@ -56,7 +56,7 @@ class Pipe:
     @property
     def is_crowded(self) -> bool:
         """Whether much waits for the other end."""
-        return self._waiting_bytes > CROWDED_BYTES
+        return self._waiting_bytes > self._most_waiting
 
     def send(self, *fields: Any) -> None:
         """Send a packet, at once or later; to an end that is gone, not at all."""

@@ -24,6 +24,8 @@ from nondum.transport.peers.sockets import Accepted, Owner
 from nondum.transport.peers.suspicion import Awake, Terms
 from nondum.transport.peers.trust import Trust
 
+MOST_WAITING = 1024 * 1024
+"""Bytes that wait for the daemon; nothing more is read of others then."""
 RETRY_S = 0.01
 """Between two attempts to hand on what a peer does not read: ZeroMQ does not tell when it may."""
 
@@ -49,7 +51,9 @@ class Service:
             lambda _problem: None,  # where these fail, this process ends
             lambda: self._awake.read(self._loop.time()),
         )
-        self._pipe = Pipe(sock, self._on_packet, lambda _: self._end(is_asked=False), self._on_room)
+        self._pipe = Pipe(
+            sock, self._on_packet, lambda _: self._end(is_asked=False), MOST_WAITING, self._on_room
+        )
 
     async def run(self) -> None:
         """Serve until the daemon says that it is enough, or is gone."""

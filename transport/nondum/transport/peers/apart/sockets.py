@@ -22,6 +22,7 @@ from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.identity import Identity, Security
 from nondum.transport.peers.keys import PeerKey
+from nondum.transport.peers.messages import MAX_MESSAGE
 from nondum.transport.peers.refusals import Reason, Refusal
 from nondum.transport.peers.sockets import Owner, Receiver
 from nondum.transport.peers.trust import Trust
@@ -36,6 +37,9 @@ FIRST_WAIT_S, LONGEST_WAIT_S = 0.1, 10.0
 """Before it is started again; what lives for longer than the longest wait begins with the first."""
 MOST_UNANSWERED = 33
 """Ticks, 0.3 s apart while this loop runs, after which the process is taken to hang."""
+MOST_WAITING = 2 * WINDOW * MAX_MESSAGE
+"""Bytes that wait for the process: more than one peer's messages ever are. Peers are told nothing
+more then."""
 MOST_CONNECTIONS = 4096
 """Accepted by the process: far more than it lets in."""
 _PIECE = 100_000
@@ -146,7 +150,7 @@ class SocketsApart:
             except OSError as error:
                 ours.close()
                 raise _not_started(str(error)) from error
-        self._pipe = Pipe(ours, self._on_packet, self._on_closed)
+        self._pipe = Pipe(ours, self._on_packet, self._on_closed, MOST_WAITING)
         self._since_s, self._unanswered = self._loop.time(), 0
         self._tell_trust()
         keys = self._me.keys
