@@ -72,7 +72,7 @@ class DeadlyCatalogue(Catalogue):
     entries = 0
     kept = 0
     """How often it has kept what lies beside the catalogue."""
-    committed: asyncio.Event
+    has_committed: asyncio.Event
     """Set at each commit."""
     is_scanned = False
     """Whether this daemon knows which drives are plugged in."""
@@ -87,7 +87,7 @@ class DeadlyCatalogue(Catalogue):
         await super().commit(after, entries)
         self.entries += len(entries)
         self.is_scanned |= any(entry.event == "DrivesScanned" for entry in entries)
-        self.committed.set()
+        self.has_committed.set()
         self.tell(f"committed {self.boot} {self.entries} {after.revision}")
         states = {drive.state.name for drive in after.drives.values()}
         if is_deadly or self.orders.get("kill_while") in states:
@@ -200,8 +200,8 @@ class Script:
 
     async def _until_committed(self) -> None:
         """Wait for the next commit: nothing else changes the state."""
-        self._catalogue.committed.clear()
-        await self._catalogue.committed.wait()
+        self._catalogue.has_committed.clear()
+        await self._catalogue.has_committed.wait()
 
     def _is_settled(self) -> bool:
         state = self._catalogue.state
@@ -228,7 +228,7 @@ async def _main(orders: dict[str, Any]) -> None:
     catalogue = await DeadlyCatalogue.open(folders.catalogue, HOST)
     assert isinstance(catalogue, DeadlyCatalogue)
     catalogue.orders, catalogue.bus, catalogue.told = orders, bus, told
-    catalogue.committed = asyncio.Event()
+    catalogue.has_committed = asyncio.Event()
     workers = Workers(HOST, bus.emit, timing=QUICK)
     executor = Executor(HOST, folders, workers, bus.emit, OPTIONS)
     manager = ComponentManager(catalogue, executor, bus)
