@@ -55,7 +55,7 @@ def _entry(lines: list[str]) -> Entry:
 def needed(entries: Iterable[Entry], names: Iterable[str]) -> frozenset[str]:
     """These packages, and all that they depend on.
 
-    >>> lock = parse("a==1\\nb==1\\n    # via a\\nc==1\\n    # via\\n    #   b\\n    #   d\\nd==1\\n")
+    >>> lock = parse("a==1\\nb==1\\n    # via a\\nc==1\\n    # via\\n    #   b\\n    #   d\\n")
     >>> sorted(needed(lock, ["b"])), sorted(needed(lock, ["A"]))
     (['b', 'c'], ['a', 'b', 'c'])
     """

@@ -17,7 +17,8 @@ HEAD = """\
 # Python and all machines. Written by `./run lock`.
 """
 OLDEST_PYTHON = "3.11"
-OVERRIDES = ("lark>=1.2",)
+OVERRIDES = "overrides.txt"
+OVERRIDING = ("lark>=1.2",)
 """Of these, what is written here holds, whatever others ask for: `pddl` asks for an older lark than
 nondum does, and works with this."""
 
@@ -38,23 +39,26 @@ def _uv(scratch: Path) -> Path:
 
 
 def _compiled(uv: Path, scratch: Path, *, upgrade: bool) -> str:
-    overrides, output = scratch / "overrides.txt", scratch / "output.txt"
-    overrides.write_text("\n".join(OVERRIDES), encoding="utf-8")
+    (scratch / OVERRIDES).write_text("\n".join(OVERRIDING), encoding="utf-8")
+    output = scratch / "output.txt"
     output.write_bytes(LOCK.read_bytes())
     _call(
         *(uv, "pip", "compile", "-", "-q", "-o", output, "--no-config", "--no-header"),
         *("--universal", "--python-version", OLDEST_PYTHON, "--fork-strategy", "fewest"),
-        *("--generate-hashes", "--no-emit-index-url", "--override", overrides),
+        *("--generate-hashes", "--no-emit-index-url", "--override", OVERRIDES),
         *["--upgrade"] * upgrade,
         words="\n".join(asked.of_all(CHECKOUT)),
+        folder=scratch,
     )
     return output.read_text(encoding="utf-8")
 
 
-def _call(*command: str | Path, words: str = "") -> None:
+def _call(*command: str | Path, words: str = "", folder: Path = CHECKOUT) -> None:
     surroundings = dict(os.environ)
     if index := os.environ.get("PIP_INDEX_URL"):
         surroundings.setdefault("UV_DEFAULT_INDEX", index)
-    done = subprocess.run(command, input=words, text=True, env=surroundings, stdout=sys.stderr)
+    done = subprocess.run(
+        command, input=words, text=True, env=surroundings, cwd=folder, stdout=sys.stderr
+    )
     if done.returncode != 0:
         raise SetUpFailed(f"{Path(command[0]).name} ended with {done.returncode}: see above")
