@@ -13,7 +13,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from packaging.markers import default_environment
 from packaging.requirements import Requirement
 from tests.kit.payloads import make_wheel
 
@@ -131,7 +130,8 @@ def _install(checkout: Path, *words: str) -> subprocess.CompletedProcess[str]:
         "PIP_FIND_LINKS": str(checkout / "index"),
         "PIP_NO_INDEX": "1",
     }
-    command = [sys.executable, "-P", checkout / "packaging/development", "install", *words]
+    program = str(checkout / "packaging/development")
+    command = [sys.executable, "-P", program, "install", *words]
     return subprocess.run(command, env={**os.environ, **ours}, capture_output=True, text=True)
 
 
@@ -155,4 +155,4 @@ def _is_meant(requirement: Requirement, python: str, machine: str) -> bool:
         "platform_machine": machine,
     }
     marker = requirement.marker
-    return marker is None or marker.evaluate({**default_environment(), **there})
+    return marker is None or marker.evaluate(there)
