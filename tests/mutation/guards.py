@@ -210,6 +210,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_T}/peers/pairing_messages.py": (f"{_TT}/peers/test_pairing_messages.py",),
     f"{_T}/peers/presence.py": (f"{_TT}/peers/test_presence.py",),
     f"{_T}/peers/private_file.py": _PEER_KEYS,
+    f"{_T}/peers/proof.py": (f"{_TT}/peers/test_proof.py",),
     f"{_T}/peers/public_file.py": (f"{_TT}/peers/test_public_file.py",),
     f"{_T}/peers/roster.py": (
         *_ADMISSION,

@@ -27,9 +27,10 @@ from nondum.transport.peers.gate import Gate, entry
 from nondum.transport.peers.identity import Identity, Security
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.link import AcceptedRoute, Link, Route
-from nondum.transport.peers.listener import HIGH_WATER, dialling, listening, prove_enforced
+from nondum.transport.peers.listener import HIGH_WATER, dialling, listening
 from nondum.transport.peers.messages import MAX_MESSAGE, Notice, Ping, encode
 from nondum.transport.peers.monitor import Watch
+from nondum.transport.peers.proof import prove_enforced
 from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.received import MOST_AHEAD
 from nondum.transport.peers.refusals import Reason, Refusal, Refusals
