@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 import struct
@@ -180,6 +181,14 @@ def test_what_copying_a_file_calls_does_nothing_where_the_user_is_the_hosts(call
     code = filter_of({**GROUPS, **WITH_THE_HOSTS_USER}, "x86_64")
     assert run(code, X86.numbers[call], X86.audit, 0, 0, 0) == ERROR | 0
     assert run(filter_of(GROUPS, "x86_64"), X86.numbers[call], X86.audit, 0, 0, 0) == ALLOW
+
+
+def test_touching_a_path_fails_there_so_that_the_file_is_made_instead() -> None:
+    code, call = filter_of({**GROUPS, **WITH_THE_HOSTS_USER}, "x86_64"), X86.numbers["utimensat"]
+    path, times = 0x7000, 0x8000
+    assert run(code, call, X86.audit, 0, path, 0) == ERROR | errno.EPERM
+    assert run(code, call, X86.audit, 0, path, times) == ERROR | 0
+    assert run(code, call, X86.audit, 0, 0, 0) == ERROR | 0, "of what is open already"
 
 
 @pytest.mark.parametrize("has_network", [False, True])

@@ -125,7 +125,7 @@ def _bind_node(source: str, target: str) -> None:
 def _mount_memory(target: str, kilobytes: int) -> None:
     os.makedirs(target, exist_ok=True)  # noqa: PTH103
     flags = kernel.MS_NOSUID | kernel.MS_NODEV | kernel.MS_NOEXEC
-    kernel.mount("tmpfs", target, "tmpfs", flags, f"size={kilobytes}k,mode=755")
+    kernel.mount("tmpfs", target, "tmpfs", flags, ",".join((f"size={kilobytes}k", "mode=755")))
 
 
 def _flags_of(target: str) -> int:

@@ -18,7 +18,6 @@ from typing import Any, Protocol
 from nondum.host.confinement import bubblewrap, landlock, refusals
 from nondum.host.confinement.bubblewrap import Ground
 from nondum.host.confinement.filters import Rule
-from nondum.host.inside import room
 from nondum.host.workers.spec import WorkerSpec, base_interpreter
 from nondum.wheelhouse.confinement import Level
 
@@ -38,8 +37,6 @@ INSTRUMENTS = (
     *("/dev/hidraw*", "/dev/i2c-*", "/dev/spidev*", "/dev/gpiochip*", "/dev/media*"),
 )
 """Where no room can be made for a worker, what one that declares devices may open."""
-SETTINGS = tuple(f"/proc/{name}" for name in ("sys", "sysrq-trigger", "irq", "bus", "fs", "acpi"))
-"""What root may write by being root, capabilities or not: `core_pattern` runs programs."""
 FIRST_USER, USERS = 61184, 4336
 """Ids of users that no account has: those that systemd gives out likewise (DynamicUser=)."""
 
@@ -207,8 +204,8 @@ class Boxed:
             "scratch": str(spec.scratch),
             "nodes": list(_nodes(spec)),
             "shared_mb": SHARED_MB,
-            "sealed": [] if "settings" in kept else SETTINGS,
-            "protected": [] if "system" in kept else ["/", "/dev", room.DEVICES],
+            "sealed": [] if "settings" in kept else bubblewrap.SEALED,
+            "protected": [] if "system" in kept else bubblewrap.PROTECTED,
             "is_last": "user namespaces" not in kept,
             "changes_user": "user" not in kept,
             "keeper_filter": calls_refused(refusals.GROUPS, mounts_too),
