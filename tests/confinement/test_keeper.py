@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
+import json
+import os
 import shutil
+import socket
 from pathlib import Path
 
 import pytest
@@ -11,6 +15,9 @@ from tests.kit.workers import WorkersUnderTest
 
 from nondum.host.inside import kernel
 from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined
+from nondum.host.workers.keeper import Keeper
+from nondum.host.workers.launcher import parameters
+from nondum.host.workers.spare import ROOM, ROOM_BYTES
 
 pytestmark = pytest.mark.anyio
 BWRAP = shutil.which("bwrap") or "bwrap"
@@ -30,6 +37,33 @@ async def test_keeper_can_do_nothing_but_mount(tested: WorkersUnderTest) -> None
         assert int(keeper[each], 16) == 1 << kernel.CAP_SYS_ADMIN
 
 
+async def test_keeper_says_who_it_is_so_that_the_end_of_its_room_is_seen(
+    tested: WorkersUnderTest,
+) -> None:
+    spec = tested.spec("guest", "")
+    spec.scratch.mkdir(parents=True)
+    confinement = Boxed(BWRAP)
+    ground = confinement.ground(spec)
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ours.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
+    link, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with theirs, link, far, confinement.entry(spec, ground) as entry:
+        process = await asyncio.create_subprocess_exec(
+            *confinement.command(ground, theirs.fileno()),
+            pass_fds=[theirs.fileno()],
+            env={ROOM: "-" * ROOM_BYTES},
+        )
+        order = json.dumps(parameters(spec, entry, looks=True)).encode()
+        socket.send_fds(ours, [order], [far.fileno()])
+        keeper = Keeper(ours)
+        assert await process.wait() == 0
+    pidfd = keeper.take_pidfd()
+    assert keeper.worker is not None
+    assert pidfd is not None
+    os.close(pidfd)
+    keeper.close()
+
+
 async def test_keeper_holds_neither_the_link_nor_the_output_of_its_worker(
     tested: WorkersUnderTest,
 ) -> None:
@@ -42,7 +76,11 @@ async def test_keeper_holds_neither_the_link_nor_the_output_of_its_worker(
 
 
 HOLDS_NOTHING = """
+import importlib.util, resource
 assert os.getsid(0) == os.getpid()
+assert resource.getrlimit(resource.RLIMIT_FSIZE) == (1 << 30, 1 << 30)
+assert importlib.util.find_spec('nondum.host') is None
+assert not [name for name in sys.modules if name.startswith('nondum.host')]
 held = subprocess.run(['ls', '/proc/self/fd'], close_fds=False, capture_output=True, text=True)
 assert held.stdout.split() == ['0', '1', '2', '3'], held  # the last one is the folder itself
 """

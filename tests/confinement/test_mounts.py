@@ -75,7 +75,7 @@ KEEPS_FLAGS = """
 import os, sys
 from nondum.host.inside import kernel, room
 
-flag, folder = int(sys.argv[1]), sys.argv[2]
+flag, folder, how = int(sys.argv[1]), sys.argv[2], sys.argv[3]
 kernel.unshare(kernel.CLONE_NEWNS)
 kernel.mount(None, "/", None, kernel.MS_SLAVE | 1 << 14)  # MS_REC
 for at, flags in ((folder, flag), ("/dev", 0)):
@@ -83,16 +83,18 @@ for at, flags in ((folder, flag), ("/dev", 0)):
 os.mkdir(room.DEVICES)
 kernel.mount("tmpfs", room.DEVICES, "tmpfs", 0)
 given = dict(outside="", seen_outside=[], hides_outside=True, changes_user=False)
-room.move_in({**given, "sealed": [folder] if sys.argv[3] == "sealed" else [],
-              "protected": [folder] if sys.argv[3] == "protected" else []})
+if how == "bound":
+    room.bind(folder, folder)
+else:
+    room.move_in({**given, "sealed": [], "protected": [], how: [folder]})
 print(os.statvfs(folder).f_flag)
 """
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="needs root, to mount")
 @pytest.mark.parametrize("flag", ["RDONLY", "NOSUID", "NODEV", "NOEXEC"])
-@pytest.mark.parametrize("how", ["sealed", "protected"])
-def test_mount_that_becomes_read_only_keeps_its_flags(flag: str, how: str) -> None:
+@pytest.mark.parametrize("how", ["sealed", "protected", "bound"])
+def test_folder_keeps_the_flags_of_its_mount(flag: str, how: str) -> None:
     bit: int = getattr(kernel, f"MS_{flag}")
     with open_folder() as folder:
         said = subprocess.run(
@@ -102,4 +104,4 @@ def test_mount_that_becomes_read_only_keeps_its_flags(flag: str, how: str) -> No
             check=True,
         )
     assert int(said.stdout) & bit
-    assert int(said.stdout) & kernel.MS_RDONLY
+    assert how == "bound" or int(said.stdout) & kernel.MS_RDONLY

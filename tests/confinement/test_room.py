@@ -15,9 +15,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.confinement.guests import does, guest, open_folder, parent
+from tests.confinement.guests import does, guest, open_folder, parent, status
 from tests.confinement.processes import children
 from tests.kit.processes import until_gone
+from tests.kit.until import until_async
 from tests.kit.workers import HOST, LIBRARIES, SDK, WorkersUnderTest
 
 from nondum.host.confinement import bubblewrap
@@ -35,6 +36,7 @@ from nondum.host.workers.confinements import (
 )
 
 pytestmark = pytest.mark.anyio
+needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="needs root, to make devices")
 
 
 @pytest.fixture
@@ -64,6 +66,53 @@ async def test_device_appears_and_vanishes_while_it_runs(
     assert await does(tested) == ""
     assert await asyncio.to_thread(os.read, far, 5) == b"hello"
     await tested.workers.detach("guest", "line")
+    assert await does(tested) == ""
+    assert not [e for e in tested.told(WorkerLogged) if e.message.startswith("DEVICE_REFUSED")]
+
+
+async def test_device_takes_the_place_of_the_one_before_it(
+    tested: WorkersUnderTest, line: tuple[int, str]
+) -> None:
+    await guest(tested, "assert os.listdir('/dev/nondum') == ([] if device is None else ['line'])")
+    for node in ("/dev/null", line[1]):
+        await tested.workers.attach("guest", "line", node, {})
+        assert await does(tested) == ""
+    await tested.workers.detach("guest", "line")
+    assert await does(tested) == ""
+
+
+@pytest.fixture
+def nodes() -> Iterator[Path]:
+    """A folder among the devices of the machine, with one in it."""
+    folder = Path(f"/dev/nondum-test-{os.getpid()}")
+    folder.mkdir()
+    try:
+        os.mknod(folder / "null", 0o20666, os.makedev(1, 3))
+        yield folder
+    finally:
+        shutil.rmtree(folder)
+
+
+@needs_root
+async def test_device_has_its_own_name_too_whatever_folder_that_is_in(
+    tested: WorkersUnderTest, nodes: Path
+) -> None:
+    body = f"assert os.path.exists('{nodes}/null') == (device is not None)"
+    await guest(tested, body)
+    assert await does(tested) == ""
+    await tested.workers.attach("guest", "line", str(nodes / "null"), {})
+    assert await does(tested) == ""
+    await tested.workers.detach("guest", "line")
+    assert await does(tested) == ""
+
+
+@needs_root
+@pytest.mark.parametrize("pattern", ["{}", "{}/null"])
+async def test_permission_brings_folders_of_device_nodes(
+    tested: WorkersUnderTest, monkeypatch: pytest.MonkeyPatch, nodes: Path, pattern: str
+) -> None:
+    monkeypatch.setattr(confinements, "NODES", {"audio": (pattern.format(nodes),)})
+    await guest(tested, f"open('{nodes}/null', 'w').close()", ("audio",))
     assert await does(tested) == ""
 
 
@@ -143,6 +192,8 @@ async def test_what_is_left_in_a_room_is_reaped(tested: WorkersUnderTest) -> Non
         "    await ctx.sleep(0.01)",
     )
     assert await does(tested) == ""
+    keeper = parent(tested.workers.pids()["guest"])
+    await until_async("its keeper waits again", lambda: status(keeper)["State"].startswith("S"))
 
 
 async def test_room_ends_with_its_worker(tested: WorkersUnderTest) -> None:
@@ -259,12 +310,25 @@ def test_what_lies_in_its_folders_is_no_device_and_has_no_set_id_bits() -> None:
     assert in_the_room == "65534 does not open"
 
 
+async def test_worker_may_name_its_user_and_not_leave_its_groups(tested: WorkersUnderTest) -> None:
+    body = (
+        "os.setuid(os.getuid())\n"
+        "os.setgid(os.getgid())\n"
+        "os.chown('.', os.getuid(), os.getgid())\n"
+        "assert open('/proc/self/setgroups').read() == 'deny\\n'"
+    )
+    await guest(tested, body)
+    assert await does(tested) == ""
+
+
 async def test_outside_is_not_told_by_what_a_worker_is(tested: WorkersUnderTest) -> None:
     body = (
         "assert os.getuid() == os.getgid() == 65534\n"
         "assert os.environ['HOME'] == os.getcwd() == str(ctx.scratch)\n"
         "import pwd\n"
         "assert pwd.getpwuid(os.getuid()).pw_dir == str(ctx.scratch)\n"
+        "import grp\n"
+        "assert grp.getgrgid(os.getgid()).gr_name == 'worker'\n"
         "assert socket.gethostname() == 'worker'\n"
         "assert not os.path.exists('/home') and not os.path.exists('/var')\n"
         "assert sorted(os.listdir('/dev')) == sorted(['core', 'fd', 'full', 'nondum', 'null',"

@@ -34,9 +34,11 @@ async def main():
 asyncio.run(main())
 """
 POLITE = """
+import asyncio
 from nondum.sdk import hookimpl
 @hookimpl
 async def stop(ctx):
+    await asyncio.sleep(0.5)  # an arm takes its time
     (ctx.scratch / "safe").touch()
 """
 STUCK = """
