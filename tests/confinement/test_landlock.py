@@ -73,6 +73,12 @@ def test_device_that_may_be_read_only_is_not_controlled(tmp_path: Path) -> None:
     assert told(f"{RESTRICTED}tell(failure({asks}))", given) == NOT_ALLOWED
 
 
+@pytest.mark.parametrize("node", ["null", "zero", "full", "random", "urandom"])
+def test_device_that_everybody_needs_may_be_used(node: str) -> None:
+    opens = f"lambda: open('/dev/{node}', 'r+b', buffering=0)"
+    assert told(f"{RESTRICTED}tell(failure({opens}))", {}) == ""
+
+
 def test_every_right_is_shown_to_matter() -> None:
     assert set(DO) | {"control a device"} == set(landlock.HANDLED)
 

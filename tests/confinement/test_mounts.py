@@ -78,8 +78,9 @@ from nondum.host.inside import kernel, room
 flag, folder, how = int(sys.argv[1]), sys.argv[2], sys.argv[3]
 kernel.unshare(kernel.CLONE_NEWNS)
 kernel.mount(None, "/", None, kernel.MS_SLAVE | 1 << 14)  # MS_REC
-for at, flags in ((folder, flag), ("/dev", 0)):
-    kernel.mount("tmpfs", at, "tmpfs", flags)
+for at in (folder, "/dev"):
+    kernel.mount("tmpfs", at, "tmpfs", 0)
+kernel.mount(None, folder, None, kernel.MS_BIND | kernel.MS_REMOUNT | flag)
 os.mkdir(room.DEVICES)
 kernel.mount("tmpfs", room.DEVICES, "tmpfs", 0)
 given = dict(outside="", seen_outside=[], hides_outside=True, changes_user=False)

@@ -46,6 +46,13 @@ def test_network_is_the_hosts_only_by_permission() -> None:
     assert set(FLAGS) - set(called("network")) == {"--unshare-net"}
 
 
+def test_settings_of_the_network_are_there_by_permission() -> None:
+    always = binds(called(), "--ro-bind-try")
+    assert ("/etc/ld.so.cache", "/etc/ld.so.cache") in always
+    more = binds(called("network"), "--ro-bind-try") - always
+    assert ("/etc/resolv.conf", "/etc/resolv.conf") in more
+
+
 def test_worker_does_not_know_the_host_name() -> None:
     assert value(called(), "--hostname") == "worker"
 

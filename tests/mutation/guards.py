@@ -339,6 +339,10 @@ SPARED: Mapping[tuple[str, str], str] = {
     (f"{_H}/inside/room.py", 'os.makedirs("/etc", exist_ok=True)'): (
         "is there already, but on a host that has none of the settings that libraries look for"
     ),
+    (f"{_H}/inside/room.py", 'Path("/proc/self/setgroups").write_text("deny")'): (
+        "is inherited from the user namespace that bubblewrap makes"
+    ),
+    (f"{_H}/inside/room.py", "revoke(need)"): "the host has taken away the one before it already",
     (f"{_H}/inside/bootstrap.py", "for … in PRELOADED"): _QUICKER,
     (f"{_H}/inside/bootstrap.py", "importlib.import_module(name)"): _QUICKER,
     (f"{_T}/discovery/ears.py", "not _INSTANCE.fullmatch(name)"): (
