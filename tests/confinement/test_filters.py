@@ -143,6 +143,7 @@ FOR_RESTRICTED = {
     "the same, and truncate": ("open", (0, 3 | os.O_TRUNC), True),
     "to read and write": ("openat", (0, 0, os.O_RDWR | os.O_TRUNC | os.O_CLOEXEC), False),
     "to read, and truncate": ("openat", (0, 0, os.O_RDONLY | os.O_TRUNC), True),
+    "the same, by the older call": ("open", (0, os.O_RDONLY | os.O_TRUNC), True),
     "truncate by path": ("truncate", (0, 0), True),
     "its own priority": ("setpriority", (0, 0, 19), False),
     "that of another": ("setpriority", (0, 1, 19), True),

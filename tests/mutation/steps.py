@@ -44,7 +44,10 @@ _JUDGES = re.compile(r"(flaw|overlap|use|excess|contradiction|twice)s?$")
 
 _CONFINEMENT = "host/nondum/host/confinement"
 TABLES: Mapping[str, tuple[str, ...]] = {
-    f"{_CONFINEMENT}/refusals.py": ("GROUPS", "WITHOUT_NAMESPACES", "SOCKETS_OF_THE_HOST"),
+    f"{_CONFINEMENT}/refusals.py": (
+        *("GROUPS", "WITHOUT_NAMESPACES", "SOCKETS_OF_THE_HOST"),
+        *("WITH_THE_HOSTS_USER", "TRUNCATION"),
+    ),
     f"{_CONFINEMENT}/bubblewrap.py": ("NAMESPACES", "SEALED", "PROTECTED"),
 }
 """Module → its tables that say, row by row, what workers are kept from."""
