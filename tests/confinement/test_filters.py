@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 import struct
@@ -142,6 +143,7 @@ FOR_RESTRICTED = {
     "the same, and truncate": ("open", (0, 3 | os.O_TRUNC), True),
     "to read and write": ("openat", (0, 0, os.O_RDWR | os.O_TRUNC | os.O_CLOEXEC), False),
     "to read, and truncate": ("openat", (0, 0, os.O_RDONLY | os.O_TRUNC), True),
+    "the same, by the older call": ("open", (0, os.O_RDONLY | os.O_TRUNC), True),
     "truncate by path": ("truncate", (0, 0), True),
     "its own priority": ("setpriority", (0, 0, 19), False),
     "that of another": ("setpriority", (0, 1, 19), True),
@@ -180,6 +182,14 @@ def test_what_copying_a_file_calls_does_nothing_where_the_user_is_the_hosts(call
     code = filter_of({**GROUPS, **WITH_THE_HOSTS_USER}, "x86_64")
     assert run(code, X86.numbers[call], X86.audit, 0, 0, 0) == ERROR | 0
     assert run(filter_of(GROUPS, "x86_64"), X86.numbers[call], X86.audit, 0, 0, 0) == ALLOW
+
+
+def test_touching_a_path_fails_there_so_that_the_file_is_made_instead() -> None:
+    code, call = filter_of({**GROUPS, **WITH_THE_HOSTS_USER}, "x86_64"), X86.numbers["utimensat"]
+    path, times = 0x7000, 0x8000
+    assert run(code, call, X86.audit, 0, path, 0) == ERROR | errno.EPERM
+    assert run(code, call, X86.audit, 0, path, times) == ERROR | 0
+    assert run(code, call, X86.audit, 0, 0, 0) == ERROR | 0, "of what is open already"
 
 
 @pytest.mark.parametrize("has_network", [False, True])

@@ -7,7 +7,13 @@ import errno
 import pytest
 
 from nondum.host.confinement.filters import Rule
-from nondum.host.confinement.refusals import GROUPS, SOCKETS_OF_THE_HOST, WITHOUT_NAMESPACES
+from nondum.host.confinement.refusals import (
+    GROUPS,
+    SOCKETS_OF_THE_HOST,
+    TRUNCATION,
+    WITH_THE_HOSTS_USER,
+    WITHOUT_NAMESPACES,
+)
 
 ALWAYS = {
     "mounts": (
@@ -50,7 +56,19 @@ SOMETIMES = {
 }
 """Group, call, which argument decides → its value, and whether the call is refused then."""
 
+WITH_ERRORS = {
+    ("metadata", 0): ("chmod", "fchmod", "fchmodat", "utime", "utimes", "futimesat", "utimensat"),
+    ("metadata", errno.EPERM): (
+        *("chown", "fchown", "lchown", "fchownat", "file_setattr"),
+        *("removexattr", "lremovexattr", "fremovexattr", "removexattrat"),
+    ),
+    ("metadata", errno.EOPNOTSUPP): ("setxattr", "lsetxattr", "fsetxattr", "setxattrat"),
+    ("truncation", errno.EPERM): ("truncate",),
+}
+"""Group, and what its calls fail with (0: they do nothing) → those that always do."""
+
 GROUPS_OF_ALL = {**GROUPS, **WITHOUT_NAMESPACES}
+WITH_ITS_USER = {**WITH_THE_HOSTS_USER, **TRUNCATION}
 
 
 @pytest.mark.parametrize(("group", "call"), [(g, c) for g, calls in ALWAYS.items() for c in calls])
@@ -65,6 +83,15 @@ def test_call_is_refused_for_what_its_argument_says(group: str, call: str, argum
     rules = [r for r in GROUPS_OF_ALL[group] if (r.call, r.argument) == (call, argument)]
     values = SOMETIMES[group, call, argument]
     assert {value: any(is_refused(rule, value) for rule in rules) for value in values} == values
+
+
+@pytest.mark.parametrize(
+    ("group", "error", "call"),
+    [(*key, call) for key, calls in WITH_ERRORS.items() for call in calls],
+)
+def test_call_is_refused_where_the_user_is_the_hosts(group: str, error: int, call: str) -> None:
+    rules = [rule for rule in WITH_ITS_USER[group] if rule.call == call and rule.is_always]
+    assert [rule.error for rule in rules] == [error]
 
 
 def is_refused(rule: Rule, value: int) -> bool:

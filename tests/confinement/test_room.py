@@ -10,14 +10,15 @@ import shutil
 import socket
 import subprocess
 import sys
-import tempfile
 from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tests.confinement.guests import does, guest, open_folder, parent, status
 from tests.confinement.processes import children
 from tests.kit.processes import until_gone
+from tests.kit.until import until_async
 from tests.kit.workers import HOST, LIBRARIES, SDK, WorkersUnderTest
 
 from nondum.host.confinement import bubblewrap
@@ -26,25 +27,9 @@ from nondum.host.events import WorkerLogged
 from nondum.host.lifecycle.folders import Folders, let_pass, make_private
 from nondum.host.workers import confinements
 from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined, user_for
-from nondum.planning.running import RunState
-from nondum.sdk.description import Behaviour, Unit
 
 pytestmark = pytest.mark.anyio
-
-DO = Behaviour("do", "(do ?u - sensor)")
-PLUGIN = """
-import os, socket, subprocess, sys, tty
-from nondum.sdk import Unit, behaviour, hookimpl
-
-@hookimpl
-def units():
-    return (Unit("it", "sensor"),)
-
-@behaviour("do", action="(do ?u - sensor)")
-async def do(ctx, u):
-    device = ctx.device("line")
-    {body}
-"""
+needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="needs root, to make devices")
 
 
 @pytest.fixture(params=[False, *([True] if os.geteuid() == 0 else [])], ids=["shared", "own"])
@@ -66,18 +51,6 @@ def line() -> Iterator[tuple[int, str]]:
             os.close(end)
 
 
-async def guest(tested: WorkersUnderTest, body: str, permissions: tuple[str, ...] = ()) -> None:
-    source = PLUGIN.replace("{body}", body.replace("\n", "\n    "))
-    spec = tested.spec("guest", source, behaviours=(DO,), units=(Unit("it", "sensor"),))
-    await tested.workers.start(replace(spec, permissions=permissions))
-
-
-async def does(tested: WorkersUnderTest) -> str:
-    """Have it do its thing; why it failed, if so."""
-    call = tested.behave("guest", "do", u=f"{HOST}__guest__it")
-    return "" if await call.ended() is RunState.SUCCEEDED else call.reason
-
-
 async def test_device_appears_and_vanishes_while_it_runs(
     tested: WorkersUnderTest, line: tuple[int, str]
 ) -> None:
@@ -95,6 +68,54 @@ async def test_device_appears_and_vanishes_while_it_runs(
     assert await does(tested) == ""
     assert await asyncio.to_thread(os.read, far, 5) == b"hello"
     await tested.workers.detach("guest", "line")
+    assert await does(tested) == ""
+    assert not [e for e in tested.told(WorkerLogged) if e.message.startswith("DEVICE_REFUSED")]
+
+
+async def test_device_takes_the_place_of_the_one_before_it(
+    tested: WorkersUnderTest, line: tuple[int, str]
+) -> None:
+    await guest(tested, "assert os.listdir('/dev/nondum') == ([] if device is None else ['line'])")
+    for node in ("/dev/null", line[1]):
+        await tested.workers.attach("guest", "line", node, {})
+        assert await does(tested) == ""
+    await tested.workers.detach("guest", "line")
+    assert await does(tested) == ""
+
+
+@pytest.fixture
+def nodes() -> Iterator[Path]:
+    """A folder among the devices of the machine, with one in it."""
+    folder = Path(f"/dev/nondum-test-{os.getpid()}")
+    folder.mkdir()
+    try:
+        os.mknod(folder / "null", 0o20666, os.makedev(1, 3))
+        (folder / "null").chmod(0o666)
+        yield folder
+    finally:
+        shutil.rmtree(folder)
+
+
+@needs_root
+async def test_device_has_its_own_name_too_whatever_folder_that_is_in(
+    tested: WorkersUnderTest, nodes: Path
+) -> None:
+    body = f"assert os.path.exists('{nodes}/null') == (device is not None)"
+    await guest(tested, body)
+    assert await does(tested) == ""
+    await tested.workers.attach("guest", "line", str(nodes / "null"), {})
+    assert await does(tested) == ""
+    await tested.workers.detach("guest", "line")
+    assert await does(tested) == ""
+
+
+@needs_root
+@pytest.mark.parametrize("pattern", ["{}", "{}/null"])
+async def test_permission_brings_folders_of_device_nodes(
+    tested: WorkersUnderTest, monkeypatch: pytest.MonkeyPatch, nodes: Path, pattern: str
+) -> None:
+    monkeypatch.setattr(confinements, "NODES", {"audio": (pattern.format(nodes),)})
+    await guest(tested, f"open('{nodes}/null', 'w').close()", ("audio",))
     assert await does(tested) == ""
 
 
@@ -194,6 +215,13 @@ async def test_what_is_left_in_a_room_is_reaped(tested: WorkersUnderTest) -> Non
         "    await ctx.sleep(0.01)",
     )
     assert await does(tested) == ""
+    keeper = parent(tested.workers.pids()["guest"])
+    await until_async("its keeper waits again", lambda: is_at_rest(keeper))
+
+
+def is_at_rest(pid: int) -> bool:
+    """Whether it sleeps, however often one looks: what spins does so at times."""
+    return all(status(pid)["State"].startswith("S") for _ in range(100))
 
 
 async def test_room_ends_with_its_worker(tested: WorkersUnderTest) -> None:
@@ -224,7 +252,10 @@ for copy in (shutil.copy, shutil.copy2, shutil.copyfile):
 shutil.copy2(os.__file__, here / 'of the system')
 one.chmod(0o600)
 one.touch()
-os.utime(one)
+(here / 'touched').touch()
+assert (here / 'touched').exists()
+subprocess.run(['touch', here / 'touched by a program'], check=True)
+os.utime(one, (1e9, 1e9))
 (here / 'tree/inner').mkdir(parents=True)
 shutil.copy(one, here / 'tree/inner')
 shutil.copytree(here / 'tree', here / 'copied')
@@ -307,10 +338,15 @@ def test_what_lies_in_its_folders_is_no_device_and_has_no_set_id_bits() -> None:
     assert in_the_room == "65534 does not open"
 
 
-async def test_keeper_has_its_system_calls_filtered(tested: WorkersUnderTest) -> None:
-    await guest(tested, "pass")
-    keeper = parent(tested.workers.pids()["guest"])
-    assert status(keeper)["Seccomp"] == "2"
+async def test_worker_may_name_its_user_and_not_leave_its_groups(tested: WorkersUnderTest) -> None:
+    body = (
+        "os.setuid(os.getuid())\n"
+        "os.setgid(os.getgid())\n"
+        "os.chown('.', os.getuid(), os.getgid())\n"
+        "assert open('/proc/self/setgroups').read() == 'deny\\n'"
+    )
+    await guest(tested, body)
+    assert await does(tested) == ""
 
 
 async def test_outside_is_not_told_by_what_a_worker_is(tested: WorkersUnderTest) -> None:
@@ -319,6 +355,8 @@ async def test_outside_is_not_told_by_what_a_worker_is(tested: WorkersUnderTest)
         "assert os.environ['HOME'] == os.getcwd() == str(ctx.scratch)\n"
         "import pwd\n"
         "assert pwd.getpwuid(os.getuid()).pw_dir == str(ctx.scratch)\n"
+        "import grp\n"
+        "assert grp.getgrgid(os.getgid()).gr_name == 'worker'\n"
         "assert socket.gethostname() == 'worker'\n"
         "assert not os.path.exists('/home') and not os.path.exists('/var')\n"
         "assert sorted(os.listdir('/dev')) == sorted(['core', 'fd', 'full', 'nondum', 'null',"
@@ -328,27 +366,8 @@ async def test_outside_is_not_told_by_what_a_worker_is(tested: WorkersUnderTest)
     assert await does(tested) == ""
 
 
-@contextlib.contextmanager
-def open_folder() -> Iterator[Path]:
-    """A folder that everybody may go into, unlike those of tests."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        folder.chmod(0o755)
-        yield folder
-
-
 def mode(node: str) -> int:
     return Path(node).stat().st_mode
-
-
-def status(pid: int) -> dict[str, str]:
-    lines = Path(f"/proc/{pid}/status").read_text(encoding="ascii").splitlines()
-    return dict(line.split(":\t", 1) for line in lines)
-
-
-def parent(pid: int) -> int:
-    fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
-    return int(fields[1])
 
 
 async def test_worker_of_root_gets_a_user_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from nondum.host.confinement.bubblewrap import INSIDE, OUTSIDE, PLACE_OF_INSIDE, Ground, command
+from nondum.host.confinement.bubblewrap import (
+    INSIDE,
+    OUTSIDE,
+    PLACE_OF_INSIDE,
+    PROTECTED,
+    SEALED,
+    Ground,
+    command,
+)
+from nondum.host.inside import room
 
 SEEN = Path("/srv/nondum/venvs")
 FLAGS = (
@@ -37,6 +46,13 @@ def test_network_is_the_hosts_only_by_permission() -> None:
     assert set(FLAGS) - set(called("network")) == {"--unshare-net"}
 
 
+def test_settings_of_the_network_are_there_by_permission() -> None:
+    always = binds(called(), "--ro-bind-try")
+    assert ("/etc/ld.so.cache", "/etc/ld.so.cache") in always
+    more = binds(called("network"), "--ro-bind-try") - always
+    assert ("/etc/resolv.conf", "/etc/resolv.conf") in more
+
+
 def test_worker_does_not_know_the_host_name() -> None:
     assert value(called(), "--hostname") == "worker"
 
@@ -44,6 +60,13 @@ def test_worker_does_not_know_the_host_name() -> None:
 def test_interpreter_takes_nothing_from_its_environment() -> None:
     words = called()
     assert words[words.index("--") + 2 :][:4] == ["-I", "-S", "-B", "-u"]
+
+
+def test_what_root_could_set_is_sealed_and_the_room_itself_protected() -> None:
+    assert set(SEALED) == {
+        f"/proc/{name}" for name in ("sys", "sysrq-trigger", "irq", "bus", "fs", "acpi")
+    }
+    assert set(PROTECTED) == {"/", "/dev", room.DEVICES}
 
 
 @pytest.mark.parametrize("permissions", [(), ("network",), ("gpu",)])

@@ -1,8 +1,8 @@
 """Fuzz every reader, guided by coverage: `python -m tests.fuzz [TARGET…] [--minutes N]`.
 
-Needs atheris (`pip install --group fuzz`). Each target runs in a process of its own, as many at a
-time as there are cores; what it finds is written to a file beside the report. With a folder for
-what was done (`--folder`) it can be stopped and goes on where it was.
+Needs atheris (`./run campaign fuzz` installs it). Each target runs in a process of its own, as many
+at a time as there are cores; what it finds is written to a file beside the report. With a folder
+for what was done (`--folder`) it can be stopped and goes on where it was.
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ on a disk of its own: a change of nondum does not cost a new root file system.
 from __future__ import annotations
 
 import hashlib
+import re
 import shutil
 import sys
 import zipfile
@@ -34,6 +35,8 @@ EXTRAS = {"nondum": "fast", "nondum_planner_fast_downward": "engine"}
 SDK_NEEDS = ("pluggy", "msgpack")
 FOR_PAYLOADS = "for-payloads"
 """The folder beside the image with wheels of what the SDK needs, for that machine's processor."""
+LOCK = CHECKOUT / "packaging/development/requirements.lock"
+"""Versions and hashes of all that others wrote."""
 PREFIX = "/opt/nondum"
 DISK_MB = 768
 PYTHON = "3.11"
@@ -130,21 +133,24 @@ def _packaging(source: Path) -> Path:
 
 def _own_wheels(source: Path, folder: Path) -> None:
     places = [source / path for path in DISTRIBUTIONS]
-    call(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", folder, *places)
+    held = ("--no-deps", "--no-index", "--no-build-isolation")
+    call(sys.executable, "-m", "pip", "wheel", "-q", *held, "-w", folder, *places)
 
 
 def _dependencies(machine: Built, own: Path) -> Path:
-    """Wheels of everything that nondum needs, fetched again when what it needs has changed."""
+    """Wheels of everything that nondum needs, fetched again when that, or the lock, has changed."""
     needs = sorted({need for wheel in own.iterdir() for need in _needs(machine, wheel)})
-    key = hashlib.sha256(f"{PLATFORMS}{needs}".encode()).hexdigest()[:16]
+    key = hashlib.sha256(f"{PLATFORMS}{needs}{LOCK.read_text()}".encode()).hexdigest()[:16]
     name = f"wheels-{machine.recipe.name}-{key}"
     return kept(name, lambda folder: _fetch(machine, needs, folder))
 
 
 def _fetch(machine: Built, needs: list[str], folder: Path) -> None:
+    lock = folder / LOCK.name
+    lock.write_text(re.sub(r" ;[^\\\n]*", "", LOCK.read_text()))  # without markers: see _needs
     call(
         *(sys.executable, "-m", "pip", "download", "-q", "--only-binary", ":all:"),
-        *("--python-version", PYTHON, "-d", folder),
+        *("--require-hashes", "-c", lock, "--python-version", PYTHON, "-d", folder),
         *(f"--platform={name}_{machine.recipe.name}" for name in PLATFORMS),
         *needs,
     )

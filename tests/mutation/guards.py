@@ -39,6 +39,8 @@ _STREAMS = (f"{_TH}/bridge/test_remote_streams.py",)
 _ADMISSION = tuple(f"{_TT}/peers/test_{each}.py" for each in ("gate", "admission"))
 _PEER_KEYS = (f"{_TT}/peers/test_keys.py",)
 _PAIRING = tuple(f"{_TT}/peers/test_{each}.py" for each in ("pairing", "pairing_channel"))
+_TC, _TI = "tests/confinement", f"{_TH}/inside"
+_IN_ROOMS = tuple(f"{_TC}/test_{each}.py" for each in ("keeper", "mounts", "room"))
 _PEER_CALLS = tuple(f"{_TT}/peers/test_{each}.py" for each in ("calls", "once", "allowance"))
 
 GUARDS: Mapping[str, tuple[str, ...]] = {
@@ -140,10 +142,29 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     # How they are confined.
     f"{_H}/confinement/choice.py": ("tests/confinement/test_level.py",),
     f"{_H}/confinement/level.py": ("tests/confinement/test_level.py",),
-    f"{_H}/confinement/bubblewrap.py": ("tests/confinement/test_room_command.py",),
+    f"{_H}/confinement/bubblewrap.py": (f"{_TC}/test_room_command.py", *_IN_ROOMS),
+    f"{_H}/confinement/landlock.py": (f"{_TC}/test_landlock.py", f"{_TC}/test_room.py"),
+    f"{_H}/confinement/own_children.py": (f"{_TC}/test_own_children.py",),
     f"{_H}/confinement/refusals.py": (
         *("tests/confinement/test_refused_calls.py", "tests/confinement/test_filters.py"),
     ),
+    f"{_H}/inside/bootstrap.py": (
+        f"{_TI}/test_bootstrap.py",
+        *_IN_ROOMS,
+        *(f"{_TH}/workers/test_{each}.py" for each in ("spare", "host_death")),
+    ),
+    f"{_H}/inside/keeper.py": (*_IN_ROOMS, f"{_TH}/workers/test_host_death.py"),
+    f"{_H}/inside/kernel.py": (f"{_TI}/test_kernel.py", f"{_TI}/test_walls.py", *_IN_ROOMS),
+    f"{_H}/inside/limits.py": (f"{_TI}/test_limits.py",),
+    f"{_H}/inside/look.py": (
+        *(f"{_TI}/test_look.py", f"{_TC}/test_level.py", f"{_TC}/test_keeper.py"),
+    ),
+    f"{_H}/inside/room.py": (
+        *_IN_ROOMS[1:],
+        f"{_TH}/workers/test_devices.py",
+        f"{_TC}/test_walls.py::test_wall_of_a_room_matters[user namespaces]",
+    ),
+    f"{_H}/inside/walls.py": (f"{_TI}/test_walls.py",),
     f"{_H}/helper/requests.py": (f"{_TH}/helper/test_requests.py",),
     f"{_H}/helper/disks.py": (f"{_TH}/helper/test_disks.py",),
     f"{_H}/helper/nodes.py": (f"{_TH}/helper/test_nodes.py",),
@@ -204,7 +225,6 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_T}/peers/identity.py": (f"{_TT}/peers/test_identity.py",),
     f"{_T}/peers/keys.py": _PEER_KEYS,
     f"{_T}/peers/link.py": (f"{_TT}/peers/test_presence.py",),
-    f"{_T}/peers/listener.py": _ADMISSION,
     f"{_T}/peers/messages.py": (f"{_TT}/peers/test_messages.py",),
     f"{_T}/peers/node.py": (*_ADMISSION, f"{_TT}/peers/test_received.py"),
     f"{_T}/peers/pairing.py": _PAIRING,
@@ -212,6 +232,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_T}/peers/pairing_messages.py": (f"{_TT}/peers/test_pairing_messages.py",),
     f"{_T}/peers/presence.py": (f"{_TT}/peers/test_presence.py",),
     f"{_T}/peers/private_file.py": _PEER_KEYS,
+    f"{_T}/peers/proof.py": (f"{_TT}/peers/test_proof.py",),
     f"{_T}/peers/public_file.py": (f"{_TT}/peers/test_public_file.py",),
     f"{_T}/peers/roster.py": (
         *_ADMISSION,
@@ -234,6 +255,7 @@ ROOMS = (
     f"{_H}/drives",
     f"{_H}/helper",
     f"{_H}/confinement",
+    f"{_H}/inside",
     f"{_H}/control",
     f"{_H}/lifecycle",
     f"{_H}/workers",
@@ -309,6 +331,7 @@ _LIMIT = "tells of a limit of this host"
 _EITHER = "where there is no code, there is no try either, and each is refused"
 _RESTORED = "it is refused as it is restored, too"
 _NO_OFFER = "of a component that is not there nothing is offered, and each is refused"
+_QUICKER = "is done ahead for speed only"
 _MONITOR = "the socket's monitor tells of the same end"
 SPARED: Mapping[tuple[str, str], str] = {
     (f"{_T}/bridge/outgoing.py", "case Sent.GONE"): _MONITOR,
@@ -316,6 +339,15 @@ SPARED: Mapping[tuple[str, str], str] = {
         f"{_T}/bridge/outgoing.py",
         "self._way.send([packets.told(Pong(at_s, self._loop.time()))]) is Sent.GONE",
     ): _MONITOR,
+    (f"{_H}/inside/room.py", 'os.makedirs("/etc", exist_ok=True)'): (
+        "is there already, but on a host that has none of the settings that libraries look for"
+    ),
+    (f"{_H}/inside/room.py", 'Path("/proc/self/setgroups").write_text("deny")'): (
+        "is inherited from the user namespace that bubblewrap makes"
+    ),
+    (f"{_H}/inside/room.py", "revoke(need)"): "the host has taken away the one before it already",
+    (f"{_H}/inside/bootstrap.py", "for … in PRELOADED"): _QUICKER,
+    (f"{_H}/inside/bootstrap.py", "importlib.import_module(name)"): _QUICKER,
     (f"{_T}/discovery/ears.py", "not _INSTANCE.fullmatch(name)"): (
         "another name is not made of the key either, which is refused below"
     ),

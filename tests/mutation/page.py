@@ -21,7 +21,9 @@ A step is what leads to a refusal of something that was plugged in, or that a wo
 this machine, or another host, has sent: a condition, of `a or b` each, and each bound of two; a
 condition that must hold, or what follows refuses; a kind of error that is answered with a refusal;
 the loop or call by which flaws that were found are told; a row of a table of refused system calls,
-or of namespaces. What limits of this machine do (a full disk) is no step. Tests of properties
+or of namespaces. In the modules by which a process is confined, more is a step: each call made for
+what it does, and each check that it was done; each flag of a mount, right of Landlock and resource
+limit; each loop. What limits of this machine do (a full disk) is no step. Tests of properties
 (Hypothesis) count only if they fail with each of three seeds. Modules that refuse something and
 stand aside are in `tests/mutation/guards.py`, with the reason; a test sees that no module is in
 neither list. A step that another one makes up for has no test, and the reason stands in its place.

@@ -9,6 +9,10 @@ Refusing is raising, telling a problem, or returning what is wrong. A step is wh
 - the call by which the flaws that another function finds are told with the others;
 - a row of a table of what workers are refused (`TABLES`).
 
+In modules by which a process confines itself, or is confined (`CONFINING`), more is a step: each
+call that is made for what it does, and each check that it was done; each flag of a mount, right and
+scope; each loop; each row of a table; each option of bubblewrap that takes something away.
+
 Without the step, the refusal never comes; what its condition reads on the way is still read.
 """
 
@@ -40,10 +44,30 @@ _JUDGES = re.compile(r"(flaw|overlap|use|excess|contradiction|twice)s?$")
 
 _CONFINEMENT = "host/nondum/host/confinement"
 TABLES: Mapping[str, tuple[str, ...]] = {
-    f"{_CONFINEMENT}/refusals.py": ("GROUPS", "WITHOUT_NAMESPACES", "SOCKETS_OF_THE_HOST"),
-    f"{_CONFINEMENT}/bubblewrap.py": ("NAMESPACES",),
+    f"{_CONFINEMENT}/refusals.py": (
+        *("GROUPS", "WITHOUT_NAMESPACES", "SOCKETS_OF_THE_HOST"),
+        *("WITH_THE_HOSTS_USER", "TRUNCATION"),
+    ),
+    f"{_CONFINEMENT}/bubblewrap.py": ("NAMESPACES", "SEALED", "PROTECTED"),
 }
 """Module → its tables that say, row by row, what workers are kept from."""
+_INSIDE = "host/nondum/host/inside"
+CONFINING = frozenset(
+    {
+        *(f"{_INSIDE}/{name}.py" for name in ("bootstrap", "keeper", "kernel", "limits")),
+        *(f"{_INSIDE}/{name}.py" for name in ("look", "room", "walls")),
+        *(f"{_CONFINEMENT}/{name}.py" for name in ("bubblewrap", "landlock", "own_children")),
+    }
+)
+"""Modules that do hardly anything but take away what a process could do."""
+_FLAG = re.compile(
+    r"(kernel\.)?MS_(RDONLY|NOSUID|NODEV|NOEXEC|SLAVE)|_(BIND|CONNECT)_TCP|_ABSTRACT_SOCKETS|_SIGNALS|CLONE_NEW\w+"
+)
+"""Flags, rights and scopes that say what is taken away."""
+_OPTION = re.compile(r"f?\"(--unshare-user|-[ISB]|(size|mode)=.*)\"")
+"""What does in the words of a command, or of a mount's options."""
+_INSTEAD = {"--ro-bind": "--bind", "--ro-bind-try": "--bind-try"}
+"""What stands in the place of an option that another one must follow."""
 
 _Function = ast.FunctionDef | ast.AsyncFunctionDef
 _Branch = ast.If | ast.match_case | ast.ExceptHandler
@@ -97,6 +121,8 @@ def steps_of(module: str, text: str) -> tuple[Step, ...]:
     found = list(_Finder().found(tree))
     if module in TABLES:
         found += _rows(tree, TABLES[module])
+    if module in CONFINING:
+        found += [one for node in ast.walk(tree) for one in _taken_away(node)]
     for from_, to, instead, told in found:
         start, end = _offset(*from_, starts, text), _offset(*to, starts, text)
         source = text[start:end]
@@ -312,6 +338,32 @@ def _rows(module: ast.Module, tables: Collection[str]) -> Iterator[_Found]:
                                 yield _Found(_start(key), _end(value), "**dict()", ast.unparse(key))
                     case ast.Tuple(elts=parts) | ast.Call(func=ast.Name(id="_all"), args=parts):
                         yield from (_whole(one, "*()") for one in parts if _is_row(one))
+
+
+def _taken_away(node: ast.AST) -> Iterator[_Found]:
+    """What a node does so that a process can do less afterwards."""
+    match node:
+        case ast.Expr(value=ast.Call() as call):
+            yield _whole(call, "None")
+        case ast.Assign(targets=[ast.Subscript()]):
+            yield _Found((node.lineno, node.col_offset), _end(node.value), "None")
+        case ast.Call(func=ast.Name(id="_checked"), args=[called, *_]):
+            yield _whole(node, ast.unparse(called), "unchecked: {}")
+        case ast.For(iter=each):
+            yield _whole(each, "()", "for … in {}")
+        case ast.Dict(keys=keys, values=values):
+            for key, value in zip(keys, values, strict=True):
+                if key is not None:
+                    yield _Found(_start(key), _end(value), "**dict()")
+        case (ast.Name(ctx=ast.Load()) | ast.Attribute(ctx=ast.Load())) as flag:
+            if _FLAG.fullmatch(ast.unparse(flag)):
+                yield _whole(flag, "0")
+        case ast.Constant(value=str(option)) if option in _INSTEAD:
+            yield _whole(node, f'"{_INSTEAD[option]}"')
+        case ast.Tuple(elts=parts):
+            for part in parts:
+                if _OPTION.fullmatch(ast.unparse(part).replace("'", '"')):
+                    yield _whole(part, "*()")
 
 
 def _is_row(part: ast.expr) -> bool:

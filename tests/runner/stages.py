@@ -17,8 +17,8 @@ from tests.runner.job import Job
 
 ROOT = Path(__file__).parents[2]
 PROCESSORS = os.cpu_count() or 1
-INSTALLED = ("-o", "pythonpath=.")
-"""`.` on the path gives tests/ and demo/ only: nondum itself is what is installed."""
+INSTALLED = ("-o", "pythonpath=. packaging/development")
+"""These give tests/, demo/ and nondum_dev only: nondum itself is what is installed."""
 COMPUTE = (
     "tests/benchmarks",
     "tests/demo/shuffle",
@@ -38,6 +38,7 @@ COMPUTE = (
 LOWEST = 19
 WITH_EXAMPLES = (
     *("host", "planning", "transport", "wheelhouse/nondum", "plugins/sdk/nondum", "demo"),
+    "packaging/development/nondum_dev",
     *("benchmarks/recompose", "benchmarks/execution", "benchmarks/composition"),
 )
 """Source with examples in its docstrings."""

@@ -19,6 +19,7 @@ from nondum.host.workers.launcher import owner_mark
 pytestmark = pytest.mark.anyio
 
 ROOT = Path(__file__).parents[3]
+LEVELS = ("sandboxed", "restricted")
 DAEMON = """
 import asyncio, sys
 from pathlib import Path
@@ -33,9 +34,11 @@ async def main():
 asyncio.run(main())
 """
 POLITE = """
+import asyncio
 from nondum.sdk import hookimpl
 @hookimpl
 async def stop(ctx):
+    await asyncio.sleep(0.5)  # an arm takes its time
     (ctx.scratch / "safe").touch()
 """
 STUCK = """
@@ -53,7 +56,9 @@ async def start(ctx):
 """
 
 
-async def daemon_with(folder: Path, plugin: str) -> tuple[asyncio.subprocess.Process, int]:
+async def daemon_with(
+    folder: Path, plugin: str, level: str
+) -> tuple[asyncio.subprocess.Process, int]:
     """A daemon in a process of its own, and the id of its worker."""
     source = folder / "source.py"
     source.write_text(plugin)
@@ -61,7 +66,11 @@ async def daemon_with(folder: Path, plugin: str) -> tuple[asyncio.subprocess.Pro
     daemon = await asyncio.create_subprocess_exec(
         *(sys.executable, "-c", DAEMON, str(folder), str(source)),
         stdout=asyncio.subprocess.PIPE,
-        env={**os.environ, "PYTHONPATH": ":".join(map(str, [*paths, ROOT / "plugins/sdk"]))},
+        env={
+            **os.environ,
+            "PYTHONPATH": ":".join(map(str, [*paths, ROOT / "plugins/sdk"])),
+            "NONDUM_TEST_LEVEL": level,
+        },
     )
     assert daemon.stdout is not None
     return daemon, int(await arrived("the worker's process", daemon.stdout.readline()))
@@ -72,15 +81,17 @@ async def kill(daemon: asyncio.subprocess.Process) -> None:
     await daemon.communicate()
 
 
-async def test_worker_leaves_things_safe_and_ends(tmp_path: Path) -> None:
-    daemon, worker = await daemon_with(tmp_path, POLITE)
+@pytest.mark.parametrize("level", LEVELS)
+async def test_worker_leaves_things_safe_and_ends(tmp_path: Path, level: str) -> None:
+    daemon, worker = await daemon_with(tmp_path, POLITE, level)
     await kill(daemon)
     await until_gone(worker)
     assert (tmp_path / "guest/scratch/safe").exists()
 
 
-async def test_stuck_interpreter_ends_too(tmp_path: Path) -> None:
-    daemon, worker = await daemon_with(tmp_path, STUCK)
+@pytest.mark.parametrize("level", LEVELS)
+async def test_stuck_interpreter_ends_too(tmp_path: Path, level: str) -> None:
+    daemon, worker = await daemon_with(tmp_path, STUCK, level)
     await until_async("held", (tmp_path / "guest/scratch/held").exists)
     await kill(daemon)
     assert is_alive(worker)

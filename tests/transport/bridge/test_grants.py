@@ -10,6 +10,7 @@ import zmq
 from tests.transport.bridge.ends import PATIENCE_S, Owner, owner, stalling, within
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.wire import pack
 from nondum.transport.bridge import Exporter, outgoing, packets
 from nondum.transport.bridge.packets import Claim, Handled, Opened, Over, Pong
 from nondum.transport.peers.failures import PeerRefused
@@ -38,6 +39,24 @@ async def test_granted_stream_arrives_with_its_type() -> None:
         reading = host.read(READER, granted)
         assert await within(reading.opened) == "depth"
         await works(host)
+
+
+async def test_longest_frame_arrives() -> None:
+    async with owner() as host:
+        granted = host.grant(READER)
+        reading = host.read(READER, granted)
+        await within(granted.claimed)
+        granted.send(bytes(packets.MAX_BULK))
+        assert len(bytes((await reading.until(1)).bulk or b"")) == packets.MAX_BULK
+
+
+async def test_longest_message_of_a_reader_arrives() -> None:
+    longest = pack([1, packets.VERSION, "x" * (packets.MAX_ASKED - 6)])
+    assert len(longest) == packets.MAX_ASKED
+    async with owner() as host:
+        raw = host.raw(READER, host.grant(READER))
+        raw.say(longest)
+        assert isinstance(await raw.hears(), Over)
 
 
 async def test_key_without_a_grant_is_not_let_in() -> None:

@@ -36,6 +36,13 @@ NAMESPACES: Mapping[str, tuple[str, ...]] = {
     "daemon's end": ("--die-with-parent",),
 }
 """Walls that bubblewrap puts up, each by itself."""
+SEALED: tuple[str, ...] = (
+    *("/proc/sys", "/proc/sysrq-trigger", "/proc/irq", "/proc/bus", "/proc/fs", "/proc/acpi"),
+)
+"""What root may write by being root, capabilities or not, is read only: `core_pattern` runs
+programs."""
+PROTECTED: tuple[str, ...] = ("/", "/dev", "/dev/nondum")
+"""Mounts of the room that become read-only once it is furnished (`nondum.host.inside.room`)."""
 
 _SYSTEM = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64")
 _SETTINGS = (

@@ -10,7 +10,7 @@ import contextlib
 import ctypes
 import os
 import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 _CREATE, _ADD = 444, 445
@@ -23,8 +23,27 @@ TRUNCATES = 3
 """The ABI from which truncating a file is a right of its own."""
 
 EXECUTE, WRITE_FILE, READ_FILE, READ_DIR = 1 << 0, 1 << 1, 1 << 2, 1 << 3
-_REFER, _TRUNCATE, IOCTL_DEVICE = 1 << 13, 1 << 14, 1 << 15
-_ALL_OF_ABI = {1: (1 << 13) - 1, 2: (1 << 14) - 1, 3: (1 << 15) - 1, 5: (1 << 16) - 1}
+_TRUNCATE, IOCTL_DEVICE = 1 << 14, 1 << 15
+HANDLED: Mapping[str, tuple[int, int]] = {
+    "execute": (EXECUTE, 1),
+    "write a file": (WRITE_FILE, 1),
+    "read a file": (READ_FILE, 1),
+    "list a folder": (READ_DIR, 1),
+    "remove a folder": (1 << 4, 1),
+    "remove a file": (1 << 5, 1),
+    "make a character device": (1 << 6, 1),
+    "make a folder": (1 << 7, 1),
+    "make a file": (1 << 8, 1),
+    "make a socket": (1 << 9, 1),
+    "make a pipe": (1 << 10, 1),
+    "make a block device": (1 << 11, 1),
+    "make a link": (1 << 12, 1),
+    "truncate a file": (_TRUNCATE, TRUNCATES),
+    "control a device": (IOCTL_DEVICE, 5),
+}
+"""What is refused wherever no rule allows it → the right, and the ABI from which it can be. (That
+of moving a file to another folder, 1 << 13, is refused by every ruleset, and never allowed here.)
+"""
 _BIND_TCP, _CONNECT_TCP = 1 << 0, 1 << 1
 _ABSTRACT_SOCKETS, _SIGNALS = 1 << 0, 1 << 1
 _FILES_ONLY = EXECUTE | WRITE_FILE | READ_FILE | _TRUNCATE | IOCTL_DEVICE
@@ -32,7 +51,6 @@ _FILES_ONLY = EXECUTE | WRITE_FILE | READ_FILE | _TRUNCATE | IOCTL_DEVICE
 
 READ = EXECUTE | READ_FILE | READ_DIR
 DEVICE = READ_FILE | WRITE_FILE | IOCTL_DEVICE
-EVERYTHING = (1 << 16) - 1
 
 _SYSTEM = (
     *("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/proc"),
@@ -67,14 +85,14 @@ def ruleset(
     `nodes` are devices, or folders of them. What is not there is left out. Raises `OSError`.
     """
     abi = version() if abi is None else abi
-    rights = max(mask for least, mask in _ALL_OF_ABI.items() if least <= max(abi, 1))
+    rights = sum(right for right, since in HANDLED.values() if since <= max(abi, 1))
     made = _created(rights, abi, has_network=has_network)
     try:
         system = (*_SYSTEM, *(_OF_THE_NETWORK if has_network else ()))
         for path in (*map(Path, system), *readable):
             _allow(made, path, READ & rights)
         for path in writable:
-            _allow(made, path, EVERYTHING & rights & ~_REFER)
+            _allow(made, path, rights)
         for node in (*_NODES, *nodes):
             _allow(made, Path(node), (DEVICE | READ_DIR) & rights)
         yield made

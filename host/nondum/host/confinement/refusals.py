@@ -118,6 +118,8 @@ WITH_THE_HOSTS_USER: Mapping[str, tuple[Rule, ...]] = {
     # nothing, and says that it was done; the rest fails.
     "metadata": (
         *_all("chmod", "fchmod", "fchmodat", error=0),
+        # Of a path, and without times: `Path.touch` makes the file if that fails, and else not.
+        Rule("utimensat", errno.EPERM, argument=2, equal=(0,), only_with=(1, 0xFFFFFFFF)),
         *_all("utime", "utimes", "futimesat", "utimensat", error=0),
         *_all("chown", "fchown", "lchown", "fchownat", "file_setattr"),
         *_all("setxattr", "lsetxattr", "fsetxattr", "setxattrat", error=errno.EOPNOTSUPP),

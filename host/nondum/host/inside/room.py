@@ -170,7 +170,7 @@ def _let_pass(outside: str) -> None:
 def _mount_memory(target: str, kilobytes: int, mode: str) -> None:
     os.makedirs(target, exist_ok=True)  # noqa: PTH103
     flags = kernel.MS_NOSUID | kernel.MS_NODEV | kernel.MS_NOEXEC
-    kernel.mount("tmpfs", target, "tmpfs", flags, f"size={kilobytes}k,mode={mode}")
+    kernel.mount("tmpfs", target, "tmpfs", flags, ",".join((f"size={kilobytes}k", f"mode={mode}")))
 
 
 def _flags_of(target: str) -> int:

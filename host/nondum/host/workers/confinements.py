@@ -43,8 +43,6 @@ INSTRUMENTS = (
     *("/dev/hidraw*", "/dev/i2c-*", "/dev/spidev*", "/dev/gpiochip*", "/dev/media*"),
 )
 """Where no room can be made for a worker, what one that declares devices may open."""
-SETTINGS = tuple(f"/proc/{name}" for name in ("sys", "sysrq-trigger", "irq", "bus", "fs", "acpi"))
-"""What root may write by being root, capabilities or not: `core_pattern` runs programs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,9 +231,9 @@ class Boxed:
             "scratch": str(spec.scratch),
             "nodes": list(nodes),
             "shared_mb": SHARED_MB,
-            "sealed": [] if "settings" in kept else SETTINGS,
+            "sealed": [] if "settings" in kept else bubblewrap.SEALED,
             "protected": [
-                *([] if "system" in kept else ["/", "/dev", room.DEVICES]),
+                *([] if "system" in kept else bubblewrap.PROTECTED),
                 *([] if "nodes" in kept else bubblewrap.NODES),
             ],
             "inotify_instances": room.INOTIFY_INSTANCES if "inotify" not in kept else 128,

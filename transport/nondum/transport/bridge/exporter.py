@@ -20,8 +20,8 @@ from nondum.transport.bridge.packets import VERSION, Claim, Over
 from nondum.transport.peers.arrivals import Arrivals
 from nondum.transport.peers.drained import Drained, Sent
 from nondum.transport.peers.keys import HostKeys, PeerKey
-from nondum.transport.peers.listener import prove_enforced
 from nondum.transport.peers.monitor import Watch
+from nondum.transport.peers.proof import prove_enforced
 from nondum.transport.peers.refusals import Refusals
 from nondum.transport.peers.zap import Entry, Knock, ZapHandler
 

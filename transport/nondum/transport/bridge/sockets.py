@@ -11,6 +11,7 @@ from nondum.transport.bridge.packets import MAX_ASKED, MAX_BULK
 from nondum.transport.bridge.window import SMALL_MESSAGES
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import HostKeys, PeerKey
+from nondum.transport.peers.received import SEALED
 
 Context = zmq.Context[zmq.Socket[bytes]]
 
@@ -69,7 +70,7 @@ def bind(socket: zmq.Socket[bytes], interfaces: Sequence[str], port: int) -> int
 def _bound(socket: zmq.Socket[bytes], longest: int) -> None:
     socket.linger = 0
     socket.setsockopt(zmq.IPV6, 1)
-    socket.setsockopt(zmq.MAXMSGSIZE, longest)
+    socket.setsockopt(zmq.MAXMSGSIZE, longest + SEALED)  # ZeroMQ counts what CURVE adds
     socket.setsockopt(zmq.HANDSHAKE_IVL, HANDSHAKE_MS)
     socket.setsockopt(zmq.SNDHWM, HIGH_WATER)
     socket.setsockopt(zmq.RCVHWM, HIGH_WATER)

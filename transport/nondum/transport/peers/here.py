@@ -17,9 +17,10 @@ from nondum.transport.peers.gate import entry, judge
 from nondum.transport.peers.identity import Identity, Security
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.link import LINGER_MS
-from nondum.transport.peers.listener import HIGH_WATER, dialling, listening, prove_enforced
+from nondum.transport.peers.listener import HIGH_WATER, dialling, listening
 from nondum.transport.peers.messages import MAX_MESSAGE, Ping, encode
 from nondum.transport.peers.monitor import Watch
+from nondum.transport.peers.proof import prove_enforced
 from nondum.transport.peers.received import MOST_AHEAD
 from nondum.transport.peers.refusals import Reason, Refusal
 from nondum.transport.peers.routes import AcceptedRoute, DialledRoute

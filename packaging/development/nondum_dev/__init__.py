@@ -1,0 +1,1 @@
+"""The environments in which nondum is developed and tested: what others wrote comes from a lock."""

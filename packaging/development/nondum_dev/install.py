@@ -1,0 +1,86 @@
+"""Installs into the environment of the Python that runs this.
+
+What others wrote is taken in the locked version, if it has a locked hash, and without pip looking
+for what it depends on: that is in the lock. What is of the checkout is built here, from no index.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from nondum_dev import asked, lockfile
+from nondum_dev.places import CHECKOUT, LOCK, LOCK_NAME
+from nondum_dev.problem import SetUpFailed
+
+PIP = (sys.executable, "-P", "-m", "pip", "-q", "--disable-pip-version-check", "install")
+
+
+@dataclass(frozen=True, slots=True)
+class Own:
+    """A folder, or a wheel, of the checkout: `plugins/sdk`, `.[fast]`, `dist/it-1.0-….whl`."""
+
+    path: Path
+    extras: tuple[str, ...] = ()
+    is_editable: bool = False
+
+    @classmethod
+    def parse(cls, word: str, *, is_editable: bool = False) -> Own:
+        """
+        >>> Own.parse("./plugins/sdk[usb,more]").extras
+        ('usb', 'more')
+        """
+        path, _, extras = word.rstrip("]").partition("[")
+        return cls(Path(path).resolve(), tuple(filter(None, extras.split(","))), is_editable)
+
+    def foreign(self) -> Iterable[str]:
+        """What it asks for, to be built and to run."""
+        if self.path.is_dir():
+            yield from asked.of_distribution(self.path, self.extras)
+        if self.is_editable:
+            yield asked.EDITABLE
+
+
+def install(own: Sequence[Own], groups: Iterable[str], requirements: Iterable[str]) -> None:
+    """Install these. Raises `SetUpFailed`, with nothing of the checkout installed, if something is
+    not in the lock, or is not what the lock says."""
+    wanted = [line for each in own for line in each.foreign()]
+    wanted += [line for group in groups for line in asked.of_group(CHECKOUT, group)]
+    _foreign([*wanted, *requirements])
+    _own(own)
+
+
+def _foreign(requirements: Iterable[str]) -> None:
+    names = {asked.name_of(line) for line in requirements} - asked.own_names(CHECKOUT)
+    entries = lockfile.parse(LOCK.read_text(encoding="utf-8"))
+    if absent := names - {entry.name for entry in entries}:
+        raise SetUpFailed(f"{LOCK_NAME} does not have {', '.join(sorted(absent))}: `./run lock`")
+    needed = lockfile.needed(entries, names)
+    chosen = [entry.text for entry in entries if entry.name in needed]
+    if not chosen:
+        return
+    with tempfile.NamedTemporaryFile("w", suffix=".txt", encoding="utf-8") as file:
+        file.writelines(chosen)
+        file.flush()
+        _pip("--require-hashes", "--no-deps", "-r", file.name)
+
+
+def _own(own: Sequence[Own]) -> None:
+    if own:
+        words = (word for each in own for word in (*["-e"] * each.is_editable, str(each.path)))
+        # A wheel that was built anew may have the version of the one that is installed.
+        held = ("--no-deps", "--no-index", "--no-build-isolation", "--force-reinstall")
+        _pip(*held, *words)
+
+
+def _pip(*words: str) -> None:
+    if subprocess.run((*PIP, *words), stdin=subprocess.DEVNULL).returncode != 0:
+        raise SetUpFailed(
+            f"pip has not installed what {LOCK_NAME} says; its words are above. If they speak of "
+            "hashes, a package is not the one that was locked: find out why before you go on, and "
+            "only then lock what there is now (`./run lock`)"
+        )
