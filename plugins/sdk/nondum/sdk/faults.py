@@ -44,7 +44,7 @@ class Faults:
             problems = tuple(located(problem, place) for problem in error.problems)
             for problem in problems:
                 carry(self.tell, problem)
-            raise MessageInvalid(*problems) from error
+            raise MessageInvalid(*problems) from None  # its frames are all the SDK's
         except TypeError as error:  # a message of another type
             carry(self.tell, Problem("MESSAGE_TYPE", str(error), where=author_place()))
             raise

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import numbers
+import operator
 import types
 from collections.abc import Callable, Iterator
 from typing import Any, TypeAlias, Union, get_args, get_origin, get_type_hints
@@ -19,31 +20,55 @@ from nondum.sdk.errors import Problem
 _Check: TypeAlias = Callable[[Any], "tuple[str, str] | None"]
 """None where a value is right; else the rest of the way to what is wrong, and what is."""
 
-_checks: dict[type[Any], tuple[tuple[str, _Check], ...]] = {}
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class _Checks:
+    """How the fields of one dataclass are checked; it has two of them at least."""
+
+    names: tuple[str, ...]
+    fields_of: Callable[[Any], tuple[Any, ...]]
+    every: tuple[_Check, ...]
+
+
+_checks: dict[type[Any], _Checks] = {}
 
 
 def type_problems(message: Any) -> tuple[Problem, ...]:
     """What is wrong with the types and shapes of a message's fields: MESSAGE_FIELD, one a field."""
+    if _is_right(message):
+        return ()
     cls = type(message)
     return tuple(
         Problem("MESSAGE_FIELD", told, where=f"{cls.TYPE}{path}") for path, told in _wrong(message)
     )
 
 
+def _is_right(value: Any) -> bool:
+    """Whether nothing is wrong with a value's fields. It is asked of every message."""
+    checks = _checks_of(type(value))
+    for field, check in zip(checks.fields_of(value), checks.every, strict=True):
+        if check(field) is not None:
+            return False
+    return True
+
+
 def _wrong(value: Any) -> Iterator[tuple[str, str]]:
-    for name, check in _checks_of(type(value)):
+    checks = _checks_of(type(value))
+    for name, check in zip(checks.names, checks.every, strict=True):
         found = check(getattr(value, name))
         if found is not None:
             yield f".{name}{found[0]}", found[1]
 
 
-def _checks_of(cls: type[Any]) -> tuple[tuple[str, _Check], ...]:
+def _checks_of(cls: type[Any]) -> _Checks:
     found = _checks.get(cls)
     if found is None:
         hints, buffer = get_type_hints(cls), getattr(cls, "BUFFER", None)
-        found = _checks[cls] = tuple(
-            (f.name, _check_bulk if f.name == buffer else _check_of(hints[f.name]))
-            for f in dataclasses.fields(cls)
+        names = tuple(field.name for field in dataclasses.fields(cls))
+        found = _checks[cls] = _Checks(
+            names,
+            operator.attrgetter(*names),
+            tuple(_check_bulk if n == buffer else _check_of(hints[n]) for n in names),
         )
     return found
 
@@ -81,7 +106,7 @@ def _value_check(cls: type[Any]) -> _Check:
     def check_value(value: Any) -> tuple[str, str] | None:
         if type(value) is not cls:
             return "", f"expected a {cls.__name__}, found {_named(value)}"
-        return next(_wrong(value), None)
+        return None if _is_right(value) else next(_wrong(value))
 
     return check_value
 
