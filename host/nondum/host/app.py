@@ -192,7 +192,9 @@ async def _run(
     places = neighbours.placement.places if neighbours else dict
     vouched = executor.trust.vouched
     take = _take(neighbours, mind, stopping)
-    conversation = Conversation(mind, workers.plugins, workers.pids, take)
+    conversation = Conversation(
+        mind, workers.plugins, workers.pids, lambda words: orders.heard(words)
+    )
     feedback: Feedback = feedback_parts.made(
         config.feedback,
         folders.root,
@@ -228,6 +230,7 @@ async def _run(
         bus,
         stopping,
         stop_all,
+        take,
         translate_s,
         lambda: goal_files,
         elsewhere,
