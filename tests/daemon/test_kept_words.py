@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from tests.daemon.neighbours import BEACON, UNCONFINED
+from tests.daemon.neighbours import BEACON, UNCONFINED, ear, say
 from tests.kit.payloads import Part
 from tests.kit.running_host import READY_S, RunningHost, running
 
@@ -32,6 +32,9 @@ class Slow:
     """A payload that is being brought in until it is let."""
 
     def __init__(self, host: RunningHost) -> None:
+        """The host has ears, too: see `says`."""
+        self._said = host.work / "said"
+        host.bring("ears", ear(self._said))
         self.host, self._let = host, host.work / "let"
         source = SLOW.replace("LOG", str(host.work / "log")).replace("LET", str(self._let))
         host.plug(host.drive("slow", Part("beacon", source)))
@@ -41,6 +44,9 @@ class Slow:
         written = self._let.with_suffix(".part")
         written.write_text(how)
         written.rename(self._let)
+
+    def says(self, words: str) -> None:
+        say(self._said, words)
 
 
 @pytest.fixture
@@ -96,6 +102,16 @@ def test_words_are_given_up_when_what_they_wait_for_does_not_come(slow: Slow) ->
         slow.let("badly")
         row = json.loads(waiting.communicate()[0])
     assert (waiting.returncode, row["state"]) == (1, "halted")
+
+
+def test_words_that_are_heard_too_early_are_kept_while_payloads_come_in(slow: Slow) -> None:
+    slow.says("blink")
+    told = slow.host.until_told("'blink': that is kept as goal ")
+    assert "1 payload is still being installed" in told
+    slow.let()
+    slow.host.until_goal("1", "reached")
+    slow.says("dance")
+    slow.host.until_told("'dance': PHRASE_UNKNOWN")
 
 
 def test_whoever_stops_the_robot_ends_what_is_kept(slow: Slow) -> None:

@@ -199,7 +199,9 @@ async def _run(
     vouched = executor.trust.vouched
     take = _take(neighbours, mind, stopping)
     answering = Answering(mind, lambda: catalogue.snapshot().payloads, workers.busy)
-    conversation = Conversation(mind, workers.plugins, workers.pids, take, answering.answer)
+    conversation = Conversation(
+        mind, workers.plugins, workers.pids, lambda words: orders.heard(words), answering.answer
+    )
     feedback: Feedback = feedback_parts.made(
         config.feedback,
         folders.root,

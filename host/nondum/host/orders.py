@@ -64,7 +64,7 @@ class Orders:
     answer: Reply
     """Answers what people ask about the robot itself."""
     take: Take
-    """Makes goals of words as if they had been heard."""
+    """Makes goals of words that are heard, here or at a peer."""
     translate_s: float
     """Time that components have to translate words."""
     goal_files: Callable[[], GoalFiles]
@@ -125,7 +125,23 @@ class Orders:
         """
         words = arguments.text("words")
         answer = await self.answer(words)
-        return {"answer": answer if answer is not None else await self.take(words)}
+        return {"answer": answer if answer is not None else await self.heard(words)}
+
+    async def heard(self, words: str) -> str:
+        """Want what a person has said: what becomes of it, in words. What means nothing yet is kept
+        while anything is being brought in. Raises `GoalRefused`."""
+        try:
+            return await self.take(words)
+        except GoalRefused as refused:
+            coming = coming_in(self.catalogue.snapshot())
+            if refused.code not in NOT_YET or not coming:
+                raise
+            if self.elsewhere is not None:
+                peer, words = await self.elsewhere.whose(words)
+                if peer is not None:
+                    raise
+        given = self._keep(words, is_translated=False, while_coming=True)
+        return f"that is kept as goal {given.id}, for {coming}"
 
     async def resume(self, arguments: Arguments) -> Row:
         """Take up a halted goal again, `id`. Raises `GoalRefused` (GOAL_NOT_HALTED, …)."""
@@ -304,17 +320,25 @@ class Orders:
 
     def _kept(self, words: str, priority: int, refused: GoalRefused, arguments: Arguments) -> Row:
         """Keep words that mean nothing yet, where that is asked for. Raises `GoalRefused`."""
-        snapshot, is_kept = self.catalogue.snapshot(), arguments.flag("keep")
-        coming = coming_in(snapshot)
+        is_kept, coming = arguments.flag("keep"), coming_in(self.catalogue.snapshot())
         if refused.code not in NOT_YET or not (is_kept or coming):
             raise refused
         if not is_kept and not arguments.flag("wait"):
             told = f"nothing here understands {words!r} yet: {coming}"
             fix = "ask again in a moment, or have the words kept: `nondum goal --keep WORDS`"
             raise GoalRefused(Problem("PHRASE_EARLY", told, fix=fix)) from refused
-        given = self.mind.keep(words, priority=priority, reason=why_kept(snapshot))
-        self.goal_files().keep(given, is_translated=arguments.flag("yes"), while_coming=not is_kept)
-        return self._row(given)
+        is_translated = arguments.flag("yes")
+        return self._row(
+            self._keep(words, priority, is_translated=is_translated, while_coming=not is_kept)
+        )
+
+    def _keep(
+        self, words: str, priority: int = 0, *, is_translated: bool, while_coming: bool
+    ) -> GivenGoal:
+        reason = why_kept(self.catalogue.snapshot())
+        given = self.mind.keep(words, priority=priority, reason=reason)
+        self.goal_files().keep(given, is_translated=is_translated, while_coming=while_coming)
+        return given
 
     def _is_kept(self, given: GivenGoal, snapshot: Snapshot) -> bool:
         """Whether a goal would survive the daemon, or has no need to."""

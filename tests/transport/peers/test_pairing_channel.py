@@ -365,7 +365,7 @@ async def test_yes_holds_for_a_later_try_with_the_same_host() -> None:
             rover.says_yes()
             port = base.port
         gone = await rover.gives_up("PAIRING_OVER")
-        assert gone.problem is not None and "no one there had said yes" in gone.problem.message
+        assert gone.problem is not None and "no one at base has said yes" in gone.problem.message
         async with end(Identity("base", keys)) as base:
             rover.host.ask(keys.public, [f"tcp://127.0.0.1:{port}", base.address])
             shown = await base.sees(Comparing)

@@ -327,6 +327,7 @@ class PairingHost:
             found.peer_name,
             own_name=self._name,
             is_confirmed=found.step is Step.AWAITING_AGREED,
+            is_confirmed_there=found.peer_agreed,
         )
         if why is Ending.NAME or (why is Ending.REFUSED and found.has_told_nonce):
             self._end(Failed(problem), None)

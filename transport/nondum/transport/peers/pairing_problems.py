@@ -36,10 +36,12 @@ _ENDINGS = {
 }
 
 
-def ended(why: Ending, name: str, *, own_name: str, is_confirmed: bool) -> Problem:
+def ended(
+    why: Ending, name: str, *, own_name: str, is_confirmed: bool, is_confirmed_there: bool
+) -> Problem:
     """Why the other end, which calls itself `name` (empty: it has not said), has given up a try.
 
-    `is_confirmed`: the person here had said yes.
+    `is_confirmed`: the person here had said yes; `is_confirmed_there`: the one there.
     """
     if why is Ending.REFUSED and name:
         told = "the person at the other host said no: the codes differ, or it was not wanted"
@@ -47,10 +49,11 @@ def ended(why: Ending, name: str, *, own_name: str, is_confirmed: bool) -> Probl
     if why is Ending.NAME:
         told = f"the other host is called {own_name} too, or knows another host of that name"
         return Problem("PAIRING_NAME", told, where=own_name, fix=_RENAME)
-    if why is Ending.OVER and is_confirmed:
-        told = f"{name} has closed its window, and no one there had said yes"
-        fix = "run `nondum peers pair` there again: the yes that was given here still holds"
-        return Problem("PAIRING_OVER", told, where=name, fix=fix)
+    if why is Ending.OVER and name:
+        who = _silent(name, is_confirmed=is_confirmed, is_confirmed_there=is_confirmed_there)
+        again = "run `nondum peers pair` there again: the yes that was given here still holds"
+        fix = again if is_confirmed else _BOTH
+        return Problem("PAIRING_OVER", f"{name} has closed its window: {who}", where=name, fix=fix)
     return replace(_ENDINGS[why], where=name)
 
 
@@ -69,12 +72,7 @@ def name_known(name: str, key: PeerKey, holder: PeerKey) -> Problem:
 
 def unanswered(name: str, *, is_confirmed: bool, is_confirmed_there: bool) -> Problem:
     """The time was over while the people compared the code."""
-    if is_confirmed:
-        who = f"no one at {name} has said yes"
-    elif is_confirmed_there:
-        who = f"the person at {name} has said yes, and no one at this host"
-    else:
-        who = f"no one has said yes, here or at {name}"
+    who = _silent(name, is_confirmed=is_confirmed, is_confirmed_there=is_confirmed_there)
     return Problem("PAIRING_OVER", f"{_TIME_IS_OVER}: {who}", where=name, fix=_BOTH)
 
 
@@ -84,6 +82,15 @@ def unmet(last: Problem | None) -> Problem:
         return Problem("PAIRING_OVER", _TIME_IS_OVER, fix=_BOTH)
     told = f"{_TIME_IS_OVER}; the last try ended with {last.code}: {last.message}"
     return Problem("PAIRING_OVER", told, fix=last.fix or _BOTH)
+
+
+def _silent(name: str, *, is_confirmed: bool, is_confirmed_there: bool) -> str:
+    """Who has not answered."""
+    if is_confirmed:
+        return f"no one at {name} has said yes"
+    if is_confirmed_there:
+        return f"the person at {name} has said yes, and no one at this host"
+    return f"no one has said yes, here or at {name}"
 
 
 _TIME_IS_OVER = f"the {pairing.WINDOW_S:.0f} seconds for pairing are over"
