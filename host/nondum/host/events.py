@@ -204,6 +204,12 @@ class PayloadVerified(Event):
     payload: str
     components: tuple[str, ...]
     """Ids of the components that it brings."""
+    index: Mapping[str, PluginDescription] = field(default_factory=dict, repr=False)
+    """Component id → what its plugin says."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Only names: what the components are stands in the catalogue once it is active."""
+        return {"payload": self.payload, "components": list(self.components)}
 
 
 @dataclass(frozen=True, slots=True)

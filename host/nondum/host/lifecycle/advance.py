@@ -40,6 +40,7 @@ RULES: Mapping[type[Event], _Rule] = {
     events.PayloadFound: payload_rules.on_payload_found,
     events.PayloadVerified: payload_rules.on_payload_verified,
     events.WheelsStored: payload_rules.on_wheels_stored,
+    events.PayloadActivated: payload_rules.on_payload_activated,
     events.BesideRefused: releases.on_beside_refused,
     events.PayloadDoubted: payload_rules.on_payload_doubted,
     events.TrustChanged: payload_rules.on_trust_changed,

@@ -42,6 +42,7 @@ from nondum.host.lifecycle.room import Needs
 from nondum.host.trust.payload_trust import PayloadTrust, TrustOptions
 from nondum.host.workers import Limits, Workers, base_interpreter, end_leftovers
 from nondum.host.workers.standing import Standing
+from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, WorkerFailed, problems_of
 from nondum.wheelhouse import disk
 from nondum.wheelhouse.gpu import Gpu
@@ -155,8 +156,9 @@ class Installation:
     async def verify(self, effect: effects.VerifyPayload) -> tuple[Event, ...]:
         """Check the staged copy."""
         arguments = self._arguments(staging=str(self._folders.staging(effect.payload)))
-        components = await self._run("verify", effect.payload, arguments)
-        return (PayloadVerified(effect.payload, tuple(components)),)
+        said = await self._run("verify", effect.payload, arguments)
+        index = {id: PluginDescription.parse(told, where=id) for id, told in said.items()}
+        return (PayloadVerified(effect.payload, tuple(index), index),)
 
     async def stage(self, effect: effects.StagePayload) -> tuple[Event, ...]:
         """Move the checked copy to its lasting place."""
