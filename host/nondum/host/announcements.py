@@ -12,6 +12,7 @@ from nondum.host.events import (
     CatalogueSetAside,
     CatalogueUnwritten,
     CatalogueWritten,
+    ConditionEnded,
     DriveFlapping,
     DriveLeftAlone,
     DriveRead,
@@ -85,6 +86,8 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return _joined(event.problems)
         case WorkerStrained():
             return _joined(event.problems)
+        case ConditionEnded():
+            return f"{event.component} goes on without a condition: {_joined(event.problems)}"
         case PayloadDistrusted():
             name = _name(event.payload, snapshot)
             return f"{name} is not trusted any more: {_joined(event.problems)}"

@@ -74,6 +74,7 @@ class Questions:
             "warnings": [
                 *self.warnings(),
                 *map(_kept_out, self.mind.views.kept_out()),
+                *(str(problem) for c in snapshot.components for problem in c.problems),
                 *map(_gone_back, gone_back(snapshot)),
             ],
             "trust": self.trusted(),

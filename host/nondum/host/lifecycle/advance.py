@@ -51,6 +51,8 @@ RULES: Mapping[type[Event], _Rule] = {
     events.WorkerReady: component_rules.on_worker_news,
     events.WorkerExited: component_rules.on_worker_news,
     events.WorkerFailed: component_rules.on_worker_news,
+    events.WorkerSteady: component_rules.on_worker_steady,
+    events.ConditionEnded: component_rules.on_condition_ended,
     events.DeviceAppeared: component_rules.on_device_appeared,
     events.DeviceChanged: component_rules.on_device_changed,
     events.DeviceRemoved: component_rules.on_device_removed,

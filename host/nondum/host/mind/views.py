@@ -17,6 +17,7 @@ from nondum.host.mind.goals import GoalQueue, GoalState
 from nondum.host.mind.people import People
 from nondum.host.mind.pursuit import Pursuit
 from nondum.host.mind.runner import BehaviourRunner
+from nondum.host.mind.silence import Silence
 from nondum.host.mind.tree_view import Row, TreeView
 from nondum.planning.conclusions import conclusions
 from nondum.planning.task_control import Phase
@@ -139,7 +140,8 @@ class Views:
 
     def composition(self) -> Row:
         """All that planning goes by, for tools that plan by themselves: `host`, `components`,
-        `facts`, `excluded` actions and why, and the components `seen` here before."""
+        `facts`, `excluded` actions and why, `silence` of what is here, and the components `seen`
+        here before."""
         beliefs, pursuit = self._mind.beliefs, self._mind.pursuit
         kept_out = dict(pursuit.left_out)
         return {
@@ -156,6 +158,7 @@ class Views:
             ],
             "facts": sorted(beliefs.world.bare_facts),
             "excluded": pursuit.failures,
+            "silence": Silence.of(beliefs.snapshot).to_dict(),
             "seen": [
                 {
                     "component": seen.contribution.component,

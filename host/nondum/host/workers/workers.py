@@ -255,6 +255,13 @@ class Workers:
             return ()
         return tuple(supervisor.worker.claims)
 
+    def dead_conditions(self, component: str, payload: str) -> tuple[errors.Problem, ...]:
+        """The conditions of a payload's worker that have ended with an error."""
+        supervisor = self._found(component, payload)
+        if supervisor is None or supervisor.worker is None:
+            return ()
+        return tuple(supervisor.worker.dead_conditions.values())
+
     def plugins(self) -> dict[str, Proxy]:
         """The plugins that run now, by component."""
         named = self._manager.list_name_plugin()
