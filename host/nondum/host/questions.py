@@ -75,6 +75,7 @@ class Questions:
                 *self.warnings(),
                 *map(_kept_out, self.mind.views.kept_out()),
                 *(str(problem) for c in snapshot.components for problem in c.problems),
+                *(f"{of}: {told}" for of, told in self.mind.views.troubles().items()),
                 *map(_gone_back, gone_back(snapshot)),
             ],
             "trust": self.trusted(),
@@ -107,7 +108,10 @@ class Questions:
             )
             for c in snapshot.components
         ]
+        troubles = self.mind.views.troubles()
         for row in own:
+            told = (row["problem"], troubles.get(row["component"], ""))
+            row["problem"] = "; ".join(filter(None, told))
             row["confinement"] = str(self.workers.launcher.level) if row["pid"] else None
         return own + [
             offered_row(offered, peer.name)

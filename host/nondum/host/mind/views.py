@@ -138,6 +138,18 @@ class Views:
             "told": [told.text for told in self._mind.people.since(self._last_few())],
         }
 
+    def troubles(self) -> dict[str, str]:
+        """Component → which of its actions fail again and again, and how."""
+        composition = self._mind.composition
+        objects = composition.merged.objects if composition else {}
+        found: dict[str, list[str]] = {}
+        for name, why in self._mind.pursuit.troubles.items():
+            schema, _, bound = name.partition(" ")
+            owner = objects.get(bound.partition(" ")[0])
+            if owner is not None and owner.component:
+                found.setdefault(owner.component, []).append(f"{schema} {why}")
+        return {component: "; ".join(told) for component, told in found.items()}
+
     def composition(self) -> Row:
         """All that planning goes by, for tools that plan by themselves: `host`, `components`,
         `facts`, `excluded` actions and why, `silence` of what is here, and the components `seen`
