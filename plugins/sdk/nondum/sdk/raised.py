@@ -27,8 +27,10 @@ def raised_at(error: BaseException, by: Callable[..., Any]) -> str:
     frames = [f for f in traceback.extract_tb(error.__traceback__) if _SDK not in f.filename]
     own = _home(by)
     mine = [frame for frame in frames if own and Path(frame.filename).is_relative_to(own)]
-    last = (mine or frames or [None])[-1]
-    return f"{within_packages(last.filename)}:{last.lineno}" if last is not None else ""
+    if not frames:
+        return ""
+    last = (mine or frames)[-1]
+    return f"{within_packages(last.filename)}:{last.lineno}"
 
 
 def within_packages(path: str) -> str:
