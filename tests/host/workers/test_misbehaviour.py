@@ -147,15 +147,23 @@ async def test_condition_that_raises_is_told_with_its_line(tested: WorkersUnderT
     assert not tested.told(WorkerExited)
 
 
-async def test_condition_that_has_ended_is_told_again_with_each_worker(
+EARLY = """
+from nondum.sdk import hookimpl
+
+@hookimpl
+async def start(ctx):
+    told = {"condition": "place", "problem": {"message": "early"}}
+    ctx._workplace.tell("condition-ended", told, None)
+"""
+
+
+async def test_condition_that_ends_early_is_told_once_the_worker_is_known_to_run(
     tested: WorkersUnderTest,
 ) -> None:
-    await watcher(tested, "1 / 0")
-    await tested.until(ConditionEnded)
-    os.kill(tested.workers.pids()["guest"], signal.SIGKILL)
-    await tested.until_ready(2)
-    ready = max(n for n, event in enumerate(tested.events) if isinstance(event, WorkerReady))
-    await tested.until(ConditionEnded, lambda told: told in tested.events[ready:])
+    source = CONDITION.replace("{body}", "await ctx.sleep(3600)") + EARLY
+    await tested.start("guest", source, conditions=(PLACE,))
+    kinds = [type(event) for event in tested.events]
+    assert ConditionEnded in kinds[kinds.index(WorkerReady) :]
 
 
 async def test_end_of_a_condition_that_the_plugin_has_not_breaks_the_protocol(
