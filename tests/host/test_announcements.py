@@ -113,6 +113,10 @@ def test_takeover_and_return_are_told() -> None:
     snapshot = Snapshot("spot", revision=2, payloads=(replace(OLD, step=Step.SUPERSEDED), new))
     told = announced(events.PayloadActivated(new.key, ()), snapshot)
     assert told == "org.example.lamp 2 (release 2) took over from release 1"
+    lower = replace(new, version="0.9")
+    snapshot = replace(snapshot, payloads=(snapshot.payloads[0], lower))
+    told = announced(events.PayloadActivated(new.key, ()), snapshot)
+    assert told is not None and told.endswith("though its version is lower: 1 was in force")
     back = Snapshot("spot", revision=3, payloads=(replace(OLD, step=Step.STORED),))
     told = announced(events.PayloadResumed(KEY, "the one that was in force is not any more"), back)
     assert told == ("org.example.lamp 1 comes back: the one that was in force is not any more")

@@ -29,7 +29,7 @@ from nondum.host.workers import (
 )
 from nondum.host.workers.confinements import Confinement
 from nondum.host.workers.launcher import MARK
-from nondum.sdk.description import Behaviour, Input, Output, PluginDescription, Unit
+from nondum.sdk.description import Behaviour, Condition, Input, Output, PluginDescription, Unit
 from nondum.wheelhouse.confinement import Level
 
 SDK = Path(__file__).parents[2] / "plugins/sdk"
@@ -79,6 +79,7 @@ class WorkersUnderTest:
         *,
         behaviours: tuple[Behaviour, ...] = (),
         units: tuple[Unit, ...] = (),
+        conditions: tuple[Condition, ...] = (),
         summary: str = "",
         limits: Limits | None = None,
         settings: dict[str, Any] | None = None,
@@ -97,7 +98,12 @@ class WorkersUnderTest:
             python=base_interpreter(),
             scratch=self.folder / component / "scratch",
             index=PluginDescription(
-                component, "0", summary=summary, behaviours=behaviours, units=units
+                component,
+                "0",
+                summary=summary,
+                behaviours=behaviours,
+                conditions=conditions,
+                units=units,
             ),
             settings=settings or {},
             limits=limits or Limits(),

@@ -7,11 +7,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 PLUGIN = '''
-from nondum.sdk import Context, Unit, behaviour, hookimpl
+from nondum.sdk import Context, Fragment, Unit, behaviour, hookimpl
 
 @hookimpl
 def units():
     return (Unit("lamp", "light"),)
+
+@hookimpl
+def fragments():
+    shine = "(:action shine :parameters (?u - light) :precondition (ready ?u))"
+    return (Fragment("domain.pddl", f"(define (domain lamp) {shine})"),)
 
 @behaviour("shine", action="(shine ?u - light)")
 async def shine(ctx: Context, u: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,13 @@ from tests.wheelhouse.hostile_wheels import WheelBuilder
 from tests.wheelhouse.locks import host
 from tests.wheelhouse.sources import PLUGIN, make_source
 
-from nondum.sdk.errors import ConfigRefused, InstallFailed, NondumError, PayloadRefused
+from nondum.sdk.errors import (
+    ConfigRefused,
+    InstallFailed,
+    NondumError,
+    PayloadRefused,
+    Problem,
+)
 from nondum.wheelhouse import build, contents, drive, index, lock, preflight
 from nondum.wheelhouse.confinement import Level
 from nondum.wheelhouse.library_wheels import library_wheel
@@ -34,6 +41,12 @@ def wheels(tmp_path: Path) -> Path:
     make_wheel(folder, "msgpack", "1.2.0", {"msgpack/__init__.py": ""})
     return folder
 
+
+DEVICES = """
+@hookimpl
+def devices():
+    return (DeviceNeed("lamp", {"usb": "1a86:7523"}),)
+"""
 
 Build = Callable[..., Path]
 
@@ -149,6 +162,25 @@ def test_a_plugin_that_cannot_describe_itself_is_refused(
     source = make_source(tmp_path / "src", files={"plugin_blinker.py": text})
     assert refused(lambda: built(source), PayloadRefused) == [code]
     assert not (tmp_path / "drive").exists()
+
+
+def test_what_hosts_would_not_plan_with_is_refused_and_not_delivered(
+    wheels: Path, tmp_path: Path
+) -> None:
+    wrong = Problem("E-UNDECL", "nobody declares it")
+    options = build.Options(
+        (HERE,), Sources((wheels,), offline=True), judge=lambda index: (wrong,) if index else ()
+    )
+    source = make_source(tmp_path / "src")
+    made = partial(build.build, source, tmp_path / "drive", options, lambda *step: None)
+    assert refused(made, PayloadRefused) == ["E-UNDECL"]
+    assert not (tmp_path / "drive").exists()
+
+
+def test_devices_that_only_the_plugin_asks_for_are_refused(built: Build, tmp_path: Path) -> None:
+    text = PLUGIN.replace("import Context,", "import Context, DeviceNeed,") + DEVICES
+    source = make_source(tmp_path / "src", files={"plugin_blinker.py": text})
+    assert refused(lambda: built(source), PayloadRefused) == ["DEVICE_RULES"]
 
 
 def test_what_a_plugin_prints_does_no_harm(built: Build, tmp_path: Path) -> None:

@@ -115,6 +115,12 @@ CONTRADICTIONS = {
         ("DESCRIPTION_INVALID",),
         rewrite("index.json", '"behaviours"', '"behaviors"'),
     ),
+    "other-devices": (
+        ("DEVICE_RULES",),
+        components(
+            lambda said: said["blinker"].update(devices=[{"name": "lamp", "match": {"usb": "*:*"}}])
+        ),
+    ),
     "index-component": (("INDEX_INVALID",), rewrite("index.json", '"blinker"', '"other"')),
     "index-lacks-a-component": (("INDEX_INVALID",), components(lambda said: said.clear())),
     "index-has-another-component": (

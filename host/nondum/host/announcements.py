@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from packaging.version import Version
+
 from nondum.host.catalogue.records import PayloadRecord, Snapshot, Step
 from nondum.host.events import (
     BesideRefused,
     CatalogueSetAside,
     CatalogueUnwritten,
     CatalogueWritten,
+    ConditionEnded,
     DriveFlapping,
     DriveLeftAlone,
     DriveRead,
@@ -85,6 +88,8 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return _joined(event.problems)
         case WorkerStrained() | WorkerFaulted() | InputAmbiguous():
             return _joined(event.problems)
+        case ConditionEnded():
+            return f"{event.component} goes on without a condition: {_joined(event.problems)}"
         case PayloadDistrusted():
             name = _name(event.payload, snapshot)
             return f"{name} is not trusted any more: {_joined(event.problems)}"
@@ -122,10 +127,19 @@ def _told_of_arrival(event: PayloadActivated, snapshot: Snapshot) -> Iterator[st
     new = _record(event.payload, snapshot)
     if new is not None and new.was:
         release = f"{new.payload_id} {new.version} (release {new.release})"
-        yield f"{release} took over from release {new.was}"
+        yield f"{release} took over from release {new.was}{_lower_version(new, snapshot)}"
     for component in event.components:
         if component.permissions:
             yield f"{component.id} may use: {', '.join(sorted(component.permissions))}"
+
+
+def _lower_version(new: PayloadRecord, snapshot: Snapshot) -> str:
+    """That a newer release has a lower version: somebody may have built the wrong sources."""
+    for old in snapshot.payloads:
+        is_before = old.payload_id == new.payload_id and old.release == new.was < new.release
+        if is_before and Version(new.version) < Version(old.version):
+            return f", though its version is lower: {old.version} was in force"
+    return ""
 
 
 def _brought_up(event: WheelsStored | PayloadResumed, snapshot: Snapshot) -> str | None:

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.devices.view import device_of
-from nondum.host.mind.diagnosis import Seen, moment, why_not, words_gone
+from nondum.host.mind.diagnosis import NO_SILENCE, Seen, moment, why_not, words_gone
+from nondum.host.mind.silence import Silence
 from nondum.host.shelf import Shelved, candidate_of, distinct, on_shelf
 from nondum.planning.advise import Advice, Candidate, Here, advise, understood
 from nondum.planning.contribution import Contribution, id_at_home
@@ -57,6 +58,7 @@ class Surroundings:
     here: Here
     seen: tuple[Seen, ...]
     failures: Mapping[str, str]
+    silence: Silence
     candidates: tuple[Candidate, ...]
     flawed: tuple[Candidate, ...]
     """Those with components whose fragments are wrong."""
@@ -84,6 +86,7 @@ class Surroundings:
             Here(host, present, frozenset(told["facts"]), frozenset(told["excluded"])),
             seen,
             told["excluded"],
+            Silence.parse(told["silence"]) if "silence" in told else NO_SILENCE,
             candidates,
             tuple(
                 candidate
@@ -144,7 +147,8 @@ class Surroundings:
         except GoalRefused as refused:
             gone = words_gone(merged, goal, self.seen)
             return gone or refused.problems if advice.ways else self._lacking_still(goal)
-        return why_not(merged, parsed, self.here.facts, self.seen, self.failures)
+        facts = self.here.facts
+        return why_not(merged, parsed, facts, self.seen, self.failures, self.silence)
 
     def _lacking_still(self, goal: str) -> tuple[Problem, ...]:
         """What a goal lacks even if all payloads were here; raises `GoalRefused` for words that

@@ -204,6 +204,12 @@ class PayloadVerified(Event):
     payload: str
     components: tuple[str, ...]
     """Ids of the components that it brings."""
+    index: Mapping[str, PluginDescription] = field(default_factory=dict, repr=False)
+    """Component id → what its plugin says."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Only names: what the components are stands in the catalogue once it is active."""
+        return {"payload": self.payload, "components": list(self.components)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -546,6 +552,30 @@ class WorkerExited(Event):
 
     component: str
     reason: str
+    payload: str = ""
+    problem: Problem | None = field(default=None, repr=False)
+    """The same as data."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The reason once."""
+        return {"component": self.component, "reason": self.reason, "payload": self.payload}
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerSteady(Event):
+    """A worker that was started again has lived for a while: what was wrong is past."""
+
+    component: str
+    payload: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionEnded(Event):
+    """A condition ended with an error: nothing tells its facts any more."""
+
+    component: str
+    condition: str
+    problems: tuple[Problem, ...]
     payload: str = ""
 
 

@@ -92,6 +92,8 @@ class Questions:
             "warnings": [
                 *self.warnings(),
                 *map(_kept_out, self.mind.views.kept_out()),
+                *(str(problem) for c in snapshot.components for problem in c.problems),
+                *(f"{of}: {told}" for of, told in self.mind.views.troubles().items()),
                 *map(_gone_back, gone_back(snapshot)),
             ],
             "trust": self.trusted(),
@@ -125,9 +127,11 @@ class Questions:
             )
             for c in snapshot.components
         ]
+        troubles = self.mind.views.troubles()
         for row in own:
-            found = (row["problem"], *map(str, self.workers.faults(row["component"])))
-            row["problem"] = "; ".join(filter(None, found))
+            of_worker = map(str, self.workers.faults(row["component"]))
+            told = (row["problem"], troubles.get(row["component"], ""), *of_worker)
+            row["problem"] = "; ".join(filter(None, told))
             row["confinement"] = str(self.workers.launcher.level) if row["pid"] else None
         return own + [
             offered_row(offered, peer.name)

@@ -14,6 +14,7 @@ from nondum.planning.contribution import Contribution
 from nondum.planning.core import core_graph, core_predicates
 from nondum.planning.domain import Merged
 from nondum.planning.merge import merge
+from nondum.planning.phrases import phrasebook
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
 
@@ -26,21 +27,20 @@ class Judged:
     """What merging a payload alone shows."""
 
     problems: tuple[Problem, ...]
-    """Why a host would keep its components out of the plan."""
+    """Why a host would keep its components out of the plan, and phrases that nobody could say."""
     warnings: tuple[Problem, ...]
 
 
 def judge(index: Mapping[str, PluginDescription]) -> Judged:
     """Merge what a payload's components say with the core vocabulary only."""
-    merged = merge(
-        [
-            Contribution.from_description(description, host=HOST, component=component)
-            for component, description in index.items()
-        ],
-        HOST,
-    )
-    problems = tuple(p for found in merged.quarantined.values() for p in found)
-    return Judged(problems, (*merged.warnings, *_own_words(merged)))
+    contributions = [
+        Contribution.from_description(description, host=HOST, component=component)
+        for component, description in index.items()
+    ]
+    merged = merge(contributions, HOST)
+    kept_out = (problem for found in merged.quarantined.values() for problem in found)
+    unsaid = phrasebook(contributions, merged).problems
+    return Judged((*kept_out, *unsaid), (*merged.warnings, *_own_words(merged)))
 
 
 def _own_words(merged: Merged) -> Iterator[Problem]:

@@ -53,9 +53,11 @@ class Cause:
         if self.goal and (self.path or self.goal != self.fact):
             purpose.append(f"({self.goal})")
         serves = "".join(f", for {step}" for step in purpose)
-        return Problem(self.lack.value, f"{self._said()}{needed}{serves}", fix=self._fix())
+        return Problem(self.lack.value, f"{self.said}{needed}{serves}", fix=self._fix())
 
-    def _said(self) -> str:
+    @property
+    def said(self) -> str:
+        """What is missing, without what needs it."""
         match self.lack:
             case Lack.ACTION:
                 return f"nothing here makes ({self.fact}) true"

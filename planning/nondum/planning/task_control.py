@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from enum import Enum
 
-from nondum.planning.attempts import Attempts, Patience
+from nondum.planning.attempts import Attempts, Patience, Setbacks
 from nondum.planning.attention import Attention
 from nondum.planning.goal import GoalKind
 from nondum.planning.guards import Footing, facts_after, footing, twins_in
@@ -57,9 +57,10 @@ class TaskControl:
         exclusive: frozenset[str] = frozenset(),
         runs: Iterable[Run] = (),
         patience: Patience | None = None,
+        setbacks: Setbacks | None = None,
     ) -> None:
         """`exclusive` are units that serve one behaviour at a time and move the body; `runs` are
-        taken over from the task before."""
+        taken over from the task before; so is what `setbacks` remembers."""
         self.regression = regression
         self.kind = kind
         self.phase = Phase.UNDER_WAY
@@ -68,7 +69,7 @@ class TaskControl:
         self.exhausted: tuple[str, ...] = ()
         """Actions that were given up and should not be in the next plan."""
         self.runs: dict[str, Run] = {run.step.name: run for run in runs}
-        self.attempts = Attempts(patience or Patience())
+        self.attempts = Attempts(patience or Patience(), setbacks or Setbacks())
         self.past: dict[str, Past] = {}
         """The last run of each action that has ended while this task was carried out."""
         self.exclusive = exclusive
@@ -243,7 +244,7 @@ class TaskControl:
     def _pursue(self, rest: Rest, ground: Footing, now_s: float) -> Phase:
         self.rest = rest
         for name in self.attempts.names():
-            if not self._is_left(name):
+            if not self._is_left(name) and not self._is_unproven(name, now_s):
                 self.attempts.effective(name)
         for run in self.runs.values():
             if run.step.add <= ground.facts:
@@ -255,6 +256,26 @@ class TaskControl:
         if not rest.steps:
             return Phase.HOLDING
         return self._advance(rest, ground, now_s)
+
+    def steady(self, now_s: float) -> tuple[str, ...]:
+        """The lasting actions that have held for a while."""
+        return tuple(name for name in self.runs if not self._is_unproven(name, now_s))
+
+    def trouble(self) -> str:
+        """Which action is tried again, and how it failed the last time; empty: none."""
+        for name in self._places:
+            failure = self.attempts.last_failure(name)
+            if failure and self._is_left(name):
+                return f"{name.partition(' ')[0]} is tried again; last time: {failure}"
+        return ""
+
+    def _is_unproven(self, name: str, now_s: float) -> bool:
+        """Whether an action is a lasting one that has not held for a while yet: it may establish
+        and fail again and again."""
+        if not any(step.lasting for step in self.regression.steps if step.name == name):
+            return name not in self._places
+        since_s = self.runs[name].established_s if name in self.runs else None
+        return since_s is None or now_s - since_s < self.attempts.patience.steady_s
 
     def _is_left(self, name: str) -> bool:
         """Whether an action is to be done, or done again."""

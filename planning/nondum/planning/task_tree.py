@@ -15,7 +15,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Composite
 
-from nondum.planning.attempts import Patience
+from nondum.planning.attempts import Patience, Setbacks
 from nondum.planning.goal import GoalKind
 from nondum.planning.partial_order import bits
 from nondum.planning.regression import Regression
@@ -79,6 +79,7 @@ class TaskTree(Composite):
         exclusive: frozenset[str] = frozenset(),
         runs: Iterable[Run] = (),
         patience: Patience | None = None,
+        setbacks: Setbacks | None = None,
         name: str = "task",
     ) -> None:
         """Make the tree of a plan that is valid in `task`.
@@ -95,6 +96,7 @@ class TaskTree(Composite):
             exclusive=exclusive,
             runs=runs,
             patience=patience,
+            setbacks=setbacks,
         )
         self._sight = sight
         self._shown = 0

@@ -106,7 +106,9 @@ def _why(control: TaskControl, index: int, state: StepState) -> str:
         case StepState.KEPT:
             return f"runs for {', '.join(_users(control, index)) or 'nothing'}"
         case StepState.RUNNING:
-            return "is starting" if step.lasting else "is running"
+            doing = "is starting" if step.lasting else "is running"
+            failure = control.attempts.last_failure(step.name)
+            return f"{doing}; last time: {failure}" if failure else doing
         case StepState.DONE:
             return "done: what the rest of the plan needs of it holds"
         case StepState.SKIPPED:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -32,6 +33,12 @@ def test_a_new_package_is_complete(tmp_path: Path) -> None:
     assert all((folder / path).is_file() for path in made["files"])
     nondum("payload", "new", "window-opener", "-o", folder).refused(2, "FOLDER_NOT_EMPTY")
     nondum("payload", "new", "Window Opener", "-o", tmp_path / "b").refused(2, "NAME_INVALID")
+
+
+def test_what_to_do_next_can_be_pasted_whatever_the_folder_is_called(tmp_path: Path) -> None:
+    folder = tmp_path / "my cam"
+    *_, last = nondum("payload", "new", "cam", "-o", folder).ok().out.splitlines()
+    assert shlex.split(last.split(";")[0]) == ["next:", "cd", str(folder)]
 
 
 def test_a_new_package_needs_a_folder_that_can_be(tmp_path: Path) -> None:

@@ -41,7 +41,7 @@ def test_what_was_changed_after_it_was_signed_is_refused(drive: Path, trust: Pat
     seal(drive / "nondum" / ID, payload_id=ID, version="2.0")
     ran = nondum("payload", "verify", drive, "--trust", trust)
     assert ran.code == 3
-    assert ran.out.startswith(f"{ID}: nobody has signed it\nSIG_INVALID ")
+    assert ran.out.startswith(f"{ID}: no signature of it holds\nSIG_INVALID ")
     assert ran.out.endswith("\nrefused\n")
 
 
@@ -74,6 +74,19 @@ def test_a_folder_that_is_none_has_problems_too(tmp_path: Path) -> None:
 def test_signatures_may_be_left_unasked(drive: Path) -> None:
     assert nondum("payload", "verify", drive, "--unsigned").ok().out.endswith("accepted\n")
     assert nondum("payload", "check", drive).ok().out.endswith("accepted\n")
+
+
+def test_whose_signatures_hold_is_told_though_nobody_is_asked_to_trust_them(
+    drive: Path, tmp_path: Path
+) -> None:
+    nondum("keys", "new", tmp_path / "alice").ok()
+    told = nondum("payload", "check", drive, "--anywhere").ok().out
+    assert told.startswith(f"{ID}: nobody has signed it\n")
+    nondum("payload", "sign", drive, "--key", tmp_path / "alice").ok()
+    (key,) = nondum("payload", "check", drive, "--anywhere", "--json").ok().json["signers"][ID]
+    assert key.startswith("SHA256:")
+    told = nondum("payload", "check", drive, "--anywhere").ok().out
+    assert told.startswith(f"{ID}: signed by {key}\n")
 
 
 def test_another_kind_of_host_is_asked_about(tmp_path: Path) -> None:

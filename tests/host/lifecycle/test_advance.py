@@ -33,6 +33,7 @@ from nondum.host.lifecycle.recovery import recover
 from nondum.host.lifecycle.tries import ATTEMPTS
 from nondum.host.transitions import COMPONENT_TRANSITIONS, RECOVERY, TRANSITIONS
 from nondum.sdk.description import PluginDescription
+from nondum.sdk.errors import Problem
 
 EVENTS: dict[type[Event], Event] = {
     type(event): event
@@ -191,6 +192,33 @@ def test_worker_that_restarts_is_not_ready_meanwhile() -> None:
     assert after(again, state=state)[0].components["eye"].state is ComponentState.READY
 
 
+def test_why_a_worker_ended_stays_with_its_component_until_the_next_one_is_steady() -> None:
+    ended = events.WorkerExited("eye", "it hung", problem=PROBLEM)
+    again = events.WorkerReady("eye", PluginDescription("eye", "1.0"))
+    state, _ = after(ended, again, state=active())
+    assert state.components["eye"].state is ComponentState.READY
+    assert state.components["eye"].problems == (PROBLEM,)
+    state, _ = after(events.WorkerSteady("eye"), state=state)
+    assert state.components["eye"].problems == ()
+
+
+def test_condition_that_has_ended_is_a_problem_of_its_component_while_its_worker_lives() -> None:
+    dead = Problem("CONDITION_RAISED", "ValueError: x", where="sees of eye (eye.py:3)")
+    told = events.ConditionEnded("eye", "sees", (dead,), "k1")
+    state, _ = after(told, state=active())
+    assert state.components["eye"].problems == (dead,)
+    assert state.components["eye"].is_ready
+    assert after(told, state=state) == (state, [])
+    assert after(events.WorkerSteady("eye"), state=state) == (state, [])
+    state, _ = after(events.WorkerExited("eye", "signal 9"), state=state)
+    assert state.components["eye"].problems == ()
+
+
+def test_condition_of_another_release_is_no_news() -> None:
+    told = events.ConditionEnded("eye", "sees", (PROBLEM,), "k2")
+    assert after(told, state=active())[0] == active()
+
+
 def test_failed_worker_is_quarantined_until_told() -> None:
     state, _ = after(events.WorkerFailed("eye", (PROBLEM,)), state=active())
     assert state.components["eye"].problems == (PROBLEM,)
@@ -306,6 +334,9 @@ HAPPENINGS: list[Event] = [
     *(events.PayloadCleared(key) for key in ("k1", "k2", "k3")),
     *(events.RetryAsked(key) for key in ("k1", "k2", "k3")),
     events.WorkerExited("eye", "test"),
+    events.WorkerExited("eye", "test", problem=PROBLEM),
+    events.WorkerSteady("eye"),
+    events.ConditionEnded("eye", "sees", (PROBLEM,)),
     events.WorkerFailed("arm", (PROBLEM,)),
     events.WorkerReady("eye", PluginDescription("eye", "1.0")),
     appeared("usb1", "/dev/x", ID_MODEL="PTU"),

@@ -30,6 +30,7 @@ from nondum.host.lifecycle import releases
 from nondum.host.lifecycle.advance import advance
 from nondum.host.lifecycle.recovery import recover
 from nondum.host.lifecycle.tries import ATTEMPTS
+from nondum.sdk.description import Behaviour, Fragment, Phrase, PluginDescription, Unit
 
 RELEASES = (1, 2, 3)
 TAKEN_IN = (Step.SUPERSEDED, Step.STORED, Step.PROBED, Step.ACTIVE)
@@ -181,6 +182,88 @@ def test_release_that_cannot_run_beside_the_other_one_takes_its_place_first() ->
     state, done = after(events.PayloadFailed("k2", (PROBLEM,)), state=state)
     assert steps(state) == {"k1": Step.STORED, "k2": Step.QUARANTINED}
     assert effects.ProbeComponents("k1") in done
+
+
+# What it says to planning
+
+
+def says(predicate: str, *, phrase: str = "known") -> PluginDescription:
+    """An eye whose action makes `predicate` true, and that declares `known`."""
+    domain = f"""(define (domain eye)
+        (:predicates (known ?h - host))
+        (:action look :parameters (?u - camera ?h - host)
+                      :precondition (ready ?u) :effect ({predicate} ?h)))"""
+    return PluginDescription(
+        name="eye",
+        version="1.0",
+        behaviours=(Behaviour("look", "(look ?u - camera ?h - host)"),),
+        fragments=(Fragment("domain.pddl", domain),),
+        units=(Unit("eye", "camera"),),
+        phrases=(Phrase("look around", f"({phrase} self)"),),
+    )
+
+
+def saying(key: str, description: PluginDescription) -> list[Event]:
+    """The way of a release of the eye whose index says that."""
+    way = way_to_active() if key == "k1" else upgrade(key)
+    entered = replace(component("eye", key), description=description)
+    way[2] = events.PayloadVerified(key, ("eye",), {"eye": description})
+    way[-1] = events.PayloadActivated(key, (entered,))
+    return way
+
+
+@pytest.mark.parametrize(
+    ("description", "code"),
+    [(says("knwon"), "E-UNDECL"), (says("known", phrase="knwon"), "PHRASE_INVALID")],
+    ids=["fragment", "phrase"],
+)
+def test_release_that_cannot_be_planned_with_is_refused_where_the_old_one_could(
+    description: PluginDescription, code: str
+) -> None:
+    before, _ = after(drive("a"), *saying("k1", says("known")))
+    state, done = after(drive("b"), *saying("k2", description)[:3], state=before)
+    assert codes(state, "k2") == [code]
+    assert steps(state) == {"k1": Step.ACTIVE, "k2": Step.REFUSED}
+    assert state.components == before.components
+    assert done[-1] == effects.ClearPayload("k2")
+
+
+def test_release_is_not_blamed_for_what_was_wrong_before() -> None:
+    before, _ = after(drive("a"), *saying("k1", says("knwon")))
+    state, _ = after(drive("b"), *saying("k2", says("knwon")), state=before)
+    assert steps(state) == {"k1": Step.SUPERSEDED, "k2": Step.ACTIVE}
+
+
+def test_first_release_is_taken_though_it_cannot_be_planned_with() -> None:
+    """It may do something all the same; there is none that it would replace."""
+    state, _ = after(drive("a"), *saying("k1", says("knwon")))
+    assert steps(state) == {"k1": Step.ACTIVE}
+
+
+def test_release_that_keeps_another_payload_out_of_planning_is_refused() -> None:
+    """It says a word otherwise than the other one, and comes before it."""
+    heard = "(define (domain more) (:predicates (heard {})))"
+    other = PluginDescription("ear", "1", fragments=(Fragment("m", heard.format("?h - host")),))
+    way = way_to_active("k9", "c", "ear", payload_id="org.y")
+    entered = replace(component("ear", "k9"), description=other)
+    way[-1] = events.PayloadActivated("k9", (entered,))
+    before, _ = after(drive("a"), *saying("k1", says("known")), drive("c"), *way)
+    more = Fragment("more.pddl", heard.format("?h - host ?of - host"))
+    unlike = replace(says("known"), fragments=(*says("known").fragments, more))
+    state, _ = after(drive("b"), *saying("k2", unlike)[:3], state=before)
+    assert codes(state, "k2") == ["E-PRED-ARITY"]
+    assert steps(state)["k1"] is Step.ACTIVE
+
+
+def test_release_that_came_first_gives_way_to_an_older_one_that_can_be_planned_with() -> None:
+    """Both are plugged in at once, so the newer one is brought up before any is active."""
+    older, newer = saying("k1", says("known")), saying("k2", says("knwon"))
+    both = drive("a"), drive("b"), older[0], newer[0], *newer[1:5], *older[1:5]
+    waiting, _ = after(*both)
+    assert steps(waiting) == {"k1": Step.SUPERSEDED, "k2": Step.STORED}
+    state, _ = after(*newer[5:], state=waiting)
+    assert codes(state, "k2") == ["E-UNDECL"]
+    assert steps(state) == {"k1": Step.STORED, "k2": Step.QUARANTINED}
 
 
 # Pulling

@@ -17,7 +17,7 @@ from nondum.host.lifecycle.going_back import go_back
 from nondum.host.lifecycle.installed import install, uninstall
 from nondum.host.workers import Timing
 from nondum.sdk.description import PluginDescription
-from nondum.sdk.errors import InstallFailed, PayloadRefused
+from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
 
 pytestmark = pytest.mark.anyio
 
@@ -99,6 +99,47 @@ async def test_newer_release_takes_over_and_the_old_one_comes_back(tmp_path: Pat
         await host.until_releases(LAMP_ID, r1=None)
         assert not left_over(host.folders)
         assert not host.workers.pids()
+
+
+DYING = (
+    LAMP
+    + """
+from nondum.sdk import condition
+
+@condition("sight", predicates=("seen",))
+async def sight(ctx):
+    await ctx.sleep(3600)
+
+@hookimpl
+async def start(ctx):
+    told = {"message": "blind", "where": "test_lamp.py:3"}
+    ctx._workplace.tell("condition-ended", {"condition": "sight", "problem": told}, None)
+"""
+)
+"""Says that its condition has ended before it says that it has started."""
+
+
+async def test_condition_that_ends_before_its_component_is_there_is_its_problem(
+    tmp_path: Path,
+) -> None:
+    """Of a first release, and of one that was brought up beside another, where nobody heard it."""
+    drives = [tmp_path / "drive-1", tmp_path / "drive-2"]
+    for number, drive in enumerate(drives, 1):
+        part = Part("lamp", DYING, version=f"{number}.0")
+        make_payload(drive, part, payload_id=LAMP_ID, version=part.version, release=number)
+    async with host_in_process(tmp_path, timing=BROUGHT_UP) as host:
+        for number, drive in enumerate(drives, 1):
+            host.plug(drive, str(number))
+            await host.until(lambda: version(host) == f"{number}.0")  # noqa: B023  # awaited at once
+            await host.until(lambda: bool(problems_of_lamp(host)))
+            (problem,) = problems_of_lamp(host)
+            assert problem.code == "CONDITION_RAISED"
+            assert problem.where == "sight of lamp (test_lamp.py:3)"
+
+
+def problems_of_lamp(host: HostInProcess) -> tuple[Problem, ...]:
+    component = host.snapshot.component("lamp")
+    return component.problems if component is not None else ()
 
 
 async def test_components_come_and_go_with_a_release(tmp_path: Path) -> None:

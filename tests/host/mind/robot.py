@@ -88,6 +88,8 @@ class Robot:
     """Behaviours, of all components or of one, that never get anywhere."""
     broken: set[str] = field(default_factory=set)
     """Components whose behaviours fail."""
+    flapping: set[str] = field(default_factory=set)
+    """Components whose behaviours are established, and fail half a second later."""
     unreachable: set[str] = field(default_factory=set)
     """Components whose host has just gone."""
     early_news: dict[str, list[Event]] = field(default_factory=dict)
@@ -110,6 +112,7 @@ class Robot:
             deadline_s=10.0,
             patience=self.patience,
             system_tree=self.system_tree,
+            now_s=asyncio.get_running_loop().time,
         )
         self._mounts = TellingMounts(self._remount, self.mind.after_tick)
         self.see()
@@ -132,6 +135,9 @@ class Robot:
         loop = asyncio.get_running_loop()
         if component in self.broken:
             loop.call_soon(call.end, RunState.FAILED, "no light")
+        elif component in self.flapping:
+            loop.call_soon(call.establish)
+            loop.call_later(0.5, call.end, RunState.FAILED, "no memory (eye/plugin.py:9)")
         elif self.stubborn & {behaviour, f"{component}.{behaviour}"}:
             pass
         elif lasting:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 from dataclasses import replace
+from functools import partial
 
 import pytest
 from tests.host.mind.conftest import at_work
@@ -21,7 +22,7 @@ from tests.planning.strangers import (
     VISUAL_TRACKER,
 )
 
-from nondum.host.catalogue.records import ComponentState
+from nondum.host.catalogue.records import ComponentState, MountPose
 from nondum.host.events import FactKnown, GoalReached, PlanMade, PlanMissing
 from nondum.host.mind.mind import PAUSE_S
 from nondum.host.mind.planners import Planners
@@ -35,6 +36,7 @@ pytestmark = pytest.mark.anyio
 
 FOLLOW = "(following self person)"
 POINT = "(pointing self radiation-source)"
+MOUNT = MountPose(f"{HOST}__recorded-camera__camera", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "person")
 REPORT = "(reported person self)"
 CHAIN = {"people-detector.detect", "visual-tracker.track", "mobile-base.drive"}
 
@@ -47,6 +49,10 @@ async def follow(robot: Robot) -> None:
     plug_followers(robot)
     robot.mind.give(pddl=FOLLOW, kind="maintain")
     await robot.until_holding()
+
+
+def has_tried(robot: Robot, times: int) -> bool:
+    return robot.started.count("recorded-camera.stream") == times
 
 
 async def test_goal_is_maintained(robot: Robot) -> None:
@@ -182,6 +188,74 @@ async def test_alternative_is_used_after_failures(robot: Robot) -> None:
     robot.plug(THERMAL_CAMERA)
     await robot.until_holding()
     assert "thermal-camera.stream" in robot.running
+
+
+async def test_behaviour_that_is_established_and_fails_is_started_ever_less_often(
+    robot: Robot, clock: VirtualClock
+) -> None:
+    plug_followers(robot)
+    robot.flapping = {"recorded-camera"}
+    robot.mind.give(pddl=FOLLOW, kind="maintain")
+    await clock.advance_until(robot.until_goal("suspended"))
+    assert robot.started.count("recorded-camera.stream") == 3
+    for tries, cool_down_s in ((4, 30.0), (5, 60.0), (6, 120.0)):
+        await clock.advance(cool_down_s * 0.9)
+        assert robot.started.count("recorded-camera.stream") == tries - 1
+        again = robot.until(partial(has_tried, robot, tries))
+        await clock.advance_until(again, step_s=1.0)
+        await clock.advance_until(robot.until_goal("suspended"))
+    goal = robot.mind.queue["1"]
+    assert "failed 6 times: no memory (eye/plugin.py:9)" in goal.reason
+    told = robot.mind.views.troubles()["recorded-camera"]
+    assert "failed 6 times: no memory (eye/plugin.py:9)" in told
+
+
+async def test_goal_says_how_what_is_tried_again_failed_the_last_time(
+    robot: Robot, clock: VirtualClock
+) -> None:
+    """A camera that never comes to send anything is overdue after a while, and started again."""
+    plug_followers(robot)
+    robot.stubborn = {"recorded-camera.stream"}
+    robot.mind.give(pddl=FOLLOW, kind="maintain")
+    await clock.advance_until(robot.until(lambda: robot.started != []))
+    await clock.advance_until(robot.until(lambda: len(robot.started) == 2), step_s=1.0)
+    goal = robot.mind.queue["1"]
+    assert goal.state.value == "active"
+    assert "recorded-camera.stream is tried again; last time: BEHAVIOUR_OVERDUE" in goal.reason
+    assert "failed once: BEHAVIOUR_OVERDUE" in robot.mind.views.troubles()["recorded-camera"]
+    assert any(
+        "last time: BEHAVIOUR_OVERDUE" in said for said in robot.mind.views.why()["sentences"]
+    )
+
+
+async def test_behaviour_that_holds_for_a_while_is_no_trouble_any_more(
+    robot: Robot, clock: VirtualClock
+) -> None:
+    plug_followers(robot)
+    robot.broken = {"recorded-camera"}
+    robot.mind.give(pddl=FOLLOW, kind="maintain")
+    await clock.advance_until(robot.until_goal("suspended"))
+    robot.broken = set()
+    await clock.advance_until(robot.until_holding(), step_s=1.0)
+    assert robot.mind.views.troubles()
+    await clock.advance(11.0)
+    assert not robot.mind.views.troubles()
+
+
+async def test_restarted_worker_does_not_shorten_the_wait_of_what_failed(
+    robot: Robot, clock: VirtualClock
+) -> None:
+    plug_followers(robot)
+    robot.broken = {"recorded-camera"}
+    robot.mind.give(pddl=FOLLOW, kind="maintain")
+    await clock.advance_until(robot.until_goal("suspended"))
+    for state in (ComponentState.RESTARTING, ComponentState.READY):
+        robot.set_state("people-detector", state)
+        await clock.advance(1.0)
+    assert robot.mind.pursuit.excluded
+    robot.mounts = (*robot.mounts, MOUNT)
+    robot.see()
+    assert not robot.mind.pursuit.excluded
 
 
 async def test_host_that_is_gone_is_told_and_not_a_failure_of_its_behaviours(robot: Robot) -> None:

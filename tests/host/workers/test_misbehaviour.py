@@ -15,15 +15,17 @@ from tests.kit.workers import HOST, WorkersUnderTest
 
 from nondum.host.events import (
     BehaviourEstablished,
+    ConditionEnded,
     WorkerExited,
     WorkerFailed,
     WorkerLogged,
     WorkerReady,
+    WorkerSteady,
 )
 from nondum.host.workers import Call, Limits
-from nondum.host.workers.supervision import RESTARTS
+from nondum.host.workers.supervision import RESTARTS, WINDOW_S
 from nondum.planning.running import RunState
-from nondum.sdk.description import Behaviour, Unit
+from nondum.sdk.description import Behaviour, Condition, Unit
 
 pytestmark = pytest.mark.anyio
 
@@ -97,6 +99,95 @@ async def test_blocked_loop_is_a_hang(tested: WorkersUnderTest, clock: VirtualCl
     await tested.until(WorkerLogged, lambda line: line.message == "blocks")
     await clock.advance(tested.timing.silence_s)
     await is_replaced(tested, call, "WORKER_HUNG")
+
+
+async def test_hang_is_told_with_the_line_that_holds_up_the_loop(
+    tested: WorkersUnderTest, clock: VirtualClock
+) -> None:
+    await guest(tested, "time.sleep(3600)")
+    call = tested.behave("guest", "do", u=UNIT)
+    line = (
+        PLUGIN.replace("{body}", "time.sleep(3600)").splitlines().index("    time.sleep(3600)") + 1
+    )
+    dumped = f'guest_plugin.py", line {line} in do'
+    await tested.until(WorkerLogged, lambda said: dumped in said.message)
+    await tested.until(WorkerLogged, lambda said: "sdk/worker.py" in said.message)
+    await clock.advance(tested.timing.silence_s)
+    assert await call.ended() is RunState.FAILED
+    assert call.reason.startswith("WORKER_HUNG")
+    assert f"do, guest_plugin.py:{line}" in call.reason
+    exited = await tested.until(WorkerExited)
+    assert exited.problem is not None
+    assert exited.problem.code == "WORKER_HUNG"
+
+
+CONDITION = """
+from nondum.sdk import condition
+
+@condition("place", predicates=("position-known",))
+async def place(ctx):
+    {body}
+"""
+PLACE = Condition("place", ("position-known",))
+
+
+async def watcher(tested: WorkersUnderTest, body: str) -> None:
+    await tested.start("guest", CONDITION.replace("{body}", body), conditions=(PLACE,))
+
+
+async def test_condition_that_raises_is_told_with_its_line(tested: WorkersUnderTest) -> None:
+    """Also where the error is raised in the SDK, for what the author wrote."""
+    await watcher(tested, "ctx.know('elsewhere', ctx.host)")
+    told = await tested.until(ConditionEnded)
+    (problem,) = told.problems
+    assert (told.component, told.condition, problem.code) == ("guest", "place", "CONDITION_RAISED")
+    assert problem.where == "place of guest (guest_plugin.py:6)"
+    assert "ValueError" in problem.message
+    assert tested.workers.dead_conditions("guest", "0" * 16) == (problem,)
+    assert not tested.told(WorkerExited)
+
+
+EARLY = """
+from nondum.sdk import hookimpl
+
+@hookimpl
+async def start(ctx):
+    told = {"condition": "place", "problem": {"message": "early"}}
+    ctx._workplace.tell("condition-ended", told, None)
+"""
+
+
+async def test_condition_that_ends_early_is_told_once_the_worker_is_known_to_run(
+    tested: WorkersUnderTest,
+) -> None:
+    source = CONDITION.replace("{body}", "await ctx.sleep(3600)") + EARLY
+    await tested.start("guest", source, conditions=(PLACE,))
+    kinds = [type(event) for event in tested.events]
+    assert ConditionEnded in kinds[kinds.index(WorkerReady) :]
+
+
+async def test_end_of_a_condition_that_the_plugin_has_not_breaks_the_protocol(
+    tested: WorkersUnderTest,
+) -> None:
+    sends = (
+        "from nondum.sdk.wire import Event, encode\n"
+        "link().send(encode(Event('condition-ended', None, {'condition': 'x', 'problem': "
+        "{'message': 'y'}})))\nawait asyncio.Event().wait()"
+    )
+    await exits_with(tested, sends, "PROTO_VIOLATION")
+
+
+async def test_what_ended_a_worker_is_past_once_the_next_one_has_lived_for_a_while(
+    tested: WorkersUnderTest, clock: VirtualClock
+) -> None:
+    tested.workers.timing = replace(tested.timing, missed=1_000_000)
+    await guest(tested, "pass")
+    os.kill(tested.workers.pids()["guest"], signal.SIGKILL)
+    await tested.until_ready(2)
+    await clock.advance(WINDOW_S * 0.9)
+    assert not tested.told(WorkerSteady)
+    await clock.advance(WINDOW_S * 0.2)
+    await tested.until(WorkerSteady)
 
 
 async def test_worker_that_shows_signs_of_life_does_not_hang(

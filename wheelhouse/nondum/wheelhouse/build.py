@@ -30,6 +30,7 @@ from nondum.wheelhouse import (
     lock,
     locking,
     manifest,
+    payload,
     resolve,
     wheel,
 )
@@ -62,6 +63,8 @@ class Options:
     fleet: str = ""
     hosts: tuple[str, ...] = ()
     """Names of the only hosts that it is meant for; empty: any."""
+    judge: Callable[[index.Index], Sequence[Problem]] = lambda _: ()
+    """What is wrong with what the plugins say to planning, which nobody here can tell."""
 
 
 def build(package: Path, drive: Path, options: Options, progress: Progress) -> Path:
@@ -81,6 +84,7 @@ def build(package: Path, drive: Path, options: Options, progress: Progress) -> P
         chosen = _fetched(own, work, options, sources, progress)
         progress("asking the plugin what it is", steps - 3, steps)
         described = _described(said, chosen[Target.here()], work / "site-packages")
+        _judge_descriptions(said, described, options)
         progress("writing the payload", steps - 2, steps)
         locked = {target: chosen[target] for target in options.targets}
         folder = work / said.id
@@ -164,6 +168,18 @@ def _described(
         found = entry_point(site_packages, component.distribution, component.id)
         described[component.id] = capture.describe(site_packages, found, component.distribution)
     return described
+
+
+def _judge_descriptions(
+    said: Manifest, described: Mapping[str, PluginDescription], options: Options
+) -> None:
+    """Refuse what the plugins say of themselves where a host would, or would not plan with it."""
+    problems = [
+        problem
+        for component in said.components
+        for problem in payload.disagreeing_devices(component, described[component.id])
+    ]
+    wheel.refuse_if_any((*problems, *options.judge(described)))
 
 
 def entry_point(site_packages: Path, distribution: str, component: str) -> str:

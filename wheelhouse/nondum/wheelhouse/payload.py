@@ -12,12 +12,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TypeVar
 
+from nondum.sdk.description import DeviceNeed, PluginDescription
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem
 from nondum.wheelhouse import goals, index, lock, manifest, tables, wheel
 from nondum.wheelhouse.contents import Contents
 from nondum.wheelhouse.index import Index
 from nondum.wheelhouse.lock import Lock, LockedWheel
-from nondum.wheelhouse.manifest import Manifest
+from nondum.wheelhouse.manifest import ComponentManifest, Manifest
 from nondum.wheelhouse.preflight import (
     HostFacts,
     misfits,
@@ -122,6 +123,35 @@ def check_wheels(
         problems.extend(unmet(requirements, chosen, facts, lock.file_name(component)))
     problems.extend(unpacked_problems(layouts.values(), facts, payload.manifest.id))
     return tuple(problems)
+
+
+def device_problems(payload: StagedPayload) -> Iterator[Problem]:
+    """Where a plugin asks for other devices than the manifest, by which they are given out."""
+    for component in payload.manifest.components:
+        yield from disagreeing_devices(component, payload.index[component.id])
+
+
+def disagreeing_devices(component: ComponentManifest, said: PluginDescription) -> Iterator[Problem]:
+    """Where a plugin's `devices()` is not what a component's table of the manifest says."""
+    asked = {need.name: need for need in component.devices}
+    answered = {need.name: need for need in said.devices}
+    for name in sorted(asked.keys() | answered.keys()):
+        if asked.get(name) != answered.get(name):
+            yield Problem(
+                "DEVICE_RULES",
+                f"device {name!r} is not the same in devices() and in the manifest",
+                where=component.id,
+                need=_rules(asked.get(name), manifest.NAME),
+                have=_rules(answered.get(name), "devices()"),
+                fix=f"say the same in {manifest.NAME}, by which devices are given out",
+            )
+
+
+def _rules(need: DeviceNeed | None, where: str) -> str:
+    if need is None:
+        return f"no such device in {where}"
+    rules = ", ".join(f'{key} = "{pattern}"' for key, pattern in need.match.items())
+    return f"{{ {rules} }}{', optional' if need.optional else ''} in {where}"
 
 
 def _layout(path: Path, stored: Layout | None) -> Layout:

@@ -106,6 +106,7 @@ def _found(
         return
     if not verdict.problems:
         yield from verdict.grant.problems(staged.manifest, staged.goals)
+    yield from payload.device_problems(staged)
     if facts is None:
         return
     minimum = staged.contents.minimum_nondum

@@ -14,6 +14,7 @@ from nondum.sdk.errors import PayloadRefused, Problem
 
 if TYPE_CHECKING:
     from nondum.wheelhouse.payload import StagedPayload
+    from nondum.wheelhouse.trust.trust import Trust
 
 FOLDER = click.Path(path_type=Path, exists=True, file_okay=False)
 
@@ -73,15 +74,21 @@ def loaded_payload(folder: Path) -> StagedPayload:
     return load(folder, listed)
 
 
-def _signed(folder: Path) -> dict[str, Any]:
-    """The fingerprints of those whose signatures hold; else, why there is none."""
+def signed(folder: Path, trust: Trust | None = None) -> dict[str, Any]:
+    """Whose signatures hold, by their names in a trust file or by fingerprints; else, why there is
+    none. Whether they are trusted is not asked. Raises `PayloadRefused`, `DriveGone`.
+    """
     from nondum.wheelhouse import drive
     from nondum.wheelhouse.trust.judging import Circumstances, judge
 
     data, signature = drive.read_contents(folder), drive.read_signature(folder)
-    verdict = judge(None, data, signature, Circumstances())
-    why = "not signed" if signature is None else str(verdict.problems[0])
-    return {"signers": list(verdict.signers), "unsigned": "" if verdict.signers else why}
+    verdict = judge(trust, data, signature, Circumstances())
+    if verdict.signers:
+        return {"signers": list(verdict.signers), "unsigned": ""}
+    return {
+        "signers": [],
+        "unsigned": "not signed" if signature is None else str(verdict.problems[0]),
+    }
 
 
 def _view(payload: StagedPayload) -> dict[str, Any]:
@@ -95,7 +102,7 @@ def _view(payload: StagedPayload) -> dict[str, Any]:
         "fleet": listed.fleet,
         "built": listed.built,
         "age_s": age_s(listed.built),
-        **_signed(payload.folder),
+        **signed(payload.folder),
         "summary": payload.manifest.summary,
         "bytes": listed.total_bytes,
         "goals": list(payload.goals),

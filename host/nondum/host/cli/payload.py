@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import closing
+import shlex
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,10 @@ import click
 
 from nondum.host.cli import complete, render
 from nondum.host.cli.connection import Session, json_option
-from nondum.host.cli.judge import FOLDER, inspect, payloads
+from nondum.host.cli.judge import FOLDER, inspect, loaded_payload, payloads
 from nondum.host.cli.progress import ProgressLine
 from nondum.host.cli.verify import check, verify
+from nondum.sdk.errors import NondumError
 
 INSTALL_TIMEOUT_S = 600.0
 KEY = click.Path(path_type=Path, exists=True, dir_okay=False)
@@ -50,7 +52,7 @@ def new(session: Session, name: str, output: Path | None, payload_id: str | None
         return
     for path in made.files:
         click.echo(f"{made.folder / path}")
-    click.echo(f"next: cd {made.folder}; pytest; nondum payload build . -o DRIVE")
+    click.echo(f"next: cd {shlex.quote(str(made.folder))}; pytest; nondum payload build . -o DRIVE")
 
 
 @payload.command()
@@ -101,6 +103,7 @@ def build(
     Examples: nondum payload build . -o /media/usb
               nondum payload build a b -o drive --arch x86_64 --arch aarch64 --python 3.11
     """
+    from nondum.host import vocabulary_check
     from nondum.wheelhouse import build as building
     from nondum.wheelhouse.resolve import Sources
     from nondum.wheelhouse.target import PYTHONS, Target, targets
@@ -113,8 +116,9 @@ def build(
         release=release,
         fleet=fleet,
         hosts=hosts,
+        judge=lambda index: vocabulary_check.judge(index).problems,
     )
-    made = []
+    made, before = [], _versions(output)
     for package in packages:
         is_wanted = not (quiet or session.as_json)
         with ProgressLine(package.resolve().name, is_wanted=is_wanted) as show:
@@ -126,6 +130,7 @@ def build(
     elif not quiet:
         for folder in made:
             click.echo(f"{folder}  {_size(folder)}")
+            _remark_lower_version(folder, before.get(folder.name))
 
 
 @payload.command()
@@ -300,6 +305,29 @@ def forget(session: Session, payload_id: str) -> None:
         render.as_json(done)
     else:
         click.echo(f"forgot {payload_id}")
+
+
+def _versions(drive: Path) -> dict[str, str]:
+    """Payload id → version, of what a drive carries already."""
+    from nondum.wheelhouse.drive import find_payloads
+
+    found = {}
+    for folder in find_payloads(drive) if drive.is_dir() else ():
+        with suppress(NondumError):  # it is to be replaced
+            found[folder.name] = loaded_payload(folder).contents.version
+    return found
+
+
+def _remark_lower_version(folder: Path, before: str | None) -> None:
+    """Say that a version went down while the release went up: hosts go by the release."""
+    from packaging.version import Version
+
+    now = loaded_payload(folder).contents.version
+    if before is not None and Version(now) < Version(before):
+        told = (
+            f"this is version {now}, {before} was here; hosts take the newer release all the same"
+        )
+        render.sentence(told, colour="yellow", mark="warning: ")
 
 
 def _size(folder: Path) -> str:

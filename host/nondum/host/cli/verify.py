@@ -13,10 +13,10 @@ import click
 from nondum.host.cli import render
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.failure import EXIT_PROBLEMS
-from nondum.host.cli.judge import FOLDER, payloads
+from nondum.host.cli.judge import FOLDER, payloads, signed
 from nondum.host.cli.machine import this_machine
 from nondum.host.cli.progress import ProgressLine
-from nondum.sdk.errors import HostUnreachable, PayloadRefused, Problem
+from nondum.sdk.errors import HostUnreachable, NondumError, PayloadRefused, Problem
 
 if TYPE_CHECKING:
     from nondum.wheelhouse.preflight import HostFacts
@@ -60,8 +60,9 @@ def verify(
               nondum payload verify drive --trust trust.toml --arch aarch64 --python 3.12 --json
     """
     facts = None if anywhere else _facts(session, arch, python)
-    verifier = _verifier(_trusted(session, trust), unsigned=unsigned)
-    return _tell(session, drive, verifier, facts)
+    trusted = _trusted(session, trust)
+    verifier = _verifier(trusted, unsigned=unsigned)
+    return _tell(session, drive, verifier, facts, trusted)
 
 
 @click.command()
@@ -79,14 +80,23 @@ def check(session: Session, drive: Path, anywhere: bool) -> int:
               nondum payload check drive --anywhere --json
     """
     facts = None if anywhere else _facts(session, None, None)
-    return _tell(session, drive, _verifier(None, unsigned=True), facts)
+    trusted = _trusted(session, None)
+    return _tell(session, drive, _verifier(None, unsigned=True), facts, trusted)
 
 
-def _tell(session: Session, drive: Path, verifier: Verifier, facts: HostFacts | None) -> int:
-    """Judge all payloads of a drive, tell what was found, and give the exit code."""
+def _tell(
+    session: Session,
+    drive: Path,
+    verifier: Verifier,
+    facts: HostFacts | None,
+    trust: Trust | None,
+) -> int:
+    """Judge all payloads of a drive, tell what was found, and give the exit code. Signers are
+    called as `trust` has them."""
     problems: list[Problem] = []
     warnings: list[Problem] = []
     signers: dict[str, list[str]] = {}
+    signed_by: dict[str, str] = {}
     try:
         folders = list(payloads(drive))
     except PayloadRefused as refused:
@@ -96,21 +106,33 @@ def _tell(session: Session, drive: Path, verifier: Verifier, facts: HostFacts | 
             found = _verified(folder, verifier, facts, show)
         problems += found.problems
         warnings += found.warnings
-        signers[folder.name] = list(found.signers)
+        signers[folder.name], signed_by[folder.name] = _signers(folder, trust)
     if session.as_json:
-        told = {"ok": not problems, "problems": _rows(problems), "warnings": _rows(warnings)}
-        render.as_json({**told, "signers": signers})
+        told_all = {"ok": not problems, "problems": _rows(problems), "warnings": _rows(warnings)}
+        render.as_json({**told_all, "signers": signers})
     else:
-        for name, keys in signers.items():
-            render.sentence(
-                f"{name}: signed by {', '.join(keys)}" if keys else f"{name}: nobody has signed it"
-            )
+        for name, told in signed_by.items():
+            render.sentence(f"{name}: {told}")
         for problem in problems:
             render.sentence(str(problem), colour="red")
         for warning in warnings:
             render.sentence(str(warning), colour="yellow", mark="warning: ")
         click.echo("refused" if problems else "accepted")
     return EXIT_PROBLEMS if problems else 0
+
+
+def _signers(folder: Path, trust: Trust | None) -> tuple[list[str], str]:
+    """Whose signatures of a payload hold, and that in words."""
+    try:
+        keys: list[str] = signed(folder, trust)["signers"]
+    except NondumError:  # its list cannot be read, which is told as a problem
+        keys = []
+    if keys:
+        return keys, f"signed by {', '.join(keys)}"
+    from nondum.wheelhouse import contents
+
+    is_signed = (folder / contents.SIGNATURE_NAME).exists()
+    return keys, "no signature of it holds" if is_signed else "nobody has signed it"
 
 
 def _rows(problems: Iterable[Problem]) -> list[dict[str, str]]:

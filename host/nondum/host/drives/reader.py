@@ -133,8 +133,8 @@ def copy(arguments: Arguments, report: Report) -> dict[str, int]:
     return {"copied": copied, "known": known_bytes}
 
 
-def verify(arguments: Arguments, report: Report) -> list[str]:
-    """Check the staged wheels and that nothing is missing; tell the ids of the components.
+def verify(arguments: Arguments, report: Report) -> dict[str, Any]:
+    """Check the staged wheels and that nothing is missing; tell what each component's plugin says.
 
     Raises `PayloadRefused`.
     """
@@ -144,8 +144,10 @@ def verify(arguments: Arguments, report: Report) -> list[str]:
         sha256: _stored_layout(found)
         for sha256, found in known_wheels(arguments, staged, facts).items()
     }
-    refuse_if_any(payload.check_wheels(staged, facts, stored))
-    return [component.id for component in staged.manifest.components]
+    wrong_devices = payload.device_problems(staged)
+    refuse_if_any((*payload.check_wheels(staged, facts, stored), *wrong_devices))
+    ids = [component.id for component in staged.manifest.components]
+    return {id: staged.index[id].to_dict() for id in ids}
 
 
 def load_staged(folder: Path) -> StagedPayload:

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from nondum.host.catalogue.records import DeviceRecord, MountPose, Step
+from nondum.host.catalogue.records import (
+    ComponentRecord,
+    ComponentState,
+    DeviceRecord,
+    MountPose,
+    Step,
+)
 from nondum.host.effects import RestartWorker
 from nondum.host.events import (
+    ConditionEnded,
     DeviceAppeared,
     DeviceChanged,
     DeviceRemoved,
@@ -18,11 +25,15 @@ from nondum.host.events import (
     WorkerExited,
     WorkerFailed,
     WorkerReady,
+    WorkerSteady,
 )
 from nondum.host.lifecycle import known_devices, releases
 from nondum.host.lifecycle.payload_rules import on_payload_tried
 from nondum.host.lifecycle.turn import Turn
 from nondum.host.transitions import COMPONENT_TRANSITIONS
+from nondum.sdk.errors import Problem
+
+CONDITION = "CONDITION_RAISED"
 
 
 def on_worker_news(turn: Turn, event: WorkerReady | WorkerExited | WorkerFailed) -> None:
@@ -35,11 +46,45 @@ def on_worker_news(turn: Turn, event: WorkerReady | WorkerExited | WorkerFailed)
     if state is None:
         return
     turn.events.append(event)
-    problems = event.problems if isinstance(event, WorkerFailed) else ()
-    turn.put_component(replace(component, state=state, problems=problems))
-    if problems:
+    turn.put_component(replace(component, state=state, problems=_problems(component, event)))
+    if isinstance(event, WorkerFailed):
         payload = turn.state.payloads[component.payload]
-        turn.pending.extend(releases.gives_way(turn.state, payload, problems))
+        turn.pending.extend(releases.gives_way(turn.state, payload, event.problems))
+
+
+def _problems(
+    component: ComponentRecord, event: WorkerReady | WorkerExited | WorkerFailed
+) -> tuple[Problem, ...]:
+    """What is wrong with a component. Why a worker ended stays until the next one is steady; that
+    of its conditions is over with the worker."""
+    match event:
+        case WorkerFailed():
+            return event.problems
+        case WorkerExited():
+            return (event.problem,) if event.problem is not None else ()
+    return component.problems
+
+
+def on_worker_steady(turn: Turn, event: WorkerSteady) -> None:
+    """Forget why the worker before this one ended; what its own conditions ended with stays."""
+    component = turn.state.components.get(event.component)
+    if component is None or event.payload not in ("", component.payload):
+        return
+    left = tuple(p for p in component.problems if p.code == CONDITION)
+    if left != component.problems and component.state is ComponentState.READY:
+        turn.events.append(event)
+        turn.put_component(replace(component, problems=left))
+
+
+def on_condition_ended(turn: Turn, event: ConditionEnded) -> None:
+    """Keep the error with the component, which goes on without the condition. May be told twice."""
+    component = turn.state.components.get(event.component)
+    if component is None or event.payload not in ("", component.payload):
+        return
+    new = tuple(problem for problem in event.problems if problem not in component.problems)
+    if new and component.state is ComponentState.READY:
+        turn.events.append(event)
+        turn.put_component(replace(component, problems=(*component.problems, *new)))
 
 
 def on_retry_asked(turn: Turn, event: RetryAsked) -> None:

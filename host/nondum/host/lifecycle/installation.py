@@ -8,13 +8,13 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from nondum.host import effects
-from nondum.host.catalogue.records import Moment
+from nondum.host.catalogue.records import ComponentRecord, Moment
 from nondum.host.catalogue.state import HostState
 from nondum.host.drives.reading import LOOK_S, telling_stalls
 from nondum.host.events import (
@@ -42,6 +42,7 @@ from nondum.host.lifecycle.room import Needs
 from nondum.host.trust.payload_trust import PayloadTrust, TrustOptions
 from nondum.host.workers import Limits, Workers, base_interpreter, end_leftovers
 from nondum.host.workers.standing import Standing
+from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, WorkerFailed, problems_of
 from nondum.wheelhouse import disk
 from nondum.wheelhouse.gpu import Gpu
@@ -155,8 +156,9 @@ class Installation:
     async def verify(self, effect: effects.VerifyPayload) -> tuple[Event, ...]:
         """Check the staged copy."""
         arguments = self._arguments(staging=str(self._folders.staging(effect.payload)))
-        components = await self._run("verify", effect.payload, arguments)
-        return (PayloadVerified(effect.payload, tuple(components)),)
+        said = await self._run("verify", effect.payload, arguments)
+        index = {id: PluginDescription.parse(told, where=id) for id, told in said.items()}
+        return (PayloadVerified(effect.payload, tuple(index), index),)
 
     async def stage(self, effect: effects.StagePayload) -> tuple[Event, ...]:
         """Move the checked copy to its lasting place."""
@@ -206,12 +208,17 @@ class Installation:
         return (
             PayloadActivated(
                 effect.payload,
-                tuple(component.record(effect.payload) for component in prepared),
+                tuple(self._record(component, effect.payload) for component in prepared),
                 tuple(pose for component in prepared for pose in component.poses(self._host)),
                 self._grants[effect.payload],
                 self._goals[effect.payload],
             ),
         )
+
+    def _record(self, component: Prepared, payload: str) -> ComponentRecord:
+        """A component as the catalogue takes it in, with what has gone wrong since its start."""
+        problems = self._workers.dead_conditions(component.id, payload)
+        return replace(component.record(payload), problems=problems)
 
     async def compile(self, effect: effects.CompileWheels) -> tuple[Event, ...]:
         """Byte-compile in the store what it runs, and link that into its venvs.

@@ -40,7 +40,7 @@ from nondum.host.events import (
     TrustChanged,
     WheelsStored,
 )
-from nondum.host.lifecycle import admission, releases, safe_mode, tries
+from nondum.host.lifecycle import admission, releases, replacement, safe_mode, tries
 from nondum.host.lifecycle.claims import granted
 from nondum.host.lifecycle.drive_rules import copy_of, read
 from nondum.host.lifecycle.turn import Turn
@@ -92,7 +92,8 @@ def on_payload_found(turn: Turn, event: PayloadFound) -> None:
 
 
 def on_payload_verified(turn: Turn, event: PayloadVerified) -> None:
-    """Go on, unless another payload brings one of its components."""
+    """Go on, unless another payload brings one of its components, or it would replace a release
+    that can be planned with by one that cannot."""
     payload = turn.state.payloads.get(event.payload)
     if payload is None or payload.step is not Step.COPIED:
         return
@@ -103,6 +104,8 @@ def on_payload_verified(turn: Turn, event: PayloadVerified) -> None:
         turn.pending.append(PayloadRefused(event.payload, problems))
     elif rivals:
         turn.put_payload(replace(payload, waits_for=rivals[0].key))
+    elif worse := replacement.problems(turn.state, payload, event.index):
+        turn.pending.append(PayloadRefused(event.payload, worse))
     else:
         on_payload_step(turn, event)
 
@@ -117,6 +120,19 @@ def on_wheels_stored(turn: Turn, event: WheelsStored) -> None:
     enter(turn, payload, event, row, with_effect=other is None)
     if other is not None:
         turn.pending.append(releases.waiting(payload, other))
+
+
+def on_payload_activated(turn: Turn, event: PayloadActivated) -> None:
+    """Enter its components, unless a release that can be planned with would give way to it: what
+    is here may have changed since it was verified."""
+    payload = turn.state.payloads.get(event.payload)
+    if payload is None or payload.step is not Step.PROBED:
+        return
+    index = {component.id: component.description for component in event.components}
+    if worse := replacement.problems(turn.state, payload, index):
+        turn.pending.append(PayloadFailed(event.payload, worse))
+    else:
+        on_payload_step(turn, event)
 
 
 def on_payload_tried(turn: Turn, event: RetryAsked) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from nondum.host.catalogue.records import FormerPayload, Snapshot
+from nondum.host.mind.silence import Silence
 from nondum.planning.claims import claims_of
 from nondum.planning.contribution import Contribution
 from nondum.planning.domain import Merged
@@ -18,6 +19,7 @@ from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import FragmentRefused, Problem
 from nondum.sdk.planner import Answer, GroundTask
 
+NO_SILENCE = Silence()
 _TRIAL_S = 0.3
 """How long a part of a goal is planned for, to see whether it can be had by itself."""
 
@@ -81,10 +83,12 @@ def why_not(
     facts: frozenset[str],
     seen: Iterable[Seen],
     failures: Mapping[str, str] | None = None,
+    silence: Silence = NO_SILENCE,
 ) -> tuple[Problem, ...]:
     """What is missing for a goal that cannot be reached, and who used to supply it.
 
-    `failures` are the actions that must not be planned with, and how they failed. Takes its time.
+    `failures` are the actions that must not be planned with, and how they failed; `silence` is what
+    keeps those from telling it that could. Takes its time.
     """
     try:
         diagnosis = explain(merged, facts, goal.expr, search=_tried_out)
@@ -96,6 +100,9 @@ def why_not(
         return (Problem("NO_OTHER_WAY", message, fix="it is tried again after a while"),)
     gone = {known.contribution: known for known in seen}
     brought = [gone[contribution] for contribution in suppliers(diagnosis.causes, gone)]
+    if diagnosis.causes:
+        missing = tuple(map(silence.problem, diagnosis.causes))
+        return (*missing, *_used_to_supply(brought))
     return (*diagnosis.problems(), *_used_to_supply(brought))
 
 

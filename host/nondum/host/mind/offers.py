@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.diagnosis import Seen, why_not
+from nondum.host.mind.silence import Silence
 from nondum.planning.domain import bind
 from nondum.planning.exploration import explore
 from nondum.planning.goal import Goal, goal_text
@@ -172,5 +173,6 @@ class _Outlook:
         self._explained += 1
         if self._explained > MOST_EXPLAINED:
             return []
-        problems = why_not(self._composition.merged, goal, self._bare, self._seen)
+        merged, silence = self._composition.merged, Silence.of(self._composition.snapshot)
+        problems = why_not(merged, goal, self._bare, self._seen, silence=silence)
         return [problem.message for problem in problems]

@@ -11,6 +11,7 @@ import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from nondum.host.catalogue.records import ComponentState
 from nondum.host.events import Emit, GoalEnded, GoalReached, PlanMade, PlanMissing
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition
@@ -20,7 +21,7 @@ from nondum.host.mind.people import People
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.runner import BehaviourRunner
 from nondum.host.mind.search import NoPlan, Past, Planned, Situation, search, task_of
-from nondum.planning.attempts import Patience
+from nondum.planning.attempts import Attempts, Patience, Setbacks
 from nondum.planning.goal import parse_goal
 from nondum.planning.plain import plain
 from nondum.planning.replay import beginning_at, replayed
@@ -31,9 +32,6 @@ from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
 from nondum.sdk.planner import GroundTask, Plan
 
 log = logging.getLogger(__name__)
-
-COOL_DOWN_S = 30.0
-"""How long an action that failed again and again is left out of plans."""
 
 
 @dataclass(slots=True)
@@ -49,6 +47,8 @@ class Current:
     """The plan does not fit the components that are here now."""
     phase: Phase = Phase.UNDER_WAY
     """As people were last told."""
+    trouble: str = ""
+    """What is tried again, and why, as the goal's reason was last said to be."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -94,6 +94,7 @@ class Pursuit:
         self._tried: dict[int, Situation] = {}
         """By the number of a goal: one that is given again under its id was not tried yet."""
         self._excluded_until_s: dict[str, float] = {}
+        self.setbacks = Setbacks()
         self._left_over: tuple[Run, ...] = ()
 
     @property
@@ -121,6 +122,15 @@ class Pursuit:
     def failures(self) -> dict[str, str]:
         """The actions that are excluded, and how they failed."""
         return {name: self._failures.get(name, "") for name in sorted(self.excluded)}
+
+    @property
+    def troubles(self) -> dict[str, str]:
+        """Actions that fail and are tried again, or are left out for it, and how they failed."""
+        control = self.current.tree.control if self.current else None
+        attempts = control.attempts if control else Attempts(self._patience, self.setbacks)
+        well = control.steady(self._now_s()) if control else ()
+        failing = (name for name in attempts.troubled() if name not in well)
+        return {name: why for name in failing if (why := attempts.trouble(name))}
 
     @property
     def is_searching(self) -> bool:
@@ -155,9 +165,11 @@ class Pursuit:
         before = self._composition.contributions if self._composition else ()
         if not set(before) <= set(composition.contributions):  # what is left may be small enough
             self._left_out.clear()
+        if self._composition is None or _parts(self._composition) != _parts(composition):
+            self._excluded_until_s.clear()  # what it failed for may be another now
+            self.setbacks.clear()
         self._composition = composition
         self._seen = seen_in(composition.snapshot)
-        self._excluded_until_s.clear()
         current = self.current
         if current is None:
             return
@@ -187,10 +199,16 @@ class Pursuit:
         current = self.current
         if current is None or not current.tree.control.decisions:  # not ticked yet
             return
-        phase = current.tree.control.phase
+        control = current.tree.control
+        phase = control.phase
         if phase is not current.phase:
-            current.phase = phase
+            current.phase, current.trouble = phase, ""
             self._tell_phase(current, phase)
+        for name in control.steady(self._now_s()):
+            control.attempts.effective(name)
+        if phase is Phase.UNDER_WAY and (trouble := control.trouble()) != current.trouble:
+            current.trouble = trouble
+            self.queue.put(current.goal, GoalState.ACTIVE, trouble)
         if phase is Phase.REACHED:
             self.queue.put(current.goal, GoalState.REACHED, "it holds")
             self._emit(GoalReached(current.goal))
@@ -232,7 +250,10 @@ class Pursuit:
         for name in control.exhausted:
             self._failures[name] = control.attempts.given_up(name) or ""
             if self._excluded_until_s.get(name, 0.0) <= now_s:
-                self._excluded_until_s[name] = now_s + COOL_DOWN_S
+                attempts = control.attempts
+                reason, failures = attempts.last_failure(name), attempts.count(name)
+                setback = self.setbacks.note(name, failures, reason)
+                self._excluded_until_s[name] = now_s + setback.cool_down_s
 
     def _start_search(self, wanted: GivenGoal) -> None:
         assert self._composition is not None  # `step` waits for one
@@ -357,6 +378,7 @@ class Pursuit:
             exclusive=self._composition.exclusive,
             runs=(*runs, *self._left_over),
             patience=self._patience,
+            setbacks=self.setbacks,
             name=f"goal {goal.id}",
         )
         self._left_over = ()
@@ -378,3 +400,11 @@ class Pursuit:
         believed = self._beliefs.world.facts
         plan = replayed(task, current.names, believed, composition.merged.lasting())
         return None if plan is None else plain(beginning_at(task, believed), plan)
+
+
+def _parts(composition: Composition) -> tuple[object, ...]:
+    """What an action's failure may come from: who is here, with which devices, and where units sit.
+    Workers that are started again by themselves change nothing of that."""
+    snapshot, given_up = composition.snapshot, ComponentState.QUARANTINED
+    own = ((c.id, c.devices, c.state is given_up) for c in snapshot.components)
+    return (*composition.contributions, *own, *snapshot.mounts)

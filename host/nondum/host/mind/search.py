@@ -11,6 +11,7 @@ from nondum.host.mind.composition import Composition
 from nondum.host.mind.diagnosis import Seen, why_not, words_gone
 from nondum.host.mind.goals import GivenGoal
 from nondum.host.mind.planners import Planners
+from nondum.host.mind.silence import Silence
 from nondum.planning.bounds import INSTANCES_LIMIT
 from nondum.planning.cutting import cut_short
 from nondum.planning.domain import Merged
@@ -162,7 +163,13 @@ async def _searched(
         case Unsolvable():
             failures = {name: past.failures.get(name, "") for name in situation.excluded}
             problems = await asyncio.to_thread(
-                why_not, fit.merged, goal, situation.facts, past.seen, failures
+                why_not,
+                fit.merged,
+                goal,
+                situation.facts,
+                past.seen,
+                failures,
+                Silence.of(composition.snapshot),
             )
             return NoPlan(situation, (*problems, *too_big))
 

@@ -17,6 +17,7 @@ from nondum.host.mind.goals import GoalQueue, GoalState
 from nondum.host.mind.people import People
 from nondum.host.mind.pursuit import Pursuit
 from nondum.host.mind.runner import BehaviourRunner
+from nondum.host.mind.silence import Silence
 from nondum.host.mind.tree_view import Row, TreeView
 from nondum.planning.conclusions import conclusions
 from nondum.planning.task_control import Phase
@@ -137,9 +138,22 @@ class Views:
             "told": [told.text for told in self._mind.people.since(self._last_few())],
         }
 
+    def troubles(self) -> dict[str, str]:
+        """Component → which of its actions fail again and again, and how."""
+        composition = self._mind.composition
+        objects = composition.merged.objects if composition else {}
+        found: dict[str, list[str]] = {}
+        for name, why in self._mind.pursuit.troubles.items():
+            schema, _, bound = name.partition(" ")
+            owner = objects.get(bound.partition(" ")[0])
+            if owner is not None and owner.component:
+                found.setdefault(owner.component, []).append(f"{schema} {why}")
+        return {component: "; ".join(told) for component, told in found.items()}
+
     def composition(self) -> Row:
         """All that planning goes by, for tools that plan by themselves: `host`, `components`,
-        `facts`, `excluded` actions and why, and the components `seen` here before."""
+        `facts`, `excluded` actions and why, `silence` of what is here, and the components `seen`
+        here before."""
         beliefs, pursuit = self._mind.beliefs, self._mind.pursuit
         kept_out = dict(pursuit.left_out)
         return {
@@ -156,6 +170,7 @@ class Views:
             ],
             "facts": sorted(beliefs.world.bare_facts),
             "excluded": pursuit.failures,
+            "silence": Silence.of(beliefs.snapshot).to_dict(),
             "seen": [
                 {
                     "component": seen.contribution.component,

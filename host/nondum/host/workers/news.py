@@ -15,6 +15,7 @@ from nondum.host.events import (
     WorkerLogged,
 )
 from nondum.host.printable import printable, printable_text
+from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import MessageInvalid, Problem, ProtocolViolation
 from nondum.sdk.messages import value_from_wire
 from nondum.sdk.wire import pack
@@ -27,6 +28,8 @@ MAX_RATE_HZ = 1e6
 """Messages a second; no worker gets so many through."""
 MAX_TEXT = 16 * 1024
 """Characters of one message that are kept."""
+MAX_REASON = 1000
+"""Characters of the error that a condition ended with."""
 MAX_CLAIMS = 4096
 """Facts that one worker may say at once."""
 MAX_CLAIMED_BYTES = 4 * 1024 * 1024
@@ -144,6 +147,18 @@ def parse_count(body: Mapping[str, Any]) -> int:
         case {"count": int(count)} if 0 < count <= MAX_COUNT and count is not True:
             return count
     raise _violation("EVENT_INVALID", "event 'crowded' lacks what it tells")
+
+
+def parse_condition(said: PluginDescription, body: Mapping[str, Any]) -> tuple[str, Problem]:
+    """Which condition of a plugin has ended, and with what error. Raises `ProtocolViolation`."""
+    match body:
+        case {"condition": str(name), "problem": {"message": str(message), **rest}}:
+            if all(condition.name != name for condition in said.conditions):
+                raise _violation("EVENT_INVALID", f"{name!r:.80} is no condition of the plugin")
+            where = rest.get("where", "")
+            place = printable(where[:MAX_WORD]) if isinstance(where, str) else ""
+            return name, Problem("CONDITION_RAISED", printable(message[:MAX_REASON]), place)
+    raise _violation("EVENT_INVALID", "event 'condition-ended' lacks what it tells")
 
 
 def _word(value: object) -> str:

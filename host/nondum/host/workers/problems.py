@@ -135,9 +135,11 @@ def hung_up(component: str) -> Problem:
     return Problem("WORKER_HUNG", message, where=component, fix=_author(component))
 
 
-def silent(component: str, silence_s: float) -> Problem:
-    """Its heartbeat stopped."""
+def silent(component: str, silence_s: float, place: str = "") -> Problem:
+    """Its heartbeat stopped; `place` is where its loop stood, if that is known."""
     message = f"the worker showed no sign of life for {silence_s:g} s"
+    if place:
+        message += f": its loop is held up in {place}"
     return Problem("WORKER_HUNG", message, where=component, fix=_author(component))
 
 

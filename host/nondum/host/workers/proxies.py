@@ -23,7 +23,7 @@ from nondum.sdk.description import (
     PluginDescription,
     Unit,
 )
-from nondum.sdk.errors import NondumError
+from nondum.sdk.errors import LinkClosed, NondumError
 from nondum.sdk.hooks import hookimpl
 
 Ask: TypeAlias = Callable[[str, Mapping[str, Any]], Awaitable[dict[str, Any]]]
@@ -115,6 +115,8 @@ class Proxy:
     async def _answer(self, verb: str, body: Mapping[str, Any]) -> Mapping[str, Any] | None:
         try:
             return await self._ask(verb, body)
+        except LinkClosed:  # it has ended or was taken away, which its own events tell
+            return None
         except NondumError as error:
             log.warning("%s does not answer %s: %s", self.component, verb, error)
             return None

@@ -98,6 +98,7 @@ class Supervisor:
         self.standing = Standing.IN_FORCE
         if self._worker is not None:
             self._household.on_ready(self._worker)
+            self._worker.tell_conditions()
 
     def withdraw(self) -> None:
         """Nobody shall count on it any more; `stop` it."""
@@ -133,7 +134,8 @@ class Supervisor:
             if self.standing is Standing.BESIDE:
                 self._emit(events.TrialFailed(self.spec.payload, self.spec.component, (problem,)))
                 return
-            self._emit(events.WorkerExited(self.spec.component, str(problem), self.spec.payload))
+            component, payload = self.spec.component, self.spec.payload
+            self._emit(events.WorkerExited(component, str(problem), payload, problem))
             if not await self._restart(problem):
                 return
 
@@ -141,10 +143,22 @@ class Supervisor:
         """Wait for the end of the present worker; say why it ended."""
         worker = self._worker
         assert worker is not None, "only called after a start"
-        problem = await asyncio.shield(worker.gone)
+        if self._supervision.crashes:
+            problem = await self._outlived(worker)
+        else:
+            problem = await asyncio.shield(worker.gone)
         self._on_gone()
         self._worker = None
         return problem
+
+    async def _outlived(self, worker: Worker) -> Problem:
+        """The same for one that others have crashed before: after a while that is past."""
+        try:
+            async with asyncio.timeout(supervision.WINDOW_S):
+                return await asyncio.shield(worker.gone)
+        except TimeoutError:
+            self._emit(events.WorkerSteady(self.spec.component, self.spec.payload))
+            return await asyncio.shield(worker.gone)
 
     async def _restart(self, problem: Problem) -> bool:
         """Start another worker, trying as often as supervision allows; say whether one runs."""
@@ -184,6 +198,7 @@ class Supervisor:
         if self.standing is Standing.IN_FORCE:
             household.on_ready(self._worker)
         self._emit(events.WorkerReady(self.spec.component, self.spec.index, self.spec.payload))
+        self._worker.tell_conditions()
 
     def _emit(self, event: Event) -> None:
         """Tell what has happened, as far as it is anybody's business."""

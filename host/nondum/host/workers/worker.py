@@ -6,12 +6,14 @@ import asyncio
 import socket
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from nondum.host.cgroups import Usage
 from nondum.host.events import (
     BehaviourProgressed,
+    ConditionEnded,
     Event,
     StreamFlowing,
     WorkerFaulted,
@@ -29,10 +31,18 @@ from nondum.host.workers.index import mismatches
 from nondum.host.workers.launcher import Launcher
 from nondum.host.workers.leftovers import end_leftovers
 from nondum.host.workers.lending import Lending
-from nondum.host.workers.news import Claims, parse_count, parse_news, parse_progress, parse_rates
+from nondum.host.workers.news import (
+    Claims,
+    parse_condition,
+    parse_count,
+    parse_news,
+    parse_progress,
+    parse_rates,
+)
 from nondum.host.workers.output import Output, Valve
 from nondum.host.workers.process import WorkerProcess, names_of
 from nondum.host.workers.spec import Timing, WorkerSpec
+from nondum.host.workers.standstill import Standstill
 from nondum.planning.core import core_value_types
 from nondum.planning.running import RunState
 from nondum.sdk.description import PluginDescription
@@ -93,6 +103,9 @@ class Worker:
         """Need → name → node that it has by that name."""
         self._lending = Lending(process.user)
         self._tail: deque[str] = deque(maxlen=TAIL_LINES)
+        self._standstill = Standstill(spec.entry_point.partition(":")[0].partition(".")[0])
+        self.dead_conditions: dict[str, Problem] = {}
+        """Condition → the error that it ended with."""
         self._ending: asyncio.Task[None] | None = None
         self._watchdog: asyncio.TimerHandle | None = None
         self.gone: asyncio.Future[Problem] = self._loop.create_future()
@@ -359,7 +372,8 @@ class Worker:
             self._watchdog = self._loop.call_later(self._timing.silence_s, self._on_silence)
 
     def _on_silence(self) -> None:
-        self.end(problems.silent(self.spec.component, self._timing.silence_s))
+        place = self._standstill.place
+        self.end(problems.silent(self.spec.component, self._timing.silence_s, place))
 
     def _on_event(self, name: str, body: dict[str, Any], call_id: int | None) -> None:
         if self._watchdog is not None:  # until it has started, only the startup probe counts
@@ -371,11 +385,14 @@ class Worker:
                     self.rates = parse_rates(self._streams, body)
                 self._beats += 1
                 self._beaten.set()
+                self._standstill.forget()
             case "established":
                 if call is not None:  # it may come from a thread whose call has just ended
                     call.establish()
             case "crowded":
                 self._on_crowded(parse_count(body))
+            case "condition-ended":
+                self._on_condition_ended(*parse_condition(self.spec.index, body))
             case "progress":
                 progress = parse_progress(body)
                 if call is not None:
@@ -401,9 +418,23 @@ class Worker:
                 self.claims.take(news)
                 self._emit(news)
 
+    def _on_condition_ended(self, condition: str, problem: Problem) -> None:
+        """A condition will tell nothing any more; `tell_conditions` tells it again."""
+        place = f"{condition} of {self.spec.component}"
+        where = f"{place} ({problem.where})" if problem.where else place
+        self.dead_conditions[condition] = replace(problem, where=where)
+        self.tell_conditions()
+
+    def tell_conditions(self) -> None:
+        """Tell of the conditions that have ended, also to those who were not there at the time."""
+        for condition, problem in self.dead_conditions.items():
+            self._emit(
+                ConditionEnded(self.spec.component, condition, (problem,), self.spec.payload)
+            )
+
     def _on_line(self, source: str, line: str) -> None:
         text = printable(line)
-        if source == "stderr":
+        if source == "stderr" and not self._standstill.take(line):
             self._tail.append(text)
         self._emit(WorkerLogged(self.spec.component, source, text))
 

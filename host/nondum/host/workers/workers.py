@@ -282,6 +282,13 @@ class Workers:
         worker = supervisor.worker if supervisor is not None else None
         return tuple(worker.faults) if worker is not None else ()
 
+    def dead_conditions(self, component: str, payload: str) -> tuple[errors.Problem, ...]:
+        """The conditions of a payload's worker that have ended with an error."""
+        supervisor = self._found(component, payload)
+        if supervisor is None or supervisor.worker is None:
+            return ()
+        return tuple(supervisor.worker.dead_conditions.values())
+
     def plugins(self) -> dict[str, Proxy]:
         """The plugins that run now, by component."""
         named = self._manager.list_name_plugin()

@@ -73,7 +73,7 @@ def units() -> Sequence[Unit]:  # type: ignore[empty-body]  # a specification
 
 @hookspec
 def devices() -> Sequence[DeviceNeed]:  # type: ignore[empty-body]  # a specification
-    """Give the devices that the plugin opens. The payload's manifest must ask for them too."""
+    """Give the devices that the plugin opens. The payload's manifest must ask for the same."""
 
 
 @hookspec

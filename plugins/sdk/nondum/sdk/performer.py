@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from nondum.sdk.context import Context
 from nondum.sdk.decorators import behaviour_of, condition_of
 from nondum.sdk.errors import NondumError, Problem, WorkerFailed
 from nondum.sdk.plugin import Plugin, behaviours_of, conditions_of, describe
+from nondum.sdk.raised import raised
 from nondum.sdk.running import Runner, call, call_hook
 from nondum.sdk.signature import parse_signature
 from nondum.sdk.workplace import Workplace
@@ -83,8 +85,9 @@ class Performer:
             raise
         except Exception as error:
             self._log.exception("hook %s raised", name)
-            told = f"hook {name!r} raised {type(error).__name__}: {error}"[:1000]
-            raise WorkerFailed(Problem("HOOK_FAILED", told)) from error
+            problem = raised("HOOK_FAILED", error, implementation.function)
+            told = replace(problem, message=f"hook {name!r} raised {problem.message}")
+            raise WorkerFailed(told) from error
 
     def _bound(
         self, name: str, arguments: Mapping[str, str]
@@ -112,7 +115,10 @@ class Performer:
         context = Context(self._workplace, self._log, predicates=frozenset(described.predicates))
         try:
             await call(marked, context)
-        except Exception:
+        except Exception as error:
             self._log.exception("condition %s ended with an error", described.name)
+            problem = raised("CONDITION_RAISED", error, marked)
+            body = {"condition": described.name, "problem": problem.to_dict()}
+            self._workplace.tell("condition-ended", body, None)
         finally:
             await context.close(forget=True)

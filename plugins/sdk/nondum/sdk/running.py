@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import inspect
-import traceback
 from collections.abc import Callable
 from typing import Any
 
 from pluggy import HookImpl
 
 from nondum.sdk.context import Context
-from nondum.sdk.errors import BehaviourFailed, NondumError, Problem
+from nondum.sdk.errors import BehaviourFailed, NondumError
+from nondum.sdk.raised import raised
 from nondum.sdk.threads import run_in_thread
 from nondum.sdk.ticked import Status, TickedBehaviour
 
@@ -56,9 +56,7 @@ class Runner:
             raise
         except Exception as error:
             context.log.exception("a behaviour raised")
-            message = f"{type(error).__name__}: {error}"[:1000]
-            problem = Problem("BEHAVIOUR_RAISED", message, where=_raised_at(error))
-            raise BehaviourFailed(problem) from error
+            raise BehaviourFailed(raised("BEHAVIOUR_RAISED", error, marked)) from error
 
     async def _run_ticked(
         self, kind: type[TickedBehaviour], context: Context, *arguments: str
@@ -84,9 +82,3 @@ class Runner:
             behaviour.terminate(status)
         if status is not Status.SUCCESS:
             raise BehaviourFailed(behaviour.feedback_message or "the last tick came to FAILURE")
-
-
-def _raised_at(error: Exception) -> str:
-    """File and line; nothing where an exception has lost them on its way."""
-    frames = traceback.extract_tb(error.__traceback__)
-    return f"{frames[-1].filename}:{frames[-1].lineno}" if frames else ""

@@ -33,8 +33,15 @@ Body: TypeAlias = dict[str, Any]
 class Session:
     """One worker's life: greet, describe, start, behave, stop."""
 
-    def __init__(self, packets: Packets, load_plugin: Callable[[], Plugin]) -> None:
-        """Own `packets`. `load_plugin` is called in a thread when the host asks what it is."""
+    def __init__(
+        self,
+        packets: Packets,
+        load_plugin: Callable[[], Plugin],
+        on_beat: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Own `packets`. `load_plugin` is called in a thread when the host asks what it is,
+        `on_beat` with each sign of life."""
+        self._on_beat = on_beat
         self._load_plugin = load_plugin
         self._performer: Performer | None = None
         self._workplace: Workplace | None = None
@@ -105,6 +112,7 @@ class Session:
 
     async def _beat(self) -> None:
         while True:
+            self._on_beat()
             rates = self._place.rates(asyncio.get_running_loop().time())
             self.tell("heartbeat", {"rates": rates} if rates else {})
             await asyncio.sleep(HEARTBEAT_S)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import faulthandler
 import logging
 import os
 import socket
@@ -13,8 +14,11 @@ from nondum.sdk.errors import NondumError
 from nondum.sdk.logs import EventHandler
 from nondum.sdk.packets import SocketPackets
 from nondum.sdk.plugin import load
-from nondum.sdk.session import Session
+from nondum.sdk.session import HEARTBEAT_S, Session
 from nondum.sdk.wire import MAX_PACKET
+
+STALL_S = 2 * HEARTBEAT_S
+"""How long the loop may stand still before it is written down where."""
 
 
 def main(fd: int, entry_point: str, distribution: str) -> None:
@@ -38,8 +42,16 @@ def main(fd: int, entry_point: str, distribution: str) -> None:
         os._exit(status)  # threads that never end must not keep the process
 
 
+def _await_next_beat() -> None:
+    """Write where every thread stands to standard error unless this is called again in time: soon
+    the host ends a worker whose loop stands still, and its author should know where it stood."""
+    faulthandler.dump_traceback_later(STALL_S)
+
+
 async def _serve(sock: socket.socket, entry_point: str, distribution: str) -> None:
-    session = Session(SocketPackets(sock, MAX_PACKET), lambda: load(entry_point, distribution))
+    session = Session(
+        SocketPackets(sock, MAX_PACKET), lambda: load(entry_point, distribution), _await_next_beat
+    )
     root = logging.getLogger()
     root.setLevel(logging.INFO)
     root.addHandler(EventHandler(session.tell))

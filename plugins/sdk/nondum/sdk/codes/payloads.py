@@ -30,6 +30,11 @@ CODES = (
         "build the payload with `nondum payload build`, and copy its whole folder",
     ),
     Code(
+        "DEVICE_RULES",
+        "A plugin's devices() and the manifest ask for a device differently.",
+        "say the same in both; devices are given out by the manifest",
+    ),
+    Code(
         "DESCRIBE_FAILED",
         "The plugin ended while it was asked what it can do.",
         "run its tests (`pytest` in its folder); describing hooks must not need devices or "

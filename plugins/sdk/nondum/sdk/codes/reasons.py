@@ -41,6 +41,13 @@ CODES = (
         is_told=False,
     ),
     Code(
+        "WHY_NOT_TOLD",
+        "Something here could tell what is needed, and does not: its condition has ended with an "
+        "error, its worker is not ready, its device is not there, or it has not seen it yet.",
+        "see `nondum components` and `nondum logs`; plug in the device, or the payload again",
+        is_told=False,
+    ),
+    Code(
         "WHY_NOT_TOGETHER",
         "All is there, but not at the same time.",
         "ask for one after the other",

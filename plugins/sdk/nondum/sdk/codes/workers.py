@@ -50,6 +50,12 @@ CODES = (
         "tell whoever made the program at the other end",
     ),
     Code(
+        "CONDITION_RAISED",
+        "A condition ended with an error, so nothing tells its facts any more.",
+        "its author finds the reason at the line that is named and in `nondum logs`; pull the "
+        "payload and plug it in again to have it started again",
+    ),
+    Code(
         "COMPONENT_REMOVED",
         "The component was removed while it was in use.",
         "plug its payload in again if it is still needed",

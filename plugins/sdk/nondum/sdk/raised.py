@@ -1,0 +1,50 @@
+"""What is told of an exception that a plugin raised: what, and where its author has to look."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from nondum.sdk.errors import Problem
+
+MAX_TEXT = 1000
+"""Characters of an exception that are told."""
+
+_SDK = str(Path(__file__).parent)
+
+
+def raised(code: str, error: BaseException, by: Callable[..., Any]) -> Problem:
+    """The problem of an exception that left a function of the plugin; a traceback is in its log."""
+    return Problem(code, f"{type(error).__name__}: {error}"[:MAX_TEXT], where=raised_at(error, by))
+
+
+def raised_at(error: BaseException, by: Callable[..., Any]) -> str:
+    """File and line, within `site-packages`: the innermost one of the plugin's own package, else of
+    whatever is not the SDK; nothing where an exception has lost them on its way."""
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if _SDK not in f.filename]
+    own = _home(by)
+    mine = [frame for frame in frames if own and Path(frame.filename).is_relative_to(own)]
+    if not frames:
+        return ""
+    last = (mine or frames)[-1]
+    return f"{within_packages(last.filename)}:{last.lineno}"
+
+
+def within_packages(path: str) -> str:
+    """A file as its author knows it: without the folder of packages that it was installed in.
+
+    >>> within_packages("/v/lib/python3.11/site-packages/gps/plugin.py")
+    'gps/plugin.py'
+    """
+    return path.rpartition("/site-packages/")[2]
+
+
+def _home(function: Callable[..., Any]) -> str:
+    """The folder of a function's package, or the file of a module that is in none."""
+    name = str(getattr(function, "__module__", ""))
+    top = sys.modules.get(name.partition(".")[0])
+    file = getattr(top, "__file__", None) or ""
+    return str(Path(file).parent) if file.endswith("__init__.py") else file
