@@ -30,6 +30,7 @@ from nondum.host.events import (
     PeerTurnedAway,
     PlaceLost,
     PlaceMissing,
+    RetryAsked,
     RollbackAsked,
     SafeModeEntered,
     SafeModeLeft,
@@ -63,6 +64,8 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             name = _name(event.payload, snapshot)
             was = event.from_release
             return f"a person goes back to {name} (release {event.release}) from release {was}"
+        case RetryAsked(why=why) if why:
+            return f"{_name(event.payload, snapshot)} is tried again: {why}"
         case PayloadWithdrawn():
             return f"{_name(event.payload, snapshot)} is withdrawn: {event.reason}"
         case PayloadSentAway():

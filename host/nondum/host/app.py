@@ -44,6 +44,7 @@ from nondum.host.lifecycle.folders import Folders, let_pass, make_private
 from nondum.host.lifecycle.installation import InstallOptions
 from nondum.host.lifecycle.lanes import in_thread
 from nondum.host.lifecycle.tally import Tally
+from nondum.host.lifecycle.trying_again import TryingAgain
 from nondum.host.mind.frames import mounts_of_all
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.mounts import TellingMounts
@@ -189,6 +190,8 @@ async def _run(
         )
 
     places = neighbours.placement.places if neighbours else dict
+    amounts = executor.installation.amounts
+    trying_again = TryingAgain(catalogue.snapshot, amounts, bus.emit, places)
     vouched = executor.trust.vouched
     take = _take(neighbours, mind, stopping)
     conversation = Conversation(mind, workers.plugins, workers.pids, take)
@@ -255,6 +258,7 @@ async def _run(
             conversation.run(),
             feedback.run(),
             goal_files.run(),
+            trying_again.run(),
             *(source.watch(bus.emit) for source in device_sources(config)),
         )
     finally:

@@ -415,9 +415,12 @@ class PayloadCleared(Event):
 
 @dataclass(frozen=True, slots=True)
 class RetryAsked(Event):
-    """A person asked that a refused or quarantined payload be tried again."""
+    """A refused or quarantined payload is to be tried again: a person asked for it, or the host
+    does by itself."""
 
     payload: str
+    why: str = ""
+    """Why the host does; empty: a person asked."""
 
 
 @dataclass(frozen=True, slots=True)
