@@ -13,6 +13,7 @@ from nondum.host.events import (
     DriveFlapping,
     DriveLeftAlone,
     DriveRead,
+    DriveRetried,
     DriveUnreadable,
     Event,
     PayloadActivated,
@@ -99,8 +100,10 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return f"a trust file from {event.source} is not taken: {_joined(event.problems)}"
         case DriveUnreadable():
             return f"drive {event.drive} cannot be used: {_joined(event.problems)}"
-        case SafeModeLeft():
-            return "safe mode is left: payloads are taken in again"
+        case SafeModeLeft(why=why):
+            return f"safe mode is left: payloads are taken in again{f', as {why}' if why else ''}"
+        case DriveRetried(why=why) if why:
+            return f"drive {event.drive} is looked at again: {why}"
         case CatalogueUnwritten() | CatalogueSetAside() | SafeModeEntered():
             return _joined(event.problems)
         case CatalogueWritten():

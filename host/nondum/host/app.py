@@ -35,7 +35,7 @@ from nondum.host.feedback import parts as feedback_parts
 from nondum.host.feedback.feedback import Feedback
 from nondum.host.goal_files import GoalFiles, of_people
 from nondum.host.helper import privileged
-from nondum.host.lifecycle import safe_mode, state_lock
+from nondum.host.lifecycle import safe_mode, state_lock, trials, tries
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.lifecycle.children import watched_without_threads
 from nondum.host.lifecycle.component_manager import ComponentManager
@@ -183,6 +183,8 @@ async def _run(
         return (
             *executor.trust.warnings,
             *_warnings(catalogue, safety[1]),
+            *tally.warnings(),
+            *tries.counts(catalogue.snapshot()),
             *standing.warnings(),
             *feedback.warnings,
             *map(str, cages.problems()),
@@ -259,6 +261,7 @@ async def _run(
             feedback.run(),
             goal_files.run(),
             trying_again.run(),
+            trials.hold(catalogue.snapshot, tally, bus.emit),
             *(source.watch(bus.emit) for source in device_sources(config)),
         )
     finally:

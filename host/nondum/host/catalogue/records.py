@@ -404,6 +404,8 @@ class Snapshot:
     peers: tuple[PeerRecord, ...] = ()
     """By name."""
     safety: Safety = Safety.OFF
+    tries: Mapping[str, int] = field(default_factory=dict)
+    """What daemons died at, as `lifecycle/tries.py` counts it."""
 
     def everyone(self) -> Iterator[tuple[str, ComponentRecord | PeerComponent]]:
         """Each component, this host's own first, with the name of its host."""
