@@ -86,6 +86,7 @@ class Questions:
                     places.get(p.key, ""),
                     snapshot.rollbacks,
                     self.vouched(p.key),
+                    snapshot.components,
                 )
                 for p in snapshot.payloads
             ],

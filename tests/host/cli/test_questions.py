@@ -84,6 +84,7 @@ PAYLOAD_KEYS = {
     "codes",
     "phases",
     "place",
+    "waits_for",
     "signers",
     "built",
     "age_s",

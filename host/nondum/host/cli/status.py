@@ -87,11 +87,19 @@ def _show_confinement(confinement: dict[str, Any]) -> None:
         render.sentence("; ".join(filter(None, (why, finding["fix"]))), mark=mark)
 
 
+def _state(row: dict[str, Any]) -> str:
+    if row["place"]:
+        return "placed"
+    if row["waits_for"]:
+        return f"waits for {', '.join(row['waits_for'])}"
+    return str(row["state"])
+
+
 def _show_payloads(payloads: list[dict[str, Any]]) -> None:
     rows = [
         {
             **row,
-            "state": "placed" if row["place"] else row["state"],
+            "state": _state(row),
             "on": row["place"],
             "release": render.release(row),
             "progress": render.progress(row["progress"]),

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from nondum.host import missing_devices
 from nondum.host.catalogue.records import ComponentRecord, PeerComponent
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.frames import mount_warnings
@@ -67,9 +68,9 @@ def recomposed(old: Composition | None, new: Composition) -> list[str]:
         if earlier is not None and earlier.version != component.version:
             sentences.append(f"{id} is now version {component.version}: {_offers(component)}")
         elif earlier is None or earlier.payload != component.payload:
-            sentences.append(f"{id} is here: {_offers(component)}")
+            sentences.append(f"{id} {_arrives(component)}")
         elif earlier.is_ready != component.is_ready:
-            sentences.append(f"{id} is {_health(component)}")
+            sentences.append(f"{id} {_health(component)}")
     return sentences + _contested(old, new) + _doubts(old, new) + _kept_out(old, new)
 
 
@@ -115,13 +116,20 @@ def _abilities(component: _Component) -> str:
     return ", ".join(component.abilities)
 
 
+def _arrives(component: _Component) -> str:
+    """What it can do if it is ready; else what it waits for."""
+    if component.is_ready:
+        return f"is here: {_offers(component)}"
+    names = _abilities(component)
+    return f"{_health(component)}{f'; then it can {names}' if names else ''}"
+
+
 def _health(component: _Component) -> str:
     if component.is_ready:
-        return "ready"
+        return "is ready"
     if isinstance(component, PeerComponent):
-        return "not ready, says its host"
-    missing = [c.name for c in component.devices if c.device is None and not c.optional]
-    if missing:
-        return f"not ready: it waits for the device {', '.join(missing)}"
+        return "is not ready, says its host"
+    if told := missing_devices.waits(component):
+        return told
     reason = f": {component.problems[0]}" if component.problems else ""
-    return f"not ready, it is {component.state.value}{reason}"
+    return f"is not ready, it is {component.state.value}{reason}"
