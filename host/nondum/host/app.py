@@ -30,7 +30,7 @@ from nondum.host.drives.blocks import BlockSource
 from nondum.host.drives.slots import SlotSource
 from nondum.host.drives.source import DriveSource
 from nondum.host.drives.steady import Steady
-from nondum.host.events import Event, HostStarted, Recomposed
+from nondum.host.events import DriveRemoved, Event, HostStarted, PayloadWithdrawn, Recomposed
 from nondum.host.feedback import parts as feedback_parts
 from nondum.host.feedback.feedback import Feedback
 from nondum.host.goal_files import GoalFiles, of_people
@@ -395,10 +395,20 @@ class _Listener:
             if isinstance(event, HostStarted):
                 self._mind.restore(of_people(snapshot.goals))
             return
+        about = _about(event)
+        if isinstance(event, DriveRemoved | PayloadWithdrawn):
+            self._mind.people.end(about)
+            about = ""
         sentence = announced(event, self._catalogue.snapshot())
         if sentence is not None:
-            self._mind.people.tell(sentence)
+            self._mind.people.tell(sentence, about)
         self._mind.on_event(event)
+
+
+def _about(event: Event) -> str:
+    """The drive or payload that an event is about, if it is about one."""
+    names = ((kind, getattr(event, kind, "")) for kind in ("drive", "payload"))
+    return next((f"{kind} {name}" for kind, name in names if name), "")
 
 
 def _install_options(config: HostConfig) -> InstallOptions:

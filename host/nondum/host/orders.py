@@ -25,6 +25,7 @@ from nondum.host.mind.translation import Understood
 from nondum.host.news import News
 from nondum.host.rows import Row, gone_back, is_at_rest, payload_row, unknown
 from nondum.host.stopping import Stopped, Stopping
+from nondum.host.whole_names import whole
 from nondum.host.workers.workers import Workers
 from nondum.planning.goal import GoalKind
 from nondum.planning.stop_words import is_stop
@@ -101,7 +102,7 @@ class Orders:
 
         Raises `ConfigRefused` (UNIT_UNKNOWN).
         """
-        unit = arguments.text("unit")
+        unit = whole(arguments.text("unit"), self.mind.names)
         known = {row["unit"] for row in self.mind.views.units()}
         if unit not in known:
             raise ConfigRefused(unknown("unit", unit, known))
@@ -175,7 +176,7 @@ class Orders:
 
     async def tap(self, arguments: Arguments) -> Handing:
         """Hand the client a consumer's end of a stream. Raises `NondumError`."""
-        name = arguments.text("stream")
+        name = whole(arguments.text("stream"), self.mind.names)
         found = {s.stream: s for s in self.workers.streams.listing()}
         if name not in found:
             raise NondumError(unknown("stream", name, found))

@@ -30,6 +30,7 @@ from nondum.host.rows import (
     unknown,
 )
 from nondum.host.trust.vouched import NOBODY, Vouched
+from nondum.host.whole_names import whole
 from nondum.host.workers.workers import Workers
 from nondum.sdk.errors import GoalRefused, NondumError, Problem
 
@@ -107,7 +108,11 @@ class Questions:
             )
             for c in snapshot.components
         ]
+        kept_out = {row["component"]: row["problem"] for row in self.mind.views.kept_out()}
         for row in own:
+            if why := kept_out.get(row["component"]):
+                told = f"kept out of planning: {why}"
+                row["problem"] = "; ".join(filter(None, (row["problem"], told)))
             row["confinement"] = str(self.workers.launcher.level) if row["pid"] else None
         return own + [
             offered_row(offered, peer.name)
@@ -151,11 +156,15 @@ class Questions:
 
     async def fact(self, arguments: Arguments) -> Row:
         """One fact, true or not, and all that bears on it."""
-        return self.mind.views.fact(arguments.text("fact"))
+        return self.mind.views.fact(whole(arguments.text("fact"), self.mind.names))
 
     async def goals(self, arguments: Arguments) -> Row:
         """What can be asked for, and what was."""
         return await asyncio.to_thread(self.mind.views.goals())
+
+    async def names(self, arguments: Arguments) -> Row:
+        """Units and streams: whole name → the short one that people read."""
+        return dict(self.mind.names)
 
     async def plan(self, arguments: Arguments) -> Row:
         """The plan that is carried out."""

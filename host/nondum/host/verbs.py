@@ -54,6 +54,7 @@ def answering(
         "leave_safe_mode": orders.leave_safe_mode,
         "logs": questions.logs,
         "mount": orders.mount,
+        "names": questions.names,
         "plan": questions.plan,
         "retry": orders.retry,
         "status": questions.status,

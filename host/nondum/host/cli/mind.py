@@ -20,6 +20,7 @@ from nondum.host.cli.advise import (
 )
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.failure import tell_problem
+from nondum.host.cli.status import show_told
 from nondum.host.cli.table import cell, table
 from nondum.sdk.errors import GoalRefused
 
@@ -59,7 +60,7 @@ def facts(session: Session, why: str | None, parked: bool) -> None:
         return
     shown = [{**row, "since": render.age(row["age_s"])} for row in rows]
     last = "absent" if parked else "value"
-    table(shown, ["fact", "since", "source", last], empty=_NOTHING[parked])
+    table(session.short(shown), ["fact", "since", "source", last], empty=_NOTHING[parked])
 
 
 _NOTHING = {False: "nothing is believed", True: "nothing waits for an object"}
@@ -69,6 +70,7 @@ def _explain(session: Session, found: dict[str, Any]) -> None:
     if session.as_json:
         render.as_json(found)
         return
+    found = session.short(found)
     render.sentence(f"({found['fact']}) {'holds' if found['holds'] else 'does not hold'}")
     for side in ("for", "against"):
         for word in found[side]:
@@ -111,6 +113,7 @@ def goals(session: Session) -> None:
     if session.as_json:
         render.as_json(view)
         return
+    view = session.short(view)
     shown = [{**row, "now": _outlook(row)} for row in view["can"]]
     table(shown, ["words", "goal", "kind", "now", "from"], empty="nothing can be asked for yet")
     for problem in view["problems"]:
@@ -138,7 +141,8 @@ def plan(session: Session) -> None:
         return
     if view["goal"]:
         click.echo(f"goal {view['id']}  {view['goal']}  {view['kind']}")
-    table(view["steps"], ["step", "action", "state", "why"], empty="no plan")
+    steps = [{**row, "action": row["told"], "why": row["told_why"]} for row in view["steps"]]
+    table(steps, ["step", "action", "state", "why"], empty="no plan")
 
 
 @click.command()
@@ -167,6 +171,7 @@ def why(session: Session, goal: tuple[str, ...], wheelhouses: tuple[Path, ...]) 
         told = [{"goal": id, **(ways(found) if found else {})} for id, found in helps.items()]
         render.as_json({**view, "advice": told})
         return
+    view = session.short(view)
     for sentence in view["sentences"]:
         render.sentence(sentence)
     for problem in view["problems"]:
@@ -176,8 +181,7 @@ def why(session: Session, goal: tuple[str, ...], wheelhouses: tuple[Path, ...]) 
         render.sentence("; ".join(filter(None, parts)), mark=f"goal {id}: ")
     if view["told"]:
         click.echo()
-    for told in view["told"]:
-        render.sentence(told, mark="> ")
+    show_told(view["told"])
 
 
 def _helps(session: Session, wheelhouses: tuple[Path, ...]) -> dict[str, Advice | None]:

@@ -40,6 +40,7 @@ def journal(session: Session, subject: str | None, limit: int) -> None:
     if session.as_json:
         render.as_json(rows)
         return
+    rows = session.short(rows)
     shown = [{**row, "when": render.clock(row["when"]), "detail": _detail(row)} for row in rows]
     columns = ["when", "subject", "event", "step", "detail"]
     table(shown, columns, empty="the journal says nothing of it" if subject else "it is empty")

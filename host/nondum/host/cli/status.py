@@ -31,14 +31,14 @@ def status(session: Session, follow: bool) -> None:
     """
     if not follow:
         view = session.ask("status")
-        render.as_json(view) if session.as_json else show(view)
+        render.as_json(view) if session.as_json else show(session.short(view))
         return
     for view in session.follow("watch"):
         if session.as_json:
             render.as_json_line(view)
         else:
             click.clear()
-            show(view)
+            show(session.short(view, anew=True))
 
 
 def show(view: dict[str, Any]) -> None:
@@ -62,8 +62,13 @@ def show(view: dict[str, Any]) -> None:
         table(view["goals"], ["id", "text", "kind", "state", "reason"], empty="")
     if view["told"]:
         click.echo()
-    for told in view["told"][-LAST_TOLD:]:
-        render.sentence(told["text"], mark="> ")
+    show_told(view["told"])
+
+
+def show_told(told: list[dict[str, Any]]) -> None:
+    """Print the last sentences that people were told, but for those of what is gone."""
+    for row in [row for row in told if not row["over"]][-LAST_TOLD:]:
+        render.sentence(row["text"], mark=f"> {render.moment(row['when'])}  ")
 
 
 def _show_feedback(shown: dict[str, Any]) -> None:

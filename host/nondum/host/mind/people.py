@@ -1,11 +1,14 @@
-"""What people are told: sentences in the order things happened, never taken back."""
+"""What people are told: sentences in the order things happened, never taken back.
+
+What a sentence is about may be gone since; then it is over.
+"""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import TypeAlias
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
 
 from nondum.host import missing_devices
 from nondum.host.catalogue.records import ComponentRecord, PeerComponent
@@ -28,13 +31,23 @@ class Told:
     wall_s: float
     """Seconds since the epoch."""
     text: str
+    about: str = ""
+    """What it is about, where that can be gone: `drive sdb1-7`."""
+    is_over: bool = False
+    """Whether that is gone."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for people's tools."""
+        row = {"number": self.number, "when": self.wall_s, "text": self.text}
+        return {**row, "over": self.is_over}
 
 
 class People:
     """Everything that people were told since the host started, the last thousand sentences."""
 
-    def __init__(self, wall_s: Callable[[], float]) -> None:
-        self._wall_s = wall_s
+    def __init__(self, wall_s: Callable[[], float], short: Callable[[str], str] = str) -> None:
+        """`short` makes names of units and streams in a sentence as short as can be."""
+        self._wall_s, self._short = wall_s, short
         self._told: deque[Told] = deque(maxlen=MAX_SENTENCES)
         self._number = 0
 
@@ -51,11 +64,18 @@ class People:
         """What was told after the sentence of that number."""
         return tuple(told for told in self._told if told.number > number)
 
-    def tell(self, text: str) -> None:
-        """Say a sentence."""
+    def tell(self, text: str, about: str = "") -> None:
+        """Say a sentence, `about` something that may be gone some time."""
         self._number += 1
+        text = self._short(text)
         kept = text if len(text) <= MAX_CHARACTERS else f"{text[:MAX_CHARACTERS]}…"
-        self._told.append(Told(self._number, self._wall_s(), kept))
+        self._told.append(Told(self._number, self._wall_s(), kept, about))
+
+    def end(self, about: str) -> None:
+        """What sentences were about is gone."""
+        for index, told in enumerate(self._told):
+            if told.about == about:
+                self._told[index] = replace(told, is_over=True)
 
 
 def recomposed(old: Composition | None, new: Composition) -> list[str]:
