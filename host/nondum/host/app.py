@@ -30,7 +30,15 @@ from nondum.host.drives.blocks import BlockSource
 from nondum.host.drives.slots import SlotSource
 from nondum.host.drives.source import DriveSource
 from nondum.host.drives.steady import Steady
-from nondum.host.events import DriveRemoved, Event, HostStarted, PayloadWithdrawn, Recomposed
+from nondum.host.events import (
+    DriveRemoved,
+    Event,
+    HostStarted,
+    PayloadActivated,
+    PayloadWithdrawn,
+    Recomposed,
+    RetryAsked,
+)
 from nondum.host.feedback import parts as feedback_parts
 from nondum.host.feedback.feedback import Feedback
 from nondum.host.goal_files import GoalFiles, of_people
@@ -379,6 +387,10 @@ def _make_slots(config: HostConfig) -> None:
         raise ConfigRefused(*problems)
 
 
+_ENDS = DriveRemoved | PayloadWithdrawn | PayloadActivated | RetryAsked
+"""What was told of a drive or payload before these is of no interest any more."""
+
+
 class _Listener:
     """Tells mind and workers what the bus tells."""
 
@@ -396,12 +408,12 @@ class _Listener:
                 self._mind.restore(of_people(snapshot.goals))
             return
         about = _about(event)
-        if isinstance(event, DriveRemoved | PayloadWithdrawn):
+        if isinstance(event, _ENDS):
             self._mind.people.end(about)
-            about = ""
         sentence = announced(event, self._catalogue.snapshot())
         if sentence is not None:
-            self._mind.people.tell(sentence, about)
+            is_gone = isinstance(event, DriveRemoved | PayloadWithdrawn)
+            self._mind.people.tell(sentence, "" if is_gone else about)
         self._mind.on_event(event)
 
 
