@@ -141,9 +141,10 @@ class Surroundings:
         merged = merge(self.here.contributions, self.here.host)
         try:
             parsed = parse_goal(goal, merged)
-        except GoalRefused as refused:
+        except GoalRefused:
+            # Words that come with what would help are no mistake.
             gone = words_gone(merged, goal, self.seen)
-            return gone or refused.problems if advice.ways else self._lacking_still(goal)
+            return gone if advice.ways else self._lacking_still(goal)
         return why_not(merged, parsed, self.here.facts, self.seen, self.failures)
 
     def _lacking_still(self, goal: str) -> tuple[Problem, ...]:
