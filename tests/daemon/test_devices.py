@@ -49,7 +49,7 @@ def test_device_pulled_in_the_middle_of_a_behaviour(host: RunningHost, plug_gaug
     host.until_goal(goal, "active")
     slots.unplug(host.devices, "port-1")
     host.until_component("gauge", WAITS)
-    host.until_told("gauge is not ready: it waits for the device gauge")
+    host.until_told("gauge waits for its device gauge")
     reason = host.until_goal(goal, "suspended")["reason"]
     assert "ready spot__gauge__gauge" in reason
     ends = [e["detail"] for e in host.journal("gauge") if e["event"] == "BehaviourEnded"]

@@ -63,3 +63,15 @@ def test_what_cannot_be_shown_is_told_in_every_status(tmp_path: Path) -> None:
             timeout_s=READY_S,
         )
         assert host.log.count("LAMP_MISSING") == 1
+
+
+def test_what_was_told_of_a_drive_that_is_pulled_is_not_shown_any_more(tmp_path: Path) -> None:
+    told = "drive photos carries no payload"
+    (tmp_path / "drives/photos").mkdir(parents=True)
+    with running(tmp_path) as host:
+        host.plug(tmp_path / "drives/photos")
+        host.until_told(told)
+        assert told in host.run("status").ok().out
+        host.pull("photos")
+        host.until("it is over", lambda v: any(r["over"] for r in v["told"] if r["text"] == told))
+        assert told not in host.run("status").ok().out

@@ -61,7 +61,7 @@ def test_actuator_whose_plugin_does_not_ask_has_one_user_at_a_time(host: Running
     host.bring("arm", arm(is_rude=True))
     host.until_goal(host.want("(raised spot)"), "holds")
     host.until_goal(host.want(BOTH), "suspended")
-    host.until_told("waits for spot__arm__arm, which test-arm.lift spot__arm__arm spot uses")
+    host.until_told("waits for arm, which test-arm.lift arm spot uses")
     for view in host.views:
         assert list(steps(view).values()).count("established") <= 1
 
@@ -70,9 +70,11 @@ def test_mount_that_a_behaviour_needs_is_asked_for_and_then_counts(own_host: Run
     host = own_host  # what a person says of a mount stays
     host.bring("compass", compass())
     goal = host.want("(bearing-known north spot)", "achieve")
-    host.until_told("FRAME_UNKNOWN no way is known from frame 'spot__compass__needle' to 'spot'")
+    host.until_told("FRAME_UNKNOWN no way is known from frame 'needle' to 'spot'")
     host.until_told("→ give the mount pose: nondum mount")
-    assert mount(host, "0 0 1.5707963").endswith(" is mounted at xyz 0 0 0, rpy 0 0 1.5708\n")
+    assert mount(host, "0 0 1.5707963").endswith(
+        "__needle is mounted at xyz 0 0 0, rpy 0 0 1.5708\n"
+    )
     host.until_goal(goal, "reached")
     assert bearing(host, "north") == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
     mount(host, "0 0 0")
@@ -82,7 +84,7 @@ def test_mount_that_a_behaviour_needs_is_asked_for_and_then_counts(own_host: Run
 
 def mount(host: RunningHost, rpy: str) -> str:
     """Turn the needle on its body, as a person does."""
-    unit = "spot__compass__needle"
+    unit = "needle"
     return nondum("--control", host.control, "mount", unit, "--rpy", *rpy.split())
 
 

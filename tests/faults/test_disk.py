@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import shutil
 import subprocess
@@ -19,6 +20,7 @@ from nondum.host.catalogue.reserve import RESERVE_BYTES
 from nondum.host.lifecycle import state_lock
 from nondum.host.lifecycle.installation import InstallOptions
 from nondum.host.lifecycle.installed import install, uninstall
+from nondum.host.lifecycle.trying_again import TryingAgain
 from nondum.sdk.errors import ConfigRefused
 
 pytestmark = pytest.mark.anyio
@@ -97,7 +99,8 @@ async def test_full_disk_while_installing_rolls_back(small_disk: Path, tmp_path:
 async def test_full_disk_does_not_keep_the_catalogue_from_being_written(
     mounted: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    """Some of it was set aside, and is so again once there is room."""
+    """Some of it was set aside, and is so again once there is room; then, what was refused for
+    that comes in by itself."""
     sound(tmp_path / "drive")
     root = mounted("size=160m")
     async with host_in_process(root) as host:
@@ -108,9 +111,13 @@ async def test_full_disk_does_not_keep_the_catalogue_from_being_written(
         assert [problem.code for problem in record.problems] == ["DISK_FULL"]
         assert host.catalogue.unwritten is None
         assert (await host.journal())[-1].event == "PayloadRefused"
-        filler.unlink()
-        host.bus.emit(events.RetryAsked(record.key))
-        await host.until(lambda: host.snapshot.component("lamp") is not None)
+        amounts = host.executor.installation.amounts
+        trying_again = TryingAgain(host.catalogue.snapshot, amounts, host.bus.emit)
+        async with asyncio.TaskGroup() as tasks:
+            looking = tasks.create_task(trying_again.run())
+            filler.unlink()
+            await host.until(lambda: host.snapshot.component("lamp") is not None)
+            looking.cancel()
         assert (root / "state/reserve").stat().st_size == RESERVE_BYTES
 
 

@@ -16,6 +16,7 @@ from nondum.host.events import (
     DriveFlapping,
     DriveLeftAlone,
     DriveRead,
+    DriveRetried,
     DriveUnreadable,
     Event,
     InputAmbiguous,
@@ -34,6 +35,7 @@ from nondum.host.events import (
     PeerTurnedAway,
     PlaceLost,
     PlaceMissing,
+    RetryAsked,
     RollbackAsked,
     SafeModeEntered,
     SafeModeLeft,
@@ -68,6 +70,8 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             name = _name(event.payload, snapshot)
             was = event.from_release
             return f"a person goes back to {name} (release {event.release}) from release {was}"
+        case RetryAsked(why=why) if why:
+            return f"{_name(event.payload, snapshot)} is tried again: {why}"
         case PayloadWithdrawn():
             return f"{_name(event.payload, snapshot)} is withdrawn: {event.reason}"
         case PayloadSentAway():
@@ -103,8 +107,10 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return f"a trust file from {event.source} is not taken: {_joined(event.problems)}"
         case DriveUnreadable():
             return f"drive {event.drive} cannot be used: {_joined(event.problems)}"
-        case SafeModeLeft():
-            return "safe mode is left: payloads are taken in again"
+        case SafeModeLeft(why=why):
+            return f"safe mode is left: payloads are taken in again{f', as {why}' if why else ''}"
+        case DriveRetried(why=why) if why:
+            return f"drive {event.drive} is looked at again: {why}"
         case CatalogueUnwritten() | CatalogueSetAside() | SafeModeEntered():
             return _joined(event.problems)
         case CatalogueWritten():

@@ -31,12 +31,20 @@ from nondum.host.drives.blocks import BlockSource
 from nondum.host.drives.slots import SlotSource
 from nondum.host.drives.source import DriveSource
 from nondum.host.drives.steady import Steady
-from nondum.host.events import Event, HostStarted, Recomposed
+from nondum.host.events import (
+    DriveRemoved,
+    Event,
+    HostStarted,
+    PayloadActivated,
+    PayloadWithdrawn,
+    Recomposed,
+    RetryAsked,
+)
 from nondum.host.feedback import parts as feedback_parts
 from nondum.host.feedback.feedback import Feedback
 from nondum.host.goal_files import GoalFiles, of_people
 from nondum.host.helper import privileged
-from nondum.host.lifecycle import safe_mode, state_lock
+from nondum.host.lifecycle import safe_mode, state_lock, trials, tries
 from nondum.host.lifecycle.bus import Bus
 from nondum.host.lifecycle.children import watched_without_threads
 from nondum.host.lifecycle.component_manager import ComponentManager
@@ -45,6 +53,7 @@ from nondum.host.lifecycle.folders import Folders, let_pass, make_private
 from nondum.host.lifecycle.installation import InstallOptions
 from nondum.host.lifecycle.lanes import in_thread
 from nondum.host.lifecycle.tally import Tally
+from nondum.host.lifecycle.trying_again import TryingAgain
 from nondum.host.mind.frames import mounts_of_all
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.mounts import TellingMounts
@@ -186,6 +195,8 @@ async def _run(
         return (
             *executor.trust.warnings,
             *_warnings(catalogue, safety[1]),
+            *tally.warnings(),
+            *tries.counts(catalogue.snapshot()),
             *standing.warnings(),
             *feedback.warnings,
             *stop_hook.warnings,
@@ -196,6 +207,8 @@ async def _run(
 
     elsewhere = neighbours.goals if neighbours else None
     places = neighbours.placement.places if neighbours else dict
+    amounts = executor.installation.amounts
+    trying_again = TryingAgain(catalogue.snapshot, amounts, bus.emit, places)
     vouched = executor.trust.vouched
     take = _take(neighbours, mind, stopping)
     answering = Answering(mind, lambda: catalogue.snapshot().payloads, workers.busy)
@@ -282,6 +295,8 @@ async def _run(
             stop_button.run(),
             feedback.run(),
             goal_files.run(),
+            trying_again.run(),
+            trials.hold(catalogue.snapshot, tally, bus.emit),
             *(source.watch(bus.emit) for source in device_sources(config)),
         )
     finally:
@@ -405,6 +420,10 @@ def _make_slots(config: HostConfig) -> None:
         raise ConfigRefused(*problems)
 
 
+_ENDS = DriveRemoved | PayloadWithdrawn | PayloadActivated | RetryAsked
+"""What was told of a drive or payload before these is of no interest any more."""
+
+
 class _Listener:
     """Tells mind and workers what the bus tells."""
 
@@ -422,10 +441,20 @@ class _Listener:
             if isinstance(event, HostStarted):
                 self._mind.restore(of_people(snapshot.goals))
             return
+        about = _about(event)
+        if isinstance(event, _ENDS):
+            self._mind.people.end(about)
         sentence = announced(event, self._catalogue.snapshot())
         if sentence is not None:
-            self._mind.people.tell(sentence)
+            is_gone = isinstance(event, DriveRemoved | PayloadWithdrawn)
+            self._mind.people.tell(sentence, "" if is_gone else about)
         self._mind.on_event(event)
+
+
+def _about(event: Event) -> str:
+    """The drive or payload that an event is about, if it is about one."""
+    names = ((kind, getattr(event, kind, "")) for kind in ("drive", "payload"))
+    return next((f"{kind} {name}" for kind, name in names if name), "")
 
 
 def _install_options(config: HostConfig) -> InstallOptions:

@@ -144,9 +144,10 @@ class Surroundings:
         merged = merge(self.here.contributions, self.here.host)
         try:
             parsed = parse_goal(goal, merged)
-        except GoalRefused as refused:
+        except GoalRefused:
+            # Words that come with what would help are no mistake.
             gone = words_gone(merged, goal, self.seen)
-            return gone or refused.problems if advice.ways else self._lacking_still(goal)
+            return gone if advice.ways else self._lacking_still(goal)
         facts = self.here.facts
         return why_not(merged, parsed, facts, self.seen, self.failures, self.silence)
 

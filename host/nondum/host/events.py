@@ -421,9 +421,12 @@ class PayloadCleared(Event):
 
 @dataclass(frozen=True, slots=True)
 class RetryAsked(Event):
-    """A person asked that a refused or quarantined payload be tried again."""
+    """A refused or quarantined payload is to be tried again: a person asked for it, or the host
+    does by itself."""
 
     payload: str
+    why: str = ""
+    """Why the host does; empty: a person asked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -469,9 +472,30 @@ class SafeModeEntered(Event):
 
 @dataclass(frozen=True, slots=True)
 class SafeModeLeft(Event):
-    """A person asked that payloads be taken in again."""
+    """Payloads are taken in again: a person asked for it, or the host does by itself."""
 
     host: str
+    why: str = ""
+    """Why the host does; empty: a person asked."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrialDue(Event):
+    """The daemon has lived long enough to try again something that others died of."""
+
+    JOURNALLED: ClassVar[bool] = False
+
+    host: str
+
+
+@dataclass(frozen=True, slots=True)
+class DriveRetried(Event):
+    """A drive that was left alone is to be looked at: a person asked for it, or the host does by
+    itself."""
+
+    drive: str
+    why: str = ""
+    """Why the host does; empty: a person asked."""
 
 
 @dataclass(frozen=True, slots=True)

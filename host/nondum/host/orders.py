@@ -14,10 +14,18 @@ from nondum.host.control.arguments import Arguments, Triple
 from nondum.host.control.server import Handing
 from nondum.host.conversation import Reply, Take
 from nondum.host.elsewhere import Elsewhere
-from nondum.host.events import ForgetAsked, InputConnected, MountSet, RetryAsked, SafeModeLeft
+from nondum.host.events import (
+    DriveRetried,
+    ForgetAsked,
+    InputConnected,
+    MountSet,
+    RetryAsked,
+    SafeModeLeft,
+)
 from nondum.host.goal_files import GoalFiles, why_kept
 from nondum.host.lifecycle import going_back, installed
 from nondum.host.lifecycle.bus import Bus
+from nondum.host.lifecycle.trial_rules import is_quarantined
 from nondum.host.mind import translation
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.frames import implausible
@@ -36,6 +44,7 @@ from nondum.host.rows import (
     unknown,
 )
 from nondum.host.stopping import Stopped, Stopping
+from nondum.host.whole_names import whole
 from nondum.host.workers.workers import Workers
 from nondum.planning.goal import GoalKind
 from nondum.planning.stop_words import is_stop
@@ -166,7 +175,7 @@ class Orders:
 
         Raises `ConfigRefused` (UNIT_UNKNOWN).
         """
-        unit = arguments.text("unit")
+        unit = whole(arguments.text("unit"), self.mind.names)
         known = {row["unit"] for row in self.mind.views.units()}
         if unit not in known:
             raise ConfigRefused(unknown("unit", unit, known))
@@ -235,13 +244,28 @@ class Orders:
         return {"payloads": [payload.payload_id for payload in troubled]}
 
     async def leave_safe_mode(self, arguments: Arguments) -> Row:
-        """Take in what was left alone. Raises `NondumError` (SAFE_MODE_OFF)."""
+        """Take in what was left alone; with `all`, also each payload that was refused or
+        quarantined, and each drive that daemons died at. Raises `NondumError` (SAFE_MODE_OFF)."""
+        snapshot, brings_all = self.catalogue.snapshot(), arguments.flag("all")
+        if snapshot.safety is Safety.OFF and not brings_all:
+            fix = "`nondum host resume --all` brings back what is left alone all the same"
+            raise NondumError(Problem("SAFE_MODE_OFF", "this host is not in safe mode", fix=fix))
+        if snapshot.safety is not Safety.OFF:
+            self.bus.emit(SafeModeLeft(snapshot.host))
+            await self._until(lambda snapshot: snapshot.safety is Safety.OFF)
+        row: Row = {"was": snapshot.safety.value}
+        return row | {"payloads": self._retry_all()} if brings_all else row
+
+    def _retry_all(self) -> list[str]:
+        """Try again all that is left alone; answers which."""
         snapshot = self.catalogue.snapshot()
-        if snapshot.safety is Safety.OFF:
-            raise NondumError(Problem("SAFE_MODE_OFF", "this host is not in safe mode"))
-        self.bus.emit(SafeModeLeft(snapshot.host))
-        await self._until(lambda snapshot: snapshot.safety is Safety.OFF)
-        return {"was": snapshot.safety.value}
+        drives = [drive.id for drive in snapshot.drives if is_quarantined(drive.problems)]
+        payloads = [payload for payload in snapshot.payloads if _is_troubled(payload, snapshot)]
+        for id in drives:
+            self.bus.emit(DriveRetried(id))
+        for payload in payloads:
+            self.bus.emit(RetryAsked(payload.key))
+        return [*drives, *(payload.payload_id for payload in payloads)]
 
     async def forget(self, arguments: Arguments) -> Row:
         """Forget a payload that was here. Raises `InstallFailed` (FORGET_UNKNOWN)."""
@@ -259,7 +283,7 @@ class Orders:
 
     async def tap(self, arguments: Arguments) -> Handing:
         """Hand the client a consumer's end of a stream. Raises `NondumError`."""
-        name = arguments.text("stream")
+        name = whole(arguments.text("stream"), self.mind.names)
         found = {s.stream: s for s in self.workers.streams.listing()}
         if name not in found:
             raise NondumError(unknown("stream", name, found))

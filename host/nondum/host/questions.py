@@ -37,6 +37,7 @@ from nondum.host.rows import (
     unknown,
 )
 from nondum.host.trust.vouched import NOBODY, Vouched
+from nondum.host.whole_names import whole
 from nondum.host.workers.workers import Workers
 from nondum.sdk.errors import GoalRefused, NondumError, Problem
 
@@ -107,6 +108,7 @@ class Questions:
                     places.get(p.key, ""),
                     snapshot.rollbacks,
                     self.vouched(p.key),
+                    snapshot.components,
                 )
                 for p in snapshot.payloads
             ],
@@ -128,9 +130,12 @@ class Questions:
             for c in snapshot.components
         ]
         troubles = self.mind.views.troubles()
+        kept_out = {row["component"]: row["problem"] for row in self.mind.views.kept_out()}
         for row in own:
-            of_worker = map(str, self.workers.faults(row["component"]))
-            told = (row["problem"], troubles.get(row["component"], ""), *of_worker)
+            told = [row["problem"], troubles.get(row["component"], "")]
+            if why := kept_out.get(row["component"]):
+                told.append(f"kept out of planning: {why}")
+            told += map(str, self.workers.faults(row["component"]))
             row["problem"] = "; ".join(filter(None, told))
             row["confinement"] = str(self.workers.launcher.level) if row["pid"] else None
         return own + [
@@ -182,7 +187,7 @@ class Questions:
 
     async def fact(self, arguments: Arguments) -> Row:
         """One fact, true or not, and all that bears on it."""
-        return self.mind.views.fact(arguments.text("fact"))
+        return self.mind.views.fact(whole(arguments.text("fact"), self.mind.names))
 
     async def goals(self, arguments: Arguments) -> Row:
         """What can be asked for, and what was: `given` here, `elsewhere` to peers, by `host`."""
@@ -191,6 +196,10 @@ class Questions:
         elsewhere = self.elsewhere.given() if self.elsewhere else []
         own = [own_goal_row(row, host) for row in view["given"]]
         return {**view, "given": own, "elsewhere": elsewhere}
+
+    async def names(self, arguments: Arguments) -> Row:
+        """Units and streams: whole name → the short one that people read."""
+        return dict(self.mind.names)
 
     async def plan(self, arguments: Arguments) -> Row:
         """The plan that is carried out."""

@@ -6,8 +6,10 @@ import difflib
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any, TypeAlias
 
+from nondum.host import missing_devices
 from nondum.host.catalogue.records import (
     ComponentRecord,
+    ComponentState,
     DriveRecord,
     DriveState,
     JournalEntry,
@@ -88,8 +90,15 @@ def problems_of(snapshot: Snapshot, places: Collection[str] = ()) -> Iterator[Pr
             yield from payload.problems
     for component in snapshot.components:
         yield from component.problems
+        yield from waits_for_devices(component)
     for drive in snapshot.drives:
         yield from drive.problems
+
+
+def waits_for_devices(component: ComponentRecord) -> Iterator[Problem]:
+    """That a component waits for devices, if it does and for nothing else."""
+    if told := missing_devices.waits(component):
+        yield Problem("DEVICE_MISSING", f"{component.id} {told}")
 
 
 def payload_row(
@@ -98,9 +107,11 @@ def payload_row(
     place: str = "",
     rollbacks: Collection[str] = (),
     vouched: Vouched = NOBODY,
+    components: Iterable[ComponentRecord] = (),
 ) -> Row:
     """A payload: how far it has come, where it is, what is wrong with it, and the peer that it runs
-    on, if it does. `rollbacks` are the digests of those that people went back to."""
+    on, if it does. `rollbacks` are the digests of those that people went back to, `components` all
+    that are here: devices that those of the payload wait for are told."""
     return {
         "payload": payload.payload_id,
         "key": payload.key,
@@ -110,6 +121,9 @@ def payload_row(
         "gone_back": payload.digest in rollbacks,
         "state": payload.step.value,
         "progress": progress.to_dict() if progress else None,
+        "waits_for": [
+            name for c in components if c.payload == payload.key for name in c.missing_devices
+        ],
         "place": place,
         "signers": list(vouched.signers),
         "built": vouched.built,
@@ -256,7 +270,7 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> Problem:
 
 
 def _state(component: ComponentRecord) -> str:
-    missing = [c.name for c in component.devices if c.device is None and not c.optional]
-    if component.state.value == "ready" and missing:
+    missing = component.missing_devices
+    if component.state is ComponentState.READY and missing:
         return f"waits for {', '.join(missing)}"
     return component.state.value

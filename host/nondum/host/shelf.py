@@ -33,11 +33,16 @@ class Shelved:
 
 
 def on_shelf(folder: Path, facts: HostFacts | None) -> Iterator[Shelved | Problem]:
-    """The payloads of a drive, of a folder of payloads, or of a payload's own folder.
+    """The payloads of a drive, of a folder of payloads or of drives, or of a payload's own folder.
 
-    With `facts`, what keeps them from this machine are caveats. What cannot be read is a problem.
+    With `facts`, what keeps them from this machine are caveats. What cannot be read is a problem,
+    and so is a folder without any.
     """
-    for found in _folders(folder):
+    folders = _folders(folder)
+    if not folders:
+        text, fix = "no payload was found there", "give a drive, or a folder of payloads or drives"
+        yield Problem("DRIVE_NOT_PAYLOAD", text, where=str(folder), fix=fix)
+    for found in folders:
         try:
             listed = contents.parse(drive.read_contents(found), f"{found.name}/{contents.NAME}")
             payload = load(found, listed)
@@ -48,12 +53,15 @@ def on_shelf(folder: Path, facts: HostFacts | None) -> Iterator[Shelved | Proble
         yield Shelved(listed.payload_id, listed.version, str(found), payload.index, caveats)
 
 
-def _folders(folder: Path) -> Iterable[Path]:
+def _folders(folder: Path) -> Sequence[Path]:
     if (folder / contents.NAME).is_file():
         return (folder,)
     if found := drive.find_payloads(folder):
         return found
-    return sorted(path.parent for path in folder.glob(f"*/{contents.NAME}"))
+    if found := sorted(path.parent for path in folder.glob(f"*/{contents.NAME}")):
+        return found
+    drives = sorted(path.parent for path in folder.glob(f"*/{drive.FOLDER}"))
+    return [payload for one in drives for payload in drive.find_payloads(one)]
 
 
 def _preflight(payload: StagedPayload, facts: HostFacts) -> tuple[Problem, ...]:

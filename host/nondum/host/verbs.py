@@ -56,6 +56,7 @@ def answering(
         "leave_safe_mode": orders.leave_safe_mode,
         "logs": questions.logs,
         "mount": orders.mount,
+        "names": questions.names,
         "plan": questions.plan,
         "resume": orders.resume,
         "retry": orders.retry,

@@ -42,6 +42,24 @@ def test_payloads_that_help_together_are_told_with_their_plan(shelf: Path) -> No
     assert any(row.startswith("2 org.example.right 2.0") for row in rows)
 
 
+def test_words_that_come_with_what_would_help_are_no_mistake(shelf: Path) -> None:
+    asked = ("advise", WRITTEN, "--host-of", "spot", "--wheelhouse", shelf)
+    assert "E-UNDECL" not in nondum(*asked).ok().out
+    assert nondum(*asked, "--json").ok().json["causes"] == []
+
+
+def test_folder_of_drives_is_looked_through(shelf: Path, tmp_path: Path) -> None:
+    (tmp_path / "drives").mkdir()
+    (tmp_path / "drives/one").symlink_to(shelf)
+    asked = ("advise", WRITTEN, "--host-of", "spot", "--wheelhouse", tmp_path / "drives")
+    assert "org.example.write 1.0" in nondum(*asked).ok().out
+
+
+def test_folder_without_payloads_is_told(tmp_path: Path) -> None:
+    asked = ("advise", WRITTEN, "--host-of", "spot", "--wheelhouse", tmp_path)
+    nondum(*asked).refused(1, "DRIVE_NOT_PAYLOAD")
+
+
 def test_advice_in_json_has_whole_plans(shelf: Path) -> None:
     ran = nondum("advise", WRITTEN, "--host-of", "spot", "--wheelhouse", shelf, "--json").ok()
     assert set(ran.json) == {

@@ -13,7 +13,7 @@ from tests.kit.running_host import RunningHost
 
 GOAL_KEYS = {"id", "goal", "text", "kind", "priority", "state", "reason", "problems", "holds"}
 ROWS: dict[str, set[str]] = {
-    "behaviours": {"behaviour", "component", "kind", "running", "phrases"},
+    "behaviours": {"behaviour", "component", "kind", "running", "phrases", "problem"},
     "components": {
         "component",
         "host",
@@ -85,6 +85,7 @@ PAYLOAD_KEYS = {
     "codes",
     "phases",
     "place",
+    "waits_for",
     "signers",
     "built",
     "age_s",
@@ -101,7 +102,7 @@ confinement of workers: LEVEL
 PAYLOAD             VERSION  AGE  STATE   DRIVE   COMPONENTS
 org.example.beacon  1.0      AGE  active  beacon  beacon
 
-> beacon is here: it can greet, shine
+> TIME  beacon is here: it can greet, shine
 """
 COMPONENTS = """\
 COMPONENT  STATE  PLUGIN       VERSION  PAYLOAD             AGE  UNITS  CONFINEMENT  PROBLEM
@@ -110,26 +111,24 @@ beacon     ready  test-beacon  1.0      org.example.beacon  AGE  lamp   LEVEL   
 BEHAVIOURS = """\
 BEHAVIOUR  COMPONENT  KIND       RUNNING  PHRASES
 greet      beacon     finishing  no       greet {c}
-shine      beacon     lasting    no       -
+shine      beacon     lasting    no       shine [for {words:text}]
 """
 UNITS = """\
-UNIT                   TYPE   COMPONENT  READY  XYZ  RPY  MOUNT
-panther__beacon__lamp  light  beacon     yes    -    -    unknown
+UNIT  TYPE   COMPONENT  READY  XYZ  RPY  MOUNT
+lamp  light  beacon     yes    -    -    unknown
 """
 STREAMS = """\
-STREAM                       TYPE    COMPONENT  FLOWING  RATE  CONSUMERS
-panther__beacon__brightness  scalar  beacon     no       -     -
+STREAM      TYPE    COMPONENT  FLOWING  RATE  CONSUMERS
+brightness  scalar  beacon     no       -     -
 """
 FACTS = """\
-FACT                                        SINCE  SOURCE                                      VALUE
-free panther__beacon__brightness            AGE    nobody uses it                              -
-idle panther__beacon__lamp                  AGE    nobody uses it                              -
-on panther__beacon__lamp panther            AGE    beacon is plugged into panther              -
-output panther__beacon__lamp                AGE    beacon declares it                          -
-panther__beacon__brightness
-ready panther__beacon__lamp                 AGE    beacon is healthy and its devices are       -
-                                                   there
-self panther                                AGE    this is the host that plans                 -
+FACT                    SINCE  SOURCE                                       VALUE
+free brightness         AGE    nobody uses it                               -
+idle lamp               AGE    nobody uses it                               -
+on lamp panther         AGE    beacon is plugged into panther               -
+output lamp brightness  AGE    beacon declares it                           -
+ready lamp              AGE    beacon is healthy and its devices are there  -
+self panther            AGE    this is the host that plans                  -
 """
 GOALS = """\
 WORDS         GOAL                      KIND      NOW  FROM
@@ -150,7 +149,7 @@ TREE = """\
 WHY = """\
 nothing is asked for
 
-> beacon is here: it can greet, shine
+> TIME  beacon is here: it can greet, shine
 """
 SHOWN = {
     "status": STATUS,
@@ -169,6 +168,7 @@ SHOWN = {
 
 def normalised(text: str) -> str:
     """What a command printed, without what differs from run to run."""
+    text = re.sub(r"(?<=^> )\d\d:\d\d:\d\d(?=  )", "TIME", text, flags=re.MULTILINE)
     text = re.sub(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d", "WHEN", text)
     text = re.sub(r"(?<=  )\d+ (?:s|min)(?= )", lambda age: "AGE".ljust(len(age[0])), text)
     text = re.sub(r"AGE +(?=STATE|UNITS)|(?<=  )\d+ d +", "AGE  ", text)
@@ -261,16 +261,22 @@ def test_one_fact_is_explained_whether_it_is_true_or_not(daemon: RunningHost) ->
         r"\d+ s ago", "AGE ago", daemon.run("facts", "--why", f"(ready {LAMP})").ok().out
     )
     assert shown == (
-        f"(ready {LAMP}) holds\n"
+        "(ready lamp) holds\n"
         "for it: beacon is healthy and its devices are there, AGE ago\n"
         "note: the host itself says so, or not\n"
     )
     untrue = daemon.run("facts", "--why", f"flowing {BRIGHTNESS}").ok().out
     assert untrue == (
-        f"(flowing {BRIGHTNESS}) does not hold\n"
+        "(flowing brightness) does not hold\n"
         "nobody has said so\n"
         "would be made true by: test-beacon.shine\n"
     )
+
+
+def test_names_are_short_for_people_and_whole_in_json(daemon: RunningHost) -> None:
+    assert daemon.run("facts", "--why", "(ready lamp)").ok().out.startswith("(ready lamp) holds")
+    assert rows(daemon, "units")[0]["unit"] == LAMP
+    assert rows(daemon, "streams")[0]["stream"] == BRIGHTNESS
 
 
 def test_a_fact_amiss_gets_the_nearest_words(daemon: RunningHost) -> None:

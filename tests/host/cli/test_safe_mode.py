@@ -42,6 +42,7 @@ def test_after_so_many_deaths_payloads_of_drives_are_left_alone(tmp_path: Path) 
         )
         assert host.run("status", "--json").json["safe_mode"] == "off"
         host.run("host", "resume").refused(1, "SAFE_MODE_OFF")
+        assert "nothing to try again" in host.run("host", "resume", "--all").ok().out
     assert not (host.state / "deaths").exists()
 
 

@@ -6,8 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tests.host.lifecycle.states import component
 
 from nondum.host.catalogue.records import (
+    ComponentRecord,
     DriveRecord,
     DriveState,
     PayloadRecord,
@@ -113,6 +115,28 @@ def test_a_goal_that_cannot_be_had_needs_help() -> None:
     [help] = concerns(Known(Snapshot("spot", 1), goals=(goal,)))
     assert (help.state, help.code) == (State.HELP, "NO_PLAN")
     assert help.sentence == "goal 3 cannot be had now, follow me: nobody can see"
+
+
+def test_a_drive_that_may_be_pulled_tells_what_ends_then() -> None:
+    eye = component("eye", "k")
+    assert "eye then ends" in told(eye, PAYLOAD)
+    two = replace(PAYLOAD, sources={**PAYLOAD.sources, "sdc1-8": Path("/mnt")})
+    assert told(eye, two) == "drive sdb1-7 may be pulled"
+
+
+def told(eye: ComponentRecord, payload: PayloadRecord) -> str:
+    here = known(payload)
+    [safe] = concerns(replace(here, snapshot=replace(here.snapshot, components=(eye,))))
+    return safe.sentence
+
+
+def test_a_component_that_waits_for_its_device_needs_help() -> None:
+    waiting = component("eye", "k", need="0403")
+    [help] = concerns(Known(Snapshot("spot", 1, components=(waiting,))))
+    assert (help.state, help.code) == (State.HELP, "DEVICE_MISSING")
+    assert help.sentence == "eye waits for its device port"
+    served = replace(waiting, devices=(replace(waiting.devices[0], device="usb:1-4"),))
+    assert not concerns(Known(Snapshot("spot", 1, components=(served,))))
 
 
 def test_safe_mode_needs_help() -> None:

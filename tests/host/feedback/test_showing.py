@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 
 from hypothesis import given
 from hypothesis import strategies as st
 
 from nondum.host.feedback.showing import Durations, Shown, shown, since
-from nondum.host.feedback.state import NOTHING, PRIORITY, Concern, State
+from nondum.host.feedback.state import NOTHING, Concern, State
 
 DURATIONS = Durations(refused_s=60, safe_s=15)
 REFUSED = Concern(State.REFUSED, "payload k", "refused", "SIG_MISSING")
@@ -39,7 +40,17 @@ def test_the_order_of_concerns_does_not_matter() -> None:
     every = (REFUSED, WORKING, SAFE, HELP)
     assert {at_once(*order).concern for order in permutations(every)} == {REFUSED}
     assert {at_once(*order).concern for order in permutations(every[1:])} == {WORKING}
-    assert {at_once(*order).concern for order in permutations(every[2:])} == {SAFE}
+    assert {at_once(*order).concern for order in permutations(every[2:])} == {HELP}
+
+
+def test_a_drive_that_may_be_pulled_does_not_hide_that_help_is_needed() -> None:
+    known = since(since({}, [SAFE], 0.0), [SAFE, HELP], 5.0)
+    assert shown([SAFE, HELP], known, 6.0, DURATIONS) == Shown(HELP, None)
+    known = since(since({}, [HELP], 0.0), [SAFE, HELP], 5.0)
+    both = shown([SAFE, HELP], known, 6.0, DURATIONS)
+    assert (both.concern.state, both.until_s) == (State.SAFE, 20.0)
+    assert HELP.sentence in both.concern.sentence
+    assert shown([SAFE, HELP], known, 20.0, DURATIONS) == Shown(HELP, None)
 
 
 def test_a_refusal_is_shown_for_its_time_then_what_is_behind_it() -> None:
@@ -72,7 +83,9 @@ def test_what_is_shown_is_a_concern_and_changes_when_it_says(
 ) -> None:
     known = since({}, concerns, began_s)
     now = shown(concerns, known, began_s + later_s, DURATIONS)
-    assert now.concern in (*concerns, NOTHING)
+    assert replace(now.concern, sentence="") in [
+        replace(concern, sentence="") for concern in (*concerns, NOTHING)
+    ]
     assert now.until_s is None or now.until_s > began_s + later_s
     if now.until_s is not None:  # then it gives way to another
         assert shown(concerns, known, now.until_s, DURATIONS).concern != now.concern
@@ -80,6 +93,7 @@ def test_what_is_shown_is_a_concern_and_changes_when_it_says(
 
 @given(CONCERNS)
 def test_nothing_is_shown_while_something_before_it_is_new(concerns: list[Concern]) -> None:
-    ranks = [PRIORITY.index(concern.state) for concern in concerns]
+    order = (State.REFUSED, State.WORKING, State.HELP, State.SAFE, State.READY)
+    ranks = [order.index(concern.state) for concern in concerns]
     now = at_once(*concerns).concern
-    assert PRIORITY.index(now.state) == min(ranks, default=PRIORITY.index(State.READY))
+    assert order.index(now.state) == min(ranks, default=order.index(State.READY))

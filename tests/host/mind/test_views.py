@@ -7,7 +7,14 @@ from dataclasses import replace
 
 import pytest
 from tests.host.mind.robot import HOST, Robot
-from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT, RECORDED_CAMERA
+from tests.planning.strangers import (
+    COMPTON_CAMERA,
+    MOBILE_BASE,
+    PAN_TILT_UNIT,
+    PEOPLE_DETECTOR,
+    RECORDED_CAMERA,
+    VISUAL_TRACKER,
+)
 
 from nondum.host.catalogue.records import ComponentState, MountPose
 from nondum.sdk.description import (
@@ -213,7 +220,54 @@ async def test_behaviours_show_what_runs(robot: Robot) -> None:
         "kind": "finishing",
         "running": False,
         "phrases": [],
+        "problem": "",
     }
+
+
+async def test_behaviours_show_the_phrases_that_ask_for_them_whoever_brought_them(
+    robot: Robot,
+) -> None:
+    phrase = Phrase("aim at {t:target}", "(pointing self ?t)", "maintain")
+    robot.plug(replace(SENSING, phrases=(phrase,)), POINTING)
+    rows = {row["behaviour"]: row for row in robot.mind.views.behaviours()}
+    assert rows["point"]["phrases"] == ["point at {t}", "aim at {t:target}"]
+    assert rows["localise"]["phrases"] == []
+
+
+async def test_behaviours_of_what_is_kept_out_of_planning_say_so(robot: Robot) -> None:
+    broken = replace(PAN_TILT_UNIT, fragments=(Fragment("domain.pddl", "(define (domain"),))
+    robot.plug(broken)
+    [row] = robot.mind.views.behaviours()
+    assert "E-SYNTAX" in row["problem"]
+
+
+async def test_plans_are_told_in_short_and_kept_whole(robot: Robot) -> None:
+    await point(robot)
+    [plan] = [text for text in robot.told if text.startswith("plan for")]
+    assert plan.endswith(": compton-camera.localise, then pan-tilt-unit.point")
+    steps = {row["told"]: row["action"] for row in robot.mind.views.plan()["steps"]}
+    assert HEAD in steps["pan-tilt-unit.point"]
+    assert not any("__" in sentence for sentence in robot.mind.views.why()["sentences"])
+
+
+async def test_units_that_a_behaviour_uses_are_not_said_to_be_unused(robot: Robot) -> None:
+    robot.plug(COMPTON_CAMERA, PAN_TILT_UNIT, RECORDED_CAMERA, PEOPLE_DETECTOR)
+    robot.plug(VISUAL_TRACKER, MOBILE_BASE)
+    robot.mind.give(pddl="(following self person)", kind="maintain")
+    await robot.until_holding()
+    said = {row["fact"]: row["source"] for row in robot.mind.views.facts()}
+    unused = {fact for fact, source in said.items() if source == "nobody uses it"}
+    assert f"idle {CRYSTAL}" in unused
+    assert f"idle {HOST}__people-detector__hog" not in unused
+    assert "people-detector.detect uses it" in said[f"idle {HOST}__people-detector__hog"]
+
+
+async def test_what_was_told_of_something_that_is_gone_is_over(robot: Robot) -> None:
+    people = robot.mind.people
+    people.tell("drive photos carries no payload", "drive photos")
+    people.tell("drive tools is full", "drive tools")
+    people.end("drive photos")
+    assert [row["over"] for row in robot.mind.views.told()] == [True, False]
 
 
 async def test_streams_show_flow(robot: Robot) -> None:

@@ -95,7 +95,7 @@ def problems(needs: Requires, have: Memory, payload_id: str) -> Iterator[Problem
     """What there is too little of for a payload: NO_MEMORY, NO_GPU_MEMORY."""
     left_mb, gpu_left_mb = have.left_mb(), have.gpu_left_mb(needs.memory_mb)
     if needs.memory_mb > left_mb:
-        why, fix = _because(have.promised.unused_mb, have.promised.holders, payload_id)
+        why, fix = _because(have.promised.unused_mb, have.promised.holders)
         yield Problem(
             "NO_MEMORY",
             f"there is too little memory{why}",
@@ -105,7 +105,7 @@ def problems(needs: Requires, have: Memory, payload_id: str) -> Iterator[Problem
             fix=fix or "free some memory, or use another host",
         )
     if needs.gpu_memory_mb > gpu_left_mb:
-        why, fix = _because(have.promised.gpu_memory_mb, have.promised.gpu_holders, payload_id)
+        why, fix = _because(have.promised.gpu_memory_mb, have.promised.gpu_holders)
         yield Problem(
             "NO_GPU_MEMORY",
             f"there is too little GPU memory{why}",
@@ -116,14 +116,14 @@ def problems(needs: Requires, have: Memory, payload_id: str) -> Iterator[Problem
         )
 
 
-def _because(promised_mb: int, holders: Sequence[str], payload_id: str) -> tuple[str, str]:
+def _because(promised_mb: int, holders: Sequence[str]) -> tuple[str, str]:
     """Why there is too little and what to do, where others were promised some; else nothing."""
     if not promised_mb:
         return "", ""
     names = ", ".join(holders[:MAX_TOLD]) + (" …" if len(holders) > MAX_TOLD else "")
     which = "one of them" if len(holders) > 1 else "it"
-    again = f"pull or uninstall {which}, then `nondum retry {payload_id}`, or use another host"
-    return f", since {promised_mb} MB are promised to {names}", again
+    fix = f"pull or uninstall {which}, or use another host"
+    return f", since {promised_mb} MB are promised to {names}", fix
 
 
 def look() -> Memory:

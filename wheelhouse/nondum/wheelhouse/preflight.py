@@ -58,6 +58,8 @@ class HostFacts:
     """Level at which workers run here."""
     nondum: str
     """Version of nondum."""
+    reserve_mb: int = 0
+    """Disk that is left free, whatever comes: `install.reserve_mb`."""
 
 
 def probe(state: Path, *, reserve_mb: int, confinement: Level) -> HostFacts:
@@ -72,6 +74,7 @@ def probe(state: Path, *, reserve_mb: int, confinement: Level) -> HostFacts:
         memory=memory.look(),
         confinement=confinement,
         nondum=nondum_version(),
+        reserve_mb=reserve_mb,
     )
 
 
@@ -243,7 +246,7 @@ def unpacked_problems(layouts: Iterable[Layout], facts: HostFacts, where: str) -
     """When wheels are too much for the disk, by the sizes of all their files."""
     needed = sum(file.member.size for layout in layouts for file in layout.files) // _MB
     if needed > facts.free_disk_mb:
-        yield _short(needed, facts.free_disk_mb, where)
+        yield _short(needed, facts, where)
 
 
 def _wanted(line: str, extra: str, facts: HostFacts) -> Requirement | None:
@@ -306,15 +309,25 @@ def _disk_problems(
     wheels = {wheel.sha256: wheel.size for group in chosen.values() for wheel in group}
     needed = max(manifest.requires.disk_mb, GROWTH * sum(wheels.values()) // _MB)
     if needed > facts.free_disk_mb:
-        yield _short(needed, facts.free_disk_mb, manifest.id)
+        yield _short(needed, facts, manifest.id)
 
 
-def _short(needed_mb: int, free_mb: int, where: str) -> Problem:
+def free_beside(free_mb: int, reserve_mb: int) -> str:
+    """What there is of a disk, with what is kept of it.
+
+    >>> free_beside(7, 64)
+    '7 MB, beside the 64 MB that `install.reserve_mb` keeps free'
+    """
+    kept = f", beside the {reserve_mb} MB that `install.reserve_mb` keeps free"
+    return f"{free_mb} MB{kept if reserve_mb else ''}"
+
+
+def _short(needed_mb: int, facts: HostFacts, where: str) -> Problem:
     return Problem(
         "DISK_FULL",
         "there is too little disk",
         where=where,
         need=f"{needed_mb} MB",
-        have=f"{free_mb} MB",
+        have=free_beside(facts.free_disk_mb, facts.reserve_mb),
         fix="free some disk, or use another host",
     )

@@ -228,9 +228,13 @@ class ComponentRecord:
     @property
     def is_ready(self) -> bool:
         """Whether its worker answers and every required device is there."""
-        return self.state is ComponentState.READY and all(
-            claim.device is not None or claim.optional for claim in self.devices
-        )
+        return self.state is ComponentState.READY and not self.missing_devices
+
+    @property
+    def missing_devices(self) -> tuple[str, ...]:
+        """The names of its needs that no device serves, and that it does not act without."""
+        claims = (claim for claim in self.devices if not claim.optional)
+        return tuple(claim.name for claim in claims if claim.device is None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -406,6 +410,8 @@ class Snapshot:
     peers: tuple[PeerRecord, ...] = ()
     """By name."""
     safety: Safety = Safety.OFF
+    tries: Mapping[str, int] = field(default_factory=dict)
+    """What daemons died at, as `lifecycle/tries.py` counts it."""
 
     def everyone(self) -> Iterator[tuple[str, ComponentRecord | PeerComponent]]:
         """Each component, this host's own first, with the name of its host."""

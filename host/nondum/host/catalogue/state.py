@@ -89,4 +89,5 @@ class HostState:
             former=tuple(self.former.values()),
             peers=tuple(sorted(self.peers.values(), key=lambda p: p.name)),
             safety=self.safety,
+            tries=self.tries,
         )

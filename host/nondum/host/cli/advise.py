@@ -62,12 +62,12 @@ def advise(
     if host is None:
         asked = without_number(session, asked)
     around, problems = surroundings(session, wheelhouses, host)
+    for problem in problems if not session.as_json else ():
+        tell_problem(problem, as_warning=True)
     found = around.counsel(asked)
     if session.as_json:
         render.as_json({**row(found), "unread": [problem.to_dict() for problem in problems]})
     else:
-        for problem in problems:
-            tell_problem(problem, as_warning=True)
         show(found)
     return exit_code(found)
 

@@ -17,7 +17,7 @@ def show(session: Session, rows: list[dict[str, Any]], columns: Sequence[str], e
     if session.as_json:
         render.as_json(rows)
     else:
-        table(rows, columns, empty=empty)
+        table(session.short(rows), columns, empty=empty)
 
 
 @click.command()
@@ -51,7 +51,10 @@ def behaviours(session: Session) -> None:
     Example: nondum behaviours
     """
     columns = ["behaviour", "component", "kind", "running", "phrases"]
-    show(session, session.ask("behaviours"), columns, "no behaviours")
+    rows = session.ask("behaviours")
+    if any(row["problem"] for row in rows):
+        columns.append("problem")
+    show(session, rows, columns, "no behaviours")
 
 
 @click.command()

@@ -6,13 +6,15 @@ from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import click
 
 from nondum.host.control.client import ControlClient
+from nondum.host.whole_names import all_shortened
 from nondum.sdk.errors import HostUnreachable
 
+_Shown = TypeVar("_Shown")
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 TIMEOUT_S = 30.0
@@ -24,6 +26,7 @@ class Session:
 
     control: Path | None = None
     as_json: bool = False
+    _names: dict[str, str] | None = None
 
     def connect(self, *, timeout_s: float | None = TIMEOUT_S) -> ControlClient:
         """Connect to the daemon that was named, else to the first of the usual ones that answers.
@@ -44,6 +47,16 @@ class Session:
         """Ask one question. Raises `NondumError` with the refusal."""
         with closing(self.connect(timeout_s=timeout_s)) as client:
             return client.ask(verb, **arguments)
+
+    def short(self, shown: _Shown, *, anew: bool = False) -> _Shown:
+        """Texts, or rows of them, with short names of units and streams; JSON keeps whole ones.
+        `anew` asks again which there are.
+
+        Raises `NondumError`.
+        """
+        if self._names is None or anew:
+            self._names = self.ask("names")
+        return cast(_Shown, all_shortened(shown, self._names))
 
     def follow(self, verb: str, **arguments: Any) -> Generator[Any]:
         """Ask for answers until the caller has enough. Raises `NondumError`."""

@@ -66,18 +66,28 @@ def run(
 
 
 @host.command()
+@click.option(
+    "--all",
+    "brings_all",
+    is_flag=True,
+    help="Also try again every payload that was refused or quarantined, in safe mode or not.",
+)
 @json_option
 @click.pass_obj
-def resume(session: Session) -> None:
+def resume(session: Session, brings_all: bool) -> None:
     """Leave safe mode: take in again the drives and payloads that were left alone.
 
-    Example: nondum host resume
+    Example: nondum host resume --all
     """
-    answer = session.ask("leave_safe_mode")
+    answer = session.ask("leave_safe_mode", **({"all": True} if brings_all else {}))
     if session.as_json:
         render.as_json(answer)
-    else:
+        return
+    if answer["was"] != "off":
         click.echo("safe mode is left; `nondum status` shows what comes")
+    if brings_all:
+        tried = ", ".join(answer["payloads"])
+        click.echo(f"tried again: {tried}" if tried else "there is nothing to try again")
 
 
 def _log(level: int) -> None:

@@ -21,6 +21,7 @@ from nondum.host.cli.advise import (
 )
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.failure import tell_problem
+from nondum.host.cli.status import show_told
 from nondum.host.cli.table import cell, table
 from nondum.sdk.errors import GoalRefused
 
@@ -63,10 +64,10 @@ def facts(session: Session, why: str | None, parked: bool, follow: bool) -> None
             if session.as_json:
                 render.as_json_line(rows)
             else:
-                live.redraw(partial(_show_facts, rows, parked))
+                live.redraw(partial(_show_facts, session.short(rows, anew=True), parked))
         return
     rows = session.ask("facts", parked=parked)
-    render.as_json(rows) if session.as_json else _show_facts(rows, parked)
+    render.as_json(rows) if session.as_json else _show_facts(session.short(rows), parked)
 
 
 def _show_facts(rows: list[dict[str, Any]], parked: bool) -> None:
@@ -82,6 +83,7 @@ def _explain(session: Session, found: dict[str, Any]) -> None:
     if session.as_json:
         render.as_json(found)
         return
+    found = session.short(found)
     render.sentence(f"({found['fact']}) {'holds' if found['holds'] else 'does not hold'}")
     for side in ("for", "against"):
         for word in found[side]:
@@ -129,10 +131,10 @@ def goals(session: Session, follow: bool) -> None:
             if session.as_json:
                 render.as_json_line(view)
             else:
-                live.redraw(partial(_show_goals, view))
+                live.redraw(partial(_show_goals, session.short(view, anew=True)))
         return
     view = session.ask("goals")
-    render.as_json(view) if session.as_json else _show_goals(view)
+    render.as_json(view) if session.as_json else _show_goals(session.short(view))
 
 
 def _show_goals(view: dict[str, Any]) -> None:
@@ -171,7 +173,8 @@ def plan(session: Session) -> None:
         return
     if view["goal"]:
         click.echo(f"goal {view['id']}  {view['goal']}  {view['kind']}")
-    table(view["steps"], ["step", "action", "state", "why"], empty="no plan")
+    steps = [{**row, "action": row["told"], "why": row["told_why"]} for row in view["steps"]]
+    table(steps, ["step", "action", "state", "why"], empty="no plan")
 
 
 @click.command()
@@ -200,6 +203,7 @@ def why(session: Session, goal: tuple[str, ...], wheelhouses: tuple[Path, ...]) 
         told = [{"goal": id, **(ways(found) if found else {})} for id, found in helps.items()]
         render.as_json({**view, "advice": told})
         return
+    view = session.short(view)
     for sentence in view["sentences"]:
         render.sentence(sentence)
     for problem in view["problems"]:
@@ -209,8 +213,7 @@ def why(session: Session, goal: tuple[str, ...], wheelhouses: tuple[Path, ...]) 
         render.sentence("; ".join(filter(None, parts)), mark=f"goal {id}: ")
     if view["told"]:
         click.echo()
-    for told in view["told"]:
-        render.sentence(told, mark="> ")
+    show_told(view["told"])
 
 
 def _helps(session: Session, wheelhouses: tuple[Path, ...]) -> dict[str, Advice | None]:

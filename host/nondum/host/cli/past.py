@@ -50,6 +50,7 @@ def journal(
     if session.as_json:
         render.as_json(rows)
         return
+    rows = session.short(rows)
     shown = [{**row, "when": render.clock(row["when"]), "detail": _detail(row)} for row in rows]
     columns = ["when", "subject", "event", "step", "detail"]
     if since_s:

@@ -37,6 +37,12 @@ def clock(wall_s: float) -> str:
     return time.strftime("%F %T", time.localtime(wall_s))
 
 
+def moment(wall_s: float) -> str:
+    """The same, of today by the time of day alone."""
+    day, time_of_day = clock(wall_s).split(" ")
+    return time_of_day if day == time.strftime("%F") else f"{day} {time_of_day}"
+
+
 def age(seconds: float | None) -> str:
     """How long something has been so, as people say it.
 

@@ -33,13 +33,13 @@ def status(session: Session, follow: bool) -> None:
     """
     if not follow:
         view = session.ask("status")
-        render.as_json(view) if session.as_json else show(view)
+        render.as_json(view) if session.as_json else show(session.short(view))
         return
     for view in session.follow("watch"):
         if session.as_json:
             render.as_json_line(view)
         else:
-            live.redraw(partial(show, view))
+            live.redraw(partial(show, session.short(view, anew=True)))
 
 
 def show(view: dict[str, Any]) -> None:
@@ -64,8 +64,13 @@ def show(view: dict[str, Any]) -> None:
         table(view["goals"], ["id", "text", "kind", "state", "reason"], empty="")
     if view["told"]:
         click.echo()
-    for told in view["told"][-LAST_TOLD:]:
-        render.sentence(told["text"], mark="> ")
+    show_told(view["told"])
+
+
+def show_told(told: list[dict[str, Any]]) -> None:
+    """Print the last sentences that people were told, but for those of what is gone."""
+    for row in [row for row in told if not row["over"]][-LAST_TOLD:]:
+        render.sentence(row["text"], mark=f"> {render.moment(row['when'])}  ")
 
 
 def _show_machine(machine: dict[str, Any]) -> None:
@@ -94,11 +99,19 @@ def _show_confinement(confinement: dict[str, Any]) -> None:
         render.sentence("; ".join(filter(None, (why, finding["fix"]))), mark=mark)
 
 
+def _state(row: dict[str, Any]) -> str:
+    if row["place"]:
+        return "placed"
+    if row["waits_for"]:
+        return f"waits for {', '.join(row['waits_for'])}"
+    return str(row["state"])
+
+
 def _show_payloads(payloads: list[dict[str, Any]]) -> None:
     rows = [
         {
             **row,
-            "state": "placed" if row["place"] else row["state"],
+            "state": _state(row),
             "on": row["place"],
             "release": render.release(row),
             "progress": render.progress(row["progress"]),

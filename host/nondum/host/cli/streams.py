@@ -61,8 +61,8 @@ def streams(
 
     RATE is messages a second of late, as the component itself counts them.
 
-    A message is shown by its stamp (seconds since the host was switched on), its frame, its number,
-    and its small fields. Slow readers get the newest: numbers may be left out.
+    A message is shown by its stamp (seconds since the host was switched on), its frame, its number
+    in the stream, and its small fields. Slow readers get the newest: numbers may be left out.
 
     Plans say which streams actions read. Optional inputs are in no plan: each gets a stream of its
     type that tells of what it asks for; where several do, --connect decides, and is remembered.
@@ -94,7 +94,7 @@ def _show(session: Session, *, with_streams: bool) -> None:
         if session.as_json:
             render.as_json(found)
             return
-        table([with_rate(row) for row in found], columns, empty="no streams")
+        table([with_rate(row) for row in session.short(found)], columns, empty="no streams")
     rows = session.ask("inputs")
     if rows and with_streams:
         click.echo()
@@ -118,27 +118,28 @@ def with_rate(row: dict[str, Any]) -> dict[str, Any]:
 
 
 async def _follow(session: Session, stream: str, count: int | None) -> None:
-    from nondum.host.control.tap import messages
+    from nondum.host.control.tap import numbered
 
     shown = 0
     with closing(session.connect()) as client:
-        async for message in messages(client, stream):
+        async for number, message in numbered(client, stream):
             if session.as_json:
-                render.as_json_line(message_row(message))
+                render.as_json_line(message_row(message, number))
             else:
-                click.echo(message_line(message_row(message)))
+                click.echo(message_line(message_row(message, number)))
             shown += 1
             if shown == count:
                 return
     click.echo(f"{stream} has ended", err=True)
 
 
-def message_row(message: Message) -> dict[str, Any]:
-    """A message as plain data; of its bulk only the length."""
+def message_row(message: Message, number: int) -> dict[str, Any]:
+    """A message as plain data; of its bulk only the length. `seq` is what its author counts,
+    `number` what the stream does."""
     fields, buffer = message.to_wire()
     header = fields.pop("header")
     row = {"stamp_s": header["stamp_s"], "frame_id": header["frame_id"], "seq": header["seq"]}
-    row |= {"type": message.TYPE, "fields": fields}
+    row |= {"number": number, "type": message.TYPE, "fields": fields}
     if message.BUFFER is not None:
         row["bytes"] = 0 if buffer is None else memoryview(buffer).nbytes
     return row
@@ -149,14 +150,14 @@ def message_line(row: dict[str, Any]) -> str:
 
     >>> fields = {"value": 0.5, "unit": "1"}
     >>> message_line(
-    ...     {"stamp_s": 12.5, "frame_id": "eye", "seq": 3, "type": "scalar", "fields": fields}
+    ...     {"stamp_s": 12.5, "frame_id": "eye", "number": 3, "type": "scalar", "fields": fields}
     ... )
     '12.500000  eye  #3  value=0.5 unit=1'
     """
     fields = [f"{name}={_short(value)}" for name, value in row["fields"].items()]
     if "bytes" in row:
         fields.append(render.size(row["bytes"]))
-    head = f"{row['stamp_s']:.6f}  {printable(row['frame_id']) or '-'}  #{row['seq']}"
+    head = f"{row['stamp_s']:.6f}  {printable(row['frame_id']) or '-'}  #{row['number']}"
     return f"{head}  {' '.join(fields)}".rstrip()
 
 

@@ -20,7 +20,14 @@ from nondum.sdk.wire import MAX_PACKET
 
 
 async def messages(client: ControlClient, stream: str) -> AsyncIterator[Message]:
-    """Messages of a stream from now on, newest wins, until its producer is gone.
+    """Messages of a stream, see `numbered`."""
+    async for _, message in numbered(client, stream):
+        yield message
+
+
+async def numbered(client: ControlClient, stream: str) -> AsyncIterator[tuple[int, Message]]:
+    """Messages of a stream from now on, newest wins, until its producer is gone; each with its
+    number, as its producer counts what it sends, from 1.
 
     Raises `NondumError` when the host knows no such stream, or the producer breaks the protocol.
     """
@@ -38,6 +45,6 @@ async def messages(client: ControlClient, stream: str) -> AsyncIterator[Message]
             if isinstance(item, NondumError):
                 raise item
             if (message := consumer.take()) is not None:
-                yield message
+                yield consumer.number, message
     finally:
         consumer.close()

@@ -117,7 +117,7 @@ def _check_room(target: Path, wanted: Collection[Entry], reserve_mb: int) -> Non
                 "there is too little disk to copy it for another host",
                 where=str(target),
                 need=f"{need // _MB + 1} MB",
-                have=f"{max(0, have) // _MB} MB",
+                have=preflight.free_beside(max(0, have) // _MB, reserve_mb),
                 fix="free some disk, or plug the drive into the other host",
             )
         )

@@ -17,7 +17,7 @@ from nondum.host.catalogue.records import (
 )
 from nondum.host.feedback.state import Concern, State
 from nondum.host.mind.goals import GivenGoal, GoalState
-from nondum.host.rows import is_at_rest
+from nondum.host.rows import is_at_rest, waits_for_devices
 from nondum.sdk.errors import Problem
 
 PLUGGED = frozenset({"slot", "block"})
@@ -76,8 +76,15 @@ def _of_drive(drive: DriveRecord, known: Known) -> Iterator[Concern]:
     elif drive.state is not DriveState.IDLE:
         yield Concern(State.WORKING, about, f"drive {drive.id} is being read", drive=drive.id)
     elif drive.kind in PLUGGED and is_safe(drive, known):
-        told = f"drive {drive.id} may be pulled: nothing is read from it any more"
-        yield Concern(State.SAFE, about, told, drive=drive.id)
+        yield Concern(State.SAFE, about, _may_be_pulled(drive, known.snapshot), drive=drive.id)
+
+
+def _may_be_pulled(drive: DriveRecord, snapshot: Snapshot) -> str:
+    """That nothing is lost by it, and what ends: what came with no other drive."""
+    ending = {payload.key for payload in snapshot.payloads if set(payload.sources) == {drive.id}}
+    names = [component.id for component in snapshot.components if component.payload in ending]
+    then = f"; {' and '.join(names)} then end{'s' if len(names) == 1 else ''}" if names else ""
+    return f"drive {drive.id} may be pulled{then}"
 
 
 def is_safe(drive: DriveRecord, known: Known) -> bool:
@@ -99,6 +106,8 @@ def _of_components(snapshot: Snapshot) -> Iterator[Concern]:
             about, told = f"component {component.id}", f"{component.id} does not work"
             payload = component.payload_id
             yield refusal(State.HELP, about, told, component.problems, payload=payload)
+        for problem in waits_for_devices(component):
+            yield Concern(State.HELP, f"component {component.id}", problem.message, problem.code)
 
 
 def _cannot_be_had(goal: GivenGoal) -> bool:

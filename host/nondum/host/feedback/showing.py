@@ -8,7 +8,7 @@ no longer in any case.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from nondum.host.feedback.state import NOTHING, PRIORITY, Concern, State
@@ -44,18 +44,32 @@ def since(before: Since, concerns: Iterable[Concern], now_s: float) -> Since:
 
 
 def shown(concerns: Iterable[Concern], known: Since, now_s: float, durations: Durations) -> Shown:
-    """The concern that is shown: of the first state by `PRIORITY`, the newest."""
+    """The concern that is shown: of the first state by `PRIORITY`, the newest. That a drive may be
+    pulled is shown only until help is needed, and says so where it was needed before."""
     open_ones = []
     for concern in concerns:
         duration, began_s = durations.of(concern.state), known[_key(concern)]
         until_s = None if duration is None else began_s + duration
         if until_s is None or now_s < until_s:
-            open_ones.append((PRIORITY.index(concern.state), -began_s, concern.about, concern))
+            rank = PRIORITY.index(_alike(concern.state))
+            is_safe = concern.state is State.SAFE
+            open_ones.append((rank, -began_s, is_safe, concern.about, concern))
     if not open_ones:
         return Shown(NOTHING, None)
-    _, newest, _, first = min(open_ones, key=lambda found: found[:3])
+    open_ones.sort(key=lambda found: found[:4])
+    _, newest, _, _, first = open_ones[0]
     duration = durations.of(first.state)
+    help = next((found[4] for found in open_ones if found[4].state is State.HELP), None)
+    if first.state is State.SAFE and help is not None:
+        first = replace(
+            first, sentence=f"{first.sentence}; help is needed all the same: {help.sentence}"
+        )
     return Shown(first, None if duration is None else duration - newest)
+
+
+def _alike(state: State) -> State:
+    """Of help that is needed and a drive that may be pulled, the newest is shown."""
+    return State.HELP if state is State.SAFE else state
 
 
 def _key(concern: Concern) -> tuple[State, str, str]:

@@ -23,6 +23,7 @@ from nondum.host.lifecycle import (
     rebuilding,
     releases,
     safe_mode_rules,
+    trial_rules,
     tries,
 )
 from nondum.host.lifecycle.turn import Outcome, Turn
@@ -62,6 +63,8 @@ RULES: Mapping[type[Event], _Rule] = {
     events.GoalReached: goal_rules.on_goal_over,
     events.GoalEnded: goal_rules.on_goal_over,
     events.HostSteady: tries.on_host_steady,
+    events.TrialDue: trial_rules.on_trial_due,
+    events.DriveRetried: trial_rules.on_drive_retried,
     events.SafeModeLeft: safe_mode_rules.on_left,
     events.PeerJoined: peer_rules.on_peer_joined,
     events.PeerShared: peer_rules.on_peer_shared,

@@ -14,9 +14,10 @@ from pathlib import Path
 
 from nondum.host.catalogue.records import ComponentRecord, DeviceClaim, DeviceNode, DeviceRecord
 from nondum.host.devices.matching import chosen, serving
-from nondum.host.effects import AttachDevice, DetachDevice
-from nondum.host.events import DeviceClaimed, DeviceReleased
+from nondum.host.effects import AttachDevice, DetachDevice, RestartWorker
+from nondum.host.events import DeviceClaimed, DeviceReleased, RetryAsked
 from nondum.host.lifecycle.turn import Turn
+from nondum.host.transitions import COMPONENT_TRANSITIONS
 
 _Need = tuple[str, str]
 """Component, and the name of its need."""
@@ -101,6 +102,21 @@ def settle(turn: Turn, before: Mapping[str, DeviceRecord]) -> None:
             _move(turn, id, old, new, before)
         if claims != component.devices:
             turn.put_component(replace(component, devices=claims))
+            if any(
+                new.device and not old.device
+                for old, new in zip(component.devices, claims, strict=True)
+            ):
+                _try_again(turn, id)
+
+
+def _try_again(turn: Turn, id: str) -> None:
+    """Start a component again that failed, maybe for want of the device that it has now."""
+    component = turn.state.components[id]
+    state = COMPONENT_TRANSITIONS.get((component.state, RetryAsked))
+    if state is not None:
+        turn.put_component(replace(component, state=state, problems=()))
+        turn.events.append(RetryAsked(component.payload, f"{id} has its device again"))
+        turn.effects.append(RestartWorker(id))
 
 
 def _move(

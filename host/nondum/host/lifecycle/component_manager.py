@@ -191,7 +191,7 @@ class ComponentManager:
                 if not tries_left:
                     catalogue.owe(after, entries, error)
                     break
-                log.exception("the catalogue cannot be written; trying again")
+                log.warning("the catalogue cannot be written; trying again: %s", error)
                 tries_left -= 1
                 await asyncio.sleep(COMMIT_AGAIN_S)
         if catalogue.loss is not loss:

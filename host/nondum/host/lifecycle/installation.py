@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import shutil
+import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -31,6 +33,7 @@ from nondum.host.events import (
     WheelsCompiled,
     WheelsStored,
 )
+from nondum.host.lifecycle.causes import Amounts
 from nondum.host.lifecycle.children import STALL_S, Children
 from nondum.host.lifecycle.folders import Folders, missing, remove, sweep
 from nondum.host.lifecycle.lanes import in_thread
@@ -46,6 +49,7 @@ from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, WorkerFailed, problems_of
 from nondum.wheelhouse import disk
 from nondum.wheelhouse.gpu import Gpu
+from nondum.wheelhouse.memory import Memory, Promised, free_memory_mb
 from nondum.wheelhouse.signatures import Grant
 
 AT_ONCE = 2
@@ -271,6 +275,18 @@ class Installation:
         """What children are told of the memory that there is for a payload that is not here yet,
         which may take over from a release of it."""
         return await self._promises.room("", beside)
+
+    async def amounts(self) -> Amounts:
+        """What there is for a payload that is not here yet."""
+        promised = Promised.parse((await self.room(""))["promised"])
+        disk_mb, memory = await in_thread(self._looked_at)
+        gpu_mb = self._promises.gpu_mb - promised.gpu_memory_mb
+        left_mb = Memory(memory, promised=promised).left_mb()
+        return Amounts(disk_mb, left_mb, gpu_mb, time.time() - time.monotonic())
+
+    def _looked_at(self) -> tuple[int, int]:
+        free_mb = shutil.disk_usage(self._folders.root).free // 2**20
+        return free_mb - self._options.reserve_mb, free_memory_mb()
 
     async def _install(self, key: str, *, admit_beside: str | None = None) -> int:
         """Run the job `install`; says how many wheels the store did not have.

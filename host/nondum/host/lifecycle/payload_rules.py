@@ -40,7 +40,7 @@ from nondum.host.events import (
     TrustChanged,
     WheelsStored,
 )
-from nondum.host.lifecycle import admission, releases, replacement, safe_mode, tries
+from nondum.host.lifecycle import admission, causes, releases, replacement, safe_mode, tries
 from nondum.host.lifecycle.claims import granted
 from nondum.host.lifecycle.drive_rules import copy_of, read
 from nondum.host.lifecycle.turn import Turn
@@ -161,7 +161,15 @@ def on_payload_step(turn: Turn, event: Any) -> None:
         return
     row = TRANSITIONS.get((payload.step, type(event)))
     if row is not None:
-        enter(turn, payload, event, row)
+        enter(turn, payload, _foretold(turn.state, payload, event), row)
+
+
+def _foretold(state: HostState, payload: PayloadRecord, event: Any) -> Any:
+    """A refusal, with whether it is tried again. What was to be installed for good is not: it is
+    given up."""
+    if isinstance(event, PayloadRefused | PayloadFailed) and not tries.is_initial(state, payload):
+        return replace(event, problems=causes.foretold(event.problems, payload.payload_id))
+    return event
 
 
 def enter(
@@ -210,6 +218,11 @@ def on_trust_changed(turn: Turn, event: TrustChanged) -> None:
     """Ask anew of all payloads that are here whether they are trusted."""
     turn.events.append(event)
     turn.effects.append(JudgePayloads(kept(turn.state)))
+    turn.pending.extend(
+        RetryAsked(payload.key, "whom this host trusts has changed")
+        for payload in turn.state.payloads.values()
+        if payload.step is Step.REFUSED and causes.is_untrusted(payload.problems)
+    )
 
 
 def on_payload_doubted(turn: Turn, event: PayloadDoubted) -> None:

@@ -38,6 +38,11 @@ class Promises:
         """Remember the GPU as a child saw it: a daemon does not look itself."""
         self._gpu = gpu
 
+    @property
+    def gpu_mb(self) -> int:
+        """GPU memory that there is in all, as far as it was seen."""
+        return self._gpu.total_mb if self._gpu is not None else 0
+
     async def room(self, payload: str, beside: str) -> dict[str, Any]:
         """What the jobs `copy` and `install` are told of memory: what others were promised, and
         what the release leaves that would make room for it."""

@@ -6,7 +6,7 @@ last one was at. One that ended because it was told to counts for nothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Set
+from collections.abc import Iterator, Mapping, Set
 
 from nondum.host.catalogue.records import (
     INSTALLED,
@@ -14,12 +14,14 @@ from nondum.host.catalogue.records import (
     DriveState,
     PayloadRecord,
     Safety,
+    Snapshot,
     Step,
 )
 from nondum.host.catalogue.state import HostState
 from nondum.host.events import (
     DriveRead,
     DriveRemoved,
+    DriveRetried,
     DriveUnreadable,
     Event,
     HostSteady,
@@ -31,6 +33,10 @@ from nondum.sdk.errors import Problem
 
 ATTEMPTS = 5
 """So many daemons in a row may die at the same drive or payload; the next one leaves it alone."""
+
+ON_TRIAL = 1000
+"""The count of what was left alone and is on its one trial. The next death leaves it alone until a
+person asks."""
 
 STEADY_S = 5.0
 """A daemon that lives so long beside what it brought to life does not die of it."""
@@ -58,7 +64,25 @@ def counted(state: HostState) -> Mapping[str, int]:
 
 def is_left_alone(state: HostState, subject: str) -> bool:
     """Whether too many daemons died at it."""
-    return state.tries.get(subject, 0) >= ATTEMPTS
+    return _are_too_many(state.tries.get(subject, 0))
+
+
+def _are_too_many(deaths: int) -> bool:
+    return deaths >= ATTEMPTS and deaths != ON_TRIAL
+
+
+def counts(snapshot: Snapshot) -> Iterator[str]:
+    """What is told of drives and payloads that daemons died at and that are not left alone yet."""
+    drives = {subject_of(drive): f"drive {drive.id}" for drive in snapshot.drives}
+    names = {**{p.key: p.payload_id for p in snapshot.payloads}, **drives}
+    for subject, deaths in snapshot.tries.items():
+        if subject not in names or _are_too_many(deaths):
+            continue
+        if deaths == ON_TRIAL:
+            yield f"{names[subject]} is tried again; if the daemon dies once more, it is left alone"
+        else:
+            died = "1 daemon" if deaths == 1 else f"{deaths} daemons in a row"
+            yield f"{died} died at {names[subject]}; after {ATTEMPTS} it is left alone"
 
 
 def left_alone(where: str) -> Problem:
@@ -67,7 +91,8 @@ def left_alone(where: str) -> Problem:
         "QUARANTINED",
         f"{ATTEMPTS} daemons in a row ended while they were at it, so it is left alone",
         where=where,
-        fix="pull it and plug it in again, or ask for another try with `nondum retry`",
+        fix="pull it and plug it in again, or ask for another try with `nondum retry` or "
+        "`nondum host resume --all`",
     )
 
 
@@ -94,8 +119,10 @@ def on_event(turn: Turn, event: Event) -> None:
             drive = turn.state.drives.get(event.drive)
             if drive is not None and drive.id not in turn.missed:
                 _clear(turn, *_pulled_with(turn.state, drive))
-        case RetryAsked():
+        case RetryAsked(why=""):
             _clear(turn, event.payload)
+        case DriveRetried(why="") if event.drive in turn.state.drives:
+            _clear(turn, subject_of(turn.state.drives[event.drive]))
 
 
 def _pulled_with(state: HostState, drive: DriveRecord) -> Set[str]:

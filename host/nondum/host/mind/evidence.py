@@ -9,7 +9,7 @@ from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition
 from nondum.planning.caret import nearest, refusal
 from nondum.planning.conclusions import conclusions
-from nondum.planning.core import HOST_PREDICATES
+from nondum.planning.core import HOST_PREDICATES, TAKEN_PREDICATES
 from nondum.planning.domain import Action, DerivedRule, Merged
 from nondum.planning.facts import fact, parts
 from nondum.planning.parse import parse_formula
@@ -21,16 +21,25 @@ from nondum.sdk.errors import FragmentRefused
 Row: TypeAlias = dict[str, Any]
 
 
-def believed(beliefs: Beliefs, composition: Composition | None) -> list[Row]:
+def believed(
+    beliefs: Beliefs, composition: Composition | None, users: Mapping[str, str]
+) -> list[Row]:
     """All that is believed: `fact`, `age_s` (since somebody has said so; nothing for what follows
-    by rules), `source`, `value`."""
+    by rules), `source`, `value`. `users` are units and streams that a running behaviour uses and
+    which; those that serve several are `idle` and `free` all the same."""
     follows = _conclusions(beliefs, composition)
-    rows = [_row(text, beliefs) for text in beliefs.world.facts]
+    rows = [_with_user(_row(text, beliefs), users) for text in beliefs.world.facts]
     rows += [
         {"fact": text, "age_s": None, "source": _by_rules(rules), "value": None}
         for text, rules in follows.items()
     ]
     return sorted(rows, key=lambda row: str(row["fact"]))
+
+
+def _with_user(row: Row, users: Mapping[str, str]) -> Row:
+    predicate, arguments = parts(row["fact"])
+    user = users.get(arguments[0]) if predicate in TAKEN_PREDICATES and arguments else None
+    return row if user is None else {**row, "source": f"{user} uses it, and others may, too"}
 
 
 def _conclusions(

@@ -10,7 +10,7 @@ import asyncio
 import contextlib
 import logging
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from py_trees.behaviour import Behaviour
@@ -26,8 +26,10 @@ from nondum.host.mind.planners import Planners
 from nondum.host.mind.pursuit import Pursuit
 from nondum.host.mind.runner import BehaviourRunner, Calls
 from nondum.host.mind.search import SMALL
+from nondum.host.mind.short_names import short_names
 from nondum.host.mind.system_tree import Duty, Hold, Parts, SystemTree, TaskSlot, default_tree
 from nondum.host.mind.views import Views
+from nondum.host.whole_names import shortened
 from nondum.planning.attempts import Patience
 from nondum.planning.goal import Goal, GoalKind, goal_text, parse_goal
 from nondum.sdk.errors import GoalRefused, Problem
@@ -62,7 +64,9 @@ class Mind:
         what behaviours are waited for."""
         self.beliefs = Beliefs(host, now_s)
         self.queue = GoalQueue()
-        self.people = People(wall_s)
+        self.names: Mapping[str, str] = {}
+        """Whole names of units and streams → short ones; also of those that have just gone."""
+        self.people = People(wall_s, lambda text: shortened(text, self.names))
         self.runner = BehaviourRunner(calls, self.beliefs, now_s)
         self.composition: Composition | None = None
         self.version = 0
@@ -291,6 +295,11 @@ class Mind:
             self.people.tell(f"planning stays as it was: {composition}")
             return
         old, self.composition = self.composition, composition
+        names = short_names(composition.merged.objects)
+        before = short_names(old.merged.objects) if old else {}
+        taken = {*names.values(), *composition.merged.objects}
+        gone = {whole: short for whole, short in before.items() if short not in taken}
+        self.names = {**gone, **names}
         self.beliefs.adopt(composition)
         self.runner.adopt(composition)
         self.pursuit.adopt(composition)

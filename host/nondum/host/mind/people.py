@@ -1,12 +1,16 @@
-"""What people are told: sentences in the order things happened, never taken back."""
+"""What people are told: sentences in the order things happened, never taken back.
+
+What a sentence is about may be gone since; then it is over.
+"""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import TypeAlias
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
 
+from nondum.host import missing_devices
 from nondum.host.catalogue.records import ComponentRecord, PeerComponent
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.frames import mount_warnings
@@ -27,13 +31,23 @@ class Told:
     wall_s: float
     """Seconds since the epoch."""
     text: str
+    about: str = ""
+    """What it is about, where that can be gone: `drive sdb1-7`."""
+    is_over: bool = False
+    """Whether that is gone."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for people's tools."""
+        row = {"number": self.number, "when": self.wall_s, "text": self.text}
+        return {**row, "over": self.is_over}
 
 
 class People:
     """Everything that people were told since the host started, the last thousand sentences."""
 
-    def __init__(self, wall_s: Callable[[], float]) -> None:
-        self._wall_s = wall_s
+    def __init__(self, wall_s: Callable[[], float], short: Callable[[str], str] = str) -> None:
+        """`short` makes names of units and streams in a sentence as short as can be."""
+        self._wall_s, self._short = wall_s, short
         self._told: deque[Told] = deque(maxlen=MAX_SENTENCES)
         self._number = 0
 
@@ -50,11 +64,18 @@ class People:
         """What was told after the sentence of that number."""
         return tuple(told for told in self._told if told.number > number)
 
-    def tell(self, text: str) -> None:
-        """Say a sentence."""
+    def tell(self, text: str, about: str = "") -> None:
+        """Say a sentence, `about` something that may be gone some time."""
         self._number += 1
+        text = self._short(text)
         kept = text if len(text) <= MAX_CHARACTERS else f"{text[:MAX_CHARACTERS]}…"
-        self._told.append(Told(self._number, self._wall_s(), kept))
+        self._told.append(Told(self._number, self._wall_s(), kept, about))
+
+    def end(self, about: str) -> None:
+        """What sentences were about is gone."""
+        for index, told in enumerate(self._told):
+            if told.about == about:
+                self._told[index] = replace(told, is_over=True)
 
 
 def recomposed(old: Composition | None, new: Composition) -> list[str]:
@@ -67,9 +88,9 @@ def recomposed(old: Composition | None, new: Composition) -> list[str]:
         if earlier is not None and earlier.version != component.version:
             sentences.append(f"{id} is now version {component.version}: {_offers(component)}")
         elif earlier is None or earlier.payload != component.payload:
-            sentences.append(f"{id} is here: {_offers(component)}")
+            sentences.append(f"{id} {_arrives(component)}")
         elif earlier.is_ready != component.is_ready:
-            sentences.append(f"{id} is {_health(component)}")
+            sentences.append(f"{id} {_health(component)}")
     return sentences + _contested(old, new) + _doubts(old, new) + _kept_out(old, new)
 
 
@@ -115,13 +136,20 @@ def _abilities(component: _Component) -> str:
     return ", ".join(component.abilities)
 
 
+def _arrives(component: _Component) -> str:
+    """What it can do if it is ready; else what it waits for."""
+    if component.is_ready:
+        return f"is here: {_offers(component)}"
+    names = _abilities(component)
+    return f"{_health(component)}{f'; then it can {names}' if names else ''}"
+
+
 def _health(component: _Component) -> str:
     if component.is_ready:
-        return "ready"
+        return "is ready"
     if isinstance(component, PeerComponent):
-        return "not ready, says its host"
-    missing = [c.name for c in component.devices if c.device is None and not c.optional]
-    if missing:
-        return f"not ready: it waits for the device {', '.join(missing)}"
+        return "is not ready, says its host"
+    if told := missing_devices.waits(component):
+        return told
     reason = f": {component.problems[0]}" if component.problems else ""
-    return f"not ready, it is {component.state.value}{reason}"
+    return f"is not ready, it is {component.state.value}{reason}"

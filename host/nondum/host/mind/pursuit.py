@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from nondum.host.catalogue.records import ComponentState
 from nondum.host.events import Emit, GoalEnded, GoalReached, PlanMade, PlanMissing
+from nondum.host.mind import short_names
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.diagnosis import Seen, seen_in
@@ -351,7 +352,8 @@ class Pursuit:
             self._people.tell(f"goal {replaced.id} is {replaced.reason}: {replaced.text}")
             self._emit(GoalEnded(replaced.id, replaced.reason))
         self._grow(goal.id, found.task, found.plan)
-        steps = ", then ".join(found.names) or "nothing to do"
+        called = short_names.steps(found.names, {})
+        steps = ", then ".join(called.values()) or "nothing to do"
         because = f", because {reason}" if reason else ""
         self._people.tell(f"plan for {goal.text!r}{because}: {steps}")
         self._emit(PlanMade(goal.id, found.situation.revision, found.names, reason))

@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Protocol
 
-from py_trees.behaviour import Behaviour
+from py_trees.behaviour import Behaviour as Node
 
 from nondum.host.catalogue.records import ComponentRecord, PeerComponent
-from nondum.host.mind import evidence, offers
+from nondum.host.mind import evidence, offers, short_names
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition, own_objects
 from nondum.host.mind.frames import implausible
 from nondum.host.mind.goals import GoalQueue, GoalState
 from nondum.host.mind.people import People
-from nondum.host.mind.pursuit import Pursuit
+from nondum.host.mind.pursuit import Current, Pursuit
 from nondum.host.mind.runner import BehaviourRunner
 from nondum.host.mind.silence import Silence
 from nondum.host.mind.tree_view import Row, TreeView
 from nondum.planning.conclusions import conclusions
 from nondum.planning.task_control import Phase
 from nondum.planning.task_tree import StepLeaf
+from nondum.sdk.description import Behaviour
 
 
 class Shown(Protocol):
@@ -33,7 +34,8 @@ class Shown(Protocol):
     runner: BehaviourRunner
     pursuit: Pursuit
     composition: Composition | None
-    root: Behaviour
+    names: Mapping[str, str]
+    root: Node
 
 
 class Views:
@@ -58,12 +60,14 @@ class Views:
         )
 
     def plan(self) -> Row:
-        """The goal pursued, and each step of its plan: `step`, `action`, `state`, `why`."""
+        """The goal pursued, and each step of its plan: `step`, `action`, `state`, `why`, and the
+        last two as people are told them: `told` and `told_why`."""
         current = self._mind.pursuit.current
         if current is None:
             return {"goal": None, "kind": None, "steps": []}
         goal = self._mind.queue[current.goal]
         running = {run.step.name: run for run in self._mind.runner}
+        called = self._called(current)
         steps = []
         for leaf in current.tree.children:
             assert isinstance(leaf, StepLeaf)  # a task tree has no other children
@@ -71,7 +75,8 @@ class Views:
             state = run.state.value if run else _STATES[leaf.status.value]
             why = " ".join(filter(None, (leaf.why(), run.progress if run else "")))
             row = {"step": leaf.index + 1, "action": leaf.name, "state": state, "why": why}
-            steps.append(row | {"component": run.component if run else None})
+            row |= {"component": run.component if run else None, "told": called[leaf.name]}
+            steps.append(row | {"told_why": self._told(why, called)})
         return {"goal": goal.pddl, "id": goal.id, "kind": goal.kind, "steps": steps}
 
     def tree(self) -> Row:
@@ -80,7 +85,12 @@ class Views:
 
     def facts(self) -> list[Row]:
         """All that is believed, see `evidence.believed`."""
-        return evidence.believed(self._mind.beliefs, self._mind.composition)
+        users = {
+            name: f"{run.component}.{run.behaviour}"
+            for run in self._mind.runner
+            for name in (run.step.actor, *run.streams)
+        }
+        return evidence.believed(self._mind.beliefs, self._mind.composition, users)
 
     def parked(self) -> list[Row]:
         """The facts that wait for objects, see `evidence.parked`."""
@@ -125,8 +135,9 @@ class Views:
         sentences: list[str] = []
         if current is not None:
             goal = self._mind.queue[current.goal]
-            sentences.append(f"goal {goal.id}, {goal.text!r}: {current.tree.why()}")
-            sentences += [f"  {row['action']}: {row['why']}" for row in self.plan()["steps"]]
+            why = self._told(current.tree.why(), self._called(current))
+            sentences.append(f"goal {goal.id}, {goal.text!r}: {why}")
+            sentences += [f"  {row['told']}: {row['told_why']}" for row in self.plan()["steps"]]
         problems = []
         for goal in self._mind.queue:
             if not goal.state.is_final and (current is None or goal.id != current.goal):
@@ -135,7 +146,7 @@ class Views:
         return {
             "sentences": sentences or ["nothing is asked for"],
             "problems": problems + [row["problem"] for row in self.kept_out()] + self._conflicts(),
-            "told": [told.text for told in self._mind.people.since(self._last_few())],
+            "told": self.told(self._last_few()),
         }
 
     def troubles(self) -> dict[str, str]:
@@ -185,7 +196,9 @@ class Views:
         }
 
     def behaviours(self) -> list[Row]:
-        """What can be done: `behaviour`, `component`, `kind`, `running`, `phrases`."""
+        """What can be done: `behaviour`, `component`, `kind`, `running`, `phrases` that ask for it,
+        and the `problem` that keeps its component out of planning."""
+        kept_out = {row["component"]: row["problem"] for row in self.kept_out()}
         running = {(run.component, run.behaviour) for run in self._mind.runner}
         return [
             {
@@ -193,7 +206,8 @@ class Views:
                 "component": component.id,
                 "kind": "lasting" if behaviour.lasting else "finishing",
                 "running": (component.id, behaviour.name) in running,
-                "phrases": list(behaviour.phrases),
+                "phrases": self._phrases(component, behaviour),
+                "problem": kept_out.get(component.id, ""),
             }
             for _, component in self._everyone()
             for behaviour in component.description.behaviours
@@ -241,10 +255,34 @@ class Views:
 
     def told(self, since: int = 0) -> list[Row]:
         """What people were told after the sentence of that number."""
-        return [
-            {"number": told.number, "when": told.wall_s, "text": told.text}
-            for told in self._mind.people.since(since)
-        ]
+        return [told.to_dict() for told in self._mind.people.since(since)]
+
+    def _phrases(
+        self, component: ComponentRecord | PeerComponent, behaviour: Behaviour
+    ) -> list[str]:
+        """The phrases of a behaviour, and those of whatever plugin that ask for what it does."""
+        composition = self._mind.composition
+        if composition is None or component.id in composition.merged.quarantined:
+            return list(behaviour.phrases)
+        does = {
+            atom.predicate
+            for action in composition.merged.domain.actions.values()
+            if (action.plugin, action.behaviour) == (component.description.name, behaviour.name)
+            for atom in action.effect.added()
+        }
+        asked = (
+            phrase.pattern
+            for phrase in composition.book.phrases
+            if does & {atom.predicate for atom in phrase.condition.positive}
+        )
+        return list(dict.fromkeys([*behaviour.phrases, *asked]))
+
+    def _called(self, current: Current) -> Mapping[str, str]:
+        """What the steps of a plan are called."""
+        return short_names.steps((leaf.name for leaf in current.tree.children), self._mind.names)
+
+    def _told(self, text: str, called: Mapping[str, str]) -> str:
+        return short_names.told(text, called, self._mind.names)
 
     def _everyone(self) -> Iterator[tuple[str, ComponentRecord | PeerComponent]]:
         return self._mind.beliefs.snapshot.everyone()

@@ -23,15 +23,18 @@ class Vouched:
 
 
 NOBODY = Vouched()
+CLOCKS_DIFFER_S = 60.0
+"""So far clocks may be apart."""
 
 
 def age_s(built: str) -> float | None:
-    """Seconds since a payload was built, as it says (UTC, ISO 8601) and as this clock goes; 0 if
-    that is yet to come.
+    """Seconds since a payload was built, as it says (UTC, ISO 8601) and as this clock goes; None if
+    that is yet to come: one of them is wrong.
 
     >>> age_s(""), age_s("2999-01-01T00:00:00Z")
-    (None, 0.0)
+    (None, None)
     """
     if not built:
         return None
-    return max(0.0, time.time() - datetime.fromisoformat(built).timestamp())
+    age = time.time() - datetime.fromisoformat(built).timestamp()
+    return max(0.0, age) if age >= -CLOCKS_DIFFER_S else None

@@ -240,6 +240,8 @@ class Consumer:
         self._loop = asyncio.get_running_loop()
         self._thread = threading.get_ident()
         self._waiting: _Waiting | None = None
+        self.number = 0
+        """The message that was taken last, as its producer counts what it sends: from 1."""
         self._limit = MAX_PACKET if packets.shares_memory else UNLIMITED
         packets.open(self._receive, self._lose)
 
@@ -253,6 +255,7 @@ class Consumer:
         waiting, self._waiting = self._waiting, None
         if waiting is None:
             return None
+        self.number = waiting.seq
         if waiting.slot is None:
             buffer: Buffer | None = waiting.inline
             self._release(waiting.seq)

@@ -1,0 +1,13 @@
+"""What is said of a component that is well and waits for a device."""
+
+from __future__ import annotations
+
+from nondum.host.catalogue.records import ComponentRecord, ComponentState
+
+
+def waits(component: ComponentRecord) -> str:
+    """`waits for its device head`; empty where it waits for none, or has other troubles."""
+    missing = component.missing_devices
+    if component.state is not ComponentState.READY or not missing:
+        return ""
+    return f"waits for its device{'s' if len(missing) > 1 else ''} {' and '.join(missing)}"
