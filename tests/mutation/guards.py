@@ -217,11 +217,14 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/peers/placement/fetching.py": (f"{_TH}/peers/placement/test_fetching.py",),
     # Which other hosts are let in, and what they may say.
     f"{_T}/peers/allowance.py": (f"{_TT}/peers/test_allowance.py",),
+    f"{_T}/peers/apart/pipe.py": (f"{_TT}/peers/test_apart.py",),
+    f"{_T}/peers/apart/sockets.py": (f"{_TT}/peers/test_apart.py",),
     f"{_T}/peers/certificate.py": _PEER_KEYS,
     f"{_T}/peers/ed25519.py": _PEER_KEYS,
     f"{_T}/peers/enquiries.py": (f"{_TT}/peers/test_enquiries.py",),
     f"{_T}/peers/fleet_files.py": (f"{_TT}/peers/test_public_file.py",),
     f"{_T}/peers/gate.py": (*_ADMISSION, f"{_TT}/peers/test_death.py"),
+    f"{_T}/peers/here.py": (*_ADMISSION, f"{_TT}/peers/test_received.py"),
     f"{_T}/peers/identity.py": (f"{_TT}/peers/test_identity.py",),
     f"{_T}/peers/keys.py": _PEER_KEYS,
     f"{_T}/peers/link.py": (f"{_TT}/peers/test_presence.py",),
@@ -311,6 +314,8 @@ ASIDE: Mapping[str, str] = {
     f"{_T}/peers/calls.py": "bounds what this host itself asks of others",
     f"{_T}/peers/dial.py": "tells why a peer is not reached",
     f"{_T}/peers/errands.py": "answers with what work of this host's own has failed by",
+    f"{_T}/peers/apart/service.py": "does what its own daemon says",
+    f"{_T}/peers/routes.py": "tells why a peer is not reached",
     f"{_T}/peers/pairing_door.py": "tells that this machine cannot listen there",
     f"{_T}/peers/pairing_problems.py": "says what people are told; `pairing_channel` refuses",
     f"{_H}/peers/finder.py": "hands on the addresses that the mesh takes",
@@ -359,10 +364,10 @@ SPARED: Mapping[tuple[str, str], str] = {
         f"{_T}/peers/node.py",
         "self._roster.session(peer).notify(Notice(method, args)) is Sent.FULL",
     ): _LIMIT,
-    (f"{_T}/peers/node.py", "received is None"): (
+    (f"{_T}/peers/here.py", "received is None"): (
         "the socket's monitor has told of a connection before there is a link"
     ),
-    (f"{_T}/peers/node.py", "received.ahead(read) <= MOST_AHEAD"): (
+    (f"{_T}/peers/here.py", "received.ahead(read) <= MOST_AHEAD"): (
         "saves a look at what waits; what is no more than that is within the limit below, too"
     ),
     (f"{_T}/peers/pairing_channel.py", "not isinstance(shown, Comparing)"): _EITHER,

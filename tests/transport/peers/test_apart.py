@@ -29,7 +29,7 @@ from tests.transport.peers.hosts import (
     two_hosts,
     up,
 )
-from tests.transport.peers.puppets import ADDRESS, Puppets
+from tests.transport.peers.puppets import ADDRESS, Puppets, serving
 
 from nondum.host.peers.links.process import LinksProcess
 from nondum.transport.peers import (
@@ -45,14 +45,14 @@ from nondum.transport.peers import (
     PeerUp,
     Refusal,
     Trust,
-    trust_file,
 )
 from nondum.transport.peers.accepted import AWAITED_S
 from nondum.transport.peers.apart import sockets
-from nondum.transport.peers.apart.pipe import WINDOW, Pipe, pipe_sockets
-from nondum.transport.peers.apart.service import MOST_WAITING, Service
+from nondum.transport.peers.apart.pipe import WINDOW
+from nondum.transport.peers.apart.service import MOST_WAITING
 from nondum.transport.peers.apart.sockets import SocketsApart
 from nondum.transport.peers.beats import BEAT_S
+from nondum.transport.peers.here import SECOND_LOOK_S
 from nondum.transport.peers.listener import HIGH_WATER
 from nondum.transport.peers.messages import MAX_MESSAGE, Notice, encode
 
@@ -234,33 +234,42 @@ async def test_process_gains_no_privileges_and_is_refused_system_calls() -> None
 async def test_strangers_have_time_only_while_the_loop_of_the_daemon_runs(
     clock: VirtualClock,
 ) -> None:
-    """As its ticks tell. Here the process's end is on the loop of the test."""
-    ours, theirs = pipe_sockets()
-    heard: asyncio.Queue[list[Any]] = asyncio.Queue()
-    daemon = Pipe(ours, heard.put_nowait, lambda _: None, MOST_WAITING)
-    serving = asyncio.ensure_future(Service(theirs).run())
-    daemon.send("trust", trust_file.to_text(Trust()), True)
-    daemon.send("begin", "base", None)
-    daemon.send("listen", ["tcp://127.0.0.1:0"])
-    _, (address,) = await arrived("it listens", heard.get())
-    with socket.create_connection(("127.0.0.1", int(address.rpartition(":")[2]))):
+    """As its ticks tell."""
+    async with serving() as daemon:
 
         async def ticked(seconds: float) -> list[Any]:
             await clock.stand_still(seconds)
-            daemon.send("tick")
-            return await arrived("an answer", heard.get())
+            daemon.say("tick")
+            return await daemon.hears()
 
-        while await ticked(0.0) != ["tock", 1]:
-            pass
-        for _ in range(3):
-            assert await ticked(60.0) == ["tock", 1]
-        spent_s = 0.0
-        while (told := await ticked(BEAT_S)) == ["tock", 1] and spent_s < 2 * AWAITED_S:
-            spent_s += BEAT_S
-        assert told[:2] == ["refused", "silent"]
-    daemon.send("close")
-    await arrived("it ends", serving)
-    daemon.close()
+        with socket.create_connection(("127.0.0.1", daemon.port)):
+            while await ticked(0.0) != ["tock", 1]:
+                pass
+            for _ in range(3):
+                assert await ticked(60.0) == ["tock", 1]
+            spent_s = 0.0
+            while (told := await ticked(BEAT_S)) == ["tock", 1] and spent_s < 2 * AWAITED_S:
+                spent_s += BEAT_S
+            assert told[:2] == ["refused", "silent"]
+
+
+async def test_daemon_is_told_at_once_what_cannot_be_sent_to(clock: VirtualClock) -> None:
+    """No time passes in which the process would look for what is over."""
+    async with serving() as daemon:
+        context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        with context.socket(zmq.DEALER) as peer:
+            peer.linger = 0
+            peer.connect(f"tcp://127.0.0.1:{daemon.port}")
+            peer.send(b"hello")
+            _, number, *_ = await daemon.hears()
+            assert await daemon.hears() == ["data", number, b"hello"]
+        context.destroy(linger=0)
+        assert await daemon.hears() == ["doubtful", number]
+        daemon.say("data", number, b"are you there?")
+        await clock.advance(SECOND_LOOK_S)
+        while (told := await daemon.hears()) == ["doubtful", number]:
+            daemon.say("data", number, b"are you there?")
+        assert told == ["over", number, None]
 
 
 async def test_host_that_was_trusted_among_thousands_is_let_in() -> None:

@@ -222,8 +222,7 @@ class PeerNode:
         """What came over a link is no message of a host's."""
         match reason:
             case Reason.ENDLESS:
-                if not link.is_over:
-                    self._roster.bar(link, reason, _endless(link), linger_ms=ENDLESS_LINGER_MS)
+                self._roster.bar(link, reason, _endless(link), linger_ms=ENDLESS_LINGER_MS)
             case Reason.NOT_PROVED:
                 self._roster.turn_away(link, reason, _OTHER_KEY)
             case _:
