@@ -109,6 +109,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/lifecycle/admission.py": _RELEASES,
     f"{_H}/lifecycle/payload_rules.py": (
         *_RELEASES,
+        f"{_TH}/lifecycle/test_causes.py",
         f"{_TH}/lifecycle/test_tries.py",
         f"{_TH}/lifecycle/test_safe_mode.py",
     ),
@@ -290,6 +291,7 @@ ASIDE: Mapping[str, str] = {
     f"{_H}/helper/__main__.py": "is started by systemd only",
     f"{_H}/control/client.py": "reads what the daemon answers",
     f"{_H}/control/tap.py": "passes on what the daemon tells",
+    f"{_H}/lifecycle/causes.py": "says when what was refused is tried again",
     f"{_H}/lifecycle/child.py": _RUNS,
     f"{_H}/lifecycle/children.py": _RUNS,
     f"{_H}/lifecycle/compiling.py": _RUNS,

@@ -46,7 +46,7 @@ def test_a_goal_in_words_is_kept_up(daemon: RunningHost) -> None:
     plan = daemon.run("plan", "--json").ok().json
     assert [step["action"] for step in plan["steps"]] == [SHINE]
     assert "runs for the goal" in daemon.run("why").ok().out
-    assert f"1     {SHINE}" in daemon.run("plan").ok().out
+    assert "1     test-beacon.shine  " in daemon.run("plan").ok().out
 
 
 def test_a_goal_is_reached_while_another_is_kept_up(daemon: RunningHost) -> None:
