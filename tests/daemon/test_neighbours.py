@@ -247,6 +247,9 @@ def test_goal_that_is_heard_goes_to_the_peer_that_can_have_it(pair: Hosts, tmp_p
     mule.until_told("rover: 'blink' is reached")
     say(said, "blink")
     mule.until_told(f"'blink': that is goal {int(number) + 1} of rover")
+    typed = mule.run("say", "rover, blink").ok().out
+    assert typed == f"that is goal {int(number) + 2} of rover\n"
+    assert mule.run("say", "mule, what are you doing").ok().out.startswith("I do nothing")
 
 
 def test_goal_that_is_typed_goes_where_one_that_is_heard_would(pair: Hosts, tmp_path: Path) -> None:

@@ -12,6 +12,9 @@ from tests.kit.payloads import Part
 from tests.kit.running_host import READY_S, Row, RunningHost
 from tests.kit.until import until
 
+from nondum.planning.asking import ASKED
+from nondum.planning.stop_words import STOPS
+
 pytestmark = pytest.mark.daemon
 
 PLUGINS = Path(__file__).parents[2] / "plugins"
@@ -47,12 +50,17 @@ def test_spoken_goal_is_reached_and_told_aloud(
     host.until_component("speech", "ready")
     host.bring("beacon", Part("beacon", BEACON))
     (scratch,) = host.state.glob("scratch/*/speech")
-    until_logged(host, "2 phrases can be heard")
-    for name, text in (("no phrase", "the weather is fine today"), ("goal", "greet people")):
+    until_logged(host, f"{2 + len(STOPS) + len(ASKED)} phrases can be heard")
+    for name, text in (
+        ("no phrase", "the weather is fine today"),
+        ("question", "what can you do"),
+        ("goal", "greet people"),
+    ):
         sound = espeak.say(text, voice="en-us", words_per_minute=150)
         (scratch / "unfinished").write_bytes(sound.to_wav())
         (scratch / "unfinished").rename(scratch / "in" / f"{name}.wav")
     host.until_told("speech heard 'greet people': that is goal")
+    host.until_told("I can greet people and shine.")
     host.until("the goal is reached", greeted, timeout_s=READY_S)
     assert not any("weather" in goal["text"] for goal in host.view["goals"])
 

@@ -286,7 +286,7 @@ class Questions:
             for row in await self._journal(arguments, after=after):
                 after = cast(int, row["id"])
                 yield row
-            await self.catalogue.committed(commits)
+            await self.catalogue.changed(commits)
 
     async def follow_logs(self, arguments: Arguments) -> AsyncIterator[Row]:
         """A line after the other: what `logs` answers, and what comes.

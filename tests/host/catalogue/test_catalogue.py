@@ -254,7 +254,7 @@ async def test_entries_of_this_run_are_judged_by_the_clock_that_nobody_sets(tmp_
 async def test_who_waits_for_the_journal_hears_of_each_commit(tmp_path: Path) -> None:
     async with opened(tmp_path) as catalogue:
         before = catalogue.commits
-        waiting = asyncio.create_task(catalogue.committed(before))
+        waiting = asyncio.create_task(catalogue.changed(before))
         await catalogue.commit(FULL, (entry(),))
         assert await waiting > before
 

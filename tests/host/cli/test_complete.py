@@ -26,7 +26,7 @@ def completed(daemon: RunningHost, line: str) -> list[str]:
 @pytest.mark.parametrize(
     ("line", "offered"),
     [
-        ("nondum st", ["status", "store", "streams"]),
+        ("nondum st", ["status", "stop", "store", "streams"]),
         ("nondum payload in", ["inspect", "install"]),
         ("nondum completion ", ["bash", "fish", "zsh"]),
         ("nondum logs ", ["beacon"]),

@@ -123,7 +123,7 @@ class Catalogue:
         `since`."""
         return await self._run(journal.read, self._connection, subject, after, since, limit)
 
-    async def committed(self, since: int) -> int:
+    async def changed(self, since: int) -> int:
         """Wait until `commits` is not `since`, and give it."""
         while self.commits == since:
             await self._next.wait()
