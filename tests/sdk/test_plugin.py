@@ -187,6 +187,13 @@ def test_failed_import_is_told(target: str, told: str) -> None:
     assert caught.value.code == "IMPORT_FAILED"
 
 
+def test_missing_dependency_is_told_with_where_it_is_to_be_declared() -> None:
+    with pytest.raises(WorkerFailed) as caught:
+        load("no_such_module_anywhere")
+    (problem,) = caught.value.problems
+    assert "'no_such_module_anywhere' to `dependencies`" in problem.fix
+
+
 def test_class_that_cannot_be_made_is_told() -> None:
     class Needy:
         def __init__(self, what: str) -> None: ...

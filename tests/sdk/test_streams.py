@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import fcntl
 import mmap
 import os
+import resource
 import signal
 import socket
 import sys
@@ -468,3 +470,16 @@ async def test_frame_waits_while_too_many_descriptors_are_under_way() -> None:
         if process.returncode is None:
             process.kill()
     assert told.decode().splitlines() == ["is fed", "got 7"]
+
+
+def test_message_that_is_larger_than_a_worker_may_have_in_one_piece_is_told_with_sizes() -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, hard))
+    try:
+        with pytest.raises(OSError) as caught:
+            SlotRing().write(bytes(8192), 8192)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert caught.value.errno == errno.EFBIG
+    assert "8192 bytes" in str(caught.value)
+    assert "file_mb lets a worker have 4096 bytes" in str(caught.value)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import re
 import shlex
+import shutil
+import sys
 from pathlib import Path
 
 import pytest
 from tests.kit.beacon import BEACON, BEACON_ID
 from tests.kit.command_line import in_terminal, nondum
-from tests.kit.payloads import Part, make_payload
+from tests.kit.payloads import Part, installed_wheel, make_payload, make_wheel, sdk_wheel
 from tests.kit.signing import Key
+from tests.wheelhouse.sources import make_source
 
 INSPECTED = """\
 org.example.beacon 1.0 (release 1): Made by a test  SIZE
@@ -115,6 +118,22 @@ def test_an_empty_drive_says_what_a_payload_is(tmp_path: Path) -> None:
     ran = nondum("payload", "check", tmp_path)
     assert ran.code == 3
     assert "DRIVE_NOT_PAYLOAD" in ran.out
+
+
+def test_version_that_goes_down_is_remarked_on(tmp_path: Path) -> None:
+    """Hosts go by the release, which is newer; whoever builds may have taken the wrong sources."""
+    wheels = tmp_path / "wheels"
+    wheels.mkdir()
+    for wheel in (sdk_wheel(), installed_wheel("pluggy")):
+        shutil.copy(wheel, wheels)
+    make_wheel(wheels, "msgpack", "1.2.0", {"msgpack/__init__.py": ""})
+    source, python = make_source(tmp_path / "blinker"), "{}.{}".format(*sys.version_info)
+    words = ("payload", "build", source, "-o", tmp_path / "usb", "--offline", "--wheels", wheels)
+    words = (*words, "--python", python)
+    assert "warning" not in nondum(*words).ok().out
+    said = source / "wheel.json"
+    said.write_text(said.read_text().replace('"1.0"', '"0.9"'))
+    assert "warning: this is version 0.9, 1.0 was here" in nondum(*words).ok().out
 
 
 def test_a_package_that_is_none_cannot_be_built(tmp_path: Path) -> None:

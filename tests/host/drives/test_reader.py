@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -147,6 +148,15 @@ def test_what_does_not_fit_this_host_is_refused_before_wheels_are_copied(tmp_pat
     folder = lamp(tmp_path / "drive", requires='python = ">=3.99"')
     assert code(copy, folder, tmp_path) == "PYTHON_VERSION"
     assert not (tmp_path / "staging/wheels").exists()
+
+
+def test_devices_that_the_manifest_does_not_ask_for_are_refused(tmp_path: Path) -> None:
+    copy(lamp(tmp_path / "drive"), tmp_path)
+    file = tmp_path / "staging/index.json"
+    said = json.loads(file.read_text())
+    said["components"]["lamp"]["devices"] = [{"name": "port", "match": {"usb": "*:*"}}]
+    file.write_text(json.dumps(said))
+    assert code(reader.verify, rules(tmp_path), told) == "DEVICE_RULES"
 
 
 def test_hostile_wheel_is_refused_where_it_was_copied(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from nondum.sdk import hooks
 from nondum.sdk.decorators import behaviour_of, condition_of
 from nondum.sdk.description import WHEN_LOST, Behaviour, Condition, PluginDescription, Unit
 from nondum.sdk.errors import NondumError, Problem, WorkerFailed
+from nondum.sdk.raised import within_packages
 from nondum.sdk.signature import parse_signature
 from nondum.sdk.ticked import TickedBehaviour
 
@@ -242,8 +243,11 @@ def _make(plugin_class: type[Any]) -> object:
 def _told(code: str, what: str, error: BaseException) -> Problem:
     """An author's error as a problem that names its file and line."""
     frames = traceback.extract_tb(error.__traceback__)
-    place = f"{frames[-1].filename}:{frames[-1].lineno}" if frames else ""
-    return Problem(code, f"{what}: {type(error).__name__}: {error}", where=place)
+    place = f"{within_packages(frames[-1].filename)}:{frames[-1].lineno}" if frames else ""
+    fix = ""
+    if isinstance(error, ModuleNotFoundError) and error.name:
+        fix = f"add the distribution that has {error.name!r} to `dependencies` in pyproject.toml"
+    return Problem(code, f"{what}: {type(error).__name__}: {error}", where=place, fix=fix)
 
 
 def _invalid(message: str) -> WorkerFailed:

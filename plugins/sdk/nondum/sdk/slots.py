@@ -6,10 +6,12 @@ it under a reader, grow it, or write to it. The producer alone counts who still 
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import itertools
 import mmap
 import os
+import resource
 import weakref
 from collections.abc import Callable, Iterator
 
@@ -45,6 +47,9 @@ class Slot:
             os.ftruncate(self.descriptor, size)
             self.memory = mmap.mmap(self.descriptor, size)
             fcntl.fcntl(self.descriptor, fcntl.F_ADD_SEALS, SEALS | fcntl.F_SEAL_SEAL)
+        except OSError as error:
+            os.close(self.descriptor)
+            raise _no_room(size, error) from error
         except BaseException:
             os.close(self.descriptor)
             raise
@@ -194,6 +199,16 @@ def _map_sealed(descriptor: int) -> mmap.mmap:
         return mmap.mmap(descriptor, size, access=mmap.ACCESS_COPY)
     except (OSError, ValueError) as error:  # no memfd at all, or not mappable
         raise _violation("SLOT_SEALS", f"a slot is no sealed memory: {error}") from error
+
+
+def _no_room(size: int, error: OSError) -> OSError:
+    """What is told where the system gives no memory for a message: how much it was, and the limit
+    that it met, if it is that."""
+    told = f"there is no room for a message of {size} bytes ({error.strerror})"
+    most, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
+    if error.errno == errno.EFBIG:
+        told += f"; the host's [workers] file_mb lets a worker have {most} bytes in one piece"
+    return OSError(error.errno, told)
 
 
 def _violation(code: str, message: str) -> ProtocolViolation:

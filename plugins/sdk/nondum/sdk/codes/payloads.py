@@ -155,7 +155,8 @@ CODES = (
     Code(
         "WHEEL_MISSING",
         "pip found no wheel of a dependency for that architecture and Python.",
-        "give its source folder with --library or a folder of wheels with --wheels, pin a "
-        "version that has wheels, or build without that target",
+        "see whether it is spelt so in `dependencies`; give its source folder with --library or a "
+        "folder of wheels with --wheels, pin a version that has wheels, or build without that "
+        "target",
     ),
 )
