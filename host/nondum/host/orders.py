@@ -345,12 +345,11 @@ class Orders:
     def _kept(self, words: str, priority: int, refused: GoalRefused, arguments: Arguments) -> Row:
         """Keep words that mean nothing yet, where that is asked for. Raises `GoalRefused`."""
         is_kept, coming = arguments.flag("keep"), coming_in(self.catalogue.snapshot())
-        if refused.code not in NOT_YET or not (is_kept or coming):
+        more_may_come = bool(coming) or self.mind.composition is None
+        if refused.code not in NOT_YET:
             raise refused
-        if not is_kept and not arguments.flag("wait"):
-            told = f"nothing here understands {words!r} yet: {coming}"
-            fix = "ask again in a moment, or have the words kept: `nondum goal --keep WORDS`"
-            raise GoalRefused(Problem("PHRASE_EARLY", told, fix=fix)) from refused
+        if not is_kept and not (arguments.flag("wait") and more_may_come):
+            raise _too_early(words, coming) if coming else refused
         is_translated = arguments.flag("yes")
         return self._row(
             self._keep(words, priority, is_translated=is_translated, while_coming=not is_kept)
@@ -414,3 +413,9 @@ def _is_troubled(payload: PayloadRecord, snapshot: Snapshot) -> bool:
         return was_left or payload.step in (Step.REFUSED, Step.QUARANTINED)
     states = [c.state.value for c in snapshot.components if c.payload == payload.key]
     return "quarantined" in states
+
+
+def _too_early(words: str, coming: str) -> GoalRefused:
+    told = f"nothing here understands {words!r} yet: {coming}"
+    fix = "ask again in a moment, or have the words kept: `nondum goal --keep WORDS`"
+    return GoalRefused(Problem("PHRASE_EARLY", told, fix=fix))

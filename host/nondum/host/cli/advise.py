@@ -76,7 +76,7 @@ def without_number(session: Session, asked: str) -> str:
     """The goal in PDDL where its number is given. Raises `GoalRefused` (GOAL_UNKNOWN)."""
     if not asked.isdecimal():
         return asked
-    given = {row["id"]: str(row["goal"]) for row in session.ask("status")["goals"]}
+    given = {row["id"]: str(row["goal"] or row["text"]) for row in session.ask("status")["goals"]}
     if asked not in given:
         known = ", ".join(given) or "none was given"
         message = f"there is no goal {asked!r}"
