@@ -128,10 +128,8 @@ def test_version_that_goes_down_is_remarked_on(tmp_path: Path) -> None:
         shutil.copy(wheel, wheels)
     make_wheel(wheels, "msgpack", "1.2.0", {"msgpack/__init__.py": ""})
     source, python = make_source(tmp_path / "blinker"), "{}.{}".format(*sys.version_info)
-    words = (
-        *("payload", "build", source, "-o", tmp_path / "usb", "--offline", "--wheels", wheels),
-        *("--python", python),
-    )
+    words: tuple[str | Path, ...] = ("payload", "build", source, "-o", tmp_path / "usb")
+    words = (*words, "--offline", "--wheels", wheels, "--python", python)
     assert "warning" not in nondum(*words).ok().out
     said = source / "wheel.json"
     said.write_text(said.read_text().replace('"1.0"', '"0.9"'))
