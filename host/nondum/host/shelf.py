@@ -58,8 +58,8 @@ def _folders(folder: Path) -> Sequence[Path]:
         return (folder,)
     if found := drive.find_payloads(folder):
         return found
-    if found := sorted(path.parent for path in folder.glob(f"*/{contents.NAME}")):
-        return found
+    if payloads := sorted(path.parent for path in folder.glob(f"*/{contents.NAME}")):
+        return payloads
     drives = sorted(path.parent for path in folder.glob(f"*/{drive.FOLDER}"))
     return [payload for one in drives for payload in drive.find_payloads(one)]
 
