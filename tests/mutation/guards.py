@@ -291,6 +291,8 @@ ASIDE: Mapping[str, str] = {
     f"{_H}/helper/__main__.py": "is started by systemd only",
     f"{_H}/control/client.py": "reads what the daemon answers",
     f"{_H}/control/tap.py": "passes on what the daemon tells",
+    f"{_H}/lifecycle/tally.py": "counts deaths; what is left alone for them is `safe_mode`'s",
+    f"{_H}/lifecycle/trial_rules.py": "tries again what `tries` left alone",
     f"{_H}/lifecycle/causes.py": "says when what was refused is tried again",
     f"{_H}/lifecycle/component_rules.py": "keeps what others told of a worker",
     f"{_H}/lifecycle/replacement.py": "compares what two releases say; planning refuses",

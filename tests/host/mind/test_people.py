@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from nondum.host.mind.people import MAX_CHARACTERS, MAX_SENTENCES, People
+from dataclasses import replace
+
+from tests.host.lifecycle.states import component
+
+from nondum.host.catalogue.records import Snapshot
+from nondum.host.mind.composition import compose
+from nondum.host.mind.people import MAX_CHARACTERS, MAX_SENTENCES, People, recomposed
 
 
 def test_sentences_are_numbered_and_the_last_ones_kept() -> None:
@@ -24,3 +30,15 @@ def test_sentence_without_end_is_cut() -> None:
     whole, cut = people
     assert whole.text == "x" * MAX_CHARACTERS
     assert cut.text == "y" * MAX_CHARACTERS + "…"
+
+
+def test_component_that_waits_for_its_device_is_not_said_to_be_able_to_do_anything() -> None:
+    waiting = component("eye", need="0403")
+    served = replace(waiting, devices=(replace(waiting.devices[0], device="usb:1-4"),))
+    before, after = (
+        compose(Snapshot("spot", revision, components=(one,)))
+        for revision, one in enumerate((waiting, served))
+    )
+    assert recomposed(None, before) == ["eye waits for its device port"]
+    assert recomposed(before, after) == ["eye is ready"]
+    assert recomposed(after, before) == ["eye waits for its device port"]
