@@ -114,7 +114,8 @@ def test_odd_values_of_options_are_told(
 ) -> None:
     for option in parameters(name, click.Option):
         for value in ("", "no such thing", "\x1b[2J", str(nowhere / "noise")):
-            judge(*run(filled(name, "folder", option.opts[0], value), capfd))
+            values = [value] * option.nargs
+            judge(*run(filled(name, "folder", option.opts[0], *values), capfd))
 
 
 @pytest.mark.parametrize("name", sorted(name for name in ASKING if takes_json(name)))
