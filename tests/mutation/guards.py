@@ -218,7 +218,6 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/peers/placement/fetching.py": (f"{_TH}/peers/placement/test_fetching.py",),
     # Which other hosts are let in, and what they may say.
     f"{_T}/peers/allowance.py": (f"{_TT}/peers/test_allowance.py",),
-    f"{_T}/peers/apart/pipe.py": (f"{_TT}/peers/test_apart.py",),
     f"{_T}/peers/apart/sockets.py": (f"{_TT}/peers/test_apart.py",),
     f"{_T}/peers/certificate.py": _PEER_KEYS,
     f"{_T}/peers/ed25519.py": _PEER_KEYS,

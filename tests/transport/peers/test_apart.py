@@ -182,10 +182,12 @@ async def test_daemon_keeps_little_for_a_process_that_stands_still(
 async def test_connection_that_breaks_is_told_by_the_process() -> None:
     base, rover = identity("base"), identity("rover")
     async with host(base, trusting(rover)) as there:
+        pid = pid_of(there)
         with bad_dealer(there.address, rover, there) as bad:
             bad.send(hello_of(rover))
             await there.told(PeerUp)
         assert (await there.told(PeerLost)).reason is Loss.DISCONNECTED
+        assert there.node.links_pid == pid
 
 
 async def test_host_that_is_dialled_before_there_is_a_process_is_reached(
@@ -298,7 +300,10 @@ async def test_address_that_is_taken_is_told_and_another_may_be_tried() -> None:
         await node.close()
 
 
-async def test_process_that_does_not_start_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_process_that_does_not_start_is_told(
+    clock: VirtualClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At once: no time passes that others would be given."""
     for start in (functools.partial(LinksProcess, memory=1024**2), no_process):
         monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketsApart, start=start))
         with pytest.raises(PeerRefused, match="LINKS_START"):

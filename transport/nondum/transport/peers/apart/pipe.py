@@ -34,7 +34,7 @@ class Pipe:
     def __init__(
         self,
         sock: socket.socket,
-        on_packet: Callable[[list[Any]], None],
+        on_packet: Callable[[Any], None],
         on_closed: Callable[[ProtocolViolation | None], None],
         most_waiting: int,
         on_room: Callable[[], None] = lambda: None,
@@ -86,10 +86,7 @@ class Pipe:
 
     def _receive(self, data: bytes, _handles: tuple[Handle, ...]) -> None:
         try:
-            fields = unpack(data, LONGEST)
-            if not isinstance(fields, list):
-                raise violation()
-            self._on_packet(fields)
+            self._on_packet(unpack(data, LONGEST))
         except ProtocolViolation as violated:
             self.close()
             self._on_closed(violated)

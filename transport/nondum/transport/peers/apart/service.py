@@ -64,7 +64,7 @@ class Service:
         if not self._is_asked_to_end.done():
             self._is_asked_to_end.set_result(is_asked)
 
-    def _on_packet(self, packet: list[Any]) -> None:
+    def _on_packet(self, packet: Any) -> None:
         match packet:
             case ["data", int(number), bytes(data)]:
                 if served := self._served.get(number):

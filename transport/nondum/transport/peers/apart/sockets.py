@@ -228,7 +228,7 @@ class SocketsApart:
                 await self._give_up(0.0)
         self._again = None
 
-    def _on_packet(self, packet: list[Any]) -> None:
+    def _on_packet(self, packet: Any) -> None:
         match packet:
             case ["data", int(number), bytes(data)]:
                 if route := self._routes.get(number):
