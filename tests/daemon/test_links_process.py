@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 from pathlib import Path
-from typing import Any
 
 import pytest
 from tests.daemon.neighbours import neighbours, until_peer
@@ -37,5 +36,5 @@ def test_it_ends_with_a_daemon_that_is_killed(tmp_path: Path) -> None:
 
 
 def links_of(host: RunningHost) -> int | None:
-    why: dict[str, Any] = host.ask("peers_why")
-    return why["process"]
+    pid: int | None = host.ask("peers_why")["process"]
+    return pid
