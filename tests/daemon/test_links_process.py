@@ -36,5 +36,5 @@ def test_it_ends_with_a_daemon_that_is_killed(tmp_path: Path) -> None:
 
 
 def links_of(host: RunningHost) -> int | None:
-    process: int | None = host.ask("peers_why")["process"]
-    return process
+    pid: int | None = host.ask("peers_why")["process"]
+    return pid

@@ -319,6 +319,7 @@ ASIDE: Mapping[str, str] = {
     f"{_T}/peers/arrivals.py": "counts what ZeroMQ has turned away",
     f"{_T}/peers/calls.py": "bounds what this host itself asks of others",
     f"{_T}/peers/dial.py": "tells why a peer is not reached",
+    f"{_T}/peers/drained.py": "says whether messages wait still",
     f"{_T}/peers/errands.py": "answers with what work of this host's own has failed by",
     f"{_T}/peers/apart/service.py": "does what its own daemon says",
     f"{_T}/peers/routes.py": "tells why a peer is not reached",
