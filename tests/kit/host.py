@@ -26,11 +26,21 @@ from nondum.host.workers import Timing, Workers
 HOST = "spot"
 
 LAMP = '''"""A lamp that does nothing, well."""
-from nondum.sdk import Output, Unit, behaviour, hookimpl
+from nondum.sdk import Fragment, Output, Unit, behaviour, hookimpl
+
+DOMAIN = """
+(define (domain lamp)
+  (:predicates (lit ?u - light))
+  (:action shine :parameters (?u - light) :precondition (ready ?u) :effect (lit ?u)))
+"""
 
 @hookimpl
 def units():
     return [Unit("lamp", "light")]
+
+@hookimpl
+def fragments():
+    return [Fragment("lamp.pddl", DOMAIN)]
 
 @behaviour("shine", action="(shine ?u - light)", lasting=True)
 async def shine(ctx, u):

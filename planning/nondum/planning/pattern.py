@@ -71,6 +71,24 @@ def name_words(words: Sequence[str]) -> tuple[str, ...]:
     return opened[1:] if len(opened) > 1 and opened[0] in _ARTICLES else opened
 
 
+def as_said(text: str) -> str:
+    """A pattern as people would say it, without what may be left out.
+
+    >>> as_said("[please] point at {t:target}"), as_said("point at the source")
+    ('point at something', 'point at the source')
+    """
+    try:
+        parts = parse_pattern(text)
+    except PatternInvalid:
+        return text
+    said = [
+        part.text if isinstance(part, Word) else "something"
+        for part in parts
+        if not isinstance(part, Optional) and not (isinstance(part, Slot) and part.is_free)
+    ]
+    return " ".join(said)
+
+
 def parse_pattern(text: str) -> tuple[Part, ...]:
     """Read a pattern. Raises `PatternInvalid`."""
     stack: list[list[Part]] = [[]]

@@ -41,6 +41,14 @@ from nondum.sdk.errors import HostUnreachable, Problem
 HOST = "rover"
 
 
+def _clock() -> Callable[[], float]:
+    """The loop's, which may be virtual; any where there is none, for one tick."""
+    try:
+        return asyncio.get_running_loop().time
+    except RuntimeError:
+        return time.monotonic
+
+
 @dataclass(eq=False)
 class RobotCall:
     """One behaviour that was asked for."""
@@ -112,7 +120,7 @@ class Robot:
             deadline_s=10.0,
             patience=self.patience,
             system_tree=self.system_tree,
-            now_s=asyncio.get_running_loop().time,
+            now_s=_clock(),
         )
         self._mounts = TellingMounts(self._remount, self.mind.after_tick)
         self.see()

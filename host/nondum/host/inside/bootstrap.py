@@ -21,9 +21,9 @@ from types import ModuleType
 from typing import Any
 
 PRELOADED = (
-    *("__future__", "ast", "asyncio", "contextvars", "dataclasses", "importlib.metadata"),
-    *("inspect", "logging", "math", "mmap", "pathlib", "random", "traceback", "typing"),
-    "warnings",
+    *("__future__", "ast", "asyncio", "contextvars", "dataclasses", "faulthandler"),
+    *("importlib.metadata", "inspect", "logging", "math", "mmap", "numbers", "pathlib", "random"),
+    *("resource", "traceback", "typing", "warnings"),
 )
 """What the SDK and pluggy import of the standard library, with what those import in turn."""
 INSIDE = ("kernel", "keeper", "limits", "look", "room", "walls")

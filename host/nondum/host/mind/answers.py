@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from nondum.planning.pattern import Optional, PatternInvalid, Slot, Word, parse_pattern
+from nondum.planning.pattern import as_said
 
 Row = Mapping[str, Any]
 
@@ -103,31 +103,13 @@ def _lacking(rows: Iterable[Row]) -> list[str]:
     wanted: dict[str, dict[str, str]] = {}
     for row in concrete:
         need = next(filter(None, map(_need, row["lacks"])), "")
-        wanted.setdefault(need, {}).setdefault(row["goal"], of_the_robot(_said(row["words"])))
+        wanted.setdefault(need, {}).setdefault(row["goal"], of_the_robot(as_said(row["words"])))
     return [
         f"to {_few(list(words.values()), 2)} I need {need}"
         if need
         else f"I cannot {_few(list(words.values()), 2)} now"
         for need, words in wanted.items()
     ]
-
-
-def _said(pattern: str) -> str:
-    """A pattern as people would say it.
-
-    >>> _said("[please] point at {t:target}"), _said("point at the source")
-    ('point at something', 'point at the source')
-    """
-    try:
-        parts = parse_pattern(pattern)
-    except PatternInvalid:
-        return pattern
-    said = [
-        part.text if isinstance(part, Word) else "something"
-        for part in parts
-        if not isinstance(part, Optional) and not (isinstance(part, Slot) and part.is_free)
-    ]
-    return " ".join(said)
 
 
 def _need(lack: str) -> str:
@@ -143,7 +125,7 @@ def _need(lack: str) -> str:
         return _a(found[1])
     if found := re.fullmatch(r"there is no \(either ([\w -]+)\)(?: to name)?", first):
         return " or ".join(map(_a, found[1].split()))
-    if found := re.fullmatch(r"\(ready ([\w-]+)\) does not hold", first):
+    if found := re.fullmatch(r"\(ready ([\w-]+)\) does not hold(: .*)?", first):
         return f"the {_short(found[1])} to be ready"
     return ""
 
