@@ -155,12 +155,13 @@ def terminal(
     """Run `nondum` in a terminal of a size, for as long as the context lasts."""
     ours, theirs = pty.openpty()
     _set_size(ours, columns, lines)
+    own_size = {name: "" for name in ("COLUMNS", "LINES")}  # not that of who runs the tests
     process = subprocess.Popen(
         command(*arguments),
         stdin=theirs,
         stdout=theirs,
         stderr=theirs,
-        env=quiet_environment() | {"TERM": "xterm"} | environment,
+        env=quiet_environment() | {"TERM": "xterm"} | own_size | environment,
         start_new_session=True,
     )
     os.close(theirs)

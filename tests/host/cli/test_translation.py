@@ -76,7 +76,7 @@ def test_translation_is_taken_where_the_person_said_so(daemon: RunningHost) -> N
     assert shown.startswith(f"{LIT}\ngoal ")
     daemon.until("the goal holds", holds)
     assert daemon.view["goals"][-1]["text"] == "brighten up"
-    assert f"> 'brighten up' is {LIT}" in daemon.run("status").ok().out
+    assert f"'brighten up' is {LIT}" in daemon.run("status").ok().out
 
 
 def test_machine_is_told_who_understood_what(daemon: RunningHost) -> None:
