@@ -139,6 +139,20 @@ async def test_device_can_be_used_and_its_node_stays_as_it_is(
     assert mode(line[1]) == before
 
 
+async def test_worker_writes_where_everybody_may(tested: WorkersUnderTest) -> None:
+    await guest(tested, "for each in ('/tmp', '/dev/shm'):\n    open(f'{each}/x', 'w').close()")
+    assert await does(tested) == ""
+
+
+async def test_worker_has_the_umask_of_the_host(tested: WorkersUnderTest) -> None:
+    before = os.umask(0o002)
+    try:
+        await guest(tested, "was = os.umask(0o022); os.umask(was); assert was == 0o002, oct(was)")
+    finally:
+        os.umask(before)
+    assert await does(tested) == ""
+
+
 async def test_only_devices_are_handed_in(tested: WorkersUnderTest, tmp_path: Path) -> None:
     secret = tmp_path / "secret"
     secret.write_text("of the host")
