@@ -100,6 +100,8 @@ async def test_two_workers_are_two_users_and_neither_is_the_hosts(
     (first,), (second,) = users_of(pids["one"]), users_of(pids["other"])
     assert is_workers(first) and is_workers(second) and first != second
     assert [owner(one), owner(other)] == [first, second]
+    groups = {id: set(status(pid)["Gid"].split()) for id, pid in pids.items()}
+    assert groups == {"one": {str(first)}, "other": {str(second)}}
 
 
 async def test_worker_is_the_same_user_after_a_restart_of_it_and_of_the_host(

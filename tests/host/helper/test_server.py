@@ -28,6 +28,7 @@ from nondum.host.cgroups.cages import NoTree
 from nondum.host.drives import nodes
 from nondum.host.feedback.lamps import Lamps
 from nondum.host.helper import HelperClient, removals, requests
+from nondum.host.helper.client import PressesOfHelper
 from nondum.host.helper.disks import Disks
 from nondum.host.helper.nodes import Nodes
 from nondum.host.helper.server import MOST_CHILDREN, Server, answer
@@ -387,6 +388,20 @@ def test_presses_of_the_stop_key_are_told_until_it_is_gone() -> None:
         os.close(keyboard)
         serving.join()
     assert [problem["code"] for problem in told[0]["problems"]] == ["HELPER_FAILED"]
+
+
+@pytest.mark.parametrize("said", [b"", b'{"error":"InstallFailed","problems":[]}'])
+def test_helper_that_listens_no_more_is_noticed(said: bytes) -> None:
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ours.settimeout(0)
+    with ours, theirs:
+        presses = PressesOfHelper(ours, is_down=False)
+        assert presses.read() == 0
+        theirs.send(b'{"pressed":2}')
+        assert presses.read() == 2
+        theirs.send(said) if said else theirs.close()
+        with pytest.raises(ConnectionResetError):
+            presses.read()
 
 
 def test_nodes_go_when_the_kernel_tells_that_their_device_has_gone(tmp_path: Path) -> None:
