@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tests.confinement.guests import status
 from tests.kit.workers import HOST, WorkersUnderTest
 
 from nondum.host.confinement.users import FIRST_USER, Users, is_workers
