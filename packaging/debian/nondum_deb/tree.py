@@ -36,6 +36,8 @@ sys.exit(main())
 """
 """`-I`: what the caller's folder and variables hold is not run."""
 DOCS = "usr/share/doc/nondum"
+NOT_INSTALLED = (DEBIAN, PACKAGING / "development")
+"""What makes packages and development environments."""
 FOLDERS = {
     "systemd": "lib/systemd/system",
     "systemd/user": f"{DOCS}/examples/user",
@@ -123,7 +125,7 @@ def _venv(root: Path) -> None:
 
 def _machine_files(root: Path) -> None:
     for file in (f for f in sorted(PACKAGING.rglob("*")) if f.is_file()):
-        if not file.is_relative_to(DEBIAN):
+        if not any(map(file.is_relative_to, NOT_INSTALLED)):
             folder = str(file.parent.relative_to(PACKAGING))
             if folder not in FOLDERS:
                 raise BuildFailed(f"{file}: nobody said where on a machine this belongs")

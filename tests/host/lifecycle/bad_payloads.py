@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -42,7 +43,9 @@ def of(part: Part, **options: Any) -> Callable[[Path], None]:
 def flip(folder: Path) -> None:
     wheel = next((folder / "wheels").glob("test_bad-*.whl"))
     data = bytearray(wheel.read_bytes())
-    data[len(data) // 2] ^= 0xFF
+    with zipfile.ZipFile(wheel) as archive:
+        plugin = next(entry for entry in archive.infolist() if entry.filename.endswith(".py"))
+    data[plugin.header_offset + 30 + len(plugin.filename) + plugin.compress_size // 2] ^= 0xFF
     wheel.write_bytes(data)
 
 
