@@ -259,7 +259,8 @@ class TaskControl:
 
     def steady(self, now_s: float) -> tuple[str, ...]:
         """The lasting actions that have held for a while."""
-        return tuple(name for name in self.runs if not self._is_unproven(name, now_s))
+        lasting = (name for name, run in self.runs.items() if run.step.lasting)
+        return tuple(name for name in lasting if not self._is_unproven(name, now_s))
 
     def trouble(self) -> str:
         """Which action is tried again, and how it failed the last time; empty: none."""
