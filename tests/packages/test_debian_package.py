@@ -117,7 +117,8 @@ def test_commented_keys_are_keys(tree: Tree, architecture: str) -> None:
 @both
 def test_every_unit_and_rule_of_the_checkout_is_in_it(tree: Tree, architecture: str) -> None:
     names = {path.name for path in _files(tree(architecture))}
-    folders = (f for f in (ROOT / "packaging").iterdir() if f.name != "debian")
+    others = {"debian", "development"}  # what makes packages, and environments to develop in
+    folders = (f for f in (ROOT / "packaging").iterdir() if f.name not in others)
     assert {path.name for folder in folders for path in _files(folder)} <= names
 
 
