@@ -35,6 +35,7 @@ from nondum.host.workers.spec import Timing, WorkerSpec
 from nondum.host.workers.standing import Standing
 from nondum.host.workers.supervisor import Supervisor
 from nondum.host.workers.worker import Worker
+from nondum.planning.core import core_value_types
 from nondum.planning.running import RunState
 from nondum.sdk import errors
 from nondum.sdk.description import PluginDescription
@@ -77,6 +78,7 @@ class Workers:
         self._others = Others()
         self._devices: dict[str, Granted] = {}
         self._mounts: Mapping[str, Any] = {}
+        core_value_types()  # read now: a worker may be started when there is little memory
         self._call_ids = itertools.count(1)
         self._calls: dict[asyncio.Task[None], Call] = {}
         self._keeps_spare = False
