@@ -8,13 +8,12 @@ import resource
 import shutil
 import stat
 import subprocess
-import tempfile
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.confinement.guests import status
+from tests.confinement.guests import DO, open_folder, status
 from tests.kit.workers import HOST, WorkersUnderTest
 
 from nondum.host.confinement.users import FIRST_USER, Users, is_workers
@@ -25,7 +24,7 @@ from nondum.host.workers.confinements import Boxed
 from nondum.host.workers.lending import Lending
 from nondum.host.workers.spare import Spare
 from nondum.planning.running import RunState
-from nondum.sdk.description import Behaviour, Unit
+from nondum.sdk.description import Unit
 
 pytestmark = [
     pytest.mark.anyio,
@@ -47,7 +46,6 @@ os.chmod('games', 0)
 os.chmod('.', 0)
 print('here', flush=True)
 """
-DO = Behaviour("do", "(do ?u - sensor)")
 OPENS = """
 import os
 from nondum.sdk import Unit, behaviour, hookimpl
@@ -72,9 +70,7 @@ async def tested(tmp_path: Path) -> AsyncIterator[WorkersUnderTest]:
 @pytest.fixture
 def folder() -> Iterator[Path]:
     """A folder that everybody may go into, unlike those of tests."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        folder.chmod(0o755)
+    with open_folder() as folder:
         yield folder
 
 

@@ -215,6 +215,17 @@ def test_failing_action_is_given_up_after_tries() -> None:
     assert robot.started == ["pick ball0 a"] * 3
 
 
+def test_only_a_lasting_action_holds_for_a_while() -> None:
+    """Else what a finishing one has failed before would be forgotten as it is tried again."""
+    robot = Robot(gripper_task(1), frozenset())
+    tree = task_tree(robot, plan_of(robot.task, "pick ball0 a", "move a b", "drop ball0 b"))
+    tree.tick_once()
+    assert tree.control.runs.keys() == {"pick ball0 a"}
+    assert tree.control.steady(robot.now_s + 3600) == ()
+    robot, tree = following()
+    assert set(tree.control.steady(robot.now_s + 3600)) == set(FOLLOW_PLAN)
+
+
 def test_action_that_fails_as_it_is_started_is_tried_again_and_tells_why() -> None:
     robot = Robot(gripper_task(1), frozenset(), troubles=Troubles(refuses=1.0))
     tree = task_tree(robot, plan_of(robot.task, "pick ball0 a", "move a b", "drop ball0 b"))
