@@ -22,6 +22,7 @@ async def start(ctx):
     await asyncio.sleep(20)
 """
 SHINE = f"test-beacon.shine {LAMP} {BRIGHTNESS} panther"
+SHINE_SHORT = "test-beacon.shine lamp brightness panther"
 
 TORCH_ID = "org.example.torch"
 
@@ -91,14 +92,14 @@ def test_halting_one_goal_leaves_the_others(daemon: RunningHost) -> None:
 def test_halting_now_halts_what_runs(daemon: RunningHost) -> None:
     id = daemon.run("goal", "shine", "--wait", "--json").ok().json["id"]
     shown = daemon.run("halt", "--now").ok().out
-    assert shown == f"goal {id} is halted\nhalting {SHINE}\n"
+    assert shown == f"goal {id} is halted\nhalting {SHINE_SHORT}\n"
     assert daemon.run("halt").ok().out == "nothing was asked for, nothing was running\n"
 
 
 @pytest.mark.parametrize("words", [["stop"], ["goal", "stop"], ["goal", "halt", "now,", "please"]])
 def test_a_word_stops_the_robot(daemon: RunningHost, words: list[str]) -> None:
     id = daemon.run("goal", "shine", "--wait", "--json").ok().json["id"]
-    assert daemon.run(*words).ok().out == f"goal {id} is halted\nhalting {SHINE}\n"
+    assert daemon.run(*words).ok().out == f"goal {id} is halted\nhalting {SHINE_SHORT}\n"
     daemon.until_goal(id, "halted")
 
 

@@ -222,7 +222,7 @@ def _show_stopped(session: Session, halted: dict[str, Any]) -> None:
         return
     for goal in halted["goals"]:
         click.echo(f"goal {goal} is halted")
-    for behaviour in halted["halted"]:
+    for behaviour in session.short(halted["halted"]):
         render.sentence(behaviour, mark="halting ")
     for peer in halted["peers"]:
         click.echo(f"{peer} has stopped")
