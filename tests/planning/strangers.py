@@ -202,6 +202,32 @@ LAMP = PluginDescription(
     units=(Unit("led", "light"),),
 )
 
+BEACON = PluginDescription(
+    "beacon",
+    "1.0",
+    behaviours=(
+        Behaviour("shine", "(shine ?u - light)", lasting=True),
+        Behaviour("flash", "(flash ?u - light ?c - class ?h - host)", lasting=True),
+    ),
+    fragments=(
+        Fragment(
+            "domain.pddl",
+            """
+            (define (domain beacon)
+              (:constants person - class)
+              (:predicates (lit ?u - light))
+              (:action shine :parameters (?u - light)
+                :precondition (and (ready ?u) (idle ?u)) :effect (and (not (idle ?u)) (lit ?u)))
+              (:action flash :parameters (?u - light ?c - class ?h - host)
+                :precondition (and (ready ?u) (idle ?u) (on ?u ?h))
+                :effect (and (not (idle ?u)) (reported ?c ?h))))
+            """,
+        ),
+    ),
+    units=(Unit("led", "light"),),
+)
+"""A unit that can do one of two things. It is not among the strangers."""
+
 STRANGERS = (
     RECORDED_CAMERA,
     PEOPLE_DETECTOR,

@@ -40,6 +40,7 @@ class Answering:
         if question is Question.ABILITIES:
             found = await asyncio.to_thread(views.goals())
             return abilities(found["can"], coming)
-        steps = views.plan()["steps"]
+        plan = views.plan()
+        steps = [row for one in (plan, *plan["beside"]) for row in one["steps"]]
         lent = {*self._busy()} - {row["component"] for row in steps}
         return activity(views.given(), steps, lent, coming)

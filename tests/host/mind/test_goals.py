@@ -5,13 +5,9 @@ from __future__ import annotations
 import pytest
 
 from nondum.host.catalogue.records import GoalRecord
-from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState
+from nondum.host.mind.goals import GoalQueue, GoalState
 from nondum.planning.goal import GoalKind
 from nondum.sdk.errors import GoalRefused
-
-
-def never(_: GivenGoal) -> bool:
-    return False
 
 
 def give(queue: GoalQueue, kind: GoalKind = "achieve", priority: int = 0) -> str:
@@ -24,8 +20,7 @@ def queue() -> GoalQueue:
 
 
 def wanted(queue: GoalQueue) -> str | None:
-    goal = queue.wanted(never)
-    return goal.id if goal else None
+    return next((goal.id for goal in queue.open()), None)
 
 
 def test_higher_priority_goes_first(queue: GoalQueue) -> None:
@@ -67,29 +62,26 @@ def test_goals_that_people_gave_can_be_resumed_while_they_are_halted(queue: Goal
     assert (queue[ours].is_resumable, queue[payloads].is_resumable) == (True, False)
 
 
-def test_suspended_goal_waits_for_something_new(queue: GoalQueue) -> None:
+def test_suspended_goal_keeps_its_place(queue: GoalQueue) -> None:
     first = give(queue, priority=1)
     give(queue)
     queue.put(first, GoalState.SUSPENDED, "no way")
-    assert wanted(queue) == "2"
-    again = queue.wanted(lambda goal: goal.id == first)
-    assert again is not None
-    assert again.id == first
+    assert [goal.id for goal in queue.open()] == ["1", "2"]
 
 
-def test_active_goal_replaces_an_older_one_to_maintain(queue: GoalQueue) -> None:
+def test_newer_goal_to_maintain_replaces_an_older_one_that_is_in_its_way(queue: GoalQueue) -> None:
     old, new = give(queue, "maintain"), give(queue, "maintain")
-    assert [goal.id for goal in queue.activate(new)] == [old]
+    queue.put_aside(old, new, "the base")
     assert queue[old].state is GoalState.HALTED
     assert queue[old].reason == "replaced by goal 2"
 
 
-def test_interrupted_goal_waits_its_turn(queue: GoalQueue) -> None:
-    old = give(queue, "maintain")
-    queue.activate(old)
-    new = give(queue, priority=1)
-    assert queue.activate(new) == ()
-    assert (queue[old].state, queue[old].reason) == (GoalState.QUEUED, "waits for goal 2")
+def test_goal_put_aside_waits_its_turn_and_tells_for_what(queue: GoalQueue) -> None:
+    old, new = give(queue, "maintain"), give(queue, priority=1)
+    queue.put(old, GoalState.ACTIVE)
+    queue.put_aside(old, new, "the base")
+    assert queue[old].state is GoalState.QUEUED
+    assert queue[old].reason == "waits for goal 2: both need the base"
 
 
 def test_what_is_over_stays_over(queue: GoalQueue) -> None:

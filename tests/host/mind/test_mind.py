@@ -12,6 +12,7 @@ from tests.host.mind.conftest import at_work
 from tests.host.mind.robot import HOST, Robot
 from tests.kit.clock import VirtualClock
 from tests.planning.strangers import (
+    BEACON,
     COMPTON_CAMERA,
     MOBILE_BASE,
     PAN_TILT_UNIT,
@@ -38,6 +39,7 @@ FOLLOW = "(following self person)"
 POINT = "(pointing self radiation-source)"
 MOUNT = MountPose(f"{HOST}__recorded-camera__camera", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "person")
 REPORT = "(reported person self)"
+LIT_BEACON = f"(lit {HOST}__beacon__led)"
 CHAIN = {"people-detector.detect", "visual-tracker.track", "mobile-base.drive"}
 
 
@@ -154,9 +156,9 @@ async def test_spare_camera_fails_over_without_suspension(robot: Robot) -> None:
 async def test_unrelated_recomposition_keeps_plan_and_behaviours(robot: Robot) -> None:
     await follow(robot)
     started = list(robot.started)
-    tree = robot.mind.pursuit.tree
+    trees = robot.mind.pursuit.trees
     robot.plug(SPEAKER)
-    await robot.until(lambda: robot.mind.pursuit.tree is not tree)
+    await robot.until(lambda: robot.mind.pursuit.trees != trees)
     await robot.until(lambda: "speaker is here: it can report" in robot.told)
     assert robot.started == started
     assert len([e for e in robot.events if isinstance(e, PlanMade)]) == 1
@@ -340,14 +342,13 @@ async def test_more_urgent_goal_goes_first_and_the_other_returns(robot: Robot) -
 
 
 async def test_goal_put_aside_returns_though_nothing_new_is_known(robot: Robot) -> None:
-    robot.plug(COMPTON_CAMERA)
-    robot.stubborn.add("localise")
-    robot.mind.give(pddl="(bearing-known radiation-source self)")
-    await robot.until(lambda: robot.running == {"compton-camera.localise"})
-    robot.mind.give(pddl="(self self)", priority=5)
+    robot.plug(BEACON)
+    robot.mind.give(pddl=LIT_BEACON, kind="maintain")
+    await robot.until_holding("1")
+    robot.mind.give(pddl=REPORT, priority=5)
     await robot.until_goal("reached", "2")
-    await robot.until(lambda: robot.started == ["compton-camera.localise"] * 2)
-    assert robot.mind.queue["1"].state.value == "active"
+    await robot.until_holding("1")
+    assert robot.started == ["beacon.shine", "beacon.flash", "beacon.shine"]
 
 
 async def test_goal_without_plan_does_not_interrupt(robot: Robot) -> None:
@@ -361,13 +362,16 @@ async def test_goal_without_plan_does_not_interrupt(robot: Robot) -> None:
     assert robot.mind.queue["1"].state.value == "active"
 
 
-async def test_newer_goal_to_maintain_replaces_the_older(robot: Robot) -> None:
-    await follow(robot)
-    robot.plug(COMPTON_CAMERA, PAN_TILT_UNIT)
-    robot.mind.give(pddl=POINT, kind="maintain")
+async def test_newer_goal_to_maintain_replaces_an_older_one_that_needs_the_same(
+    robot: Robot,
+) -> None:
+    robot.plug(BEACON)
+    robot.mind.give(pddl=LIT_BEACON, kind="maintain")
+    await robot.until_holding("1")
+    robot.mind.give(pddl=REPORT, kind="maintain")
     await robot.until_holding("2")
     assert robot.mind.queue["1"].state.value == "halted"
-    await robot.until(lambda: robot.running == {"pan-tilt-unit.point"})
+    await robot.until(lambda: robot.running == {"beacon.flash"})
 
 
 async def test_halt_now_ends_everything_without_planner(robot: Robot) -> None:
@@ -376,7 +380,7 @@ async def test_halt_now_ends_everything_without_planner(robot: Robot) -> None:
     assert len(names) == 4
     await robot.until(lambda: not robot.running)
     assert robot.mind.queue["1"].state.value == "halted"
-    assert robot.mind.pursuit.current is None
+    assert robot.mind.pursuit.pursued == ()
 
 
 async def test_one_goal_is_halted_alone(robot: Robot) -> None:

@@ -132,7 +132,7 @@ async def test_plan_shows_steps_and_why(robot: Robot) -> None:
 
 
 async def test_no_plan_is_shown_as_none(robot: Robot) -> None:
-    assert robot.mind.views.plan() == {"goal": None, "kind": None, "steps": []}
+    assert robot.mind.views.plan() == {"goal": None, "kind": None, "steps": [], "beside": []}
 
 
 async def test_facts_are_explained(robot: Robot) -> None:

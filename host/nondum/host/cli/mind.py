@@ -163,7 +163,7 @@ def _outlook(row: dict[str, Any]) -> str:
 @json_option
 @click.pass_obj
 def plan(session: Session) -> None:
-    """The plan that is being carried out.
+    """The plans that are being carried out, that of the most urgent goal first.
 
     Example: nondum plan
     """
@@ -171,10 +171,11 @@ def plan(session: Session) -> None:
     if session.as_json:
         render.as_json(view)
         return
-    if view["goal"]:
-        click.echo(f"goal {view['id']}  {view['goal']}  {view['kind']}")
-    steps = [{**row, "action": row["told"], "why": row["told_why"]} for row in view["steps"]]
-    table(steps, ["step", "action", "state", "why"], empty="no plan")
+    for one in (view, *view["beside"]):
+        if one["goal"]:
+            click.echo(f"goal {one['id']}  {one['goal']}  {one['kind']}")
+        steps = [{**row, "action": row["told"], "why": row["told_why"]} for row in one["steps"]]
+        table(steps, ["step", "action", "state", "why"], empty="no plan")
 
 
 @click.command()

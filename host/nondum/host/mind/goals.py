@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -23,7 +23,7 @@ class GoalState(Enum):
     QUEUED = "queued"
     """Waits for its turn, or for its first plan."""
     ACTIVE = "active"
-    """Its plan is carried out, or held."""
+    """Its plan is carried out, or held, perhaps beside those of other goals."""
     SUSPENDED = "suspended"
     """There is no plan as things are; it is tried again when something new is known."""
     REACHED = "reached"
@@ -148,16 +148,10 @@ class GoalQueue:
                 restored.append(goal)
         return tuple(restored)
 
-    def wanted(self, is_worth_a_try: Callable[[GivenGoal], bool]) -> GivenGoal | None:
-        """The most urgent goal that is not over. Suspended ones count if they are worth a try."""
-        candidates = [
-            goal
-            for goal in self._goals.values()
-            if not goal.state.is_final
-            and goal.state is not GoalState.KEPT
-            and (goal.state is not GoalState.SUSPENDED or is_worth_a_try(goal))
-        ]
-        return min(candidates, key=urgency, default=None)
+    def open(self) -> tuple[GivenGoal, ...]:
+        """The goals that are not over and mean something, the most urgent first."""
+        over = (GoalState.REACHED, GoalState.HALTED, GoalState.KEPT)
+        return tuple(sorted((g for g in self if g.state not in over), key=urgency))
 
     def put(
         self, id: str, state: GoalState, reason: str = "", problems: tuple[Problem, ...] = ()
@@ -168,18 +162,14 @@ class GoalQueue:
             goal = self._goals[id] = replace(goal, state=state, reason=reason, problems=problems)
         return goal
 
-    def activate(self, id: str) -> tuple[GivenGoal, ...]:
-        """Make a goal the active one. Gives the goals to maintain that it replaces."""
-        active = self.put(id, GoalState.ACTIVE)
-        replaced = []
-        for goal in self:
-            if goal.id == id or goal.state.is_final:
-                continue
-            if goal.state is GoalState.ACTIVE:
-                self.put(goal.id, GoalState.QUEUED, f"waits for goal {id}")
-            if is_replaced(goal, active):
-                replaced.append(self.put(goal.id, GoalState.HALTED, f"replaced by goal {id}"))
-        return tuple(replaced)
+    def put_aside(self, id: str, behind: str, shared: str = "") -> GivenGoal:
+        """Have a goal wait for another one, with which it shares something; a goal to maintain that
+        a newer one takes the place of is over."""
+        goal = self._goals[id]
+        if is_replaced(goal, self._goals[behind]):
+            return self.put(id, GoalState.HALTED, f"replaced by goal {behind}")
+        why = f": both need {shared}" if shared else ""
+        return self.put(id, GoalState.QUEUED, f"waits for goal {behind}{why}")
 
     def _forget_oldest(self) -> None:
         ended = [goal.id for goal in self._goals.values() if goal.state.is_final]
@@ -188,7 +178,8 @@ class GoalQueue:
 
 
 def is_replaced(goal: GivenGoal, by: GivenGoal) -> bool:
-    """Whether a newer goal to maintain takes the place of an older one."""
+    """Whether a newer goal to maintain takes the place of an older one that it cannot be kept
+    beside."""
     return (
         goal.kind == by.kind == "maintain"
         and goal.priority <= by.priority

@@ -204,13 +204,12 @@ class Mind:
                 self.queue.put(goal.id, GoalState.HALTED, why)
                 self._emit(GoalEnded(goal.id, why))
                 self.people.tell(f"goal {goal.id} is halted: {goal.text}")
-        current = self.pursuit.current
-        is_over = current is not None and self.queue[current.goal].state.is_final
-        running = tuple(run.step.name for run in self.runner) if now or is_over else ()
-        if now or is_over:
-            self.pursuit.drop(why)
         if now:
+            running = tuple(run.step.name for run in self.runner)
+            self.pursuit.drop(why)
             self.runner.halt_all()
+        else:
+            running = self.pursuit.drop_ended(why)
         self.wake()
         return running
 
@@ -240,7 +239,7 @@ class Mind:
                     async with self._viewers:
                         self._viewers.notify_all()
                 with contextlib.suppress(TimeoutError):
-                    async with asyncio.timeout(BUSY_S if self.pursuit.current else IDLE_S):
+                    async with asyncio.timeout(BUSY_S if self.pursuit.pursued else IDLE_S):
                         await self._news.wait()
                 await asyncio.sleep(max(0.0, earliest_s - loop.time()))
         finally:
@@ -279,7 +278,7 @@ class Mind:
             monitor=Duty("monitor", self._monitor),
             world_model=Duty("world model", self._believe),
             goals=Duty("goals", self._choose),
-            task=TaskSlot(lambda: self.pursuit.tree, Hold(self._waits_for)),
+            task=TaskSlot(lambda: self.pursuit.trees, Hold(self._waits_for)),
             people=Duty("people", lambda: f"{self.people.last_number} sentences told"),
         )
 
@@ -313,13 +312,13 @@ class Mind:
 
     def _choose(self) -> str:
         self.pursuit.step()
-        current = self.pursuit.current
-        return f"goal {current.goal}: {self.queue[current.goal].text}" if current else ""
+        goals = (self.queue[one.goal] for one in self.pursuit.pursued)
+        return "; ".join(f"goal {goal.id}: {goal.text}" for goal in goals)
 
     def _waits_for(self) -> str:
         if self.pursuit.is_searching:
             return "a plan is being searched for"
-        if self.pursuit.current is not None:
+        if self.pursuit.pursued:
             return "another plan is needed"
         open_goals = [goal for goal in self.queue if not goal.state.is_final]
         return "; ".join(f"goal {g.id} is {g.state.value}: {g.reason}" for g in open_goals)

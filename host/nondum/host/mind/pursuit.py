@@ -1,6 +1,7 @@
-"""The pursuit of goals: which one, by which plan, and what happens when the world says otherwise.
+"""The pursuit of goals: which, by which plans, and what happens when the world says otherwise.
 
-One goal is pursued at a time. While another plan is searched for, the tree at hand goes on as far
+Goals whose plans take nothing from each other are pursued side by side; of others the more urgent
+one goes first. While another plan is searched for, one at a time, the tree at hand goes on as far
 as it can by itself; it is replaced between two ticks, and what runs and is still needed runs on.
 """
 
@@ -8,8 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Mapping
 
 from nondum.host.catalogue.records import ComponentState
 from nondum.host.events import Emit, GoalEnded, GoalReached, PlanMade, PlanMissing
@@ -17,16 +17,19 @@ from nondum.host.mind import short_names
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.diagnosis import Seen, seen_in
-from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState
+from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState, is_replaced, urgency
 from nondum.host.mind.people import People
 from nondum.host.mind.planners import Planners
+from nondum.host.mind.pursued import Pursued, conflicts
 from nondum.host.mind.runner import BehaviourRunner
-from nondum.host.mind.search import NoPlan, Past, Planned, Situation, search, task_of
+from nondum.host.mind.search import search, task_of
+from nondum.host.mind.situation import NoPlan, Others, Outcome, Past, Planned, Situation, Waits
 from nondum.planning.attempts import Attempts, Patience, Setbacks
 from nondum.planning.goal import parse_goal
 from nondum.planning.plain import plain
 from nondum.planning.replay import beginning_at, replayed
 from nondum.planning.running import Run
+from nondum.planning.side_by_side import Reservation
 from nondum.planning.task_control import Phase, TaskControl
 from nondum.planning.task_tree import TaskTree
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
@@ -35,30 +38,8 @@ from nondum.sdk.planner import GroundTask, Plan
 log = logging.getLogger(__name__)
 
 
-@dataclass(slots=True)
-class Current:
-    """The goal that is being pursued, and how."""
-
-    goal: str
-    """Its id."""
-    task: GroundTask
-    plan: Plan
-    tree: TaskTree
-    is_outdated: bool = False
-    """The plan does not fit the components that are here now."""
-    phase: Phase = Phase.UNDER_WAY
-    """As people were last told."""
-    trouble: str = ""
-    """What is tried again, and why, as the goal's reason was last said to be."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The names of the plan's actions."""
-        return tuple(self.task.actions[step].name for step in self.plan.steps)
-
-
 class Pursuit:
-    """Keeps the most urgent goal that can be had in a task tree."""
+    """Keeps the goals that can be had, the most urgent ones first, each in a task tree."""
 
     def __init__(
         self,
@@ -76,7 +57,7 @@ class Pursuit:
     ) -> None:
         """`wake` asks for a tick: a search has ended."""
         self.queue = queue
-        self.current: Current | None = None
+        self._pursued: dict[str, Pursued] = {}
         self._beliefs = beliefs
         self._runner = runner
         self._planners = planners
@@ -90,18 +71,26 @@ class Pursuit:
         self._seen: tuple[Seen, ...] = ()
         self._left_out: dict[str, Problem] = {}
         self._failures: dict[str, str] = {}
-        self._search: asyncio.Task[Planned | NoPlan] | None = None
+        self._search: asyncio.Task[Outcome] | None = None
         self._searched_for: Situation | None = None
         self._tried: dict[int, Situation] = {}
         """By the number of a goal: one that is given again under its id was not tried yet."""
         self._excluded_until_s: dict[str, float] = {}
         self.setbacks = Setbacks()
         self._left_over: tuple[Run, ...] = ()
+        self._facts: dict[frozenset[str], frozenset[str]] = {}
+        """Actions that go on → what holds then, at one revision of the world."""
+        self._facts_of = -1
 
     @property
-    def tree(self) -> TaskTree | None:
-        """The task tree to tick, if a goal is pursued."""
-        return self.current.tree if self.current else None
+    def pursued(self) -> tuple[Pursued, ...]:
+        """The goals that are pursued now, the most urgent first."""
+        return tuple(sorted(self._pursued.values(), key=lambda one: urgency(self.queue[one.goal])))
+
+    @property
+    def trees(self) -> tuple[TaskTree, ...]:
+        """The task trees to tick."""
+        return tuple(one.tree for one in self.pursued)
 
     @property
     def seen(self) -> tuple[Seen, ...]:
@@ -116,8 +105,8 @@ class Pursuit:
     @property
     def runs(self) -> tuple[Run, ...]:
         """All that was started and has not been seen to end, of this plan and of those before."""
-        current = tuple(self.current.tree.control.runs.values()) if self.current else ()
-        return (*current, *self._left_over)
+        current = (run for one in self.pursued for run in one.tree.control.runs.values())
+        return _once((*current, *self._left_over))
 
     @property
     def failures(self) -> dict[str, str]:
@@ -127,11 +116,16 @@ class Pursuit:
     @property
     def troubles(self) -> dict[str, str]:
         """Actions that fail and are tried again, or are left out for it, and how they failed."""
-        control = self.current.tree.control if self.current else None
-        attempts = control.attempts if control else Attempts(self._patience, self.setbacks)
-        well = control.steady(self._now_s()) if control else ()
-        failing = (name for name in attempts.troubled() if name not in well)
-        return {name: why for name in failing if (why := attempts.trouble(name))}
+        controls = [one.tree.control for one in self.pursued]
+        well = {name for control in controls for name in control.steady(self._now_s())}
+        attempts = [control.attempts for control in controls]
+        attempts = attempts or [Attempts(self._patience, self.setbacks)]
+        return {
+            name: why
+            for one in attempts
+            for name in one.troubled()
+            if name not in well and (why := one.trouble(name))
+        }
 
     @property
     def is_searching(self) -> bool:
@@ -147,19 +141,22 @@ class Pursuit:
     # Between ticks
 
     def step(self) -> None:
-        """Draw the conclusions of the last tick, and see to a plan for what is wanted most."""
+        """Draw the conclusions of the last tick, and see to plans for what is wanted."""
         self._left_over = tuple(r for r in self._left_over if not r.action.state.has_ended)
-        self._conclude()
+        for one in self.pursued:
+            self._conclude(one)
         self._take_found()
         if self._composition is None:
             return
-        wanted = self.queue.wanted(lambda g: self._tried.get(g.number) != self._situation(g.id))
-        if self.current and (wanted is None or self.queue[self.current.goal].state.is_final):
-            self.drop("its goal is over")
-        if wanted is None:
-            self._cancel_search()
-        elif not self._is_on_its_way(wanted):
-            self._start_search(wanted)
+        self.drop_ended("its goal is over")
+        for goal in self.queue.open():
+            if self._is_on_its_way(goal):
+                continue
+            if not self._is_searched_for(goal):
+                self._start_search(goal)
+            if self._search is not None:
+                return
+        self._cancel_search()
 
     def adopt(self, composition: Composition) -> None:
         """Go on with the plan in a new composition if it still works there."""
@@ -171,21 +168,29 @@ class Pursuit:
             self.setbacks.clear()
         self._composition = composition
         self._seen = seen_in(composition.snapshot)
-        current = self.current
-        if current is None:
-            return
-        kept = self._replayed(composition, current)
-        if kept is None:
-            current.is_outdated = True
-        else:
-            self._grow(current.goal, *kept, phase=current.phase)
+        for one in self.pursued:
+            kept = self._replayed(composition, one)
+            if kept is None:
+                one.is_outdated = True
+            else:
+                self._grow(one.goal, *kept, phase=one.phase)
+        for goal in conflicts(self.pursued):
+            self._pursued[goal].is_outdated = True
 
-    def drop(self, because: str) -> None:
-        """Stop pursuing: everything that runs is halted."""
-        if self.current is not None:
-            self.current.tree.halt(because)
-            self._left_over += self.current.tree.release()
-            self.current = None
+    def drop(self, because: str, goal: str | None = None) -> tuple[str, ...]:
+        """Stop pursuing a goal, or all: everything that runs for it is halted. Gives its names."""
+        dropped = [one for one in self.pursued if goal in (None, one.goal)]
+        runs = [run for one in dropped for run in one.tree.control.runs.values()]
+        for one in dropped:
+            one.tree.halt(because)
+            self._left_over = _once((*self._left_over, *one.tree.release()))
+            del self._pursued[one.goal]
+        return tuple(run.step.name for run in _once(runs))
+
+    def drop_ended(self, because: str) -> tuple[str, ...]:
+        """Stop pursuing goals that are over. Gives the names of what is halted."""
+        over = [one.goal for one in self.pursued if self.queue[one.goal].state.is_final]
+        return tuple(name for goal in over for name in self.drop(because, goal))
 
     async def close(self) -> None:
         """Stop searching and pursuing."""
@@ -196,27 +201,26 @@ class Pursuit:
 
     # What the last tick came to
 
-    def _conclude(self) -> None:
-        current = self.current
-        if current is None or not current.tree.control.decisions:  # not ticked yet
+    def _conclude(self, one: Pursued) -> None:
+        control = one.tree.control
+        if not control.decisions:  # not ticked yet
             return
-        control = current.tree.control
         phase = control.phase
-        if phase is not current.phase:
-            current.phase, current.trouble = phase, ""
-            self._tell_phase(current, phase)
+        if phase is not one.phase:
+            one.phase, one.trouble = phase, ""
+            self._tell_phase(one, phase)
         for name in control.steady(self._now_s()):
             control.attempts.effective(name)
-        if phase is Phase.UNDER_WAY and (trouble := control.trouble()) != current.trouble:
-            current.trouble = trouble
-            self.queue.put(current.goal, GoalState.ACTIVE, trouble)
+        if phase is Phase.UNDER_WAY and (trouble := control.trouble()) != one.trouble:
+            one.trouble = trouble
+            self.queue.put(one.goal, GoalState.ACTIVE, trouble)
         if phase is Phase.REACHED:
-            self.queue.put(current.goal, GoalState.REACHED, "it holds")
-            self._emit(GoalReached(current.goal))
-            self.drop("the goal is reached")
+            self.queue.put(one.goal, GoalState.REACHED, "it holds")
+            self._emit(GoalReached(one.goal))
+            self.drop("the goal is reached", one.goal)
 
-    def _tell_phase(self, current: Current, phase: Phase) -> None:
-        goal = self.queue[current.goal]
+    def _tell_phase(self, one: Pursued, phase: Phase) -> None:
+        goal = self.queue[one.goal]
         if phase is Phase.REACHED:
             self._people.tell(f"goal {goal.id} is reached: {goal.text}")
         elif phase is Phase.HOLDING:
@@ -224,7 +228,7 @@ class Pursuit:
             self._people.tell(f"goal {goal.id} holds and is kept so: {goal.text}")
         elif phase is Phase.UNDER_WAY:
             self.queue.put(goal.id, GoalState.ACTIVE, "")
-        elif why := current.tree.needs_replan:
+        elif why := one.tree.needs_replan:
             self.queue.put(goal.id, GoalState.ACTIVE, f"another plan is needed: {why}")
             self._people.tell(f"goal {goal.id} needs another plan: {why}")
 
@@ -232,19 +236,50 @@ class Pursuit:
 
     def _situation(self, goal: str) -> Situation:
         revision = self._composition.revision if self._composition else 0
-        return Situation(goal, revision, self._beliefs.world.bare_facts, self.excluded)
+        world = self._beliefs.world
+        return Situation(goal, revision, world.bare_facts, self.excluded, self._others(goal))
 
-    def _is_on_its_way(self, wanted: GivenGoal) -> bool:
-        """Whether a goal has a plan that goes on, or will have one soon."""
-        current = self.current
-        if current is not None and current.goal == wanted.id:
-            self._exclude(current.tree.control)
-            if not current.is_outdated and current.tree.needs_replan is None:
-                self._cancel_search()
-                return True
-        return self._searched_for is not None and self._searched_for.is_like(
-            self._situation(wanted.id)
+    def _others(self, goal: str) -> Others:
+        others = [one for one in self.pursued if one.goal != goal]
+        if not others:
+            return Others()
+        mine = urgency(self.queue[goal])
+        firm = [one for one in others if urgency(self.queue[one.goal]) < mine]
+        yielding = [one for one in others if one not in firm]
+        return Others(
+            tuple(one.reservation for one in firm),
+            tuple(one.reservation for one in yielding),
+            self._facts_with(firm),
+            self._facts_with(others),
         )
+
+    def _facts_with(self, others: Iterable[Pursued]) -> frozenset[str]:
+        """What holds while other goals are pursued, and nothing else runs."""
+        world = self._beliefs.world
+        if self._facts_of != world.revision:
+            self._facts_of = world.revision
+            self._facts.clear()
+        runs = (run for one in others for run in one.tree.control.runs.values())
+        going_on = frozenset(run.step.name for run in runs if not run.is_halting)
+        if going_on not in self._facts:
+            ended = {run.step.name for run in self.runs} - going_on
+            self._facts[going_on] = world.facts_without(ended)
+        return self._facts[going_on]
+
+    def _is_on_its_way(self, goal: GivenGoal) -> bool:
+        """Whether a goal has a plan that goes on, or nothing new is known since none was found."""
+        if one := self._pursued.get(goal.id):
+            self._exclude(one.tree.control)
+            return not one.is_outdated and one.tree.needs_replan is None
+        tried = self._tried.get(goal.number)
+        if tried is None:
+            return False
+        now = self._situation(goal.id)
+        return tried == now if goal.state is GoalState.SUSPENDED else tried.is_like(now)
+
+    def _is_searched_for(self, goal: GivenGoal) -> bool:
+        asked = self._searched_for
+        return asked is not None and asked.is_like(self._situation(goal.id))
 
     def _exclude(self, control: TaskControl) -> None:
         now_s = self._now_s()
@@ -278,7 +313,8 @@ class Pursuit:
 
     def _give_up_plan(self, wanted: GivenGoal) -> None:
         """The plan at hand is stuck, and nothing new is known that another could be made of."""
-        why = self.current.tree.needs_replan if self.current else None
+        one = self._pursued.get(wanted.id)
+        why = one.tree.needs_replan if one else None
         problem = Problem("PLAN_STUCK", why or "its plan does not go on", where=f"goal {wanted.id}")
         self._suspend(NoPlan(self._situation(wanted.id), (problem,)))
 
@@ -300,6 +336,8 @@ class Pursuit:
         self._note_left_out(found.left_out)
         if isinstance(found, NoPlan):
             self._suspend(found)
+        elif isinstance(found, Waits):
+            self._wait(found)
         elif self._still_works(found):
             self._take_up(found)
         else:
@@ -311,9 +349,7 @@ class Pursuit:
                 self._people.tell(f"{component} is kept out of planning: {problem}")
         self._left_out = dict(left_out)
 
-    def _outcome(
-        self, search: asyncio.Task[Planned | NoPlan], asked: Situation
-    ) -> Planned | NoPlan:
+    def _outcome(self, search: asyncio.Task[Outcome], asked: Situation) -> Outcome:
         """What a search came to; a fault in planning is contained, and told like a missing plan."""
         error = search.exception()
         if error is None:
@@ -324,14 +360,15 @@ class Pursuit:
 
     def _still_works(self, found: Planned) -> bool:
         assert self._composition is not None  # there was a search
-        lasting, believed = self._composition.merged.lasting(), self._beliefs.world.bare_facts
+        beside = {other.goal for other in found.beside}
+        believed = self._facts_with(one for one in self.pursued if one.goal in beside)
+        lasting = self._composition.merged.lasting()
         return replayed(found.task, found.names, believed, lasting) is not None
 
     def _suspend(self, found: NoPlan) -> None:
         goal = self.queue[found.situation.goal]
         self._tried[goal.number] = found.situation
-        if self.current is not None and self.current.goal == goal.id:
-            self.drop("there is no plan any more")
+        self.drop("there is no plan any more", goal.id)
         if goal.state is not GoalState.SUSPENDED or goal.problems != found.problems:
             words = "; ".join(problem.message for problem in found.problems)
             fixes = "; ".join(problem.fix for problem in found.problems if problem.fix)
@@ -340,18 +377,34 @@ class Pursuit:
         reason = found.problems[0].message
         self.queue.put(goal.id, GoalState.SUSPENDED, reason, found.problems)
 
+    def _wait(self, found: Waits) -> None:
+        goal = self.queue[found.situation.goal]
+        self.drop("more urgent goals need what it uses", goal.id)
+        newer = (id for id in found.behind if is_replaced(goal, self.queue[id]))
+        first = next(newer, next(iter(found.behind)))
+        self._put_aside(goal.id, first, found.behind[first])
+
+    def _put_aside(self, goal: str, behind: str, shared: str) -> None:
+        was = self.queue[goal]
+        now = self.queue.put_aside(goal, behind, shared)
+        if (was.state, was.reason) != (now.state, now.reason):
+            self._people.tell(f"goal {now.id} {_WAITS[now.state]}{now.reason}: {now.text}")
+        if now.state.is_final:
+            self._emit(GoalEnded(now.id, now.reason))
+
     # Taking up a plan
 
     def _take_up(self, found: Planned) -> None:
         goal = self.queue[found.situation.goal]
         reason = self._why_another_plan(goal.id)
-        if self.current is not None and self.current.goal != goal.id:
-            put_aside = self.queue[self.current.goal].number
-            self._tried.pop(put_aside, None)  # it is put aside, not given up
-        for replaced in self.queue.activate(goal.id):
-            self._people.tell(f"goal {replaced.id} is {replaced.reason}: {replaced.text}")
-            self._emit(GoalEnded(replaced.id, replaced.reason))
-        self._grow(goal.id, found.task, found.plan)
+        handed_over: list[Run] = []
+        for id, shared in found.puts_aside.items():
+            if one := self._pursued.pop(id, None):
+                handed_over += one.tree.release()
+                self._tried.pop(self.queue[id].number, None)  # it is put aside, not given up
+                self._put_aside(id, goal.id, shared)
+        self.queue.put(goal.id, GoalState.ACTIVE)
+        self._grow(goal.id, found.task, found.plan, runs=handed_over)
         called = short_names.steps(found.names, {})
         steps = ", then ".join(called.values()) or "nothing to do"
         because = f", because {reason}" if reason else ""
@@ -359,17 +412,25 @@ class Pursuit:
         self._emit(PlanMade(goal.id, found.situation.revision, found.names, reason))
 
     def _why_another_plan(self, goal: str) -> str:
-        if self.current is None or self.current.goal != goal:
-            return ""
-        return self.current.tree.needs_replan or "the components changed"
+        one = self._pursued.get(goal)
+        return (one.tree.needs_replan or "the components changed") if one else ""
 
     def _grow(
-        self, id: str, task: GroundTask, plan: Plan, *, phase: Phase = Phase.UNDER_WAY
+        self,
+        id: str,
+        task: GroundTask,
+        plan: Plan,
+        *,
+        phase: Phase = Phase.UNDER_WAY,
+        runs: Collection[Run] = (),
     ) -> None:
-        """Put the tree of a plan in the place of the present one."""
+        """Put the tree of a plan in the place of the present one of that goal; `runs` are those of
+        goals that are put aside."""
         assert self._composition is not None  # there is a task
-        runs = self.current.tree.release() if self.current else ()
-        goal = self.queue[id]
+        before = self._pursued.get(id)
+        halting = [run for run in self.runs if run.is_halting]  # units may not be free before
+        own = before.tree.release() if before else ()
+        goal, exclusive = self.queue[id], self._composition.exclusive
         tree = TaskTree(
             task,
             plan,
@@ -377,31 +438,38 @@ class Pursuit:
             runner=self._runner,
             kind=goal.kind,
             sight=lambda: (self._beliefs.world, self._now_s()),
-            exclusive=self._composition.exclusive,
-            runs=(*runs, *self._left_over),
+            exclusive=exclusive,
+            runs=_once((*own, *runs, *halting)),
             patience=self._patience,
             setbacks=self.setbacks,
             name=f"goal {goal.id}",
         )
-        self._left_over = ()
-        self.current = Current(goal.id, task, plan, tree, phase=phase)
+        kept = tree.control.regression
+        reservation = Reservation.of(id, kept.steps, kept.goal, exclusive)
+        self._pursued[id] = Pursued(id, task, plan, tree, reservation, phase=phase)
 
-    def _replayed(
-        self, composition: Composition, current: Current
-    ) -> tuple[GroundTask, Plan] | None:
+    def _replayed(self, composition: Composition, one: Pursued) -> tuple[GroundTask, Plan] | None:
         """The plan in the new composition, if what is left of it still reaches the goal there."""
-        given = self.queue[current.goal]
+        given = self.queue[one.goal]
         try:
             goal = parse_goal(given.pddl, composition.merged, kind=given.kind)
         except GoalRefused:
             return None
         try:
-            task = task_of(composition, goal, self._situation(current.goal))
+            task = task_of(composition, goal, self._situation(one.goal))
         except FragmentRefused:  # too many ways: the plan at hand goes on, guarded as before
-            task = current.task
+            task = one.task
         believed = self._beliefs.world.facts
-        plan = replayed(task, current.names, believed, composition.merged.lasting())
+        plan = replayed(task, one.names, believed, composition.merged.lasting())
         return None if plan is None else plain(beginning_at(task, believed), plan)
+
+
+_WAITS = {GoalState.QUEUED: "", GoalState.HALTED: "is "}
+
+
+def _once(runs: Iterable[Run]) -> tuple[Run, ...]:
+    """Each run once: those that are being halted are known to every tree."""
+    return tuple({id(run): run for run in runs}.values())
 
 
 def _parts(composition: Composition) -> tuple[object, ...]:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeAlias
 
 from nondum.host.mind.composition import Composition
-from nondum.host.mind.diagnosis import Seen, why_not, words_gone
+from nondum.host.mind.diagnosis import why_not, words_gone
 from nondum.host.mind.goals import GivenGoal
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.silence import Silence
+from nondum.host.mind.situation import NoPlan, Outcome, Past, Planned, Situation, Waits
 from nondum.planning.bounds import INSTANCES_LIMIT
 from nondum.planning.cutting import cut_short
 from nondum.planning.domain import Merged
@@ -21,74 +24,17 @@ from nondum.planning.oversize import Fitted, fitted
 from nondum.planning.pddl_text import pddl_text
 from nondum.planning.plain import plain
 from nondum.planning.pricing import at_own_cost, handicaps, priced
+from nondum.planning.side_by_side import Reservation, conflicting, kept_clear
+from nondum.planning.step import steps_of, words
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
 from nondum.sdk.planner import AlreadyTrue, GaveUp, GroundTask, Plan, Unsolvable
 
+BESIDE_S = 2.0
+"""How long a plan is searched for that leaves those of other goals alone."""
 AT_ONCE = 2_000
 """Ground actions that the loop can spare the time for: some tens of milliseconds."""
 SMALL = 20
 """Up to so many components, grounding takes less of the loop than a thread's switching does."""
-
-
-@dataclass(frozen=True, slots=True)
-class Situation:
-    """What a search depends on: the same situation gives the same answer."""
-
-    goal: str
-    """Id of the goal."""
-    revision: int
-    facts: frozenset[str]
-    """What holds when no lasting behaviour runs."""
-    excluded: frozenset[str]
-    """Actions that failed too often to be planned with for now."""
-
-    def is_like(self, other: Situation) -> bool:
-        """Whether only facts differ: a search goes on, and its plan is checked when it comes."""
-        return (self.goal, self.revision, self.excluded) == (
-            other.goal,
-            other.revision,
-            other.excluded,
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class Planned:
-    """A plan for a goal, in the task that it is valid in."""
-
-    situation: Situation
-    task: GroundTask
-    plan: Plan
-    planner: str = ""
-    took_s: float = 0.0
-    left_out: Mapping[str, Problem] = field(default_factory=dict)
-    """Components that were not planned with, for they have too many ways to act."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The names of the steps' actions."""
-        return tuple(self.task.actions[step].name for step in self.plan.steps)
-
-
-@dataclass(frozen=True, slots=True)
-class NoPlan:
-    """There is none, or none was found; the problems say why."""
-
-    situation: Situation
-    problems: tuple[Problem, ...]
-    left_out: Mapping[str, Problem] = field(default_factory=dict)
-    """Components that were not planned with, for they have too many ways to act."""
-
-
-@dataclass(frozen=True, slots=True)
-class Past:
-    """What is remembered from before a search."""
-
-    seen: tuple[Seen, ...] = ()
-    """The components that were here: they may bring what is missing."""
-    failures: Mapping[str, str] = field(default_factory=dict)
-    """Actions that are excluded, and how they failed."""
-    left_out: Mapping[str, Problem] = field(default_factory=dict)
-    """Components that are known to have too many ways to act."""
 
 
 def task_of(
@@ -110,68 +56,117 @@ async def search(
     *,
     deadline_s: float,
     past: Past | None = None,
-) -> Planned | NoPlan:
+) -> Outcome:
     """Find a plan, or say why there is none.
 
-    A component with too many ways to act is left out of the task, and told of in the answer.
+    It leaves the plans of other goals alone where that can be, else those of more urgent ones. A
+    component with too many ways to act is left out of the task, and told of in the answer.
     """
-    past = past or Past()
-    try:
-        goal = parse_goal(given.pddl, composition.merged, kind=given.kind)
-    except GoalRefused as refused:
-        gone = await asyncio.to_thread(words_gone, composition.merged, given.pddl, past.seen)
-        return NoPlan(situation, gone or refused.problems)
-    try:
-        fit = await _task_of_any_size(composition, goal, situation, past.left_out)
-    except FragmentRefused as refused:
-        return NoPlan(situation, refused.problems)
-    found = await _searched(planners, composition, goal, situation, deadline_s, past, fit)
-    return replace(found, left_out=fit.left_out)
+    searching = _Searching(planners, composition, given, past or Past())
+    found = await searching.plan(situation, deadline_s)
+    others, exclusive = situation.others, composition.exclusive
+    if isinstance(found, NoPlan) or not others.all:
+        return found
+    in_the_way = searching.shared(found, others.all)
+    if not in_the_way:
+        return found
+    firm = frozenset(other.goal for other in others.firm)
+    ways = [(others.all, others.with_all)]
+    if others.yielding and firm & in_the_way.keys():
+        ways.append((others.firm, others.with_firm))
+    for beside, facts in ways:
+        there, time_s = replace(situation, facts=facts), min(deadline_s, BESIDE_S)
+        narrowed = partial(kept_clear, others=beside, exclusive=exclusive)
+        another = await searching.plan(there, time_s, narrowed)
+        if isinstance(another, Planned) and not searching.shared(another, beside):
+            aside = searching.shared(another, others.yielding)
+            return replace(another, situation=situation, beside=beside, puts_aside=aside)
+    behind = {goal: what for goal, what in in_the_way.items() if goal in firm}
+    if behind:
+        return Waits(situation, behind, found.left_out)
+    return replace(found, puts_aside=in_the_way)
 
 
-async def _searched(
-    planners: Planners,
-    composition: Composition,
-    goal: Goal,
-    situation: Situation,
-    deadline_s: float,
-    past: Past,
-    fit: Fitted[GroundTask | None],
-) -> Planned | NoPlan:
-    task, too_big = fit.made, tuple(fit.left_out.values())
-    if task is None:
-        return NoPlan(situation, too_big)
-    handicap = handicaps(composition.contributions, composition.host)
-    found = await planners.plan(
-        priced(task, handicap),
-        deadline_s,
-        lambda: pddl_text(fit.merged, situation.facts, goal.expr),
-    )
-    match found.answer:
-        case AlreadyTrue():
-            task, nothing = plain(task, Plan((), 0))
-            return Planned(situation, task, nothing, took_s=found.took_s)
-        case Plan() as dear:
-            task, plan = plain(task, at_own_cost(task, dear))
-            if problem := cut_short(composition.merged, task, plan):
-                return NoPlan(situation, (problem,))
-            return Planned(situation, task, plan, found.planner, found.took_s)
-        case GaveUp(why):
-            message = f"it is not known whether there is a plan: {why}"
-            fix = "ask again with a longer planning.deadline_s, or for less"
-            return NoPlan(situation, (Problem("NO_ANSWER", message, fix=fix), *too_big))
-        case Unsolvable():
-            failures = {name: past.failures.get(name, "") for name in situation.excluded}
-            problems = await asyncio.to_thread(
-                why_not,
-                fit.merged,
-                goal,
-                situation.facts,
-                past.seen,
-                failures,
-                Silence.of(composition.snapshot),
-            )
-            return NoPlan(situation, (*problems, *too_big))
+_Narrowing: TypeAlias = Callable[[GroundTask], GroundTask]
+
+
+@dataclass(frozen=True, slots=True)
+class _Searching:
+    """Searches for plans for one goal."""
+
+    planners: Planners
+    composition: Composition
+    given: GivenGoal
+    past: Past
+
+    async def plan(
+        self, situation: Situation, deadline_s: float, narrowed: _Narrowing | None = None
+    ) -> Planned | NoPlan:
+        """One search. Why there is no plan in a narrowed task is not asked."""
+        merged, given = self.composition.merged, self.given
+        try:
+            goal = parse_goal(given.pddl, merged, kind=given.kind)
+        except GoalRefused as refused:
+            gone = await asyncio.to_thread(words_gone, merged, given.pddl, self.past.seen)
+            return NoPlan(situation, gone or refused.problems)
+        try:
+            left_out = self.past.left_out
+            fit = await _task_of_any_size(self.composition, goal, situation, left_out)
+        except FragmentRefused as refused:
+            return NoPlan(situation, refused.problems)
+        too_big = tuple(fit.left_out.values())
+        if fit.made is None:
+            return NoPlan(situation, too_big, fit.left_out)
+        task = narrowed(fit.made) if narrowed else fit.made
+        found = await self._answered(task, fit.merged, goal, situation, deadline_s)
+        if isinstance(found, Planned):
+            return replace(found, left_out=fit.left_out)
+        problems = found.problems if found else ()
+        if found is None and narrowed is None:
+            problems = await self._why_not(fit.merged, goal, situation)
+        return NoPlan(situation, (*problems, *too_big), fit.left_out)
+
+    def shared(self, plan: Planned, others: Iterable[Reservation]) -> dict[str, str]:
+        """Goal → what its plan shares with this one, of those that cannot be beside it."""
+        steps = steps_of(plan.task, plan.plan, self.composition.merged.lasting())
+        goal = words(plan.task, plan.task.goal)
+        exclusive = self.composition.exclusive
+        return conflicting(Reservation.of(self.given.id, steps, goal, exclusive), others)
+
+    async def _answered(
+        self, task: GroundTask, merged: Merged, goal: Goal, situation: Situation, deadline_s: float
+    ) -> Planned | NoPlan | None:
+        """What the planners say; None: there is no plan."""
+        handicap = handicaps(self.composition.contributions, self.composition.host)
+        found = await self.planners.plan(
+            priced(task, handicap),
+            deadline_s,
+            lambda: pddl_text(merged, situation.facts, goal.expr),
+        )
+        match found.answer:
+            case AlreadyTrue():
+                task, nothing = plain(task, Plan((), 0))
+                return Planned(situation, task, nothing, took_s=found.took_s)
+            case Plan() as dear:
+                task, plan = plain(task, at_own_cost(task, dear))
+                if problem := cut_short(self.composition.merged, task, plan):
+                    return NoPlan(situation, (problem,))
+                return Planned(situation, task, plan, found.planner, found.took_s)
+            case GaveUp(why):
+                message = f"it is not known whether there is a plan: {why}"
+                fix = "ask again with a longer planning.deadline_s, or for less"
+                return NoPlan(situation, (Problem("NO_ANSWER", message, fix=fix),))
+            case Unsolvable():
+                return None
+
+    async def _why_not(
+        self, merged: Merged, goal: Goal, situation: Situation
+    ) -> tuple[Problem, ...]:
+        failures = {name: self.past.failures.get(name, "") for name in situation.excluded}
+        silence = Silence.of(self.composition.snapshot)
+        return await asyncio.to_thread(
+            why_not, merged, goal, situation.facts, self.past.seen, failures, silence
+        )
 
 
 async def _task_of_any_size(

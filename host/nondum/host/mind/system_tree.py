@@ -8,7 +8,7 @@ not block.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TypeAlias
@@ -58,22 +58,23 @@ class Hold(Behaviour):
 
 
 class TaskSlot(Composite):
-    """Where the task tree sits. While there is none, or it is stuck, the slot holds."""
+    """Where the task trees sit, the most urgent first. While there is none, or all are stuck, the
+    slot holds."""
 
-    def __init__(self, tree: Callable[[], TaskTree | None], hold: Hold) -> None:
+    def __init__(self, trees: Callable[[], Sequence[TaskTree]], hold: Hold) -> None:
         super().__init__("task", [hold])
-        self._tree = tree
+        self._trees = trees
         self._hold = hold
 
     def tick(self) -> Iterator[Behaviour]:
-        """Swap the tree if there is another one now, and tick it; hold where that fails."""
-        tree = self._tree()
-        self._swap(tree)
-        status = Status.FAILURE
-        if tree is not None:
+        """Swap trees if there are others now, and tick them; hold where all fail."""
+        trees = tuple(self._trees())
+        self._swap(trees)
+        self.current_child = None
+        for tree in trees:
             yield from tree.tick()
-            status = tree.status
-        self.current_child = tree
+        status = _together([tree.status for tree in trees])
+        self.current_child = next((tree for tree in trees if tree.status is status), None)
         if status is Status.FAILURE:
             yield from self._hold.tick()
             status, self.current_child = self._hold.status, self._hold
@@ -84,15 +85,25 @@ class TaskSlot(Composite):
 
     def why(self) -> str:
         """Why the slot is where it is."""
-        tree = self._tree()
-        return tree.why() if tree is not None else self._hold.why()
+        return "; ".join(tree.why() for tree in self._trees()) or self._hold.why()
 
-    def _swap(self, tree: TaskTree | None) -> None:
-        for child in [c for c in self.children if c is not tree and c is not self._hold]:
+    def _swap(self, trees: Sequence[TaskTree]) -> None:
+        wanted: list[Behaviour] = [*trees, self._hold]
+        for child in [child for child in self.children if child not in wanted]:
             # What it ran was handed over or halted when it was replaced.
             self.remove_child(child)
-        if tree is not None and tree not in self.children:
-            self.insert_child(tree, 0)
+        for tree in trees:
+            if tree not in self.children:
+                self.add_child(tree)
+        self.children.sort(key=wanted.index)
+
+
+def _together(statuses: Sequence[Status]) -> Status:
+    """RUNNING if anything runs; else FAILURE if anything failed, or there is nothing."""
+    for status in (Status.RUNNING, Status.FAILURE):
+        if status in statuses:
+            return status
+    return Status.SUCCESS if statuses else Status.FAILURE
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +117,7 @@ class Parts:
     goals: Behaviour
     """Chooses the goal and sees to its plan."""
     task: Behaviour
-    """The slot of the task tree."""
+    """The slot of the task trees."""
     people: Behaviour
     """Tells people."""
 

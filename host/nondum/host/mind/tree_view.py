@@ -14,7 +14,8 @@ from py_trees.composites import Parallel, Selector, Sequence
 
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.goals import GoalQueue
-from nondum.host.mind.pursuit import Current, Pursuit
+from nondum.host.mind.pursued import Pursued
+from nondum.host.mind.pursuit import Pursuit
 from nondum.host.mind.runner import BehaviourRunner
 from nondum.planning.choice import Alternatives
 from nondum.planning.facts import parts
@@ -80,15 +81,14 @@ class TreeView:
             "left": control.rest.steps.bit_count(),
             "excluded": sorted(self._pursuit.excluded),
         }
-        if current := self._current(tree):
-            goal = self._queue[current.goal]
+        if one := self._pursued(tree):
+            goal = self._queue[one.goal]
             row |= {"id": goal.id, "goal": goal.pddl, "text": goal.text, "kind": goal.kind}
-            row["cost"] = current.plan.cost
+            row["cost"] = one.plan.cost
         return row
 
-    def _current(self, tree: TaskTree) -> Current | None:
-        current = self._pursuit.current
-        return current if current is not None and current.tree is tree else None
+    def _pursued(self, tree: TaskTree) -> Pursued | None:
+        return next((one for one in self._pursuit.pursued if one.tree is tree), None)
 
     # A step
 
@@ -196,10 +196,10 @@ class TreeView:
         if not isinstance(tree, TaskTree) or composition is None:
             return ()
         if self._choices is None or self._choices[0] is not tree:
-            current = self._current(tree)
-            if current is None:
+            one = self._pursued(tree)
+            if one is None:
                 return ()
-            found = Alternatives(current.task, lambda name: _kind(composition, name))
+            found = Alternatives(one.task, lambda name: _kind(composition, name))
             self._choices = tree, found.of_plan(tree.control.regression)
         return self._choices[1][leaf.index]
 

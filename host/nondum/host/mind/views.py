@@ -15,7 +15,8 @@ from nondum.host.mind.composition import Composition, own_objects
 from nondum.host.mind.frames import implausible
 from nondum.host.mind.goals import GoalQueue, GoalState
 from nondum.host.mind.people import People
-from nondum.host.mind.pursuit import Current, Pursuit
+from nondum.host.mind.pursued import Pursued
+from nondum.host.mind.pursuit import Pursuit
 from nondum.host.mind.runner import BehaviourRunner
 from nondum.host.mind.silence import Silence
 from nondum.host.mind.tree_view import Row, TreeView
@@ -60,16 +61,18 @@ class Views:
         )
 
     def plan(self) -> Row:
-        """The goal pursued, and each step of its plan: `step`, `action`, `state`, `why`, and the
-        last two as people are told them: `told` and `told_why`."""
-        current = self._mind.pursuit.current
-        if current is None:
-            return {"goal": None, "kind": None, "steps": []}
-        goal = self._mind.queue[current.goal]
+        """The most urgent goal that is pursued, and each step of its plan: `step`, `action`,
+        `state`, `why`, and the last two as people are told them: `told` and `told_why`; `beside`
+        has the same of goals that are pursued at the same time."""
+        first, *others = [self._plan(one) for one in self._mind.pursuit.pursued] or [_NO_PLAN]
+        return {**first, "beside": others}
+
+    def _plan(self, one: Pursued) -> Row:
+        goal = self._mind.queue[one.goal]
         running = {run.step.name: run for run in self._mind.runner}
-        called = self._called(current)
+        called = self._called(one)
         steps = []
-        for leaf in current.tree.children:
+        for leaf in one.tree.children:
             assert isinstance(leaf, StepLeaf)  # a task tree has no other children
             run = running.get(leaf.name)
             state = run.state.value if run else _STATES[leaf.status.value]
@@ -102,10 +105,9 @@ class Views:
 
     def given(self) -> list[Row]:
         """What was asked for; of goals that are reached, or kept up just now, `holds` is true."""
-        current = self._mind.pursuit.current
-        held = current.goal if current and current.phase is Phase.HOLDING else None
+        held = {one.goal for one in self._mind.pursuit.pursued if one.phase is Phase.HOLDING}
         return [
-            {**goal.to_dict(), "holds": goal.state is GoalState.REACHED or goal.id == held}
+            {**goal.to_dict(), "holds": goal.state is GoalState.REACHED or goal.id in held}
             for goal in self._mind.queue
         ]
 
@@ -131,17 +133,19 @@ class Views:
 
     def why(self) -> Row:
         """Why the robot does what it does, or cannot: `sentences` and `problems`."""
-        current = self._mind.pursuit.current
+        pursued = self._mind.pursuit.pursued
         sentences: list[str] = []
-        if current is not None:
-            goal = self._mind.queue[current.goal]
-            why = self._told(current.tree.why(), self._called(current))
+        for one in pursued:
+            goal = self._mind.queue[one.goal]
+            why = self._told(one.tree.why(), self._called(one))
             sentences.append(f"goal {goal.id}, {goal.text!r}: {why}")
-            sentences += [f"  {row['told']}: {row['told_why']}" for row in self.plan()["steps"]]
+            sentences += [f"  {row['told']}: {row['told_why']}" for row in self._plan(one)["steps"]]
         problems = []
         for goal in self._mind.queue:
-            if not goal.state.is_final and (current is None or goal.id != current.goal):
-                sentences.append(f"goal {goal.id}, {goal.text!r}, is {goal.state.value}")
+            if not goal.state.is_final and goal.id not in {one.goal for one in pursued}:
+                reason = self._told(goal.reason, {}) if goal.state is GoalState.QUEUED else ""
+                waits = f": {reason}" if reason else ""
+                sentences.append(f"goal {goal.id}, {goal.text!r}, is {goal.state.value}{waits}")
                 problems += [str(problem) for problem in goal.problems]
         return {
             "sentences": sentences or ["nothing is asked for"],
@@ -277,9 +281,9 @@ class Views:
         )
         return list(dict.fromkeys([*behaviour.phrases, *asked]))
 
-    def _called(self, current: Current) -> Mapping[str, str]:
+    def _called(self, one: Pursued) -> Mapping[str, str]:
         """What the steps of a plan are called."""
-        return short_names.steps((leaf.name for leaf in current.tree.children), self._mind.names)
+        return short_names.steps((leaf.name for leaf in one.tree.children), self._mind.names)
 
     def _told(self, text: str, called: Mapping[str, str]) -> str:
         return short_names.told(text, called, self._mind.names)
@@ -302,4 +306,5 @@ class Views:
         return [str(problem) for problem in self._mind.beliefs.world.conflicts()]
 
 
+_NO_PLAN: Row = {"goal": None, "kind": None, "steps": []}
 _STATES = {"SUCCESS": "done", "RUNNING": "running", "FAILURE": "failed", "INVALID": "to do"}
