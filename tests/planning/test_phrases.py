@@ -67,6 +67,13 @@ def test_free_words_bind_nothing(sentence: str) -> None:
     assert asked(goal) == ("maintain", "(following rover person)")
 
 
+def test_question_is_to_be_done_anew_each_time() -> None:
+    question = Phrase("where is {t:target}", "(bearing-known ?t self)", "do")
+    compton = replace(COMPTON, phrases=(question,))
+    goal = book(compton).goal("where is the radiation source")
+    assert asked(goal) == ("do", "(bearing-known radiation-source rover)")
+
+
 def test_finishing_behaviour_is_achieved() -> None:
     goal = book(saying(SPEAKER, "report {class}"), DETECTOR).goal("report people")
     assert asked(goal) == ("achieve", "(reported person rover)")

@@ -65,6 +65,14 @@ def test_silent_component_observes_and_runs_nothing(world: WorldModel) -> None:
     assert world.facts == {"free img", "ready cam", "scanned room"}
 
 
+def test_effects_that_are_withdrawn_leave_what_others_say(world: WorldModel) -> None:
+    world.succeed("go a b", "base", add=["at b", "tired"], delete=["at a"], at_s=1.0)
+    world.know("tired", "nurse", 2.0)
+    world.withdraw_effects(["at b", "tired", "unheard of"])
+    assert not world.holds("at b")
+    assert world.holds("tired")
+
+
 def test_succeeded_behaviour_is_believed(world: WorldModel) -> None:
     world.know("at a", "map", 0.0)
     world.succeed("go a b", "base", add=["at b"], delete=["at a"], at_s=1.0)

@@ -78,7 +78,7 @@ async def speak(ctx: Context, text: str) -> None:
 
 
 @behaviour("greet", action="(greet ?u - speaker ?h - host)", phrase="greet {h}")
-async def greet(ctx: Context, u: str, h: str) -> None:
+async def greet(ctx: Context, u: str, h: str) -> str:
     """Say hello once."""
     ctx.progress(0.5, "clearing the throat")
     ctx.output("words").send(Text(Header(frame_id=u), f"hello {h}"))
@@ -87,6 +87,7 @@ async def greet(ctx: Context, u: str, h: str) -> None:
     if h == "error":
         raise ZeroDivisionError("a mistake of the author")
     ctx.know("greeted", h)
+    return f"{h} was greeted"
 
 
 @behaviour("sing", action="(sing ?u - speaker ?o - text)", lasting=True)

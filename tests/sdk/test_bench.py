@@ -29,6 +29,11 @@ def test_finishing_behaviour_succeeds(bench: Bench) -> None:
     assert ("greeted", "robot") in bench.facts
 
 
+def test_text_that_a_behaviour_returns_is_its_answer(bench: Bench) -> None:
+    assert bench.behave("greet", u="mouth", h="robot").wait().answer == "robot was greeted"
+    assert bench.behave("await-hint", u="mouth").answer == ""
+
+
 def test_own_failure_keeps_its_words(bench: Bench) -> None:
     call = bench.behave("greet", u="mouth", h="nobody").assert_failed()
     assert call.problem is not None

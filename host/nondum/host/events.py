@@ -686,6 +686,7 @@ class BehaviourEnded(Event):
     outcome: str
     """`SUCCEEDED`, `FAILED` or `HALTED`."""
     reason: str = ""
+    """Why it failed or was halted; what it answered, if it succeeded."""
 
 
 @dataclass(frozen=True, slots=True)

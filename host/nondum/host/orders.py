@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
+from typing import cast, get_args
 
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.records import MountPose, PayloadRecord, Safety, Snapshot, Step
@@ -98,7 +98,7 @@ class Orders:
             return {"stopped": (await self.stop_all()).to_dict()}
         if words is not None and (answer := await self.answer(words)) is not None:
             return {"answer": answer}
-        kind = cast(GoalKind | None, arguments.choice("kind", "achieve", "maintain"))
+        kind = cast(GoalKind | None, arguments.choice("kind", *get_args(GoalKind)))
         highest = HIGHEST_PRIORITY
         priority = arguments.number("priority", 0, at_least=-highest, at_most=highest)
         said, understood = arguments.optional_text("said"), None

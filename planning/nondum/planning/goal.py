@@ -17,7 +17,9 @@ from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
 GoalExpr: TypeAlias = Condition
 """Facts that must hold, must not hold, and objects that must be equal or not; no variables."""
 
-GoalKind: TypeAlias = Literal["achieve", "maintain"]
+GoalKind: TypeAlias = Literal["achieve", "do", "maintain"]
+"""`achieve`: it is made true once. `do`: the same, from anew each time that it is asked for: what
+behaviours that have ended once made true of it does not count. `maintain`: it is kept true."""
 
 FILE = "goal"
 """Where problems with a goal's text are said to be."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import cast, get_args
 
 from nondum.planning.caret import Misplaced
 from nondum.planning.contribution import Contribution
@@ -75,7 +76,7 @@ def _known(pattern: str, source: Phrase | Action, by: Contribution, merged: Merg
         kind: GoalKind = "maintain" if source.lasting else "achieve"
     else:
         condition = _condition(source, parts, merged)
-        kind = "maintain" if source.kind == "maintain" else "achieve"
+        kind = cast(GoalKind, source.kind) if source.kind in get_args(GoalKind) else "achieve"
     known = KnownPhrase(pattern, parts, condition, kind, by.plugin, by.component)
     _check_slots(known, merged)
     return known

@@ -38,7 +38,7 @@ class RunningAction(Protocol):
 
     @property
     def reason(self) -> str:
-        """Why it failed or was halted, in the author's words; empty otherwise."""
+        """Why it failed or was halted, in the author's words; what it answered, if it succeeded."""
         ...
 
     @property

@@ -43,6 +43,8 @@ class Past:
     """How it ended."""
     started_s: float
     ended_s: float
+    answer: str = ""
+    """What it answered, if it succeeded."""
 
 
 class TaskControl:
@@ -143,6 +145,11 @@ class TaskControl:
         self.runs = {}
         return runs
 
+    @property
+    def answer(self) -> str:
+        """What the plan's behaviours answered, in the order of its steps."""
+        return " ".join(filter(None, (p.answer for n in self._places if (p := self.past.get(n)))))
+
     def places_of(self, names: Iterable[str]) -> int:
         """The mask of the steps with these actions."""
         mask = 0
@@ -163,7 +170,8 @@ class TaskControl:
                 run.established_s = now_s
             if state.has_ended:
                 del self.runs[name]
-                self.past[name] = Past(state, run.started_s, now_s)
+                answer = run.action.reason if state is RunState.SUCCEEDED else ""
+                self.past[name] = Past(state, run.started_s, now_s, answer)
                 if not run.is_halting:
                     self._judge(run, state, now_s)
             elif problem := self.attempts.overdue(run, now_s):
@@ -249,7 +257,7 @@ class TaskControl:
         for run in self.runs.values():
             if run.step.add <= ground.facts:
                 run.ineffective_s = None
-        if not rest.steps and self.kind == "achieve":
+        if not rest.steps and self.kind != "maintain":
             self.halt(GOAL_REACHED)
             return Phase.REACHED
         self._halt_unneeded()

@@ -229,6 +229,13 @@ class WorldModel:
             if parts(fact)[0] not in self._observed:
                 self._take(fact, word)
 
+    def withdraw_effects(self, facts: Iterable[str]) -> None:
+        """Forget that finishing behaviours made facts true; who else says so is believed."""
+        for fact in facts:
+            for voice, word in tuple(self._testimony.of(fact).items()):
+                if word.kind is SourceKind.EFFECT and not word.is_against:
+                    self._drop(fact, voice)
+
     # What goes away
 
     def remove_component(self, component: str, objects: Collection[str]) -> None:

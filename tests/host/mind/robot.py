@@ -100,6 +100,8 @@ class Robot:
     """Components whose behaviours are established, and fail half a second later."""
     unreachable: set[str] = field(default_factory=set)
     """Components whose host has just gone."""
+    answers: dict[str, str] = field(default_factory=dict)
+    """Behaviour of a component → what it answers when it succeeds."""
     early_news: dict[str, list[Event]] = field(default_factory=dict)
     """What components say before they are in the catalogue."""
     patience: Patience | None = None
@@ -151,7 +153,8 @@ class Robot:
         elif lasting:
             loop.call_soon(call.establish)
         else:
-            loop.call_soon(call.end, RunState.SUCCEEDED)
+            answer = self.answers.get(f"{component}.{behaviour}", "")
+            loop.call_soon(call.end, RunState.SUCCEEDED, answer)
         return call
 
     def tell_values(self, component: str, values: Sequence[FactValue]) -> None:

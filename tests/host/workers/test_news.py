@@ -9,7 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nondum.host.events import FactForgotten, FactKnown, StreamFlowing, WorkerFaulted, WorkerLogged
-from nondum.host.workers.news import MAX_CLAIMS, Claims, parse_news, parse_progress, parse_rates
+from nondum.host.workers.news import (
+    MAX_CLAIMS,
+    MAX_TEXT,
+    Claims,
+    parse_answer,
+    parse_news,
+    parse_progress,
+    parse_rates,
+)
 from nondum.sdk.errors import MessageInvalid, ProtocolViolation
 
 PLAIN = st.recursive(
@@ -156,3 +164,15 @@ def test_what_claims_take_is_bounded() -> None:
     with pytest.raises(ProtocolViolation, match="the values of a worker's facts"):
         for number in range(MAX_CLAIMS):
             claims.take(FactKnown("g", "p", (str(number),), "x" * 10_000))
+
+
+def test_answer_is_a_printable_text_of_bounded_length() -> None:
+    assert parse_answer({}) == ""
+    assert parse_answer({"answer": "at home\x1b[2J"}) == "at home\\x1b[2J"
+    assert len(parse_answer({"answer": "x" * (2 * MAX_TEXT)})) <= MAX_TEXT
+
+
+@pytest.mark.parametrize("answer", [None, 7, b"at home", ["at home"]])
+def test_what_is_no_text_is_no_answer(answer: object) -> None:
+    with pytest.raises(ProtocolViolation):
+        parse_answer({"answer": answer})

@@ -21,7 +21,15 @@ _TRIPLE = (float, float, float)
 @click.command()
 @click.argument("words", nargs=-1, shell_complete=complete.goal_words)
 @click.option("--pddl", metavar="GOAL", help="The goal as PDDL, for example (found person self).")
-@click.option("--maintain", is_flag=True, help="With --pddl: keep it true instead of reaching it.")
+@click.option(
+    "--maintain",
+    "kind",
+    flag_value="maintain",
+    help="With --pddl: keep it true instead of reaching it.",
+)
+@click.option(
+    "--do", "kind", flag_value="do", help="With --pddl: do it anew, though it was done before."
+)
 @click.option(
     "--priority",
     default=0,
@@ -45,7 +53,7 @@ def goal(
     session: Session,
     words: tuple[str, ...],
     pddl: str | None,
-    maintain: bool,
+    kind: str | None,
     priority: int,
     yes: bool,
     wait: bool,
@@ -74,11 +82,10 @@ def goal(
         return _shown(session, session.ask("resume", id=resumed), wait=wait)
     if bool(words) == (pddl is not None):
         raise click.UsageError("give the goal in words, or with --pddl")
-    if maintain and pddl is None:
-        raise click.UsageError("--maintain is of use with --pddl only: words say it themselves")
+    if kind and pddl is None:
+        raise click.UsageError(f"--{kind} is of use with --pddl only: words say it themselves")
     if keep and pddl is not None:
         raise click.UsageError("--keep is of use with words only")
-    kind = "maintain" if maintain else None
     said = " ".join(words) or None
     given = session.ask(
         "goal",

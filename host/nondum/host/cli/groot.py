@@ -99,7 +99,7 @@ class _Document:
             ET.SubElement(tree, "AlwaysSuccess")
             return
         task, parent = node["task"], tree
-        if task.get("kind") == "achieve":  # then everything is halted once the goal holds
+        if task.get("kind") != "maintain":  # then everything is halted once the goal holds
             parent = ET.SubElement(tree, "ReactiveFallback", name="until the goal holds")
             self._leaf(parent, "Condition", HOLDS, {"facts": task["goal"]})
         side_by_side = ET.SubElement(parent, "Parallel", {"name": "steps", **_ALL})

@@ -31,6 +31,7 @@ from nondum.host.mind.system_tree import Duty, Hold, Parts, SystemTree, TaskSlot
 from nondum.host.mind.views import Views
 from nondum.host.whole_names import shortened
 from nondum.planning.attempts import Patience
+from nondum.planning.facts import fact
 from nondum.planning.goal import Goal, GoalKind, goal_text, parse_goal
 from nondum.sdk.errors import GoalRefused, Problem
 
@@ -151,6 +152,11 @@ class Mind:
         """
         goal = self._understood(words, pddl, kind)
         text = words or said or goal.text
+        if goal.kind == "do":
+            self.beliefs.world.withdraw_effects(
+                fact(atom.predicate, *(term.name for term in atom.terms))
+                for atom in goal.expr.positive
+            )
         given = self.queue.give(text, goal_text(goal.expr), goal.kind, priority=priority, id=id)
         self._emit(GoalGiven(given.id, given.text, given.kind, given.pddl, priority))
         self.wake()

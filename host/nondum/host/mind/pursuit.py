@@ -215,14 +215,18 @@ class Pursuit:
             one.trouble = trouble
             self.queue.put(one.goal, GoalState.ACTIVE, trouble)
         if phase is Phase.REACHED:
-            self.queue.put(one.goal, GoalState.REACHED, "it holds")
+            goal = self.queue.put(one.goal, GoalState.REACHED, control.answer or "it holds")
+            if goal.kind == "do":  # the next time that it is asked for, it is done again
+                self._beliefs.world.withdraw_effects(control.regression.goal)
             self._emit(GoalReached(one.goal))
             self.drop("the goal is reached", one.goal)
 
     def _tell_phase(self, one: Pursued, phase: Phase) -> None:
         goal = self.queue[one.goal]
         if phase is Phase.REACHED:
-            self._people.tell(f"goal {goal.id} is reached: {goal.text}")
+            answer = one.tree.control.answer
+            told = f"{goal.text}: {answer}" if answer else f"goal {goal.id} is reached: {goal.text}"
+            self._people.tell(told)
         elif phase is Phase.HOLDING:
             self.queue.put(goal.id, GoalState.ACTIVE, "it holds and is kept so")
             self._people.tell(f"goal {goal.id} holds and is kept so: {goal.text}")

@@ -23,7 +23,7 @@ class Call:
     emit: Emit = field(repr=False)
     state: RunState = RunState.STARTING
     reason: str = ""
-    """Why it failed or was halted; empty otherwise."""
+    """Why it failed or was halted; what it answered, if it succeeded; empty otherwise."""
     is_halting: bool = False
     """Whether it was asked to end."""
     _on_halt: Callable[[], None] | None = None

@@ -141,6 +141,14 @@ def parse_progress(body: Mapping[str, Any]) -> tuple[float, str]:
     raise _violation("EVENT_INVALID", "event 'progress' lacks what it tells")
 
 
+def parse_answer(body: Mapping[str, Any]) -> str:
+    """What a behaviour that succeeded answers, or nothing. Raises `ProtocolViolation`."""
+    answer = body.get("answer", "")
+    if not isinstance(answer, str):
+        raise _violation("RESULT_INVALID", "the answer of a behaviour is no text")
+    return printable(answer[:MAX_TEXT])
+
+
 def parse_count(body: Mapping[str, Any]) -> int:
     """How often something was so. Raises `ProtocolViolation`."""
     match body:

@@ -33,6 +33,7 @@ from nondum.host.workers.leftovers import end_leftovers
 from nondum.host.workers.lending import Lending
 from nondum.host.workers.news import (
     Claims,
+    parse_answer,
     parse_condition,
     parse_count,
     parse_news,
@@ -345,7 +346,7 @@ class Worker:
 
     async def _outcome(self, pending: Pending, call: Call) -> tuple[RunState, str]:
         try:
-            await pending
+            answer = parse_answer(await pending)
         except LinkClosed:
             problem = await asyncio.shield(self.gone)
             is_expected = call.is_halting or problem.code == problems.REMOVED
@@ -353,7 +354,7 @@ class Worker:
         except WorkerFailed as error:
             is_halted = error.code == "HALTED"
             return RunState.HALTED if is_halted else RunState.FAILED, problems.words(error)
-        return RunState.SUCCEEDED, ""
+        return RunState.SUCCEEDED, answer
 
     def _halt(self, call_id: int, call: Call) -> None:
         self.link.cancel(call_id)

@@ -50,6 +50,11 @@ class Call:
         return list(self._run.progress)
 
     @property
+    def answer(self) -> str:
+        """What it answered when it succeeded: the text that it returned."""
+        return self._run.answer
+
+    @property
     def has_ended(self) -> bool:
         """Whether it runs no more."""
         return self.state in ("succeeded", "failed", "halted")

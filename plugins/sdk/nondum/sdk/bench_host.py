@@ -33,11 +33,13 @@ class Run:
         """Why it failed."""
         self.progress: list[tuple[float, str]] = []
         """What it said about how far it is."""
+        self.answer = ""
+        """What it answered when it succeeded."""
 
     async def follow(self) -> None:
         """Take down how it ends."""
         try:
-            await self.pending
+            self.answer = (await self.pending).get("answer", "")
             self.state = "succeeded"
         except NondumError as error:
             self.state = "halted" if error.code == "HALTED" else "failed"

@@ -33,7 +33,8 @@ def behaviour(
     A coroutine function runs on the worker's loop, a plain function in a thread of its own.
 
     Returning is SUCCESS, raising `BehaviourFailed` is FAILURE, and so is any other error; being
-    cancelled is being halted. A lasting behaviour never ends by itself and says
+    cancelled is being halted. A text that is returned is the answer to whoever asked for the goal:
+    people are told it, and it is spoken. A lasting behaviour never ends by itself and says
     `await ctx.established()` when its effects begin to hold.
 
     `phrase` is one pattern, or several, of words that ask for it: `"point at {t}"`.

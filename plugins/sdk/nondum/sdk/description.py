@@ -115,7 +115,7 @@ class Phrase:
     goal: str
     """PDDL over the slots: `(pointing self ?t)`."""
     kind: str = "achieve"
-    """`achieve` or `maintain`."""
+    """`achieve`, `maintain`, or `do`: achieve it anew each time, as the answer to a question."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -52,8 +52,8 @@ class Performer:
 
     async def behave(
         self, name: str, arguments: Mapping[str, str], values: Sequence[Any], call_id: int
-    ) -> None:
-        """Run a behaviour to its end.
+    ) -> str:
+        """Run a behaviour to its end, and give what it answers, if it does.
 
         Raises `BehaviourFailed`; `WorkerFailed` (BEHAVIOUR_UNKNOWN, ARGUMENTS).
         """
@@ -66,7 +66,7 @@ class Performer:
         assert task is not None
         self._behaving.add(task)
         try:
-            await self._runner.run(marked, context, *ordered)
+            return await self._runner.run(marked, context, *ordered)
         finally:
             self._behaving.discard(task)
             await context.close()

@@ -42,21 +42,22 @@ class Runner:
     def __init__(self) -> None:
         self._ticked: dict[type[TickedBehaviour], TickedBehaviour] = {}
 
-    async def run(self, marked: Callable[..., Any], context: Context, *arguments: str) -> None:
-        """Run a behaviour to its end.
+    async def run(self, marked: Callable[..., Any], context: Context, *arguments: str) -> str:
+        """Run a behaviour to its end, and give what it answers, if it does.
 
         Raises `BehaviourFailed` for whatever it raises itself.
         """
         try:
             if isinstance(marked, type) and issubclass(marked, TickedBehaviour):
                 await self._run_ticked(marked, context, *arguments)
-            else:
-                await call(marked, context, *arguments)
+                return ""
+            answer = await call(marked, context, *arguments)
         except NondumError:
             raise
         except Exception as error:
             context.log.exception("a behaviour raised")
             raise BehaviourFailed(raised("BEHAVIOUR_RAISED", error, marked)) from error
+        return answer if isinstance(answer, str) else ""
 
     async def _run_ticked(
         self, kind: type[TickedBehaviour], context: Context, *arguments: str

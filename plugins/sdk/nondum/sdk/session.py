@@ -145,9 +145,10 @@ class Session:
                 await self._plugin_at_work.stop()
             case "behave":
                 values = body.get("values", ())
-                await self._plugin_at_work.behave(
+                answer = await self._plugin_at_work.behave(
                     body["behaviour"], body["arguments"], values, call_id
                 )
+                return {"answer": answer} if answer else {}
             case "translate_goal":
                 vocabulary = body.get("vocabulary", {})
                 return await self._answer(
