@@ -11,7 +11,7 @@ from nondum.planning.task_tree import TaskTree
 from nondum.sdk.planner import GroundTask, Plan
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Pursued:
     """One goal with its plan and the tree of it."""
 

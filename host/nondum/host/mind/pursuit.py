@@ -24,6 +24,7 @@ from nondum.host.mind.pursued import Pursued, conflicts
 from nondum.host.mind.runner import BehaviourRunner
 from nondum.host.mind.search import search, task_of
 from nondum.host.mind.situation import NoPlan, Others, Outcome, Past, Planned, Situation, Waits
+from nondum.host.mind.turns import Turns
 from nondum.planning.attempts import Attempts, Patience, Setbacks
 from nondum.planning.goal import parse_goal
 from nondum.planning.plain import plain
@@ -75,6 +76,7 @@ class Pursuit:
         self._searched_for: Situation | None = None
         self._tried: dict[int, Situation] = {}
         """By the number of a goal: one that is given again under its id was not tried yet."""
+        self._turns = Turns()
         self._excluded_until_s: dict[str, float] = {}
         self.setbacks = Setbacks()
         self._left_over: tuple[Run, ...] = ()
@@ -149,9 +151,7 @@ class Pursuit:
         if self._composition is None:
             return
         self.drop_ended("its goal is over")
-        for goal in self.queue.open():
-            if self._is_on_its_way(goal):
-                continue
+        while (goal := self._next()) is not None:
             if not self._is_searched_for(goal):
                 self._start_search(goal)
             if self._search is not None:
@@ -166,6 +166,7 @@ class Pursuit:
         if self._composition is None or _parts(self._composition) != _parts(composition):
             self._excluded_until_s.clear()  # what it failed for may be another now
             self.setbacks.clear()
+        self._turns.restart()
         self._composition = composition
         self._seen = seen_in(composition.snapshot)
         for one in self.pursued:
@@ -249,7 +250,7 @@ class Pursuit:
             return Others()
         mine = urgency(self.queue[goal])
         firm = [one for one in others if urgency(self.queue[one.goal]) < mine]
-        yielding = [one for one in others if one not in firm]
+        yielding = others[len(firm) :]
         return Others(
             tuple(one.reservation for one in firm),
             tuple(one.reservation for one in yielding),
@@ -280,6 +281,11 @@ class Pursuit:
             return False
         now = self._situation(goal.id)
         return tried == now if goal.state is GoalState.SUSPENDED else tried.is_like(now)
+
+    def _next(self) -> GivenGoal | None:
+        due = [goal for goal in self.queue.open() if not self._is_on_its_way(goal)]
+        searched = next(filter(self._is_searched_for, due), None)
+        return self._turns.next(due, searched, self._pursued)
 
     def _is_searched_for(self, goal: GivenGoal) -> bool:
         asked = self._searched_for
