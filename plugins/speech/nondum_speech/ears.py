@@ -15,7 +15,7 @@ from nondum_speech.espeak import Espeak
 from nondum_speech.grammar import Vocabulary
 from nondum_speech.inbox import Inbox, may_grow
 from nondum_speech.lexicon import lexicon
-from nondum_speech.recogniser import FreeHearing, Recogniser
+from nondum_speech.recognising import RecogniserEnded, Recognising
 from nondum_speech.sentences import Sentences, sentences_of
 from nondum_speech.sound import Sound, SoundInvalid, read_wav
 
@@ -31,10 +31,8 @@ class Ears:
 
     def __init__(self, espeak: Espeak, log: logging.Logger, *, confidence: float) -> None:
         self.sentences: asyncio.Queue[str] = asyncio.Queue()
-        self._espeak, self._log, self._confidence = espeak, log, confidence
-        self._free: FreeHearing | None = None
-        self._recogniser: Recogniser | None = None
-        self._one_at_a_time = asyncio.Lock()
+        self._espeak, self._log = espeak, log
+        self._recognising = Recognising(confidence=confidence)
         self._learnt = asyncio.Event()
         self._speaking = 0
 
@@ -46,14 +44,13 @@ class Ears:
         if words.unsayable:
             told = ", ".join(words.unsayable)
             self._log.warning("phrases and names with these words cannot be heard: %s", told)
-        async with self._one_at_a_time:
-            if self._free is None:
-                self._free = await asyncio.to_thread(FreeHearing)
-            self._recogniser = await asyncio.to_thread(
-                Recogniser, vocabulary, words, self._free, confidence=self._confidence
-            )
+        await self._recognising.learn(vocabulary, words)
         self._learnt.set()
         self._log.info("%d phrases can be heard", len(vocabulary.phrases))
+
+    async def close(self) -> None:
+        """Hear nothing any more."""
+        await self._recognising.close()
 
     async def watch(self, inbox: Inbox) -> None:
         """Hear the files that are put into a folder, for ever."""
@@ -98,10 +95,11 @@ class Ears:
             await self._hear(sentence)
 
     async def _hear(self, sentence: Sound) -> None:
-        async with self._one_at_a_time:
-            if self._recogniser is None:
-                return
-            heard = await asyncio.to_thread(self._recogniser.hear, sentence)
+        try:
+            heard = await self._recognising.hear(sentence)
+        except RecogniserEnded as ended:
+            self._log.warning("a sentence of %.1f s was not heard: %s", sentence.seconds, ended)
+            return
         if not heard.said:
             near = (
                 f"; the nearest is {heard.words!r} ({heard.confidence:.2f})" if heard.words else ""

@@ -56,6 +56,12 @@ class Speech:
             ctx.spawn(_attend(ctx, self._ears, settings.microphone))
 
     @hookimpl
+    async def stop(self, ctx: Context) -> None:
+        """End the recogniser."""
+        if self._ears is not None:
+            await self._ears.close()
+
+    @hookimpl
     async def learn_words(self, ctx: Context, vocabulary: Mapping[str, Any]) -> None:
         """Hear what can be said now, and nothing else."""
         if self._ears is not None:
