@@ -22,7 +22,7 @@ from nondum.host.cgroups import Cages
 from nondum.host.config import HostConfig
 from nondum.host.confinement import choice
 from nondum.host.control.server import ControlServer
-from nondum.host.conversation import Conversation, Take
+from nondum.host.conversation import Conversation, Take, wanted
 from nondum.host.devices.slots import DeviceSlotSource
 from nondum.host.devices.software import Software
 from nondum.host.devices.source import DeviceSource
@@ -361,7 +361,7 @@ def _take(neighbours: Neighbourhood | None, mind: Mind, stopping: Stopping) -> T
     async def taken(words: str) -> str:
         if is_stop(words):
             return str(stopping.stop())
-        return f"that is goal {mind.give(words=words).id}"
+        return wanted(mind, words)
 
     return taken
 

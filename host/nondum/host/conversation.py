@@ -14,6 +14,7 @@ from typing import Any, Protocol, TypeAlias
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.sayings import sayings
+from nondum.host.replaced import replacing
 from nondum.host.workers.proxies import Answer
 from nondum.sdk.errors import GoalRefused
 
@@ -150,6 +151,17 @@ class Conversation:
                 return
             await self.heard(component, words)
             await asyncio.sleep(PAUSE_S)
+
+
+def wanted(mind: Mind, words: str) -> str:
+    """Make a goal of words that are heard; says what became of them. Raises `GoalRefused`."""
+    return given_goal(mind.views.goal(mind.give(words=words)))
+
+
+def given_goal(row: Mapping[str, Any], *, of: str = "") -> str:
+    """What is said of words that are a goal now, which peer's `of` says."""
+    told = f"that is goal {row['id']}{of}"
+    return "; ".join(filter(None, (told, replacing(row["replaces"]))))
 
 
 def _hosts(composition: Composition) -> tuple[str, ...]:

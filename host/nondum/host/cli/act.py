@@ -10,6 +10,7 @@ import click
 from nondum.host.cli import complete, render
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.failure import EXIT_REFUSED
+from nondum.host.replaced import replacing
 from nondum.planning.stop_words import STOPS
 from nondum.sdk.errors import GoalRefused, Problem
 
@@ -57,6 +58,9 @@ def goal(
     `nondum goals` says which words are understood now. Others may be translated by a component:
     what it understood is shown, and given only once it is confirmed. Words that a peer can have and
     this host cannot, or that begin with its name, are given to the peer.
+
+    A goal to maintain, such as "follow me", replaces older ones to maintain of the same or a lower
+    priority as soon as there is a plan for it: which ones is shown. Of JSON, they are `replaces`.
 
     Words that mean nothing yet, since their payload is still being brought in, are kept with --keep
     and given once they do; with --wait, while anything is being brought in. With --wait, exits with
@@ -175,6 +179,8 @@ def _show_goal(given: dict[str, Any]) -> None:
     for problem in given["problems"]:
         fix = f" → {problem['fix']}" if problem.get("fix") else ""
         render.sentence(f"{problem['code']} {problem['message']}{fix}", colour="red", mark="  ")
+    if told := replacing(given["replaces"]):
+        render.sentence(told, mark="  ")
 
 
 @click.command()

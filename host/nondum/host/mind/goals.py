@@ -55,6 +55,8 @@ class GivenGoal:
     """Why it is where it is."""
     problems: tuple[Problem, ...] = ()
     """What keeps it suspended."""
+    replaced_by: str = ""
+    """The goal that has taken its place."""
 
     def to_dict(self) -> dict[str, object]:
         """Plain data for people's tools."""
@@ -178,13 +180,28 @@ class GoalQueue:
             if goal.state is GoalState.ACTIVE:
                 self.put(goal.id, GoalState.QUEUED, f"waits for goal {id}")
             if is_replaced(goal, active):
-                replaced.append(self.put(goal.id, GoalState.HALTED, f"replaced by goal {id}"))
+                halted = self.put(goal.id, GoalState.HALTED, f"replaced by goal {id}")
+                self._goals[goal.id] = replace(halted, replaced_by=id)
+                replaced.append(self._goals[goal.id])
         return tuple(replaced)
+
+    def replaces(self, id: str) -> tuple[GivenGoal, ...]:
+        """The goals whose place a goal has taken, or takes as soon as it has a plan."""
+        by = self._goals[id]
+        return tuple(
+            goal
+            for goal in self
+            if goal.replaced_by == id or (not _either_is_over(goal, by) and is_replaced(goal, by))
+        )
 
     def _forget_oldest(self) -> None:
         ended = [goal.id for goal in self._goals.values() if goal.state.is_final]
         for id in ended[: max(0, len(ended) - MAX_ENDED)]:
             del self._goals[id]
+
+
+def _either_is_over(*goals: GivenGoal) -> bool:
+    return any(goal.state.is_final for goal in goals)
 
 
 def is_replaced(goal: GivenGoal, by: GivenGoal) -> bool:

@@ -11,11 +11,12 @@ import contextlib
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from typing import Any
 
+from nondum.host.conversation import given_goal, wanted
 from nondum.host.events import Event, GoalEnded, GoalReached, PeerLeft, PlanMissing
 from nondum.host.mind.goals import HIGHEST_PRIORITY
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.offers import prospect
-from nondum.host.peers.given_away import GivenAway, standing
+from nondum.host.peers.given_away import GivenAway, replaced, standing
 from nondum.host.peers.remote_calls import Reaches
 from nondum.host.printable import printable
 from nondum.host.rows import Row
@@ -67,11 +68,12 @@ class Goals:
         peer, rest = await self.whose(words)
         if peer is not None:
             given = await self.give(peer, rest)
-            stopped = f"{peer} has stopped"
-            return stopped if "stopped" in given else f"that is goal {given['id']} of {peer}"
+            if "stopped" in given:
+                return f"{peer} has stopped"
+            return given_goal(given, of=f" of {peer}")
         if is_stop(rest):
             return str(self._stop())
-        return f"that is goal {self._mind().give(words=rest).id}"
+        return wanted(self._mind(), rest)
 
     async def whose(self, words: str) -> tuple[str | None, str]:
         """The peer whose goal words are, None for this host; and the words without its name.
@@ -165,7 +167,8 @@ class Goals:
         if self._telling is None or self._telling.done():
             self._telling = asyncio.create_task(self._tell_givers())
         self._mind().people.tell(f"{errand.caller.name} heard {words!r}: that is goal {given.id}")
-        return {"goal": given.id, "text": given.text, "pddl": given.pddl, "kind": given.kind}
+        told = {"goal": given.id, "text": given.text, "pddl": given.pddl, "kind": given.kind}
+        return told | {"replaces": replaced(self._mind().views.goal(given))}
 
     async def close(self) -> None:
         """Tell no one any more."""
