@@ -58,6 +58,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/trust/anchors.py": (f"{_TH}/trust/test_anchors.py",),
     f"{_H}/trust/chain.py": (f"{_TH}/trust/test_chain.py",),
     f"{_H}/trust/payload_trust.py": _BROUGHT,
+    f"{_H}/trust/clock.py": (f"{_TH}/trust/test_clock.py",),
     # What drives are, and what is read of them.
     f"{_H}/drives/mounting.py": _MOUNTED,
     f"{_H}/drives/nodes.py": _CLAIMED,

@@ -70,6 +70,7 @@ from nondum.host.service.words import words
 from nondum.host.stop_button.button import StopButton
 from nondum.host.stop_button.hook import StopHook
 from nondum.host.stopping import Stopped, Stopping
+from nondum.host.trust.clock import ClockWatch
 from nondum.host.trust.orders import TrustOrders
 from nondum.host.trust.payload_trust import TrustOptions
 from nondum.host.workers.confinements import changes_user
@@ -189,11 +190,13 @@ async def _run(
     if journal.is_in_use():
         bus.subscribe(Telling(catalogue.snapshot).on_event)
     listing = executor.installation.listing
+    clock = ClockWatch(lambda: executor.trust.trust, bus.emit)
 
     def warnings() -> tuple[str, ...]:
         of_peers = neighbours.warnings if neighbours else ()
         return (
             *executor.trust.warnings,
+            *map(str, clock.problems),
             *_warnings(catalogue, safety[1]),
             *tally.warnings(),
             *tries.counts(catalogue.snapshot()),
@@ -296,6 +299,7 @@ async def _run(
             feedback.run(),
             goal_files.run(),
             trying_again.run(),
+            clock.run(),
             trials.hold(catalogue.snapshot, tally, bus.emit),
             *(source.watch(bus.emit) for source in device_sources(config)),
         )
