@@ -58,7 +58,6 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/trust/anchors.py": (f"{_TH}/trust/test_anchors.py",),
     f"{_H}/trust/chain.py": (f"{_TH}/trust/test_chain.py",),
     f"{_H}/trust/payload_trust.py": _BROUGHT,
-    f"{_H}/trust/clock.py": (f"{_TH}/trust/test_clock.py",),
     # What drives are, and what is read of them.
     f"{_H}/drives/mounting.py": _MOUNTED,
     f"{_H}/drives/nodes.py": _CLAIMED,
@@ -214,6 +213,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/peers/serving.py": (f"{_TH}/peers/test_serving.py",),
     f"{_H}/peers/given_away.py": (f"{_TH}/peers/test_given_away.py",),
     f"{_H}/peers/goals.py": (f"{_TH}/peers/test_goals.py",),
+    f"{_H}/peers/asking.py": (f"{_TH}/peers/test_asking.py",),
     f"{_H}/peers/pairing_desk.py": (f"{_TH}/peers/test_pairing_desk.py",),
     f"{_H}/peers/trust_keeper.py": (f"{_TH}/peers/test_trust_keeper.py",),
     f"{_H}/peers/placement/fetching.py": (f"{_TH}/peers/placement/test_fetching.py",),

@@ -22,7 +22,7 @@ from nondum.host.cgroups import Cages
 from nondum.host.config import HostConfig
 from nondum.host.confinement import choice
 from nondum.host.control.server import ControlServer
-from nondum.host.conversation import Conversation, Take, wanted
+from nondum.host.conversation import Conversation, Reply, Take, wanted
 from nondum.host.devices.slots import DeviceSlotSource
 from nondum.host.devices.software import Software
 from nondum.host.devices.source import DeviceSource
@@ -165,7 +165,15 @@ async def _run(
     stop_hook = StopHook(config.stop)
     stopping = Stopping(lambda: mind, workers, stop_hook.run_soon)
     neighbours = await _neighbours(
-        config, folders, workers, catalogue, bus, lambda: mind, stopping.stop, executor
+        config,
+        folders,
+        workers,
+        catalogue,
+        bus,
+        lambda: mind,
+        stopping.stop,
+        lambda words: answering.own(words),
+        executor,
     )
     mind = Mind(
         config.host.name,
@@ -214,7 +222,12 @@ async def _run(
     trying_again = TryingAgain(catalogue.snapshot, amounts, bus.emit, places)
     vouched = executor.trust.vouched
     take = _take(neighbours, mind, stopping)
-    answering = Answering(mind, lambda: catalogue.snapshot().payloads, workers.busy)
+    answering = Answering(
+        mind,
+        lambda: catalogue.snapshot().payloads,
+        workers.busy,
+        neighbours.asking.ask if neighbours else None,
+    )
     conversation = Conversation(
         mind, workers.plugins, workers.pids, lambda words: orders.heard(words), answering.answer
     )
@@ -262,7 +275,7 @@ async def _run(
         elsewhere,
     )
     goal_files: GoalFiles = GoalFiles(
-        catalogue.snapshot, mind, orders.translated, bus.emit, on_change=feedback.wake
+        catalogue.snapshot, mind, orders.translated, bus.emit, feedback.wake, elsewhere
     )
     bus.subscribe(goal_files.on_event)
     control = ControlServer(
@@ -321,6 +334,7 @@ async def _neighbours(
     bus: Bus,
     mind: Callable[[], Mind],
     stop: Callable[[], Stopped],
+    answer: Reply,
     executor: Executor,
 ) -> Neighbourhood | None:
     """What this host has to do with others; None where it is to have nothing. Imported only where
@@ -340,6 +354,7 @@ async def _neighbours(
         bus.emit,
         mind,
         stop,
+        answer,
         executor.children,
         executor.judged_by,
     )

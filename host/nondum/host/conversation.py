@@ -47,7 +47,8 @@ class Speaking(Protocol):
 Take: TypeAlias = Callable[[str], Awaitable[str]]
 """What a person said → what becomes of it, in words. Raises `GoalRefused`."""
 Reply: TypeAlias = Callable[[str], Awaitable[str | None]]
-"""What a person asked → the answer, which people have been told; None: it is no question."""
+"""What a person asked → the answer, which people have been told; None: it is no question. Raises
+`GoalRefused` if the peer that is asked does not answer."""
 
 
 class Conversation:
@@ -89,9 +90,9 @@ class Conversation:
 
     async def heard(self, component: str, words: str) -> None:
         """Answer or want what a person has said; tell people where that cannot be."""
-        if await self._answer(words) is not None:
-            return
         try:
+            if await self._answer(words) is not None:
+                return
             told = await self._take(words)
         except GoalRefused as refused:
             told = str(refused.problems[0])

@@ -83,6 +83,14 @@ class GivenAway:
                 row |= {"state": UNKNOWN, "reason": f"the host {host} is gone", "holds": False}
         self._tell()
 
+    def lost(self, host: str) -> list[Row]:
+        """Those whose host went away, and of which nothing is known since."""
+        return [
+            dict(row)
+            for (at, _), row in self._rows.items()
+            if at == host and row["state"] == UNKNOWN
+        ]
+
     async def follow(self, host: str, id: str) -> AsyncIterator[Row]:
         """One of them, now and whenever there is news. Raises `GoalRefused` (GOAL_UNKNOWN)."""
         while True:
