@@ -30,7 +30,7 @@ def main() -> None:
     for part in chosen.part or PARTS:
         calm.append(await_calm(timeout_s=chosen.calm_s))
         if part == "spoken":
-            hearings += hearing.run(chosen.voices, _say)
+            hearings += hearing.run(chosen.voices, chosen.sentences, _say)
             continue
         with (
             tempfile.TemporaryDirectory(prefix="nondum-stop-", ignore_cleanup_errors=True) as work,
@@ -50,6 +50,9 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=20, help="stops of each way [20]")
     parser.add_argument("--voices", type=int, default=12, help="voices that say each sentence [12]")
+    parser.add_argument(
+        "--sentences", type=int, help="so many of the sentences that stop nothing [all]"
+    )
     parser.add_argument("--part", action="append", choices=PARTS, help="only this; repeatable")
     parser.add_argument("--out", type=Path, default=PAGE, help="the page to write")
     parser.add_argument("--note", action="append", default=[], help="a line about the machine")

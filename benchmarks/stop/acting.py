@@ -14,7 +14,7 @@ from pathlib import Path
 from benchmarks.stop.results import Stop, Way
 from demo.kit import Kit
 from demo.one_host import FIRST, INITIAL, LIBRARIES
-from demo.robot import NONDUM, Robot, TooLate, View, running
+from demo.robot import NONDUM, Robot, View, running
 from demo.search.person import Person
 from demo.search.searching import own_components, ready_components
 from demo.search.sites import site
@@ -180,12 +180,12 @@ def _with_key(
             more=more + section,
             inside=inside,
         ) as robot:
-            yield robot, lambda: _press(keyboard)
+            yield robot, lambda: press(keyboard)
     finally:
         os.close(keyboard)
 
 
-def _press(keyboard: int) -> None:
+def press(keyboard: int) -> None:
     """Down, and up."""
     for value in (1, 0):
         os.write(keyboard, EVENT.pack(0, 0, EV_KEY, code_of(KEY) or 0, value))
@@ -197,6 +197,3 @@ def _all_run(view: View) -> Sequence[View] | None:
     steps: Sequence[View] = view["plan"]["steps"]
     is_so = bool(steps) and all(step["state"] == "established" for step in steps)
     return steps if is_so else None
-
-
-__all__ = ["FIRST_DEMO", "SECOND_DEMO", "Scene", "TooLate", "first", "measured", "second"]

@@ -7,10 +7,12 @@ import contextlib
 import logging
 import tempfile
 import time
-from collections.abc import AsyncIterator, Iterator, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from benchmarks.speech import VOICES
 from benchmarks.stop.corpus import KNOWN, OTHERS
 from benchmarks.stop.results import Hearing, Spoken
@@ -34,6 +36,10 @@ WORDS_PER_MINUTE = 160
 SILENT_PART = 0.02
 """Below such a part of the loudest sample a voice has ended."""
 SPEAKS = "while the robot speaks (its ears are shut)"
+
+
+Says = Callable[[str], None]
+Waves = npt.NDArray[Any]
 
 
 class Listener:
@@ -76,7 +82,7 @@ class Listener:
         with shut:
             return await self._attended(whole, end, text, voice)
 
-    async def _attended(self, samples: np.ndarray, end: int, text: str, voice: str) -> Spoken:
+    async def _attended(self, samples: Waves, end: int, text: str, voice: str) -> Spoken:
         found: list[tuple[str, float]] = []
         queue = self._ears.sentences
 
@@ -95,45 +101,42 @@ class Listener:
         heard, after_s = (stops or found or [(None, None)])[0]
         return Spoken(text, voice, heard, heard is not None and is_stop(heard), after_s)
 
-    def _own(self, length: int, level: float) -> np.ndarray:
+    def _own(self, length: int, level: float) -> Waves:
         own = self.said(OWN_WORDS, OWN_VOICE).samples.astype(np.float64)
         repeated = np.resize(own, length)
         return repeated * (level / max(1.0, float(np.std(own))))
 
 
-async def measured(espeak: Espeak, voices: Sequence[str], say: object) -> list[Hearing]:
+async def measured(
+    espeak: Espeak, voices: Sequence[str], sentences: Sequence[str], say: Says
+) -> list[Hearing]:
     """Every word and sentence by every voice, in each circumstance."""
-    assert callable(say)
     listener = Listener(espeak)
     await listener.learn()
+
+    async def heard(texts: Sequence[str], **how: Any) -> tuple[Spoken, ...]:
+        return tuple([await listener.heard(t, v, **how) for t in texts for v in voices])
+
     found = []
     for noise_db in (None, *NOISES_DB):
         name = "quiet" if noise_db is None else f"white noise, {noise_db} dB below"
         say(f"spoken: {name}")
-        stops = [await listener.heard(t, v, noise_db=noise_db) for t, v in _each(STOPS, voices)]
-        others = [await listener.heard(t, v, noise_db=noise_db) for t, v in _each(OTHERS, voices)]
-        found.append(Hearing(name, tuple(stops), tuple(others)))
+        stops = await heard(STOPS, noise_db=noise_db)
+        found.append(Hearing(name, stops, await heard(sentences, noise_db=noise_db)))
     say(f"spoken: {SPEAKS}")
-    shut = [await listener.heard(t, v, is_speaking=True) for t, v in _each(STOPS, voices)]
-    found.append(Hearing(SPEAKS, tuple(shut)))
+    found.append(Hearing(SPEAKS, await heard(STOPS, is_speaking=True)))
     for own_db in OWN_DB:
         name = f"its own voice, {own_db} dB below, if its ears were open"
         say(f"spoken: {name}")
-        stops = [await listener.heard(t, v, own_db=own_db) for t, v in _each(STOPS, voices)]
-        found.append(Hearing(name, tuple(stops)))
+        found.append(Hearing(name, await heard(STOPS, own_db=own_db)))
     return found
 
 
-def run(voices: int, say: object) -> list[Hearing]:
-    """Measure with the first so many voices."""
+def run(voices: int, sentences: int | None, say: Says) -> list[Hearing]:
+    """Measure with the first so many voices, and so many of the other sentences (None: all)."""
+    others = OTHERS if sentences is None else OTHERS[:: max(1, len(OTHERS) // sentences)]
     with tempfile.TemporaryDirectory() as scratch:
-        return asyncio.run(measured(Espeak(Path(scratch)), VOICES[:voices], say))
-
-
-def _each(texts: Sequence[str], voices: Sequence[str]) -> Iterator[tuple[str, str]]:
-    for text in texts:
-        for voice in voices:
-            yield text, voice
+        return asyncio.run(measured(Espeak(Path(scratch)), VOICES[:voices], others, say))
 
 
 def _end(sound: Sound) -> int:
@@ -143,7 +146,7 @@ def _end(sound: Sound) -> int:
     return int(heard[-1]) + 1 if len(heard) else 0
 
 
-def _among_silence(sound: Sound) -> np.ndarray:
+def _among_silence(sound: Sound) -> Waves:
     lead, tail = (np.zeros(int(seconds * RATE_HZ)) for seconds in (LEAD_S, TAIL_S))
     return np.concatenate([lead, sound.samples.astype(np.float64), tail])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Mapping
 from typing import Any, cast
 
 import pytest
@@ -31,7 +32,7 @@ class OnePeer:
     def call(self, host: str, method: str, args: Body, *, deadline_s: float) -> Call:
         async def called() -> Body:
             answer = self.desk.serve(errand(method, args))
-            return await answer if not isinstance(answer, dict) else answer
+            return answer if isinstance(answer, Mapping) else await answer
 
         return cast(Call, asyncio.ensure_future(called()))
 
