@@ -13,6 +13,7 @@ from pathlib import Path
 from benchmarks.recompose.processes import await_calm
 from benchmarks.stop import acting, hearing, report
 from benchmarks.stop.results import Hearing, Results, Way
+from demo.robot import Robot
 
 PAGE = Path(__file__).parents[2] / "docs/benchmarks/stop.md"
 METHOD = Path(__file__).with_name("method.md")
@@ -24,6 +25,7 @@ CALM_S = 30.0
 def main() -> None:
     """Stop, hear, print the tables, and write the page."""
     chosen = _arguments()
+    Robot.slowness = chosen.slowness
     calm: list[bool] = []
     ways: list[Way] = []
     hearings: list[Hearing] = []
@@ -55,6 +57,9 @@ def _arguments() -> argparse.Namespace:
     )
     parser.add_argument("--part", action="append", choices=PARTS, help="only this; repeatable")
     parser.add_argument("--out", type=Path, default=PAGE, help="the page to write")
+    parser.add_argument(
+        "--slowness", type=float, default=1.0, help="how much longer to wait, on a busy machine [1]"
+    )
     parser.add_argument("--note", action="append", default=[], help="a line about the machine")
     parser.add_argument(
         "--calm-s", type=float, default=CALM_S, help="how long a calm machine is waited for [30]"

@@ -83,7 +83,7 @@ class Listener:
             return await self._attended(whole, end, text, voice)
 
     async def _attended(self, samples: Waves, end: int, text: str, voice: str) -> Spoken:
-        found: list[tuple[str, float]] = []
+        found: list[tuple[str, float, float]] = []
         queue = self._ears.sentences
 
         async def pieces() -> AsyncIterator[bytes]:
@@ -94,12 +94,14 @@ class Listener:
                 took_s = time.perf_counter() - began_s  # asked for more: it has heard that
                 while not queue.empty():
                     late_s = (start + len(piece) - end) / RATE_HZ
-                    found.append((queue.get_nowait(), late_s + took_s))
+                    found.append((queue.get_nowait(), late_s + took_s, late_s))
 
         await self._ears.attend(pieces())
         stops = [one for one in found if is_stop(one[0])]
-        heard, after_s = (stops or found or [(None, None)])[0]
-        return Spoken(text, voice, heard, heard is not None and is_stop(heard), after_s)
+        if not found:
+            return Spoken(text, voice, None, is_stop=False)
+        heard, after_s, sound_s = (stops or found)[0]
+        return Spoken(text, voice, heard, bool(stops), after_s, sound_s)
 
     def _own(self, length: int, level: float) -> Waves:
         own = self.said(OWN_WORDS, OWN_VOICE).samples.astype(np.float64)

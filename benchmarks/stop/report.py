@@ -42,12 +42,14 @@ def _acting(ways: Sequence[Way]) -> str:
 
 def _spoken(hearings: Sequence[Hearing]) -> str:
     head = ["", "understood", "missed", "taken for something else"]
-    head += ["after the word's end: median", "p95", "max", f"≤ {SPOKEN_AIM_S:g} s", "false stops"]
+    head += ["after the word's end: median", "p95", "max", "of that, sound: median"]
+    head += [f"≤ {SPOKEN_AIM_S:g} s", "false stops"]
     rows = []
     for hearing in hearings:
         stops, understood = len(hearing.stops), len(hearing.understood)
         mistaken = len(hearing.mistaken)
         after = [one.after_s for one in hearing.understood if one.after_s is not None]
+        sound = [one.sound_s for one in hearing.understood if one.sound_s is not None]
         rows.append(
             [
                 hearing.circumstance,
@@ -55,6 +57,7 @@ def _spoken(hearings: Sequence[Hearing]) -> str:
                 _share(stops - understood - mistaken, stops),
                 _share(mistaken, stops),
                 *_spread(after),
+                _spread(sound)[0],
                 _share(sum(one <= SPOKEN_AIM_S for one in after), len(after)),
                 _share(len(hearing.false), len(hearing.others)),
             ]

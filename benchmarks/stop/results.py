@@ -63,6 +63,8 @@ class Spoken:
     """Whether that stops a robot."""
     after_s: float | None = None
     """From the end of the last word until it was taken for said."""
+    sound_s: float | None = None
+    """How much of that was sound which had to come: the same on every machine."""
 
 
 @dataclass(frozen=True, slots=True)
