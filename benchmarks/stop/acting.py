@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import subprocess
 import sys
@@ -105,16 +106,17 @@ def second(work: Path) -> Iterator[Scene]:
         _equipped(kit, node, robot)
         talking = Talking(node)
         talking.has_learnt()
-        word = person.saying(STOPS[0], "stop.wav")
+        words = [person.saying(said, f"{n}.wav") for n, said in enumerate(STOPS)]
+        turns = itertools.cycle(words)
 
         def say() -> float:
             began_s = time.monotonic()
-            talking.hear(word)
+            talking.hear(next(turns))
             return began_s
 
         more_ways = {
             "`nondum stop` typed at the node": lambda: _typed(node),
-            "“stop” said to the node, as a WAV file that is whole": say,
+            "said to the node, as a WAV file that is whole": say,
         }
         yield Scene(SECOND_DEMO, robot, {**_ways(robot, press), **more_ways})
 
