@@ -197,6 +197,8 @@ def machine() -> str:
     cores = len(os.sched_getaffinity(0))
     release = platform.release().partition("-")[0]
     priority = f", niceness {os.nice(0)}" if os.nice(0) else ""
+    if os.sched_getscheduler(0) == os.SCHED_IDLE:
+        priority += ", only while nothing else ran (SCHED_IDLE)"
     return f"{cores} × {model}, Linux {release}, CPython {platform.python_version()}{priority}"
 
 

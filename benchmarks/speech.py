@@ -1,6 +1,6 @@
 """How well spoken goals are heard.
 
-    PYTHONPATH=plugins/espeak:plugins/speech python benchmarks/speech.py
+    PYTHONPATH=plugins/espeak:plugins/speech python -m benchmarks.speech
 
 Phrases of the shipped plugins, and sentences that are none, said by many synthesised voices at
 several speeds, under noise. Where flite is installed, it says them too: a synthesiser that had no
@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-import measuring
 import numpy as np
+from benchmarks import measuring
 
 from nondum_speech.espeak import Espeak
 from nondum_speech.grammar import Vocabulary

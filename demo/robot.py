@@ -227,7 +227,7 @@ udev = false
 
 def _await_socket(robot: Robot, daemon: subprocess.Popen[bytes]) -> None:
     done = threading.Event()
-    for _ in range(300):
+    for _ in range(round(300 * robot.slowness)):
         if daemon.poll() is not None:
             break
         try:

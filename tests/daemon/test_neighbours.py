@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from tests.daemon.neighbours import beacon, ear, neighbours, routed, say, until_shared, written
 from tests.daemon.plugins import scribe, talker
+from tests.kit.payloads import Part
 from tests.kit.running_host import READY_S, RunningHost
 from tests.kit.shared import Shared
 from tests.kit.until import until
@@ -55,6 +56,22 @@ def until_written(log: Path, *words: str) -> None:
         lambda: written(log) == list(words),
         evidence=lambda: written(log),
     )
+
+
+def shining(log: Path) -> Part:
+    """A lamp of its host alone, which can be asked to shine."""
+    part = beacon(log, type="pointer")
+    source = part.source.replace("lasting=True,", 'lasting=True, phrase="shine",')
+    return replace(part, source=source)
+
+
+def until_standing(host: RunningHost, goal: str, state: str) -> None:
+    """Wait until a goal that was given to a peer is known to be there."""
+
+    def known() -> dict[str, str]:
+        return {row["id"]: row["state"] for row in host.ask("goals")["elsewhere"]}
+
+    until(f"goal {goal} of a peer is {state}", lambda: known().get(goal) == state, evidence=known)
 
 
 def until_lost(host: RunningHost, component: str) -> None:
@@ -266,6 +283,30 @@ def test_goal_that_is_typed_goes_where_one_that_is_heard_would(pair: Hosts, tmp_
     assert rover.ask("goal", words="rover, blink")["host"] == "rover"
 
 
+def test_question_that_names_a_host_is_answered_by_it(pair: Hosts, tmp_path: Path) -> None:
+    rover, mule = pair
+    rover.bring("light", beacon(tmp_path / "log", type="pointer"))
+    until_shared(mule, "beacon@rover")
+    asked = mule.ask("say", words="rover, what can you do?")["answer"]
+    assert asked.startswith("rover: I can blink")
+    assert mule.ask("goal", words="rover, what can you do")["answer"] == asked
+    assert not mule.ask("say", words="what can you do")["answer"].startswith("rover")
+    rover.until_goal(rover.want("(lit rover)"), "holds")
+    assert "(lit rover)" in mule.ask("say", words="rover, what are you doing")["answer"]
+
+
+def test_question_that_is_heard_is_answered_by_the_host_that_it_names(
+    pair: Hosts, tmp_path: Path
+) -> None:
+    said = tmp_path / "said"
+    rover, mule = pair
+    mule.bring("ears", ear(said))
+    rover.bring("light", beacon(tmp_path / "log", type="pointer"))
+    until_shared(mule, "beacon@rover")
+    say(said, "rover, what can you do?")
+    mule.until_told("rover: I can blink")
+
+
 def test_word_that_stops_may_be_typed_for_one_host(pair: Hosts, tmp_path: Path) -> None:
     rover, mule = pair
     rover.bring("light", beacon(tmp_path / "log", type="pointer"))
@@ -279,9 +320,7 @@ def test_word_that_stops_may_be_typed_for_one_host(pair: Hosts, tmp_path: Path) 
 
 def test_goal_of_a_host_that_is_gone_is_not_known_any_more(tmp_path: Path) -> None:
     with neighbours(tmp_path, "rover", "mule") as (rover, mule):
-        part = beacon(tmp_path / "log", type="pointer")
-        source = part.source.replace("lasting=True,", 'lasting=True, phrase="shine",')
-        rover.bring("light", replace(part, source=source))
+        rover.bring("light", shining(tmp_path / "log"))
         until_shared(mule, "beacon@rover")
         given = mule.run("goal", "rover,", "shine", "--wait", "--json").ok().json
         assert (given["state"], given["holds"]) == ("active", True)
@@ -289,3 +328,39 @@ def test_goal_of_a_host_that_is_gone_is_not_known_any_more(tmp_path: Path) -> No
         mule.until_told("the host rover is gone")
         (row,) = mule.ask("goals")["elsewhere"]
         assert (row["id"], row["state"], row["holds"]) == (given["id"], "unknown", False)
+
+
+@pytest.mark.parametrize("end", ["kill", "SIGSTOP"])
+def test_goal_of_a_host_that_is_back_is_told_of_again(end: str, tmp_path: Path) -> None:
+    with neighbours(tmp_path, "rover", "mule") as (rover, mule):
+        rover.bring("light", shining(tmp_path / "log"))
+        until_shared(mule, "beacon@rover")
+        given = mule.run("goal", "rover,", "shine", "--wait", "--json").ok().json
+        stopped = rover.pid
+        rover.kill() if end == "kill" else os.kill(stopped, signal.SIGSTOP)
+        mule.until_told("the host rover is gone")
+        until_standing(mule, given["id"], "unknown")
+        rover.start() if end == "kill" else os.kill(stopped, signal.SIGCONT)
+        until_standing(mule, given["id"], "active")
+        rover.ask("halt", id=given["id"])
+        until_standing(mule, given["id"], "halted")
+
+
+def test_words_that_are_kept_go_to_the_host_that_comes_back(tmp_path: Path) -> None:
+    with neighbours(tmp_path, "rover", "mule") as (rover, mule):
+        rover.bring("light", beacon(tmp_path / "log", type="pointer"))
+        until_shared(mule, "beacon@rover")
+        rover.kill()
+        mule.until_told("the host rover is gone")
+        mule.run("goal", "rover, blink").refused(1, "PHRASE_")
+        kept = [
+            mule.run("goal", "--keep", words, "--json").ok().json["id"]
+            for words in ("rover, blink", "blink")
+        ]
+        rover.start()
+        for id in kept:
+            mule.until_goal(id, "halted")
+        given = mule.ask("goals")["elsewhere"]
+        assert [(row["host"], row["text"]) for row in given] == [("rover", "blink")] * 2
+        for row in given:
+            until_standing(mule, row["id"], "reached")

@@ -12,7 +12,8 @@ import pytest
 from demo.robot import View
 from tests.kit.beacon import BEACON
 from tests.kit.payloads import Part
-from tests.kit.running_host import COMMAND, RunningHost, running
+from tests.kit.running_host import COMMAND, Row, RunningHost, running
+from tests.kit.until import until
 
 pytestmark = pytest.mark.daemon
 
@@ -72,6 +73,26 @@ def test_clock_that_jumps_changes_nothing(tmp_path: Path, clock: Path) -> None:
             assert [row["state"] for row in view["payloads"]] == ["active"]
         told = host.run("journal", "--json").ok().json
     assert not [entry for entry in told if entry["event"] in ("WorkerExited", "WorkerFailed")]
+
+
+def test_status_says_that_the_clock_is_wrong_until_it_is_set(tmp_path: Path, clock: Path) -> None:
+    def told(view: View) -> bool:
+        return any("CLOCK_UNSURE" in warning for warning in view["warnings"])
+
+    clock.write_text("-20y")
+    with running(tmp_path / "host", program=COMMAND) as host:
+        host.until("the clock is doubted", lambda view: view if told(view) else None)
+        host.until_told("CLOCK_UNSURE")
+        clock.write_text("+0")
+        host.until("the clock is believed", lambda view: None if told(view) else view)
+
+        def journal() -> list[Row]:
+            entries = host.run("journal", "--json").ok().json
+            clocks = [entry for entry in entries if entry["event"].startswith("Clock")]
+            return clocks if clocks and clocks[-1]["event"] == "ClockRight" else []
+
+        doubted, _ = until("it is in the journal", journal)
+    assert [problem["code"] for problem in doubted["problems"]] == ["CLOCK_UNSURE"]
 
 
 def test_shim_is_what_it_is_taken_for(clock: Path) -> None:

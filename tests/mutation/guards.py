@@ -213,6 +213,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/peers/serving.py": (f"{_TH}/peers/test_serving.py",),
     f"{_H}/peers/given_away.py": (f"{_TH}/peers/test_given_away.py",),
     f"{_H}/peers/goals.py": (f"{_TH}/peers/test_goals.py",),
+    f"{_H}/peers/asking.py": (f"{_TH}/peers/test_asking.py",),
     f"{_H}/peers/pairing_desk.py": (f"{_TH}/peers/test_pairing_desk.py",),
     f"{_H}/peers/trust_keeper.py": (f"{_TH}/peers/test_trust_keeper.py",),
     f"{_H}/peers/placement/fetching.py": (f"{_TH}/peers/placement/test_fetching.py",),

@@ -12,6 +12,8 @@ from nondum.host.events import (
     CatalogueSetAside,
     CatalogueUnwritten,
     CatalogueWritten,
+    ClockDoubted,
+    ClockRight,
     ConditionEnded,
     DriveFlapping,
     DriveLeftAlone,
@@ -103,6 +105,10 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
         case TrustChanged():
             told = f"whom {event.owner} trusts has changed: version {event.version}"
             return f"{told}, from {event.source}"
+        case ClockDoubted():
+            return _joined(event.problems)
+        case ClockRight():
+            return "the clock is set: it is believed again"
         case TrustFileRefused():
             return f"a trust file from {event.source} is not taken: {_joined(event.problems)}"
         case DriveUnreadable():

@@ -1,10 +1,10 @@
 """What people ask the robot about itself is answered in one sentence, and spoken where something
-speaks; no plan, payload or peer is needed for it."""
+speaks; no plan or payload is needed for it. What they ask a peer, by its name, the peer answers."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Awaitable, Callable, Collection, Iterable
 
 from nondum.host.catalogue.records import PayloadRecord
 from nondum.host.mind.answers import abilities, activity
@@ -21,18 +21,27 @@ class Answering:
         mind: Mind,
         payloads: Callable[[], Iterable[PayloadRecord]],
         busy: Callable[[], Collection[str]],
+        ask_peer: Callable[[str], Awaitable[str | None]] | None = None,
     ) -> None:
-        """`busy` tells the components of this host that carry something out."""
+        """`busy` tells the components of this host that carry something out. `ask_peer` asks the
+        peer that words name; None where there are no peers."""
         self._mind, self._payloads, self._busy = mind, payloads, busy
+        self._ask_peer = ask_peer
 
     async def answer(self, words: str) -> str | None:
-        """Answer a question, and tell people so; None: it is none of those that are known."""
-        question = question_in(words, self._mind.beliefs.snapshot.host)
-        if question is None:
-            return None
-        told = await self._answered(question)
-        self._mind.people.tell(told)
+        """Answer a question, or have the peer that it names do so, and tell people; None: it is
+        none of those that are known. Raises `GoalRefused` if the peer does not answer."""
+        told = await self.own(words)
+        if told is None and self._ask_peer is not None:
+            told = await self._ask_peer(words)
+        if told is not None:
+            self._mind.people.tell(told)
         return told
+
+    async def own(self, words: str) -> str | None:
+        """The answer to a question about this host; None: it is none of those that are known."""
+        question = question_in(words, self._mind.beliefs.snapshot.host)
+        return None if question is None else await self._answered(question)
 
     async def _answered(self, question: Question) -> str:
         views = self._mind.views

@@ -22,7 +22,7 @@ from nondum.host.cgroups import Cages
 from nondum.host.config import HostConfig
 from nondum.host.confinement import choice
 from nondum.host.control.server import ControlServer
-from nondum.host.conversation import Conversation, Take
+from nondum.host.conversation import Conversation, Reply, Take, wanted
 from nondum.host.devices.slots import DeviceSlotSource
 from nondum.host.devices.software import Software
 from nondum.host.devices.source import DeviceSource
@@ -70,6 +70,7 @@ from nondum.host.service.words import words
 from nondum.host.stop_button.button import StopButton
 from nondum.host.stop_button.hook import StopHook
 from nondum.host.stopping import Stopped, Stopping
+from nondum.host.trust.clock import ClockWatch
 from nondum.host.trust.orders import TrustOrders
 from nondum.host.trust.payload_trust import TrustOptions
 from nondum.host.workers.confinements import changes_user
@@ -164,7 +165,15 @@ async def _run(
     stop_hook = StopHook(config.stop)
     stopping = Stopping(lambda: mind, workers, stop_hook.run_soon)
     neighbours = await _neighbours(
-        config, folders, workers, catalogue, bus, lambda: mind, stopping.stop, executor
+        config,
+        folders,
+        workers,
+        catalogue,
+        bus,
+        lambda: mind,
+        stopping.stop,
+        lambda words: answering.own(words),
+        executor,
     )
     mind = Mind(
         config.host.name,
@@ -189,11 +198,13 @@ async def _run(
     if journal.is_in_use():
         bus.subscribe(Telling(catalogue.snapshot).on_event)
     listing = executor.installation.listing
+    clock = ClockWatch(lambda: executor.trust.trust, bus.emit)
 
     def warnings() -> tuple[str, ...]:
         of_peers = neighbours.warnings if neighbours else ()
         return (
             *executor.trust.warnings,
+            *map(str, clock.problems),
             *_warnings(catalogue, safety[1]),
             *tally.warnings(),
             *tries.counts(catalogue.snapshot()),
@@ -211,7 +222,12 @@ async def _run(
     trying_again = TryingAgain(catalogue.snapshot, amounts, bus.emit, places)
     vouched = executor.trust.vouched
     take = _take(neighbours, mind, stopping)
-    answering = Answering(mind, lambda: catalogue.snapshot().payloads, workers.busy)
+    answering = Answering(
+        mind,
+        lambda: catalogue.snapshot().payloads,
+        workers.busy,
+        neighbours.asking.ask if neighbours else None,
+    )
     conversation = Conversation(
         mind, workers.plugins, workers.pids, lambda words: orders.heard(words), answering.answer
     )
@@ -259,7 +275,7 @@ async def _run(
         elsewhere,
     )
     goal_files: GoalFiles = GoalFiles(
-        catalogue.snapshot, mind, orders.translated, bus.emit, on_change=feedback.wake
+        catalogue.snapshot, mind, orders.translated, bus.emit, feedback.wake, elsewhere
     )
     bus.subscribe(goal_files.on_event)
     control = ControlServer(
@@ -296,6 +312,7 @@ async def _run(
             feedback.run(),
             goal_files.run(),
             trying_again.run(),
+            clock.run(),
             trials.hold(catalogue.snapshot, tally, bus.emit),
             *(source.watch(bus.emit) for source in device_sources(config)),
         )
@@ -317,6 +334,7 @@ async def _neighbours(
     bus: Bus,
     mind: Callable[[], Mind],
     stop: Callable[[], Stopped],
+    answer: Reply,
     executor: Executor,
 ) -> Neighbourhood | None:
     """What this host has to do with others; None where it is to have nothing. Imported only where
@@ -336,6 +354,7 @@ async def _neighbours(
         bus.emit,
         mind,
         stop,
+        answer,
         executor.children,
         executor.judged_by,
     )
@@ -361,7 +380,7 @@ def _take(neighbours: Neighbourhood | None, mind: Mind, stopping: Stopping) -> T
     async def taken(words: str) -> str:
         if is_stop(words):
             return str(stopping.stop())
-        return f"that is goal {mind.give(words=words).id}"
+        return wanted(mind, words)
 
     return taken
 

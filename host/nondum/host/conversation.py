@@ -14,6 +14,7 @@ from typing import Any, Protocol, TypeAlias
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.sayings import sayings
+from nondum.host.replaced import replacing
 from nondum.host.workers.proxies import Answer
 from nondum.sdk.errors import GoalRefused
 
@@ -46,7 +47,8 @@ class Speaking(Protocol):
 Take: TypeAlias = Callable[[str], Awaitable[str]]
 """What a person said → what becomes of it, in words. Raises `GoalRefused`."""
 Reply: TypeAlias = Callable[[str], Awaitable[str | None]]
-"""What a person asked → the answer, which people have been told; None: it is no question."""
+"""What a person asked → the answer, which people have been told; None: it is no question. Raises
+`GoalRefused` if the peer that is asked does not answer."""
 
 
 class Conversation:
@@ -88,9 +90,9 @@ class Conversation:
 
     async def heard(self, component: str, words: str) -> None:
         """Answer or want what a person has said; tell people where that cannot be."""
-        if await self._answer(words) is not None:
-            return
         try:
+            if await self._answer(words) is not None:
+                return
             told = await self._take(words)
         except GoalRefused as refused:
             told = str(refused.problems[0])
@@ -150,6 +152,17 @@ class Conversation:
                 return
             await self.heard(component, words)
             await asyncio.sleep(PAUSE_S)
+
+
+def wanted(mind: Mind, words: str) -> str:
+    """Make a goal of words that are heard; says what became of them. Raises `GoalRefused`."""
+    return given_goal(mind.views.goal(mind.give(words=words)))
+
+
+def given_goal(row: Mapping[str, Any], *, of: str = "") -> str:
+    """What is said of words that are a goal now, which peer's `of` says."""
+    told = f"that is goal {row['id']}{of}"
+    return "; ".join(filter(None, (told, replacing(row["replaces"]))))
 
 
 def _hosts(composition: Composition) -> tuple[str, ...]:

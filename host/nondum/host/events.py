@@ -318,6 +318,18 @@ class TrustFileRefused(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class ClockDoubted(Event):
+    """The wall clock shows a moment that is certainly past."""
+
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ClockRight(Event):
+    """The wall clock, which was doubted, may be right again."""
+
+
+@dataclass(frozen=True, slots=True)
 class PayloadWithdrawn(Event):
     """The payload's last source is gone: nothing of it may be used from now on."""
 

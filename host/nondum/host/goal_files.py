@@ -14,6 +14,8 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 from nondum.host.catalogue.records import GoalRecord, Snapshot, Step
+from nondum.host.conversation import given_goal
+from nondum.host.elsewhere import Elsewhere
 from nondum.host.events import Emit, Event, GoalEnded, HostStarted, PayloadActivated
 from nondum.host.feedback.concerns import refusal
 from nondum.host.feedback.state import Concern, State
@@ -71,10 +73,13 @@ class GoalFiles:
         translate: Translate,
         emit: Emit,
         on_change: Callable[[], None] = lambda: None,
+        elsewhere: Elsewhere | None = None,
     ) -> None:
-        """`on_change` is called when there are other `concerns`."""
+        """`on_change` is called when there are other `concerns`; words of people may be goals of
+        peers, `elsewhere`."""
         self._snapshot, self._mind, self._translate = snapshot, mind, translate
         self._emit, self._on_change = emit, on_change
+        self._elsewhere = elsewhere
         self._wishes: dict[str, Wish] = {}
         """Goal id → the wish that it was made of."""
         self._waiting: set[str] = set()
@@ -170,6 +175,8 @@ class GoalFiles:
             self._forget(wish)
             return
         try:
+            if await self._is_given_to_a_peer(wish):
+                return
             self._mind.give(words=wish.words, priority=wish.priority, id=id)
         except GoalRefused as refused:
             if self._mind.composition is None:  # too early: there will be one
@@ -180,6 +187,20 @@ class GoalFiles:
                 self._refused(wish, refused.problems[0])
         else:
             self._given(wish, f"{_asker(wish)} asks: {wish.words}")
+
+    async def _is_given_to_a_peer(self, wish: Wish) -> bool:
+        """Give a peer what a person wants of it, now that it is here. Raises `GoalRefused`."""
+        if self._elsewhere is None or wish.payload:
+            return False
+        peer, words = await self._elsewhere.whose(wish.words)
+        if peer is None or not self._is_wished(wish):
+            return False
+        given = await self._elsewhere.give(peer, words, wish.priority)
+        self._forget(wish)
+        self._mind.halt(id=wish.id, why=f"{peer} has it: goal {given['id']} there")
+        told = given_goal(given, of=f" of {peer}")
+        self._mind.people.tell(f"a person asks {peer}: {words}; {told}")
+        return True
 
     async def _try_translated(self, wish: Wish, refused: GoalRefused) -> None:
         try:

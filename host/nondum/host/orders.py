@@ -340,7 +340,7 @@ class Orders:
         )
 
     def _row(self, given: GivenGoal) -> Row:
-        return own_goal_row({**given.to_dict(), "holds": False}, self.catalogue.snapshot().host)
+        return own_goal_row(self.mind.views.goal(given), self.catalogue.snapshot().host)
 
     def _kept(self, words: str, priority: int, refused: GoalRefused, arguments: Arguments) -> Row:
         """Keep words that mean nothing yet, where that is asked for. Raises `GoalRefused`."""

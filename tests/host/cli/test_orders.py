@@ -56,6 +56,18 @@ def test_a_goal_is_reached_while_another_is_kept_up(daemon: RunningHost) -> None
     assert reached.split("  ")[1:] == ["(greeted person panther)", "reached", "it holds\n"]
 
 
+def test_whoever_gives_a_goal_is_told_which_it_replaces(daemon: RunningHost) -> None:
+    first = daemon.run("goal", "shine", "--wait", "--json").ok().json
+    assert first["replaces"] == []
+    second = daemon.run("goal", "shine", "--json").ok().json
+    (replaced,) = second["replaces"]
+    assert (replaced["id"], replaced["text"]) == (first["id"], "shine")
+    assert f"goal {second['id']}, 'shine'" in daemon.run("goal", "shine").ok().out
+    third = daemon.run("goal", "shine", "--wait", "--json").ok().json
+    assert second["id"] not in [goal["id"] for goal in third["replaces"] if not goal["is_over"]]
+    assert f"goal {third['id']}, 'shine'" in daemon.run("say", "shine").ok().out
+
+
 def test_a_goal_in_pddl_is_understood(daemon: RunningHost) -> None:
     given = daemon.run("goal", "--pddl", "(lit self)", "--maintain", "--wait", "--json").ok().json
     assert (given["goal"], given["kind"], given["holds"]) == ("(lit panther)", "maintain", True)

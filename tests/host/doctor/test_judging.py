@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import socket
-from datetime import UTC, datetime
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -15,10 +15,12 @@ from nondum.host.doctor import account, beliefs, clock, daemon, drives, machine,
 from nondum.host.doctor.examination import examine
 from nondum.host.doctor.finding import Finding, Result
 from nondum.host.drives.whose import Disk, Owner
+from nondum.wheelhouse.trust.judging import EARLIEST
 
 ROOT, MALLORY = Key("root"), Key("mallory")
 FULL = ("cpuset", "cpu", "io", "memory", "pids")
-TODAY_S = datetime(2026, 6, 1, tzinfo=UTC).timestamp()
+TODAY = EARLIEST + timedelta(days=1)
+TODAY_S = TODAY.timestamp()
 CARDS = " 0 [Loopback       ]: Loopback - Loopback\n                      Loopback 1\n"
 
 
@@ -52,10 +54,14 @@ CARDS = " 0 [Loopback       ]: Loopback - Loopback\n                      Loopba
         (drives.judge(Disk("sda", 9, True, Owner.NOBODY, "has partitions")), "ok", "partitions"),
         (drives.judge(Disk("sda", 9, True, Owner.HOST, "it is /srv")), "ok", "alone: it is /srv"),
         (drives.judge(Disk("sda", 9, True, Owner.SOMEBODY, "at /mnt")), "warn", "at /mnt unmount"),
-        (clock.judge(0.0, is_kept=False, is_synchronised=False), "bad", "1970-01-01"),
+        (
+            clock.judge(0.0, is_kept=False, is_synchronised=False),
+            "bad",
+            "CLOCK_UNSURE it says 1970-01-01",
+        ),
         (clock.judge(TODAY_S, is_kept=False, is_synchronised=False), "warn", "battery"),
         (clock.judge(TODAY_S, is_kept=True, is_synchronised=None), "warn", "timesyncd"),
-        (clock.judge(TODAY_S, is_kept=False, is_synchronised=True), "ok", "2026-06-01"),
+        (clock.judge(TODAY_S, is_kept=False, is_synchronised=True), "ok", f"{TODAY:%F}"),
         (beliefs.judge_planners(("native",)), "ok", "native"),
         (beliefs.judge_planners(()), "bad", "no goal has a plan"),
     ],

@@ -119,3 +119,27 @@ def test_goals_of_an_earlier_run_keep_their_ids_and_order(queue: GoalQueue) -> N
     newer = queue[give(queue)]
     assert int(newer.id) > 7
     assert all(newer.number > goal.number for goal in queue if goal is not newer)
+
+
+def test_goal_says_which_it_replaces_before_it_has_a_plan_and_after(queue: GoalQueue) -> None:
+    first, other = give(queue, "maintain"), give(queue)
+    second = give(queue, "maintain")
+    assert [goal.id for goal in queue.replaces(second)] == [first]
+    assert not queue.replaces(first)
+    assert not queue.replaces(other)
+    queue.put_aside(first, second)
+    queue.put(second, GoalState.ACTIVE)
+    assert [goal.id for goal in queue.replaces(second)] == [first]
+    third = give(queue, "maintain")
+    assert [goal.id for goal in queue.replaces(third)] == [second]
+    queue.put(third, GoalState.ACTIVE)  # both can be had
+    assert not queue.replaces(third)
+
+
+def test_goal_that_is_resumed_was_replaced_by_none(queue: GoalQueue) -> None:
+    first, second = give(queue, "maintain"), give(queue, "maintain")
+    queue.put_aside(first, second)
+    queue.put(second, GoalState.ACTIVE)
+    queue.give("words", "(goal)", "maintain", id=first)
+    assert [goal.id for goal in queue.replaces(first)] == [second]
+    assert not queue.replaces(second)

@@ -7,7 +7,14 @@ from typing import Any
 
 import pytest
 
-from nondum.host.peers.given_away import LONGEST, MOST_KEPT, MOST_PROBLEMS, GivenAway, standing
+from nondum.host.peers.given_away import (
+    LONGEST,
+    MOST_KEPT,
+    MOST_PROBLEMS,
+    MOST_REPLACED,
+    GivenAway,
+    standing,
+)
 from nondum.sdk.errors import GoalRefused
 
 pytestmark = pytest.mark.anyio
@@ -22,7 +29,8 @@ def given() -> GivenAway:
 
 
 def told(**more: Any) -> dict[str, Any]:
-    return {"goal": "7", "state": "active", "reason": "", "holds": True, "problems": []} | more
+    standing = {"goal": "7", "state": "active", "reason": "", "holds": True, "problems": []}
+    return {**standing, "replaces": [], **more}
 
 
 async def test_row_says_whose_goal_it_is_and_how_it_stands() -> None:
@@ -76,6 +84,15 @@ async def test_peer_tells_nothing_of_goals_that_it_was_not_given(peer: str, goal
     assert away.rows() == [before]
 
 
+async def test_peer_tells_which_goal_the_new_one_replaces() -> None:
+    away, older = GivenAway(), {"id": "6", "text": "shine", "is_over": False}
+    row = away.add("rover", "blink", 0, {**ANSWER, "replaces": [older]})
+    assert row["replaces"] == [older]
+    away.hear("rover", told(replaces=[{**older, "is_over": True}]))
+    assert away.rows()[0]["replaces"] == [{**older, "is_over": True}]
+    assert standing(away.rows()[0])["replaces"] == [{**older, "is_over": True}]
+
+
 async def test_what_a_peer_tells_is_bounded_and_plain() -> None:
     away = given()
     away.hear(
@@ -85,6 +102,7 @@ async def test_what_a_peer_tells_is_bounded_and_plain() -> None:
             reason="\x1b[2J",
             holds="yes",
             problems=[{"message": 7}, "no problem", *[{}] * 100],
+            replaces=[{"text": "\x1b" * 3, "is_over": "yes"}, 7, *[{}] * 100],
         ),
     )
     (row,) = away.rows()
@@ -92,7 +110,10 @@ async def test_what_a_peer_tells_is_bounded_and_plain() -> None:
     assert "\x1b" not in row["reason"]
     assert row["holds"] is False
     assert len(row["problems"]) <= MOST_PROBLEMS
-    away.hear("rover", {"goal": "7", "problems": 3})
+    assert len(row["replaces"]) < MOST_REPLACED
+    assert "\x1b" not in row["replaces"][0]["text"]
+    assert row["replaces"][0]["is_over"] is False
+    away.hear("rover", {"goal": "7", "problems": 3, "replaces": 3})
     for number in range(MOST_KEPT + 5):
         away.add("rover", "blink", 0, ANSWER | {"goal": str(number + 10)})
     assert len(away.rows()) == MOST_KEPT

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from nondum.host.mind.mind import Mind
+from nondum.host.peers.given_away import MOST_KEPT
 from nondum.host.peers.goals import MAX_WORDS, Goals
 from nondum.host.stopping import Stopped
 from nondum.sdk.wire import Body
@@ -69,3 +70,16 @@ async def test_goal_of_no_priority_that_there_is_is_refused(priority: Any) -> No
     errand.args["priority"] = priority
     with pytest.raises(CallFailed, match="CALL_MALFORMED"):
         goals.serve_give(errand)
+
+
+@pytest.mark.parametrize(
+    "goals",
+    [None, 7, [], {}, {str(number): "blink" for number in range(MOST_KEPT + 1)}],
+    ids=["nothing", "number", "list", "none", "too many"],
+)
+async def test_peer_that_is_back_asks_after_goals_by_id(goals: Any) -> None:
+    goals_here = Goals("mule", no_mind, Nobody(), lambda: (), no_stop, accepts=True)
+    errand = asked("blink")
+    errand.args["goals"] = goals
+    with pytest.raises(CallFailed, match="CALL_MALFORMED"):
+        await goals_here.serve_again(errand)

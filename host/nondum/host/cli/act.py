@@ -10,6 +10,7 @@ import click
 from nondum.host.cli import complete, render
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.failure import EXIT_REFUSED
+from nondum.host.replaced import replacing
 from nondum.planning.stop_words import STOPS
 from nondum.sdk.errors import GoalRefused, Problem
 
@@ -65,6 +66,9 @@ def goal(
     `nondum goals` says which words are understood now. Others may be translated by a component:
     what it understood is shown, and given only once it is confirmed. Words that a peer can have and
     this host cannot, or that begin with its name, are given to the peer.
+
+    A goal to maintain, such as "follow me", replaces older ones to maintain of the same or a lower
+    priority, if their plans need the same: which ones is shown. Of JSON, they are `replaces`.
 
     Words that mean nothing yet, since their payload is still being brought in, are kept with --keep
     and given once they do; with --wait, while anything is being brought in. With --wait, exits with
@@ -128,13 +132,13 @@ def _shown(session: Session, given: dict[str, Any], *, wait: bool) -> int:
 def say(session: Session, words: tuple[str, ...]) -> None:
     """Say something to the robot, as if it had heard it.
 
-    It answers "what can you do" and "what are you doing", also where nothing is plugged in. "Stop"
-    stops it; all else is a goal, for it or for the one peer that can have it. What it answers is
-    spoken, too, where something speaks.
+    It answers "what can you do" and "what are you doing", also where nothing is plugged in, and has
+    a peer answer that is named first. "Stop" stops it; all else is a goal, for it or for the one
+    peer that can have it. What it answers is spoken, too, where something speaks.
 
     \b
     Examples: nondum say what can you do
-              nondum say "what are you doing"
+              nondum say "scout, what are you doing"
     """
     _show_answer(session, session.ask("say", timeout_s=None, words=" ".join(words)))
 
@@ -182,6 +186,8 @@ def _show_goal(given: dict[str, Any]) -> None:
     for problem in given["problems"]:
         fix = f" → {problem['fix']}" if problem.get("fix") else ""
         render.sentence(f"{problem['code']} {problem['message']}{fix}", colour="red", mark="  ")
+    if told := replacing(given["replaces"]):
+        render.sentence(told, mark="  ")
 
 
 @click.command()

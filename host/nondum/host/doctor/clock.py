@@ -10,9 +10,8 @@ from pathlib import Path
 
 from nondum.host.config import HostConfig
 from nondum.host.doctor.finding import Finding, bad, ok, warn
+from nondum.wheelhouse.trust.judging import clock_unsure
 
-MADE_S = datetime(2026, 1, 1, tzinfo=UTC).timestamp()
-"""Nobody had this nondum before that."""
 _UNSYNCHRONISED = 5
 """What adjtimex(2) answers: TIME_ERROR."""
 RTC = Path("/sys/class/rtc/rtc0")
@@ -26,13 +25,15 @@ def examine(config: HostConfig) -> Iterator[Finding]:
 
 def judge(now_s: float, *, is_kept: bool, is_synchronised: bool | None) -> Finding:
     """Whether the time may be believed. Pure."""
-    day = datetime.fromtimestamp(now_s, UTC).strftime("%Y-%m-%d")
-    if now_s < MADE_S:
+    now = datetime.fromtimestamp(now_s, UTC)
+    day = now.strftime("%Y-%m-%d")
+    if (unsure := clock_unsure(None, now)) is not None:
         told = (
-            f"it says {day}, which was before nondum: certificates of hosts do not hold yet, ages "
-            "are wrong, and whether keys hold is judged by the last date that is sure"
+            f"{unsure.code} it says {day}, which was before nondum: certificates of hosts do not "
+            "hold yet, ages are wrong, and whether keys hold is judged by the last date that is "
+            "sure"
         )
-        return bad("clock", told, "set it (`date -s`), or let systemd-timesyncd reach a server")
+        return bad("clock", told, unsure.fix)
     if is_synchronised:
         return ok("clock", f"it says {day}, and is kept right")
     if not is_kept:

@@ -55,6 +55,8 @@ class GivenGoal:
     """Why it is where it is."""
     problems: tuple[Problem, ...] = ()
     """What keeps it suspended."""
+    replaced_by: str = ""
+    """The goal that has taken its place."""
 
     def to_dict(self) -> dict[str, object]:
         """Plain data for people's tools."""
@@ -167,9 +169,22 @@ class GoalQueue:
         a newer one takes the place of is over."""
         goal = self._goals[id]
         if is_replaced(goal, self._goals[behind]):
-            return self.put(id, GoalState.HALTED, f"replaced by goal {behind}")
+            goal = self.put(id, GoalState.HALTED, f"replaced by goal {behind}")
+            self._goals[id] = replace(goal, replaced_by=behind)
+            return self._goals[id]
         why = f": both need {shared}" if shared else ""
         return self.put(id, GoalState.QUEUED, f"waits for goal {behind}{why}")
+
+    def replaces(self, id: str) -> tuple[GivenGoal, ...]:
+        """The goals whose place a goal has taken, or takes if its plan needs what they need."""
+        by = self._goals[id]
+        has_no_plan_yet = by.state in (GoalState.QUEUED, GoalState.SUSPENDED)
+        return tuple(
+            goal
+            for goal in self
+            if goal.replaced_by == id
+            or (has_no_plan_yet and not goal.state.is_final and is_replaced(goal, by))
+        )
 
     def _forget_oldest(self) -> None:
         ended = [goal.id for goal in self._goals.values() if goal.state.is_final]

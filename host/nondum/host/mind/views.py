@@ -13,7 +13,7 @@ from nondum.host.mind import evidence, offers, short_names
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition, own_objects
 from nondum.host.mind.frames import implausible
-from nondum.host.mind.goals import GoalQueue, GoalState
+from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState
 from nondum.host.mind.people import People
 from nondum.host.mind.pursued import Pursued
 from nondum.host.mind.pursuit import Pursuit
@@ -104,12 +104,21 @@ class Views:
         return evidence.explained(text, self._mind.beliefs, self._mind.composition)
 
     def given(self) -> list[Row]:
-        """What was asked for; of goals that are reached, or kept up just now, `holds` is true."""
+        """What was asked for; of goals that are reached, or kept up just now, `holds` is true.
+
+        `replaces` has the goals whose place one takes: `id`, `text`, and whether that `is_over`.
+        """
+        return [self.goal(goal) for goal in self._mind.queue]
+
+    def goal(self, goal: GivenGoal) -> Row:
+        """One goal, in the same columns."""
         held = {one.goal for one in self._mind.pursuit.pursued if one.phase is Phase.HOLDING}
-        return [
-            {**goal.to_dict(), "holds": goal.state is GoalState.REACHED or goal.id in held}
-            for goal in self._mind.queue
+        replaces = [
+            {"id": other.id, "text": other.text, "is_over": other.state.is_final}
+            for other in self._mind.queue.replaces(goal.id)
         ]
+        holds = goal.state is GoalState.REACHED or goal.id in held
+        return {**goal.to_dict(), "holds": holds, "replaces": replaces}
 
     def goals(self) -> Callable[[], Row]:
         """What can be asked for now and what was, worked out by the function that is given, in any

@@ -18,6 +18,7 @@ MOST_KEPT = 50
 LONGEST = 1000
 """Characters of a text in a row."""
 MOST_PROBLEMS = 4
+MOST_REPLACED = 4
 UNKNOWN = "unknown"
 """State of a goal whose host is gone."""
 _OVER = frozenset({"reached", "halted", UNKNOWN})
@@ -50,6 +51,7 @@ class GivenAway:
             "problems": [],
             "resumable": False,
             "holds": False,
+            "replaces": _replaced(answer.get("replaces")),
         }
         self._rows.pop((host, id), None)
         if len(self._rows) >= MOST_KEPT:
@@ -66,6 +68,7 @@ class GivenAway:
         problems = told.get("problems")
         row |= {name: _text(told.get(name)) for name in ("state", "reason")}
         row["holds"] = told.get("holds") is True
+        row["replaces"] = _replaced(told.get("replaces"))
         row["problems"] = [
             {name: _text(problem.get(name)) for name in ("code", "message", "where", "fix")}
             for problem in (problems if isinstance(problems, list) else [])[:MOST_PROBLEMS]
@@ -79,6 +82,14 @@ class GivenAway:
             if at == host and row["state"] not in _OVER:
                 row |= {"state": UNKNOWN, "reason": f"the host {host} is gone", "holds": False}
         self._tell()
+
+    def lost(self, host: str) -> list[Row]:
+        """Those whose host went away, and of which nothing is known since."""
+        return [
+            dict(row)
+            for (at, _), row in self._rows.items()
+            if at == host and row["state"] == UNKNOWN
+        ]
 
     async def follow(self, host: str, id: str) -> AsyncIterator[Row]:
         """One of them, now and whenever there is news. Raises `GoalRefused` (GOAL_UNKNOWN)."""
@@ -110,7 +121,23 @@ def standing(row: Mapping[str, Any]) -> dict[str, Any]:
         "reason": row["reason"][:LONGEST],
         "holds": row["holds"],
         "problems": problems,
+        "replaces": replaced(row),
     }
+
+
+def replaced(row: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What is told of the goals whose place a goal takes."""
+    return [{**goal, "text": goal["text"][:LONGEST]} for goal in row["replaces"][:MOST_REPLACED]]
+
+
+def _replaced(told: object) -> list[dict[str, Any]]:
+    """The same, as a peer tells it; one of an earlier version does not."""
+    return [
+        {name: _text(goal.get(name)) for name in ("id", "text")}
+        | {"is_over": goal.get("is_over") is True}
+        for goal in (told if isinstance(told, list) else [])[:MOST_REPLACED]
+        if isinstance(goal, dict)
+    ]
 
 
 def _text(value: object) -> str:

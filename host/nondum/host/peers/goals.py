@@ -11,11 +11,12 @@ import contextlib
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from typing import Any
 
-from nondum.host.events import Event, GoalEnded, GoalReached, PeerLeft, PlanMissing
+from nondum.host.conversation import given_goal, wanted
+from nondum.host.events import Event, GoalEnded, GoalReached, PeerJoined, PeerLeft, PlanMissing
 from nondum.host.mind.goals import HIGHEST_PRIORITY
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.offers import prospect
-from nondum.host.peers.given_away import GivenAway, standing
+from nondum.host.peers.given_away import MOST_KEPT, GivenAway, replaced, standing
 from nondum.host.peers.remote_calls import Reaches
 from nondum.host.printable import printable
 from nondum.host.rows import Row
@@ -28,6 +29,10 @@ from nondum.transport.peers import CallFailed, Errand
 
 ASK_S = 2.0
 """How long a peer has to say whether it can."""
+RECALL_S = 5.0
+"""How long a host that has just started has to know its goals again, each time it is asked."""
+RECALLS = 6
+"""How often it is asked; goals that it does not know then are not there any more."""
 MAX_WORDS = 1000
 """Characters of what a person said."""
 
@@ -53,6 +58,7 @@ class Goals:
         """Goal → the peer that gave it."""
         self._away = GivenAway()
         self._telling: asyncio.Task[None] | None = None
+        self._asking: set[asyncio.Task[None]] = set()
 
     # What is heard here
 
@@ -67,11 +73,12 @@ class Goals:
         peer, rest = await self.whose(words)
         if peer is not None:
             given = await self.give(peer, rest)
-            stopped = f"{peer} has stopped"
-            return stopped if "stopped" in given else f"that is goal {given['id']} of {peer}"
+            if "stopped" in given:
+                return f"{peer} has stopped"
+            return given_goal(given, of=f" of {peer}")
         if is_stop(rest):
             return str(self._stop())
-        return f"that is goal {self._mind().give(words=rest).id}"
+        return wanted(self._mind(), rest)
 
     async def whose(self, words: str) -> tuple[str | None, str]:
         """The peer whose goal words are, None for this host; and the words without its name.
@@ -161,23 +168,47 @@ class Goals:
         words = self._words(errand)
         priority = _priority(errand)
         given = self._mind().give(words=words, priority=priority)
-        self._givers[given.id] = errand.caller.name
-        if self._telling is None or self._telling.done():
-            self._telling = asyncio.create_task(self._tell_givers())
+        self._is_of(given.id, errand.caller.name)
         self._mind().people.tell(f"{errand.caller.name} heard {words!r}: that is goal {given.id}")
-        return {"goal": given.id, "text": given.text, "pddl": given.pddl, "kind": given.kind}
+        told = {"goal": given.id, "text": given.text, "pddl": given.pddl, "kind": given.kind}
+        return told | {"replaces": replaced(self._mind().views.goal(given))}
+
+    async def serve_again(self, errand: Errand) -> Body:
+        """How goals stand that a peer gave before one of the two was gone: `standings`. It is told
+        of them again from now on. Raises `CallFailed`.
+
+        A host that has just started waits for a moment until it knows its goals.
+        """
+        asked = _goals_asked(errand)
+        version = -1
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(RECALL_S):
+                while not asked.items() <= {(goal.id, goal.text) for goal in self._mind().queue}:
+                    version = await self._mind().changed(version)
+        rows = [row for row in self._mind().views.given() if asked.get(row["id"]) == row["text"]]
+        caller = errand.caller.name
+        rows = [row for row in rows if self._givers.get(row["id"], caller) == caller]
+        for row in rows:
+            if not self._mind().queue[row["id"]].state.is_final:
+                self._is_of(row["id"], caller)
+        return {"standings": [standing(row) for row in rows]}
 
     async def close(self) -> None:
-        """Tell no one any more."""
-        if self._telling is not None:
-            self._telling.cancel()
-            await asyncio.gather(self._telling, return_exceptions=True)
+        """Tell no one any more, and ask no one."""
+        tasks = [*self._asking, *([self._telling] if self._telling is not None else [])]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
 
     def on_event(self, event: Event) -> None:
         """Tell those who gave a goal what became of it."""
         match event:
             case PeerLeft(host=host):
                 self._away.lose(host)
+            case PeerJoined(host=host) if lost := self._away.lost(host):
+                asking = asyncio.create_task(self._ask_again(host, lost))
+                self._asking.add(asking)
+                asking.add_done_callback(self._asking.discard)
             case GoalReached(goal):
                 self._tell_giver(goal, "is reached", is_over=True)
             case GoalEnded(goal, reason):
@@ -205,6 +236,25 @@ class Goals:
                     told[row["id"]] = now
                     with contextlib.suppress(NondumError):  # it is gone, or busy
                         self._reach.notify(giver, "goal.standing", now)
+
+    def _is_of(self, goal: str, giver: str) -> None:
+        self._givers[goal] = giver
+        if self._telling is None or self._telling.done():
+            self._telling = asyncio.create_task(self._tell_givers())
+
+    async def _ask_again(self, host: str, lost: Sequence[Row]) -> None:
+        """Ask a peer that is back what has become of the goals that it was given."""
+        goals = {row["id"]: row["text"] for row in lost}
+        with contextlib.suppress(NondumError):  # it is gone again, or is older
+            for _ in range(RECALLS):
+                args, deadline_s = {"goals": goals}, 2 * RECALL_S
+                answer = await self._reach.call(host, "goal.again", args, deadline_s=deadline_s)
+                standings = answer.get("standings")
+                for told in standings if isinstance(standings, list) else []:
+                    if isinstance(told, dict):
+                        self._away.hear(host, told)
+                if not self._away.lost(host):
+                    return
 
     def _tell_giver(self, goal: str, what: str, *, is_over: bool) -> None:
         giver = self._givers.get(goal)
@@ -239,6 +289,15 @@ class Goals:
         except GoalRefused:
             return ""
         return await asyncio.to_thread(prospect, composition, world.facts, world.bare_facts, goal)
+
+
+def _goals_asked(errand: Errand) -> Mapping[str, str]:
+    """Id → words of goals that a peer asks after. Raises `CallFailed` (CALL_MALFORMED)."""
+    goals = errand.args.get("goals")
+    if not isinstance(goals, dict) or not 0 < len(goals) <= MOST_KEPT:
+        told = f"at most {MOST_KEPT} goals are asked after, by id"
+        raise CallFailed(Problem("CALL_MALFORMED", told))
+    return {str(id): str(text) for id, text in goals.items()}
 
 
 def _priority(errand: Errand) -> int:

@@ -11,12 +11,14 @@ from nondum.host.bridge.bridge import Bridge, with_port
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.config import HostConfig, PeersSection
 from nondum.host.control.arguments import Arguments
+from nondum.host.conversation import Reply
 from nondum.host.events import CertificatesBrought, Emit, Event, UnitsTaken
 from nondum.host.lifecycle.children import Children
 from nondum.host.lifecycle.folders import Folders
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.mind import Mind
-from nondum.host.peers import trust_orders
+from nondum.host.peers import asking, trust_orders
+from nondum.host.peers.asking import Asking
 from nondum.host.peers.compute import Compute, probed
 from nondum.host.peers.desk import Desk
 from nondum.host.peers.finder import PeerFinder
@@ -66,9 +68,11 @@ class Neighbourhood:
         compute: Compute,
         mind: Callable[[], Mind],
         stop: Callable[[], Stopped],
+        answer: Reply,
         placement: Placement,
     ) -> None:
-        """Use `open`. `mind` is asked for once the host runs; `stop` stops this host."""
+        """Use `open`. `mind` is asked for once the host runs; `stop` stops this host, `answer`
+        answers what is asked about it."""
         host = config.host.name
         self.keeper = keeper
         self._tasks: set[asyncio.Task[None]] = set()
@@ -141,8 +145,11 @@ class Neighbourhood:
             stop,
             accepts=config.peers.accept_goals,
         )
+        self.asking = Asking(self.peering, self.peering.names, answer)
+        self.desk.add(asking.METHOD, self.asking.serve)
         self.desk.add("goal.ask", self.goals.serve_ask)
         self.desk.add("goal.give", self.goals.serve_give)
+        self.desk.add("goal.again", self.goals.serve_again)
         self.desk.hear("goal.news", self.goals.hear_news)
         self.desk.hear("goal.standing", self.goals.hear_standing)
         self.placement = placement
@@ -160,6 +167,7 @@ class Neighbourhood:
         emit: Emit,
         mind: Callable[[], Mind],
         stop: Callable[[], Stopped],
+        answer: Reply,
         children: Children,
         judged_by: Callable[[str], Awaitable[Mapping[str, Any]]],
     ) -> Neighbourhood:
@@ -188,7 +196,7 @@ class Neighbourhood:
             judged_by=judged_by,
             known=lambda: made.view.known().values(),
         )
-        made = cls(config, keeper, workers, catalogue, emit, compute, mind, stop, placement)
+        made = cls(config, keeper, workers, catalogue, emit, compute, mind, stop, answer, placement)
         return made
 
     @property

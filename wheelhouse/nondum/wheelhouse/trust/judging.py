@@ -67,7 +67,8 @@ def judge(
         return Verdict(signers, (*problems, refusal))
     if flaws := tuple(_misdirections(trust, listed, at.host)):
         return Verdict(signers, flaws)
-    warnings = (_clock_unsure(trust, at.now),) if _is_clock_wrong(trust, at.now) else ()
+    unsure = clock_unsure(trust, at.now) if at.now is not None else None
+    warnings = (unsure,) if unsure is not None else ()
     return Verdict(signers, (), warnings, _grant(trust, owners, role, listed))
 
 
@@ -75,6 +76,19 @@ def clock_floor(trust: Trust | None) -> datetime:
     """The moment that is certainly past: only what roots have signed is believed about it, since
     any other signer could end the keys of all by a date in the future."""
     return max(EARLIEST, trust.made) if trust is not None else EARLIEST
+
+
+def clock_unsure(trust: Trust | None, now: datetime) -> Problem | None:
+    """What is wrong with a clock that shows a moment before what is certainly past (CLOCK_UNSURE).
+
+    None: it may be right.
+    """
+    floor = clock_floor(trust)
+    if now >= floor:
+        return None
+    told = "the clock is wrong, so whether keys still hold is judged by the last date that is sure"
+    fix = "set the clock of this host (`date -s`), or let it reach a time server"
+    return Problem("CLOCK_UNSURE", told, "clock", f"{floor:%F} or later", f"{now:%F}", fix)
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,23 +194,13 @@ def _out_of_time(trust: Trust, known: TrustedKey, now: datetime | None) -> Probl
         need, have = f"a date before {known.until:%F %T}", f"{sure:%F %T} (UTC)"
         fix = "have the payload signed with a key that holds; if the date is wrong, set the clock"
         return Problem("SIG_EXPIRED", told, lists.SIGNATURE_NAME, need, have, fix)
-    if known.since is not None and now < known.since and not _is_clock_wrong(trust, now):
+    is_right = clock_unsure(trust, now) is None
+    if known.since is not None and now < known.since and is_right:
         told = f"the key {known.name} does not hold yet"
         need, have = f"a date from {known.since:%F %T} on", f"{now:%F %T} (UTC)"
         fix = "if the date is wrong, set the clock"
         return Problem("SIG_NOT_YET", told, lists.SIGNATURE_NAME, need, have, fix)
     return None
-
-
-def _is_clock_wrong(trust: Trust, now: datetime | None) -> bool:
-    return now is not None and now < clock_floor(trust)
-
-
-def _clock_unsure(trust: Trust, now: datetime | None) -> Problem:
-    assert now is not None  # else nothing is wrong with it
-    told = "the clock is wrong, so whether keys still hold is judged by the last date that is sure"
-    need, have = f"{clock_floor(trust):%F} or later", f"{now:%F}"
-    return Problem("CLOCK_UNSURE", told, "clock", need, have, "set the clock of this host")
 
 
 def _name(trust: Trust | None, key: PublicKey) -> str:

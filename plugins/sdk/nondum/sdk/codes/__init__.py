@@ -26,6 +26,7 @@ AREAS = (
     "peers",
     "pairing",
     "host",
+    "stopping",
     "feedback",
     "goals",
     "reasons",

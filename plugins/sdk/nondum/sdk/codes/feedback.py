@@ -15,11 +15,6 @@ CODES = (
         "have it end sooner, or raise `hook_deadline_s` of its table",
     ),
     Code(
-        "STOP_KEY",
-        "The key that stops the robot cannot be listened to.",
-        "plug its device in, and see `device` and `key` under [stop]",
-    ),
-    Code(
         "LAMP_MISSING",
         "There is no lamp of that name.",
         "choose one of /sys/class/leds for `lamps` under [feedback], or plug it in",

@@ -1,0 +1,34 @@
+"""A daemon whose stop key is a pipe: `python -m benchmarks.stop.with_key PIPE COMMAND…`.
+
+Only the opening of the device is another: what is read are the kernel's own `struct input_event`s,
+by the reader that a host reads its key with. COMMAND is how a host is started otherwise.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from nondum.host.cli.main import main as nondum
+from nondum.host.helper.client import HelperClient
+from nondum.host.helper.privileged import InProcess
+from nondum.host.stop_button.input_device import PressesOfDevice
+
+MODULE = "nondum.host.cli"
+
+
+def main() -> None:
+    """Run what comes after the module's name."""
+    pipe, command = Path(sys.argv[1]), sys.argv[2:]
+
+    def opened(_: object, device: Path, code: int) -> PressesOfDevice:
+        return PressesOfDevice(os.open(pipe, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC), code)
+
+    for kind in (InProcess, HelperClient):
+        kind.stop_key = opened  # type: ignore[method-assign, assignment]  # that is the point
+    nondum(command[command.index(MODULE) + 1 :])
+
+
+if __name__ == "__main__":
+    main()

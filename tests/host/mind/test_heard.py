@@ -1,0 +1,52 @@
+"""What is heard becomes a goal, an answer, or a sentence on why not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from tests.host.mind.robot import Robot
+from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT
+
+from nondum.host.conversation import Conversation, wanted
+from nondum.sdk.description import Label
+from nondum.sdk.errors import GoalRefused, Problem
+
+pytestmark = pytest.mark.anyio
+
+LISTENER = "ear"
+WORDS = "point at the radiation source"
+
+
+def told(robot: Robot) -> list[str]:
+    return [row["text"] for row in robot.mind.views.told()]
+
+
+async def take(words: str) -> str:
+    raise AssertionError(f"a goal is made of {words!r}")
+
+
+async def test_question_that_nobody_answers_is_told_and_no_goal(robot: Robot) -> None:
+    async def answer(words: str) -> str | None:
+        raise GoalRefused(Problem("METHOD_UNKNOWN", f"made up for {words}"))
+
+    hearing = Conversation(robot.mind, dict, dict, take, answer)
+    await hearing.heard(LISTENER, "mule, what can you do")
+    assert any("METHOD_UNKNOWN" in sentence for sentence in told(robot))
+
+
+async def test_answer_is_told_by_whoever_gives_it(robot: Robot) -> None:
+    async def answer(words: str) -> str | None:
+        return "I can blink."
+
+    before = told(robot)
+    await Conversation(robot.mind, dict, dict, take, answer).heard(LISTENER, "what can you do")
+    assert told(robot) == before
+
+
+async def test_goal_that_is_heard_says_which_it_replaces(robot: Robot) -> None:
+    sensing = replace(COMPTON_CAMERA, labels=(Label("radiation-source", "the radiation source"),))
+    phrases = tuple(replace(b, phrases=("point at {t}",)) for b in PAN_TILT_UNIT.behaviours)
+    robot.plug(sensing, replace(PAN_TILT_UNIT, behaviours=phrases))
+    assert wanted(robot.mind, WORDS) == "that is goal 1"
+    assert f"goal 1, {WORDS!r}" in wanted(robot.mind, WORDS)
