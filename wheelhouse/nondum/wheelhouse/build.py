@@ -21,6 +21,7 @@ from nondum.sdk.errors import InstallFailed, Problem, problems_of
 from nondum.wheelhouse import (
     capture,
     contents,
+    disk,
     goals,
     index,
     lock,
@@ -59,6 +60,8 @@ class Options:
     hosts: tuple[str, ...] = ()
     """Names of the only hosts that it is meant for; empty: any."""
     judge: source.Judge = lambda _: ()
+    finish: Callable[[Path], object] = lambda _: None
+    """Done to the payload's folder when all but this is in it, before a drive has it: signing."""
 
 
 def build(package: Path, drive: Path, options: Options, progress: Progress) -> Path:
@@ -86,6 +89,7 @@ def build(package: Path, drive: Path, options: Options, progress: Progress) -> P
         _judge(folder / "wheels", said)
         fleet, hosts = options.fleet, options.hosts
         seal(folder, said.id, _version(own), options.release, fleet=fleet, hosts=hosts)
+        options.finish(folder)
         progress("copying it to the drive", steps - 1, steps)
         target = deliver(folder, drive)
         progress("done", steps, steps)
@@ -224,11 +228,15 @@ def seal(
 
 
 def deliver(folder: Path, drive: Path) -> Path:
-    """Put the folder on the drive: copied beside, then renamed in."""
+    """Put the folder on the drive: copied beside, then put in the place of the one that is there,
+    at one stroke where the file system can, so that a host that has it plugged in sees one or the
+    other."""
     target = drive / "nondum" / folder.name
-    unfinished = target.with_name(f".{folder.name}.part")
-    shutil.rmtree(unfinished, ignore_errors=True)
-    shutil.copytree(folder, unfinished)
-    shutil.rmtree(target, ignore_errors=True)
-    unfinished.rename(target)
+    beside = target.with_name(f".{folder.name}.part")
+    shutil.rmtree(beside, ignore_errors=True)
+    shutil.copytree(folder, beside)
+    if not (target.exists() and disk.exchange(beside, target)):
+        shutil.rmtree(target, ignore_errors=True)
+        beside.rename(target)
+    shutil.rmtree(beside, ignore_errors=True)
     return target

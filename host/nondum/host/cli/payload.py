@@ -117,14 +117,13 @@ def build(
         fleet=fleet,
         hosts=hosts,
         judge=lambda index: vocabulary_check.judge(index).problems,
+        finish=lambda folder: [owners_folder.sign_payload(folder, key) for key in keys],
     )
     made, before = [], _versions(output)
     for package in packages:
         is_wanted = not (quiet or session.as_json)
         with ProgressLine(package.resolve().name, is_wanted=is_wanted) as show:
             made.append(building.build(package, output, options, show))
-        for key in keys:
-            owners_folder.sign_payload(made[-1], key)
     if session.as_json:
         render.as_json({"payloads": [str(folder) for folder in made]})
     elif not quiet:
