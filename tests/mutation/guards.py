@@ -63,7 +63,6 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/drives/nodes.py": _CLAIMED,
     f"{_H}/drives/usb.py": (f"{_TH}/drives/test_usb.py",),
     f"{_H}/drives/slots.py": (f"{_TH}/drives/test_slots.py",),
-    f"{_H}/drives/rewritten.py": (f"{_TH}/drives/test_slots.py",),
     f"{_H}/drives/reading.py": (
         f"{_TH}/trust/test_payload_trust.py"
         "::test_what_is_wrong_or_doubtful_is_told_as_a_drive_is_read",
