@@ -12,7 +12,7 @@ from typing import Any, get_args, get_type_hints
 from tests.docs.dataclass_fields import field_docs
 
 from nondum.planning.core import core, core_value_types
-from nondum.sdk.bench import Bench, Call
+from nondum.sdk.bench import Bench, Call, WorkerFactory
 from nondum.sdk.messages import MESSAGES, Message
 
 HEADER = "when and in which frame: `Header`, below"
@@ -93,6 +93,8 @@ def bench() -> str:
     """A section a class of the bench: its calls with their signatures."""
     made = [f"## worker\n\n    worker{_signature(Bench.__init__, {'scratch'})}\n"]
     made.append(f"{inspect.getdoc(Bench.__init__)}\n")
+    made.append(f"### worker.check\n\n    worker.check{_signature(WorkerFactory.check)}\n")
+    made.append(f"{inspect.getdoc(WorkerFactory.check)}\n")
     return "\n".join([*made, *_class("## Bench", Bench), *_class("## Call", Call)])
 
 

@@ -104,7 +104,7 @@ def test_output_may_tell_of_another_unit_than_its_own() -> None:
 def test_description_of_before_has_inputs_of_anything() -> None:
     said = PluginDescription("old", "1", units=(Unit("u", "camera", inputs=(Input("i", "pose"),)),))
     plain = said.to_dict()
-    del plain["units"][0]["inputs"][0]["of"]
+    assert "of" not in plain["units"][0]["inputs"][0]
     old = PluginDescription.parse(plain, where="old")
     (socket,) = sockets_of("old", old)
     assert socket.of == ""

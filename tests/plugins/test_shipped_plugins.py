@@ -13,6 +13,7 @@ from nondum.host.optional_inputs import choose, sockets_of, sources_of
 from nondum.planning.goal import goal_text
 from nondum.planning.merge import merge
 from nondum.planning.phrases import phrasebook
+from nondum.sdk.bench import WorkerFactory
 from nondum.sdk.description import Output, PluginDescription, Unit
 from nondum.sdk.planner import Plan
 from nondum.sdk.plugin import describe, load
@@ -33,6 +34,12 @@ def entry_point(folder: Path) -> str:
 def shipped() -> dict[str, PluginDescription]:
     sys.path += [str(folder) for folder in (*FOLDERS, PLUGINS / "espeak", PLUGINS / "panorama")]
     return {folder.name: describe(load(entry_point(folder), folder.name)) for folder in FOLDERS}
+
+
+@pytest.mark.usefixtures("shipped")
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_each_is_what_the_bench_asks_for(folder: Path, worker: WorkerFactory) -> None:
+    worker.check(folder)
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)

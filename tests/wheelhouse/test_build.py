@@ -19,8 +19,9 @@ from nondum.sdk.errors import (
     PayloadRefused,
     Problem,
 )
-from nondum.wheelhouse import build, contents, drive, index, lock, preflight
+from nondum.wheelhouse import build, contents, drive, index, lock, payload, preflight
 from nondum.wheelhouse.confinement import Level
+from nondum.wheelhouse.cost import Cost, costs
 from nondum.wheelhouse.library_wheels import library_wheel
 from nondum.wheelhouse.resolve import Sources
 from nondum.wheelhouse.signatures import UnsignedAllowed
@@ -111,6 +112,38 @@ def test_each_architecture_and_python_gets_its_wheels(
                 f"native-1.{minor}-cp3{minor}-cp3{minor}-manylinux_2_28_{machine}.whl"
             }
             assert len(chosen) == 5
+
+
+def test_a_wheel_that_several_targets_take_is_carried_once(
+    built: Build, tmp_path: Path, wheels: Path
+) -> None:
+    """Pure wheels, and those for the stable interface of several Pythons."""
+    old, new, x86_old, x86_new = targets(("aarch64", "x86_64"), ("3.11", "3.12"))
+    kinds = {"cp311-cp311": "aarch64", "cp312-cp312": "aarch64", "cp311-abi3": "x86_64"}
+    native = {
+        abi: make_wheel(
+            wheels,
+            "native",
+            "1.0",
+            {"native.py": abi, "more.py": "" if abi != "cp312-cp312" else str(range(100))},
+            tag=f"{abi}-manylinux_2_28_{machine}",
+        )
+        for abi, machine in kinds.items()
+    }
+    source = make_source(tmp_path / "src", requires=["nondum-sdk", "native"])
+    folder = built(source, x86_old, old, x86_new, new)
+    sizes = {path.name: path.stat().st_size for path in (folder / "wheels").iterdir()}
+    assert len(sizes) == len({"blinker", "msgpack", "nondum-sdk", "pluggy"}) + len(native)
+    listed = contents.parse(drive.read_contents(folder), "CONTENTS")
+    staged = payload.load(folder, listed)
+    size = {abi: wheel.stat().st_size for abi, wheel in native.items()}
+    pure = sum(sizes.values()) - sum(size.values())
+    assert costs(staged, (x86_old, old, x86_new, new)) == (
+        Cost(new, pure + size["cp312-cp312"], size["cp312-cp312"]),
+        Cost(old, pure + size["cp311-cp311"], size["cp311-cp311"]),
+        Cost(x86_old, pure + size["cp311-abi3"], 0),
+        Cost(x86_new, pure + size["cp311-abi3"], 0),
+    )
 
 
 def test_two_components_of_one_distribution_share_its_wheels(built: Build, tmp_path: Path) -> None:

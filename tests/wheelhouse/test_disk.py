@@ -48,3 +48,18 @@ def test_folders_are_made_as_deep_as_they_are_wanted(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(FileExistsError):
         disk.make_folder(tmp_path / "file")
+
+
+def test_two_folders_change_places_at_one_stroke(tmp_path: Path) -> None:
+    for name in ("one", "other"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "file").write_text(name)
+    assert disk.exchange(tmp_path / "one", tmp_path / "other")
+    assert (tmp_path / "one/file").read_text() == "other"
+    assert (tmp_path / "other/file").read_text() == "one"
+
+
+def test_what_is_not_there_changes_no_places(tmp_path: Path) -> None:
+    (tmp_path / "one").mkdir()
+    assert not disk.exchange(tmp_path / "one", tmp_path / "other")
+    assert (tmp_path / "one").is_dir()

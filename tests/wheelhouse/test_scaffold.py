@@ -36,11 +36,26 @@ def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_it_passes_its_own_tests(made: NewPackage) -> None:
+def own_tests(made: NewPackage) -> subprocess.CompletedProcess[str]:
     plugins = [] if _sdk_is_installed() else ["-p", "nondum.sdk.testing"]
-    done = run(made.folder, "pytest", "-q", *plugins)
+    return run(made.folder, "pytest", "-q", *plugins)
+
+
+def test_it_passes_its_own_tests(made: NewPackage) -> None:
+    done = own_tests(made)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "2 passed" in done.stdout
+    assert "3 passed" in done.stdout
+
+
+def test_a_typo_in_its_fragment_fails_its_own_tests_with_the_place(made: NewPackage) -> None:
+    fragment = made.folder / "nondum_window_opener/domain.pddl"
+    text = fragment.read_text().replace(":effect (lit", ":effect (litt")
+    fragment.write_text(text)
+    line = text[: text.index("(litt")].count("\n") + 1
+    column = text.splitlines()[line - 1].index("litt") + 1
+    done = own_tests(made)
+    assert "1 failed, 2 passed" in done.stdout
+    assert f"domain.pddl:{line}:{column}" in done.stdout
 
 
 def test_it_says_which_files_it_made(made: NewPackage) -> None:

@@ -2,6 +2,7 @@
 
 What others wrote is taken in the locked version, if it has a locked hash, and without pip looking
 for what it depends on: that is in the lock. What is of the checkout is built here, from no index.
+An environment in which anybody has not what they ask for is an error.
 """
 
 from __future__ import annotations
@@ -11,13 +12,16 @@ import sys
 import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
 
 from nondum_dev import asked, lockfile
-from nondum_dev.places import CHECKOUT, LOCK, LOCK_NAME
+from nondum_dev.consistency import Checked
+from nondum_dev.overruled import OVERRULED
+from nondum_dev.places import BESIDE, CHECKOUT, LOCK, LOCK_NAME
 from nondum_dev.problem import SetUpFailed
 
-PIP = (sys.executable, "-P", "-m", "pip", "-q", "--disable-pip-version-check", "install")
+PIP = (sys.executable, "-P", "-m", "pip", "--disable-pip-version-check")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +51,12 @@ class Own:
 
 def install(own: Sequence[Own], groups: Iterable[str], requirements: Iterable[str]) -> None:
     """Install these. Raises `SetUpFailed`, with nothing of the checkout installed, if something is
-    not in the lock, or is not what the lock says."""
+    not in the lock, or is not what the lock says; and if what is installed does not fit."""
     wanted = [line for each in own for line in each.foreign()]
     wanted += [line for group in groups for line in asked.of_group(CHECKOUT, group)]
     _foreign([*wanted, *requirements])
     _own(own)
+    _check()
 
 
 def _foreign(requirements: Iterable[str]) -> None:
@@ -60,13 +65,29 @@ def _foreign(requirements: Iterable[str]) -> None:
     if absent := names - {entry.name for entry in entries}:
         raise SetUpFailed(f"{LOCK_NAME} does not have {', '.join(sorted(absent))}: `./run lock`")
     needed = lockfile.needed(entries, names)
-    chosen = [entry.text for entry in entries if entry.name in needed]
-    if not chosen:
+    chosen = [entry for entry in entries if entry.name in needed]
+    _locked([entry for entry in chosen if entry.name not in OVERRULED])
+    if beside := [entry for entry in chosen if entry.name in OVERRULED]:
+        _remove(entry.name for entry in beside)
+        _locked(beside, "--upgrade", "--target", str(BESIDE))
+
+
+def _locked(entries: Sequence[lockfile.Entry], *words: str) -> None:
+    if not entries:
         return
     with tempfile.NamedTemporaryFile("w", suffix=".txt", encoding="utf-8") as file:
-        file.writelines(chosen)
+        file.writelines(entry.text for entry in entries)
         file.flush()
-        _pip("--require-hashes", "--no-deps", "-r", file.name)
+        _install("--require-hashes", "--no-deps", *words, "-r", file.name)
+
+
+def _remove(names: Iterable[str]) -> None:
+    """Take these out of the environment, where they were before they were put beside it."""
+    there = {lockfile.canonical(found.name) for found in metadata.distributions()}
+    if known := sorted(there & set(names)):
+        subprocess.run(
+            (*PIP, "-q", "uninstall", "-y", *known), stdin=subprocess.DEVNULL, check=False
+        )
 
 
 def _own(own: Sequence[Own]) -> None:
@@ -74,11 +95,22 @@ def _own(own: Sequence[Own]) -> None:
         words = (word for each in own for word in (*["-e"] * each.is_editable, str(each.path)))
         # A wheel that was built anew may have the version of the one that is installed.
         held = ("--no-deps", "--no-index", "--no-build-isolation", "--force-reinstall")
-        _pip(*held, *words)
+        _install(*held, *words)
 
 
-def _pip(*words: str) -> None:
-    if subprocess.run((*PIP, *words), stdin=subprocess.DEVNULL).returncode != 0:
+def _check() -> None:
+    done = subprocess.run(
+        (*PIP, "check"), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True
+    )
+    if flaws := Checked(done.returncode, done.stdout).flaws(asked.own_names(CHECKOUT)):
+        raise SetUpFailed(
+            f"what is installed in {sys.prefix} does not fit together: {' '.join(flaws)} If the "
+            "lock says so, lock what fits (`./run lock`); else delete that folder: it is made anew"
+        )
+
+
+def _install(*words: str) -> None:
+    if subprocess.run((*PIP, "-q", "install", *words), stdin=subprocess.DEVNULL).returncode != 0:
         raise SetUpFailed(
             f"pip has not installed what {LOCK_NAME} says; its words are above. If they speak of "
             "hashes, a package is not the one that was locked: find out why before you go on, and "

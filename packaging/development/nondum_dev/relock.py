@@ -9,6 +9,7 @@ import tempfile
 from pathlib import Path
 
 from nondum_dev import asked
+from nondum_dev.overruled import OVERRIDING
 from nondum_dev.places import CHECKOUT, LOCK, PACKAGING
 from nondum_dev.problem import SetUpFailed
 
@@ -18,9 +19,6 @@ HEAD = """\
 """
 OLDEST_PYTHON = "3.11"
 OVERRIDES = "overrides.txt"
-OVERRIDING = ("lark>=1.2",)
-"""Of these, what is written here holds, whatever others ask for: `pddl` asks for an older lark than
-nondum does, and works with this."""
 
 
 def relock(*, upgrade: bool) -> None:

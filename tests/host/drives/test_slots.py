@@ -6,13 +6,16 @@ import asyncio
 import contextlib
 import os
 import shutil
+import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
+from tests.kit.until import until_async
 
 from nondum.host.drives.slots import SlotSource
 from nondum.host.events import DriveInserted, DriveRemoved, DrivesScanned, Event
+from nondum.wheelhouse import disk
 
 pytestmark = pytest.mark.anyio
 
@@ -134,3 +137,117 @@ async def test_drives_of_several_folders_have_names_of_their_own(tmp_path: Path)
             if isinstance(event, DriveInserted)
         ]
         assert names == ["left/a", "right/a"]
+
+
+async def ticked(folder: Path) -> None:
+    """Wait until a file that is written from now on has a later time than any before."""
+    now_ns, file = time.time_ns(), folder / "written"
+
+    def written_ns() -> int:
+        file.write_text("")
+        return file.stat().st_ctime_ns
+
+    await until_async("a tick of the file system", lambda: written_ns() > now_ns)
+
+
+def write_payload(drive: Path, text: str, name: str = "org.example.lamp") -> None:
+    """Put a payload's list there as `payload build` does: the folder is whole when it appears."""
+    folder = drive / "nondum" / name
+    beside = folder.with_name(f".{name}.part")
+    beside.mkdir(parents=True)
+    (beside / "CONTENTS").write_text(text)
+    if folder.exists():
+        assert disk.exchange(beside, folder)
+        shutil.rmtree(beside)
+    else:
+        beside.rename(folder)
+
+
+@pytest.mark.parametrize("is_link", [True, False], ids=["link", "folder"])
+async def test_payload_that_is_built_anew_in_place_is_told_without_a_removal(
+    tmp_path: Path, is_link: bool
+) -> None:
+    slots = tmp_path / "slots"
+    drive = tmp_path / "drive" if is_link else slots / "a"
+    write_payload(drive, "first")
+    async with watched(slots) as told:
+        if is_link:
+            await told.get()
+            (slots / "a").symlink_to(drive)
+        assert await told.get() == DriveInserted("a", slots / "a", "slot")
+        if not is_link:
+            await told.get()
+        await ticked(tmp_path)
+        for text in ("second", "third"):
+            write_payload(drive, text)
+            assert await told.get() == DriveInserted("a", slots / "a", "slot")
+            await ticked(tmp_path)
+        assert told.empty()
+
+
+async def test_signature_that_comes_later_is_told(tmp_path: Path) -> None:
+    slots, drive = tmp_path / "slots", tmp_path / "drive"
+    write_payload(drive, "first")
+    async with watched(slots) as told:
+        await told.get()
+        (slots / "a").symlink_to(drive)
+        await told.get()
+        await ticked(tmp_path)
+        disk.write(drive / "nondum/org.example.lamp/CONTENTS.sig", b"signed")
+        assert await told.get() == DriveInserted("a", slots / "a", "slot")
+
+
+async def test_payload_that_comes_and_one_that_goes_are_told(tmp_path: Path) -> None:
+    slots, drive = tmp_path / "slots", tmp_path / "drive"
+    drive.mkdir()
+    async with watched(slots) as told:
+        await told.get()
+        (slots / "a").symlink_to(drive)
+        await told.get()
+        await ticked(tmp_path)
+        write_payload(drive, "first")
+        assert await told.get() == DriveInserted("a", slots / "a", "slot")
+        await ticked(tmp_path)
+        (drive / "nondum/org.example.lamp").rename(tmp_path / "elsewhere")
+        assert await told.get() == DriveInserted("a", slots / "a", "slot")
+
+
+async def test_what_is_not_listed_yet_is_not_told(tmp_path: Path) -> None:
+    """A folder that is being copied by hand: nothing is known of it before its list is there."""
+    slots, drive = tmp_path / "slots", tmp_path / "drive"
+    write_payload(drive, "first")
+    async with watched(slots) as told:
+        await told.get()
+        (slots / "a").symlink_to(drive)
+        await told.get()
+        await ticked(tmp_path)
+        (drive / "nondum/org.example.other/wheels").mkdir(parents=True)
+        (drive / "nondum/org.example.lamp/notes.txt").write_text("mine")
+        await ticked(tmp_path)
+        (slots / "b").mkdir()
+        assert await told.get() == DriveInserted("b", slots / "b", "slot")
+
+
+@pytest.mark.parametrize("how", ["deleted", "moved", "moved above"])
+async def test_link_whose_folder_goes_is_pulled_and_comes_back_with_it(
+    tmp_path: Path, how: str
+) -> None:
+    slots, drive = tmp_path / "slots", tmp_path / "work/drive"
+    write_payload(drive, "first")
+    async with watched(slots) as told:
+        await told.get()
+        (slots / "a").symlink_to(drive)
+        await told.get()
+        await ticked(tmp_path)
+        if how == "deleted":
+            shutil.rmtree(drive)
+        else:
+            moved = drive if how == "moved" else drive.parent
+            moved.rename(tmp_path / "elsewhere")
+        while (event := await told.get()) != DriveRemoved("a"):
+            assert event == DriveInserted("a", slots / "a", "slot")
+        await ticked(tmp_path)
+        write_payload(tmp_path / "new", "second")
+        drive.parent.mkdir(exist_ok=True)
+        (tmp_path / "new").rename(drive)
+        assert await told.get() == DriveInserted("a", slots / "a", "slot")

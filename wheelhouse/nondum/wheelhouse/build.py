@@ -1,7 +1,4 @@
-"""Building a payload folder from a plugin's source folder: what `nondum payload build` does.
-
-The source folder is an ordinary Python package with a `payload.toml` beside its `pyproject.toml`.
-"""
+"""Building a payload folder from a plugin's source folder: what `nondum payload build` does."""
 
 from __future__ import annotations
 
@@ -17,21 +14,21 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from importlib_metadata import distributions
 from packaging.utils import parse_wheel_filename
 
 from nondum.sdk.description import PluginDescription
-from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem, problems_of
+from nondum.sdk.errors import InstallFailed, Problem, problems_of
 from nondum.wheelhouse import (
     capture,
     contents,
+    disk,
     goals,
     index,
     lock,
     locking,
     manifest,
-    payload,
     resolve,
+    source,
     wheel,
 )
 from nondum.wheelhouse.contents import Contents, Entry
@@ -42,7 +39,6 @@ from nondum.wheelhouse.target import Target
 
 MINIMUM_NONDUM = "0.1"
 """The oldest nondum that reads what is written here."""
-ENTRY_POINT_GROUP = "nondum.plugins"
 PROCESSES = 4
 """pips at once: they wait for the index most of the time."""
 
@@ -63,8 +59,9 @@ class Options:
     fleet: str = ""
     hosts: tuple[str, ...] = ()
     """Names of the only hosts that it is meant for; empty: any."""
-    judge: Callable[[index.Index], Sequence[Problem]] = lambda _: ()
-    """What is wrong with what the plugins say to planning, which nobody here can tell."""
+    judge: source.Judge = lambda _: ()
+    finish: Callable[[Path], object] = lambda _: None
+    """Done to the payload's folder when all but this is in it, before a drive has it: signing."""
 
 
 def build(package: Path, drive: Path, options: Options, progress: Progress) -> Path:
@@ -73,7 +70,7 @@ def build(package: Path, drive: Path, options: Options, progress: Progress) -> P
     `progress` gets what is being done, and steps done of all. Raises `PayloadRefused`,
     `InstallFailed`; nothing is left on the drive then.
     """
-    said = _source(package)
+    said = source.manifest_of(package)
     with tempfile.TemporaryDirectory(prefix="nondum-build-") as temporary:
         work = Path(temporary)
         steps = 4 + len(options.targets)
@@ -84,7 +81,7 @@ def build(package: Path, drive: Path, options: Options, progress: Progress) -> P
         chosen = _fetched(own, work, options, sources, progress)
         progress("asking the plugin what it is", steps - 3, steps)
         described = _described(said, chosen[Target.here()], work / "site-packages")
-        _judge_descriptions(said, described, options)
+        wheel.refuse_if_any(source.description_problems(said, described, options.judge))
         progress("writing the payload", steps - 2, steps)
         locked = {target: chosen[target] for target in options.targets}
         folder = work / said.id
@@ -92,32 +89,11 @@ def build(package: Path, drive: Path, options: Options, progress: Progress) -> P
         _judge(folder / "wheels", said)
         fleet, hosts = options.fleet, options.hosts
         seal(folder, said.id, _version(own), options.release, fleet=fleet, hosts=hosts)
+        options.finish(folder)
         progress("copying it to the drive", steps - 1, steps)
         target = deliver(folder, drive)
         progress("done", steps, steps)
         return target
-
-
-def _source(package: Path) -> Manifest:
-    """The manifest of a source folder."""
-    missing = [n for n in (manifest.NAME, "pyproject.toml") if not (package / n).is_file()]
-    if missing:
-        raise PayloadRefused(
-            Problem(
-                "SOURCE_INCOMPLETE",
-                f"there is no file {' nor '.join(missing)}",
-                where=str(package),
-                fix="`nondum payload new` makes a complete source folder",
-            )
-        )
-    try:
-        text = (package / manifest.NAME).read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        place = str(package / manifest.NAME)
-        raise PayloadRefused(
-            Problem("NOT_UTF8", f"byte {error.start} is not UTF-8", where=place)
-        ) from error
-    return manifest.parse(text, str(package / manifest.NAME))
 
 
 def _made(package: Path, work: Path, options: Options) -> list[Path]:
@@ -165,49 +141,9 @@ def _described(
         _unpack(path, site_packages)
     described = {}
     for component in said.components:
-        found = entry_point(site_packages, component.distribution, component.id)
+        found = source.installed_entry_point(component.distribution, component.id, site_packages)
         described[component.id] = capture.describe(site_packages, found, component.distribution)
     return described
-
-
-def _judge_descriptions(
-    said: Manifest, described: Mapping[str, PluginDescription], options: Options
-) -> None:
-    """Refuse what the plugins say of themselves where a host would, or would not plan with it."""
-    problems = [
-        problem
-        for component in said.components
-        for problem in payload.disagreeing_devices(component, described[component.id])
-    ]
-    wheel.refuse_if_any((*problems, *options.judge(described)))
-
-
-def entry_point(site_packages: Path, distribution: str, component: str) -> str:
-    """The entry point of a component's plugin: the one named like it, or the only one.
-
-    Read from the files, nothing is run. Raises `PayloadRefused` (ENTRY_POINT).
-    """
-    for found in distributions(name=distribution, path=[str(site_packages)]):
-        points = found.entry_points.select(group=ENTRY_POINT_GROUP)
-        named = {point.name: str(point.value) for point in points}
-        if component in named:
-            return named[component]
-        if len(named) == 1:
-            return next(iter(named.values()))
-        have = ", ".join(sorted(named)) or "none"
-        break
-    else:
-        have = "no such distribution"
-    raise PayloadRefused(
-        Problem(
-            "ENTRY_POINT",
-            f"{distribution} has no entry point for component {component!r}",
-            where=distribution,
-            need=f"{component} in group {ENTRY_POINT_GROUP}",
-            have=have,
-            fix=f'add [project.entry-points."{ENTRY_POINT_GROUP}"] to its pyproject.toml',
-        )
-    )
 
 
 def _unpack(path: Path, site_packages: Path) -> None:
@@ -235,8 +171,7 @@ def _write(
         if not (wheels / path.name).exists():
             os.link(path, wheels / path.name)
     shutil.copyfile(package / manifest.NAME, folder / manifest.NAME)
-    if (package / goals.NAME).is_file():
-        wanted = goals.parse((package / goals.NAME).read_bytes(), str(package / goals.NAME))
+    if wanted := source.goals_of(package):
         (folder / goals.NAME).write_bytes(goals.to_bytes(wanted))
     for component in said.components:
         text = locking.lock_text(locked)
@@ -293,11 +228,15 @@ def seal(
 
 
 def deliver(folder: Path, drive: Path) -> Path:
-    """Put the folder on the drive: copied beside, then renamed in."""
+    """Put the folder on the drive: copied beside, then put in the place of the one that is there,
+    at one stroke where the file system can, so that a host that has it plugged in sees one or the
+    other."""
     target = drive / "nondum" / folder.name
-    unfinished = target.with_name(f".{folder.name}.part")
-    shutil.rmtree(unfinished, ignore_errors=True)
-    shutil.copytree(folder, unfinished)
-    shutil.rmtree(target, ignore_errors=True)
-    unfinished.rename(target)
+    beside = target.with_name(f".{folder.name}.part")
+    shutil.rmtree(beside, ignore_errors=True)
+    shutil.copytree(folder, beside)
+    if not (target.exists() and disk.exchange(beside, target)):
+        shutil.rmtree(target, ignore_errors=True)
+        beside.rename(target)
+    shutil.rmtree(beside, ignore_errors=True)
     return target

@@ -17,6 +17,7 @@ _FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
 _FAILING = frozenset({errno.EIO, errno.EROFS, errno.EUCLEAN})
 _SHORT = {errno.EMFILE: "descriptors", errno.ENFILE: "descriptors", errno.ENOMEM: "memory"}
 
+_AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 _libc = ctypes.CDLL(None, use_errno=True)
 
 
@@ -38,6 +39,16 @@ def write(path: Path, data: bytes) -> None:
         os.fsync(out.fileno())
     unfinished.rename(path)
     sync(path.parent)
+
+
+def exchange(one: Path, other: Path) -> bool:
+    """Have two paths change places at one stroke (renameat2(2)). Says whether they have: not every
+    file system can, nor every system."""
+    call = getattr(_libc, "renameat2", None)
+    if call is None:
+        return False
+    paths = (_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other))
+    return bool(call(*paths, _RENAME_EXCHANGE) == 0)
 
 
 def sync(path: Path) -> None:

@@ -97,14 +97,17 @@ def build(
     keys: tuple[Path, ...],
     quiet: bool,
 ) -> None:
-    """Build one payload a package, with wheels for every architecture and Python.
+    """Build one payload a package, with wheels for every architecture and Python. A wheel that
+    several of them take is carried once; of a large payload it is told what each of them costs.
 
     \b
     Examples: nondum payload build . -o /media/usb
               nondum payload build a b -o drive --arch x86_64 --arch aarch64 --python 3.11
     """
     from nondum.host import vocabulary_check
+    from nondum.host.cli import costs
     from nondum.wheelhouse import build as building
+    from nondum.wheelhouse import cost
     from nondum.wheelhouse.resolve import Sources
     from nondum.wheelhouse.target import PYTHONS, Target, targets
     from nondum.wheelhouse.trust import owners_folder
@@ -117,20 +120,23 @@ def build(
         fleet=fleet,
         hosts=hosts,
         judge=lambda index: vocabulary_check.judge(index).problems,
+        finish=lambda folder: [owners_folder.sign_payload(folder, key) for key in keys],
     )
     made, before = [], _versions(output)
     for package in packages:
         is_wanted = not (quiet or session.as_json)
         with ProgressLine(package.resolve().name, is_wanted=is_wanted) as show:
             made.append(building.build(package, output, options, show))
-        for key in keys:
-            owners_folder.sign_payload(made[-1], key)
+    found = {folder: cost.costs(loaded_payload(folder), options.targets) for folder in made}
     if session.as_json:
-        render.as_json({"payloads": [str(folder) for folder in made]})
+        rows = {str(folder): list(map(costs.row, told)) for folder, told in found.items()}
+        render.as_json({"payloads": [str(folder) for folder in made], "targets": rows})
     elif not quiet:
         for folder in made:
             click.echo(f"{folder}  {_size(folder)}")
             _remark_lower_version(folder, before.get(folder.name))
+            if told := costs.remark(loaded_payload(folder).contents, found[folder]):
+                render.sentence(told, colour="yellow", mark="warning: ")
 
 
 @payload.command()

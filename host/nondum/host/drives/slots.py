@@ -1,22 +1,29 @@
 """Slots: folders whose entries, real folders or symlinks, stand for drives.
 
-Put an entry there by rename or as a symlink, so that it is whole the moment it appears. What mounts
-drives by their labels lets strangers name entries: names that cannot be shown are not read.
+Put an entry there by rename or as a symlink, so that it is whole the moment it appears. One that is
+written anew where it is, as `payload build` does, is told as inserted again, without having been
+removed. What mounts drives by their labels lets strangers name entries: names that cannot be shown
+are not read.
 """
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
+from nondum.host.drives.rewritten import Rewritten
 from nondum.host.events import DriveInserted, DriveRemoved, DrivesScanned, Emit
 from nondum.host.inotify import folders_watched
 from nondum.sdk.errors import Problem
 
 _Identity = tuple[Path, int, str]
 """Path, inode and symlink target: an entry that is replaced is another drive."""
+_Slot = tuple[str, _Identity | None]
+"""A drive; or the path of a link that leads nowhere yet, without an identity."""
 
 log = logging.getLogger(__name__)
 
@@ -32,13 +39,35 @@ class SlotSource:
 
     async def watch(self, emit: Emit) -> None:
         """Tell what is there, then what comes and goes, until cancelled."""
-        with folders_watched(self._folders) as changed:
-            self._compare(emit)
+        compare, again = partial(self._compare, emit), partial(self._again, emit)
+        with (
+            folders_watched(self._folders) as changed,
+            contextlib.closing(Rewritten(changed, compare, again)) as rewritten,
+        ):
+            compare()
             emit(DrivesScanned(self.kind, tuple(self._seen)))
             while True:
+                rewritten.look(self._places())
                 await changed.wait()
                 changed.clear()
-                self._compare(emit)
+                compare()
+
+    def _places(self) -> dict[_Slot, Path]:
+        """What is worth being watched: drives, and links that lead nowhere yet."""
+        places: dict[_Slot, Path] = {
+            (drive, identity): identity[0] for drive, identity in self._seen.items()
+        }
+        for folder in self._folders:
+            for entry in _dangling(folder):
+                places[entry.path, None] = Path(entry.path)
+        return places
+
+    def _again(self, emit: Emit, slot: _Slot) -> None:
+        """Tell of a drive that was written anew, if it is the one that is in still."""
+        self._compare(emit)
+        drive, identity = slot
+        if identity is not None and self._seen.get(drive) == identity:
+            emit(self._inserted(drive, identity[0]))
 
     def _compare(self, emit: Emit) -> None:
         """Tell the difference to what was seen last."""
@@ -78,6 +107,16 @@ def _scanned(folder: Path) -> list[os.DirEntry[str]]:
     except OSError as error:
         log.warning("the slot folder %s cannot be read: %s", folder, error)
         return []
+
+
+def _dangling(folder: Path) -> Iterator[os.DirEntry[str]]:
+    """Links to what is not there; those to what is are drives, or files."""
+    for entry in _scanned(folder):
+        if entry.is_symlink() and not entry.name.startswith("."):
+            try:
+                entry.stat()
+            except OSError:
+                yield entry
 
 
 def _identity(entry: os.DirEntry[str]) -> _Identity | None:

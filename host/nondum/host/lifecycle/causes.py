@@ -45,6 +45,9 @@ UNTRUSTED = frozenset(
 )
 """Codes of refusals that another trust file may end."""
 
+UNSIGNED = UNTRUSTED | {"SIG_INVALID", "SIG_MALFORMED", "SIG_MISSING", "SIG_WRONG_PURPOSE"}
+"""Codes of refusals that other signatures may end."""
+
 HELPED_BY_RETRY = frozenset(
     {
         "CHILD_DIED",
@@ -135,6 +138,12 @@ def is_untrusted(problems: Iterable[Problem]) -> bool:
     """Whether a refusal is of those that another trust file may end."""
     codes = {problem.code for problem in problems}
     return bool(codes) and codes <= UNTRUSTED
+
+
+def is_unsigned(problems: Iterable[Problem]) -> bool:
+    """Whether a refusal is of those that other signatures may end."""
+    codes = {problem.code for problem in problems}
+    return bool(codes) and codes <= UNSIGNED
 
 
 def due(

@@ -19,13 +19,14 @@ from nondum.host.lifecycle import releases, safe_mode, tries
 from nondum.host.lifecycle.turn import Turn
 from nondum.sdk.errors import Problem
 
+_AT_WORK = releases.STARTING | {Step.ACTIVE}
 _GONE = {"placed": "the host that handed it over ended that, or is gone"}
 """What is told of payloads whose last drive is gone, for kinds that nobody pulls."""
 
 
 def on_drive_inserted(turn: Turn, event: DriveInserted) -> None:
-    """Read it, unless it is not to be. One that was there before the daemon's restart is read
-    again."""
+    """Read it, unless it is not to be. One that was there before the daemon's restart, or was
+    written anew where it is, is read again."""
     turn.events.append(event)
     drive = DriveRecord(
         id=event.drive,
@@ -60,7 +61,8 @@ def on_drive_removed(turn: Turn, event: DriveRemoved) -> None:
 
 
 def on_drive_read(turn: Turn, event: DriveRead) -> None:
-    """Withdraw what the drive carried before a restart and does not carry any more."""
+    """Withdraw what the drive carried before and does not carry any more. A release in whose place
+    another one lies goes on until that is in force."""
     drive = turn.state.drives.get(event.drive)
     if drive is None:
         return
@@ -77,8 +79,9 @@ def on_drive_read(turn: Turn, event: DriveRead) -> None:
     problems = event.flaws or ((nothing,) if is_empty else ())
     turn.put_drive(replace(drive, state=DriveState.COPYING, problems=problems))
     for payload in _on(turn, event.drive):
-        if payload.key not in event.payloads:
-            lose_source(turn, payload, event.drive, "it is not on its drive any more")
+        if payload.key in event.payloads or _is_being_replaced(turn.state, payload, event):
+            continue
+        lose_source(turn, payload, event.drive, "it is not on its drive any more")
 
 
 def on_drive_unreadable(turn: Turn, event: DriveUnreadable) -> None:
@@ -110,6 +113,25 @@ def lose_source(turn: Turn, payload: PayloadRecord, drive: str, reason: str) -> 
         turn.pending.append(PayloadWithdrawn(payload.key, reason))
     elif payload.step is Step.RECEIVED and first == drive:
         turn.effects.append(copy_of(turn.state.payloads[payload.key], turn.state))
+
+
+def drop_replaced(turn: Turn, payload: PayloadRecord) -> None:
+    """Withdraw the releases in whose place on its drive a payload lies that is in force now."""
+    for other in releases.others(turn.state, payload):
+        for drive, folder in other.sources.items():
+            if payload.sources.get(drive) == folder:
+                current = turn.state.payloads[other.key]
+                lose_source(turn, current, drive, "another release was built in its place")
+
+
+def _is_being_replaced(state: HostState, payload: PayloadRecord, read: DriveRead) -> bool:
+    """Whether a payload is at work, and what was read lies in its place on its drive."""
+    folder = payload.sources[read.drive]
+    return payload.step in _AT_WORK and any(
+        state.payloads[key].sources.get(read.drive) == folder
+        for key in read.payloads
+        if key in state.payloads
+    )
 
 
 def read(turn: Turn, drive: DriveRecord) -> None:

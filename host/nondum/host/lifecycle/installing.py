@@ -16,7 +16,7 @@ from nondum.host.drives.reader import Arguments, Report
 from nondum.host.events import plain
 from nondum.host.trust import chain
 from nondum.sdk.errors import InstallFailed, Problem
-from nondum.wheelhouse import build, memory, venvs
+from nondum.wheelhouse import memory, source, venvs
 from nondum.wheelhouse.lock import LockedWheel
 from nondum.wheelhouse.manifest import ComponentManifest
 from nondum.wheelhouse.payload import StagedPayload
@@ -194,7 +194,9 @@ def _told(staged: StagedPayload, component: ComponentManifest, root: Path) -> di
     return {
         "id": component.id,
         "distribution": component.distribution,
-        "entry_point": build.entry_point(site_packages, component.distribution, component.id),
+        "entry_point": source.installed_entry_point(
+            component.distribution, component.id, site_packages
+        ),
         "description": described.to_dict(),
         "venv": str(venv),
         "site_packages": str(site_packages),

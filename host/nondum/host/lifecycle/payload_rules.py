@@ -42,7 +42,7 @@ from nondum.host.events import (
 )
 from nondum.host.lifecycle import admission, causes, releases, replacement, safe_mode, tries
 from nondum.host.lifecycle.claims import granted
-from nondum.host.lifecycle.drive_rules import copy_of, read
+from nondum.host.lifecycle.drive_rules import copy_of, drop_replaced, read
 from nondum.host.lifecycle.turn import Turn
 from nondum.host.transitions import TRANSITIONS, Transition
 
@@ -56,7 +56,8 @@ GUEST_RANK = 1_000_000
 
 
 def on_payload_found(turn: Turn, event: PayloadFound) -> None:
-    """Take in a new payload; one that is here already has one source more."""
+    """Take in a new payload; one that is here already has one source more. One that was refused for
+    its signatures, and would not be any more, is tried again."""
     if event.drive not in turn.state.drives:
         return
     known = turn.state.payloads.get(event.payload)
@@ -65,6 +66,9 @@ def on_payload_found(turn: Turn, event: PayloadFound) -> None:
             turn.events.append(event)
         sources = {**known.sources, event.drive: event.folder}
         turn.put_payload(replace(known, sources=sources))
+        is_refused = known.step is Step.REFUSED and causes.is_unsigned(known.problems)
+        if is_refused and not event.problems:
+            turn.pending.append(RetryAsked(event.payload, "it has been signed since"))
         return
     new = PayloadRecord(
         key=event.payload,
@@ -262,6 +266,7 @@ def effect_for(
 def _activate(turn: Turn, payload: PayloadRecord, event: PayloadActivated) -> None:
     for component in _entering(turn, payload, event):
         turn.put_component(replace(component, payload_id=payload.payload_id))
+    drop_replaced(turn, payload)
     turn.forget(payload.payload_id)
     turn.change(mounts={**_by_unit(event.mounts), **turn.state.mounts})
     reached = admission.reached(turn.state, payload, event)

@@ -14,6 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
+from nondum.sdk import source_check
 from nondum.sdk.bench_host import HostSide, Run
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
@@ -287,8 +288,10 @@ class Bench:
 class WorkerFactory:
     """What the `worker` fixture gives: call it with a plugin to get a started `Bench`."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, source: Path) -> None:
+        """`folder` is where scratch folders are made, `source` the payload's source folder."""
         self._folder = folder
+        self._source = source
         self._benches: list[Bench] = []
 
     def __call__(self, plugin: str | object, **options: Any) -> Bench:
@@ -298,6 +301,16 @@ class WorkerFactory:
         bench = Bench(plugin, scratch=scratch, **options)
         self._benches.append(bench)
         return bench
+
+    def check(self, source: Path | None = None) -> None:
+        """Check a payload's source folder as `nondum payload build` and hosts do: its manifest,
+        goals, entry points, the plugins' answers, devices, fragments and phrases.
+
+        `source` is, unless it is given, the nearest folder above the test that has a
+        `payload.toml`. Raises `PayloadRefused` with everything that is wrong, each with its file
+        and place. Needs the distribution nondum, too (CHECK_MISSING).
+        """
+        source_check.check(source or self._source)
 
     def __enter__(self) -> Self:
         return self

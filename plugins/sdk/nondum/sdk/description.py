@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import resources
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
@@ -22,6 +22,11 @@ ACTUATORS = frozenset({"base", "pointer", "arm", "gripper"})
 WHEN_LOST = ("stop", "hold", "finish")
 """`stop`: it is halted at once. `hold`: it goes on until a person halts it, or the same host asks
 for it again. `finish`: it goes on to its end; a lasting behaviour has none, so it is held."""
+
+
+_ADDED = {"added": True}
+"""Of keys that were added after others had been released: hosts of before refuse what they do not
+know, so such a key is written only where an author has said something in it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +57,7 @@ class Output:
     """A stream type: image, depth, points, detections, twist, pose, audio, text, scalar …"""
     always: bool = False
     """Produced from `start` on, not by a behaviour."""
-    of: str = ""
+    of: str = field(default="", metadata=_ADDED)
     """The type of unit that the stream tells of, where it is not the unit that sends it: `base` for
     odometry that a camera works out."""
 
@@ -64,7 +69,7 @@ class Input:
 
     name: str
     type: str
-    of: str = ""
+    of: str = field(default="", metadata=_ADDED)
     """The type of unit that the stream must tell of: `base` for the odometry of this body's base.
     Empty: of anything; then a stream that only has the type may be the wrong one."""
 
@@ -167,7 +172,12 @@ class PluginDescription:
 
 def _plain(value: Any) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+        said = ((key, getattr(value, key.name)) for key in dataclasses.fields(value))
+        return {
+            key.name: _plain(one)
+            for key, one in said
+            if "added" not in key.metadata or one != key.default
+        }
     if isinstance(value, tuple):
         return [_plain(item) for item in value]
     if isinstance(value, Mapping):

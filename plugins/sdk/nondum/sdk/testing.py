@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 @pytest.fixture
-def worker(tmp_path: Path) -> Iterator[WorkerFactory]:
+def worker(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[WorkerFactory]:
     """Run plugins in this process, without a host, over the host's own protocol.
 
         def test_points_at_the_source(worker):
@@ -23,9 +23,11 @@ def worker(tmp_path: Path) -> Iterator[WorkerFactory]:
             call.wait_established()
             call.halt()
 
-    See `nondum.sdk.bench.Bench` for what can be done with it.
+    See `nondum.sdk.bench.Bench` for what can be done with it. `worker.check()` checks the payload
+    that the plugin is to be a part of.
     """
     from nondum.sdk.bench import WorkerFactory
+    from nondum.sdk.source_check import source_folder
 
-    with WorkerFactory(tmp_path) as factory:
+    with WorkerFactory(tmp_path, source_folder(request.path)) as factory:
         yield factory

@@ -10,6 +10,11 @@ CODES = (
         "read the line that is shown, and run `pip wheel .` in its folder to see more",
     ),
     Code(
+        "CHECK_MISSING",
+        "`worker.check()` found nothing installed that can check a payload's source folder.",
+        "install nondum beside nondum-sdk: `pip install nondum`",
+    ),
+    Code(
         "CONTENTS_ENCODING",
         "The contents list is not ASCII.",
         "build the payload again; its contents list is not written by hand",

@@ -8,6 +8,10 @@ from nondum.sdk.bench import WorkerFactory
 from $module.lamp import Lamp
 
 
+def test_the_payload_is_one_that_hosts_take(worker: WorkerFactory) -> None:
+    worker.check()
+
+
 def test_shines_until_it_is_halted(worker: WorkerFactory) -> None:
     lamp = worker("$module.plugin")
     call = lamp.behave("shine", u="lamp", h="robot")
