@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import pytest
 from simulated_receiver import NO_FIX, SimulatedReceiver, gga, gsa, gsv, rmc
 
 from nondum.sdk import GpsFix, NondumError
+from nondum_gps.line import Line
 
 PLUGIN = "nondum_gps.plugin:Gps"
 KNOWN = ("position-known", "robot")
@@ -137,9 +139,20 @@ def test_who_asks_a_silent_receiver_is_told(worker: Any, receiver: SimulatedRece
     bench.behave("tell-position", **ASK).assert_failed("GPS_SILENT")
 
 
-def test_port_that_cannot_be_opened_is_told_once(worker: Any) -> None:
+def test_port_that_cannot_be_opened_is_told_once(
+    worker: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    attempts = threading.Semaphore(0)
+
+    def counted(node: str, baud: int) -> Line:
+        attempts.release()
+        return Line(node, baud)
+
+    monkeypatch.setattr("nondum_gps.plugin.Line", counted)
     bench = worker(PLUGIN, devices={"receiver": "/dev/there-is-none"})
-    bench.wait_until(lambda: bench.logs, "a warning")
+    for _ in range(3):
+        assert attempts.acquire(timeout=30)
+    assert len(bench.logs) == 1
     call = bench.behave("tell-position", **ASK).assert_failed("SERIAL_FAILED")
     assert "/dev/there-is-none" in call.problem.message
 

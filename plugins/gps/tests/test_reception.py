@@ -141,6 +141,13 @@ def test_why_there_is_no_fix_is_told(heard: bytes, at_s: float, code: str, words
     assert problem.fix
 
 
+def test_satellites_of_some_time_ago_are_not_counted() -> None:
+    heard = reception()
+    heard.take(gsv("GL", 2), 100.0)
+    heard.take(gsv("GP", 3) + NO_FIX, 110.0)
+    assert "3 satellites" in heard.problem(110.0).message
+
+
 def test_how_long_a_fix_is_lost_is_told() -> None:
     heard = reception()
     heard.take(gga(), 100.0)

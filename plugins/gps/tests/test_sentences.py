@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -116,3 +118,26 @@ def test_place_that_is_not_on_earth_is_none(place: str) -> None:
     (told,) = decoded(sentence(f"GNGGA,101530.00,{place},1,08,0.9,118.2,M,44.6,M,,"))
     assert isinstance(told, Gga)
     assert told.place is None
+
+
+@pytest.mark.parametrize("number", ["nan", "inf", "1e999"])
+def test_what_is_no_number_is_not_known(number: str) -> None:
+    body = f"GNGGA,101530.00,5103.0,N,01344.0,E,1,08,{number},{number},M,{number},M,,"
+    assert decoded(sentence(body)) == [
+        Gga(Place(51.05, pytest.approx(13.7333333)), 1, 8, None, None, None)
+    ]
+
+
+def test_error_below_zero_is_none() -> None:
+    assert decoded(gst("-1.0", "1.0", "2.0")) == []
+
+
+def test_line_without_an_end_takes_no_memory() -> None:
+    decoder = Decoder()
+    tracemalloc.start()
+    for _ in range(1000):
+        decoder.feed(b"$" + b"x" * 1000)
+    held, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert held < 100_000
+    assert decoder.feed(b"\n" + gga()) == decoded(gga())
