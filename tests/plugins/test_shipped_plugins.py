@@ -7,15 +7,16 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from tests.planning.strangers import ROVER, components, planner, task
+from tests.planning.strangers import ROVER, at_rest, components, planner, task
 
 from nondum.host.optional_inputs import choose, sockets_of, sources_of
 from nondum.planning.goal import goal_text
+from nondum.planning.ground import ground
 from nondum.planning.merge import merge
 from nondum.planning.phrases import phrasebook
 from nondum.sdk.bench import WorkerFactory
 from nondum.sdk.description import Output, PluginDescription, Unit
-from nondum.sdk.planner import Plan
+from nondum.sdk.planner import Plan, Unsolvable
 from nondum.sdk.plugin import describe, load
 from nondum.wheelhouse import manifest
 
@@ -87,8 +88,9 @@ def test_manifest_says_what_the_plugin_says(
             "search for people",
             ["stream", "detect", "watch", "report"],
         ),
+        (("gps", "compton-camera"), "locate the radiation source", ["localise"]),
     ],
-    ids=["follow", "follow by warmth", "report", "search"],
+    ids=["follow", "follow by warmth", "report", "search", "locate"],
 )
 def test_words_become_the_plan_that_is_meant(
     names: tuple[str, ...], words: str, schemas: list[str], shipped: dict[str, PluginDescription]
@@ -104,6 +106,23 @@ def test_words_become_the_plan_that_is_meant(
     assert [step.partition(".")[2] for step in steps] == schemas
 
 
+@pytest.mark.parametrize("words", ["where are you", "please tell me where you are"])
+def test_where_it_is_can_be_told_while_that_is_known(
+    words: str, shipped: dict[str, PluginDescription]
+) -> None:
+    contributions = components(shipped[name] for name in ("gps", "compton-camera"))
+    merged = merge(contributions, ROVER)
+    asked = phrasebook(contributions, merged).goal(words)
+    assert asked.kind == "do"
+    there = at_rest(contributions, merged)
+    assert isinstance(planner().plan(ground(merged, there, asked.expr), 60.0), Unsolvable)
+    grounded = ground(merged, there | {f"position-known {ROVER}"}, asked.expr)
+    answer = planner().plan(grounded, 60.0)
+    assert isinstance(answer, Plan)
+    (step,) = answer.steps
+    assert grounded.actions[step].name == f"gps.tell-position {ROVER}__gps__receiver {ROVER}"
+
+
 GPS = PluginDescription(
     "a-gps", "1", units=(Unit("receiver", "sensor", outputs=(Output("fix", "pose"),)),)
 )
@@ -112,10 +131,11 @@ GPS = PluginDescription(
 
 @pytest.mark.parametrize("reader", ["recorded-camera", "thermal-camera", "visual-tracker"])
 @pytest.mark.parametrize("has_base", [False, True])
-def test_pose_of_a_gps_is_nobodys_odometry(
+def test_position_of_a_gps_is_nobodys_odometry(
     reader: str, has_base: bool, shipped: dict[str, PluginDescription]
 ) -> None:
-    there = {"a-gps": GPS} | ({"mobile-base": shipped["mobile-base"]} if has_base else {})
+    there = {"a-gps": GPS, "gps": shipped["gps"]}
+    there |= {"mobile-base": shipped["mobile-base"]} if has_base else {}
     flowing = [s for name, plugin in there.items() for s in sources_of("rover", name, plugin)]
     sockets = [s for s in sockets_of(reader, shipped[reader]) if s.slot == "odometry"]
     (choice,) = choose(sockets, flowing, {})
