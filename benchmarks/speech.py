@@ -295,7 +295,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as scratch:
         espeak = Espeak(Path(scratch))
         words = lexicon(VOCABULARY.words, lambda word, voice: espeak.phonemes(word, voice=voice))
-        recogniser = Recogniser(VOCABULARY, words, FreeHearing(), confidence=Settings().confidence)
+        recogniser = Recogniser(VOCABULARY, words, FreeHearing(), Settings().limits)
         results = list(measured(recogniser, clips(espeak, options.people)))
     measuring.write("speech", page(results))
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from benchmarks.speech import FAR, NEAR, PHRASES, VOCABULARY
 
 from nondum.planning.asking import ASKED
-from nondum.planning.stop_words import STOPS
+from nondum.planning.stop_words import STOP_PATTERNS
 from nondum_speech.grammar import Vocabulary
 
-KNOWN = Vocabulary((*STOPS, *ASKED, *VOCABULARY.phrases), VOCABULARY.names)
+KNOWN = Vocabulary((*STOP_PATTERNS, *ASKED, *VOCABULARY.phrases), VOCABULARY.names, STOP_PATTERNS)
 """What a host with the shipped plugins tells those who listen, as `mind.sayings` does."""
 
 ALIKE = (

@@ -49,7 +49,7 @@ class Listener:
         self._espeak = espeak
         self._noise = np.random.default_rng(7)
         log = logging.getLogger("benchmarks.stop")
-        self._ears = Ears(espeak, log, confidence=Settings().confidence)
+        self._ears = Ears(espeak, log, Settings().limits)
 
     async def learn(self) -> None:
         """Know what a host with the shipped plugins tells."""

@@ -60,4 +60,4 @@ class Person:
         words = lexicon(
             vocabulary.words, lambda word, voice: self._espeak.phonemes(word, voice=voice)
         )
-        return Recogniser(vocabulary, words, FreeHearing(), confidence=Settings().confidence)
+        return Recogniser(vocabulary, words, FreeHearing(), Settings().limits)

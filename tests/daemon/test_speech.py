@@ -41,7 +41,7 @@ def test_spoken_goal_is_reached_and_told_aloud(
     from nondum_speech.espeak import Espeak
     from nondum_speech.grammar import Vocabulary
     from nondum_speech.lexicon import lexicon
-    from nondum_speech.recogniser import FreeHearing, Recogniser
+    from nondum_speech.recogniser import FreeHearing, Limits, Recogniser
     from nondum_speech.sentences import sentences_of
     from nondum_speech.sound import read_wav
 
@@ -66,7 +66,7 @@ def test_spoken_goal_is_reached_and_told_aloud(
 
     said = Vocabulary(("speech heard greet people that is goal one", "speech is active"))
     words = lexicon(said.words, lambda word, voice: espeak.phonemes(word, voice=voice))
-    ears = Recogniser(said, words, FreeHearing(), confidence=-0.85)
+    ears = Recogniser(said, words, FreeHearing(), Limits(-0.85, -0.85))
 
     def repeated(_view: object) -> bool:
         return any(

@@ -8,10 +8,14 @@ from __future__ import annotations
 
 from nondum.planning.pattern import words_of
 
-STOPS = ("stop", "halt", "freeze", "abort", "whoa", "stand still", "hold still", "don't move")
-"""What to say; those who listen are told to hear it."""
+STOPS = ("stop", "halt", "freeze", "abort", "stand still", "hold still", "don't move")
+"""What to say."""
+STOP_PATTERNS = tuple(f"[please] {said} [now]" for said in STOPS)
+"""What those who listen are told to hear."""
+_TYPED = ("do not move", "whoa")
+"""Understood as well, and not listened for: "hello" is heard as "whoa"."""
 
-_ORDERS = tuple(sorted(map(words_of, (*STOPS, "do not move")), key=len, reverse=True))
+_ORDERS = tuple(sorted(map(words_of, (*STOPS, *_TYPED)), key=len, reverse=True))
 _BESIDE = frozenset(
     {
         *("please", "now", "immediately", "right", "away", "at", "once", "there", "emergency"),

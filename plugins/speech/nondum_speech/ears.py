@@ -15,6 +15,7 @@ from nondum_speech.espeak import Espeak
 from nondum_speech.grammar import Vocabulary
 from nondum_speech.inbox import Inbox, may_grow
 from nondum_speech.lexicon import lexicon
+from nondum_speech.recogniser import Limits
 from nondum_speech.recognising import RecogniserEnded, Recognising
 from nondum_speech.sentences import Sentences, sentences_of
 from nondum_speech.sound import Sound, SoundInvalid, read_wav
@@ -29,10 +30,10 @@ ECHO_BYTES = 16_000
 class Ears:
     """Turns sounds into sentences said; they wait in `sentences`."""
 
-    def __init__(self, espeak: Espeak, log: logging.Logger, *, confidence: float) -> None:
+    def __init__(self, espeak: Espeak, log: logging.Logger, limits: Limits) -> None:
         self.sentences: asyncio.Queue[str] = asyncio.Queue()
         self._espeak, self._log = espeak, log
-        self._recognising = Recognising(confidence=confidence)
+        self._recognising = Recognising(limits)
         self._learnt = asyncio.Event()
         self._speaking = 0
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import product
 
 PHONES = (
     "AA", "AE", "AH", "AO", "AW", "AY", "B", "CH", "D", "DH", "EH", "ER", "EY", "F", "G", "HH",
@@ -19,6 +20,7 @@ PHONE_WORDS = {f"phone.{phone.lower()}": phone for phone in PHONES}
 """Words of one phone: free words are heard as any phones, and understood in a second go."""
 
 _PART = re.compile(r"\{([\w-]+)\}|([\[\]])|([^\s\[\]{}]+)")
+_SLOT = re.compile(r"\{([\w-]+)\}")
 _BREAKS = re.compile(r"[^\w'-]+")
 _ARTICLES = ("the", "a", "an")
 _FREE = "free"
@@ -32,6 +34,8 @@ class Vocabulary:
     """Patterns with `[optional]` parts and `{slots}`."""
     names: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Slot → the words that may be said there; a slot without names takes any."""
+    stops: tuple[str, ...] = ()
+    """The patterns that stop the robot."""
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -40,6 +44,34 @@ class Vocabulary:
         texts += [name for names in self.names.values() for name in names]
         articles = _ARTICLES if any(self.names.values()) else ()
         return tuple(sorted({*articles, *(word for text in texts for word in words_of(text))}))
+
+
+def sentences(pattern: str, names: Mapping[str, Iterable[str]]) -> Iterator[str]:
+    """All that a pattern says, its optional parts not nested; slots without names say nothing.
+
+    >>> sorted(sentences("[{who},] halt [now]", {"who": ["mule"]}))
+    ['halt', 'halt now', 'mule halt', 'mule halt now']
+    """
+    pieces = [
+        (*_readings(inner, names), *([""] if optional else []))
+        for optional, inner in _pieces(pattern)
+    ]
+    for said in product(*pieces):
+        yield " ".join(words_of(" ".join(said)))
+
+
+def _pieces(pattern: str) -> Iterator[tuple[bool, str]]:
+    """Whether it is optional, and each part of a pattern."""
+    for number, text in enumerate(re.split(r"\[([^\[\]]*)\]", pattern)):
+        if text.strip():
+            yield number % 2 == 1, text
+
+
+def _readings(text: str, names: Mapping[str, Iterable[str]]) -> Iterator[str]:
+    slots = _SLOT.findall(text)
+    for said in product(*(tuple(names.get(slot, ())) for slot in slots)):
+        words = iter(said)
+        yield _SLOT.sub(lambda _, words=words: next(words), text)  # type: ignore[misc]  # bound now
 
 
 def words_of(text: str) -> tuple[str, ...]:

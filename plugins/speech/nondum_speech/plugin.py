@@ -48,7 +48,7 @@ class Speech:
         self._outlet = find_outlet(settings.said, os.environ, scratch=ctx.scratch)
         if self._outlet is None:
             ctx.log.info("no sound player is here: what is said will be printed only")
-        self._ears = Ears(self._espeak, ctx.log, confidence=settings.confidence)
+        self._ears = Ears(self._espeak, ctx.log, settings.limits)
         inbox = Inbox(Path(settings.inbox) if settings.inbox else ctx.scratch / "inbox")
         ctx.log.info("WAV files in %s are heard", inbox.folder)
         ctx.spawn(self._ears.watch(inbox))
@@ -66,7 +66,8 @@ class Speech:
         """Hear what can be said now, and nothing else."""
         if self._ears is not None:
             names = {slot: tuple(words) for slot, words in vocabulary["names"].items()}
-            await self._ears.learn(Vocabulary(tuple(vocabulary["phrases"]), names))
+            phrases, stops = vocabulary["phrases"], vocabulary.get("stops", ())
+            await self._ears.learn(Vocabulary(tuple(phrases), names, tuple(stops)))
 
     @hookimpl
     async def listen(self, ctx: Context) -> dict[str, str]:

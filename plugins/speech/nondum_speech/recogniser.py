@@ -23,7 +23,7 @@ from nondum_speech.decoding import (
     frames_of,
     made_audible,
 )
-from nondum_speech.grammar import PHONE_WORDS, Vocabulary, jsgf
+from nondum_speech.grammar import PHONE_WORDS, Vocabulary, jsgf, sentences
 from nondum_speech.lexicon import Lexicon
 from nondum_speech.sound import Samples, Sound
 
@@ -43,6 +43,15 @@ class Heard:
     """How well it explains the sound: log-likelihood a frame, less that of anything free."""
     said: str = ""
     """`words` if that was said; empty if something else was."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a sentence must reach to be taken as said; nearer zero is stricter."""
+
+    confidence: float
+    stop_confidence: float
+    """For words that stop the robot: a stop that is missed is worse than one too many."""
 
 
 NOTHING = Heard("", float("-inf"))
@@ -70,10 +79,11 @@ class Recogniser:
     """Hears the sentences of one vocabulary; not for several threads at once."""
 
     def __init__(
-        self, vocabulary: Vocabulary, lexicon: Lexicon, free: FreeHearing, *, confidence: float
+        self, vocabulary: Vocabulary, lexicon: Lexicon, free: FreeHearing, limits: Limits
     ) -> None:
-        """`confidence`: what a sentence must reach to be taken as said."""
-        self._free, self._confidence = free, confidence
+        self._free, self._limits = free, limits
+        spoken = (sentences(pattern, vocabulary.names) for pattern in vocabulary.stops)
+        self._stops = frozenset(said for pattern in spoken for said in pattern)
         grammar = jsgf(vocabulary, frozenset(lexicon.pronunciations))
         self._grammatical = _decoder_of(grammar, lexicon) if grammar else None
 
@@ -92,7 +102,9 @@ class Recogniser:
         worse += PHONES_WEIGH * (sentence.total - phones.total)
         confidence = worse / frames_of(samples)
         text = " ".join(_with_free_words(sentence, words))
-        return Heard(text, confidence, said=text if confidence >= self._confidence else "")
+        limits = self._limits
+        limit = limits.stop_confidence if text in self._stops else limits.confidence
+        return Heard(text, confidence, said=text if confidence >= limit else "")
 
     def _is_whole(self, sentence: Decoding) -> bool:
         """Whether it is no mere beginning of a sentence."""

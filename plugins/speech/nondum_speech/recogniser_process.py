@@ -27,7 +27,7 @@ def main() -> None:
         if isinstance(request, Learn):
             free = free or FreeHearing()
             words, lexicon = request.vocabulary, request.lexicon
-            recogniser = Recogniser(words, lexicon, free, confidence=request.confidence)
+            recogniser = Recogniser(words, lexicon, free, request.limits)
         elif isinstance(request, Sound):
             answer = recogniser.hear(request) if recogniser else NOTHING
         out.write(framed(answer))

@@ -15,7 +15,7 @@ from typing import Any
 
 from nondum_speech.grammar import Vocabulary
 from nondum_speech.lexicon import Lexicon
-from nondum_speech.recogniser import NOTHING, Heard
+from nondum_speech.recogniser import NOTHING, Heard, Limits
 from nondum_speech.requests import LENGTH, Learn, framed
 from nondum_speech.sound import Sound
 
@@ -27,8 +27,8 @@ class RecogniserEnded(Exception):
 class Recognising:
     """Asks the process, one request at a time; starts it for the first, and again if it ended."""
 
-    def __init__(self, *, confidence: float) -> None:
-        self._confidence = confidence
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
         self._learn: Learn | None = None
         self._process: asyncio.subprocess.Process | None = None
         self._one_at_a_time = asyncio.Lock()
@@ -41,7 +41,7 @@ class Recognising:
 
     async def learn(self, vocabulary: Vocabulary, lexicon: Lexicon) -> None:
         """Hear other words from now on. Raises `RecogniserEnded`."""
-        self._learn = Learn(vocabulary, lexicon, self._confidence)
+        self._learn = Learn(vocabulary, lexicon, self._limits)
         await self._asked(self._learn)
 
     async def hear(self, sound: Sound) -> Heard:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from nondum_speech.grammar import Vocabulary
 from nondum_speech.lexicon import Lexicon
+from nondum_speech.recogniser import Limits
 
 LENGTH = struct.Struct("!I")
 
@@ -18,8 +19,7 @@ class Learn:
 
     vocabulary: Vocabulary
     lexicon: Lexicon
-    confidence: float
-    """What a sentence must reach to be taken as said."""
+    limits: Limits
 
 
 def framed(value: object) -> bytes:

@@ -37,4 +37,4 @@ def free() -> FreeHearing:
 def ears(espeak: Espeak, free: FreeHearing) -> Recogniser:
     """Ears for `VOCABULARY`, as strict as they are shipped."""
     words = lexicon(VOCABULARY.words, lambda word, voice: espeak.phonemes(word, voice=voice))
-    return Recogniser(VOCABULARY, words, free, confidence=Settings().confidence)
+    return Recogniser(VOCABULARY, words, free, Settings().limits)

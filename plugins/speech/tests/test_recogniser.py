@@ -8,8 +8,8 @@ import pytest
 from nondum_speech.espeak import Espeak
 from nondum_speech.grammar import Vocabulary
 from nondum_speech.lexicon import cmu_dictionary, lexicon
-from nondum_speech.recogniser import FreeHearing, Recogniser
-from nondum_speech.sentences import sentences_of
+from nondum_speech.recogniser import FreeHearing, Heard, Limits, Recogniser
+from nondum_speech.sentences import Sentences, sentences_of
 from nondum_speech.sound import RATE_HZ, Sound
 
 SAID = (
@@ -83,13 +83,34 @@ def test_same_sound_is_heard_the_same(espeak: Espeak, ears: Recogniser) -> None:
 def test_other_words_are_heard_after_others_are_learnt(espeak: Espeak, free: FreeHearing) -> None:
     vocabulary = Vocabulary(("switch off the lamp", "open the gate"))
     words = lexicon(vocabulary.words, lambda word, voice: espeak.phonemes(word, voice=voice))
-    others = Recogniser(vocabulary, words, free, confidence=-0.85)
+    others = Recogniser(vocabulary, words, free, Limits(-0.85, -0.85))
     assert others.hear(said(espeak, "open the gate")).said == "open the gate"
     assert not others.hear(said(espeak, "search for people")).said
 
 
+def test_words_that_stop_need_less_confidence(espeak: Espeak, free: FreeHearing) -> None:
+    def heard(stops: tuple[str, ...]) -> Heard:
+        vocabulary = Vocabulary(("[please] hold still [now]", "open the gate"), {}, stops)
+        words = lexicon(vocabulary.words, lambda word, voice: espeak.phonemes(word, voice=voice))
+        strict = Recogniser(vocabulary, words, free, Limits(0.0, -9.0))
+        return strict.hear(said(espeak, "please hold still"))
+
+    assert heard(()).words == heard(("[please] hold still [now]",)).words == "please hold still"
+    assert not heard(()).said
+    assert heard(("[please] hold still [now]",)).said
+
+
+def test_word_that_is_said_in_noise_ends(espeak: Espeak) -> None:
+    word = said(espeak, "halt").samples
+    hiss = noise(4.0, 0.3 * float(np.std(word))).samples
+    hiss[RATE_HZ : RATE_HZ + len(word)] += word
+    cutter = Sentences()
+    (sentence,) = cutter.heard(Sound(hiss).to_bytes())
+    assert len(word) * 0.8 < len(sentence.samples) < len(word) + RATE_HZ
+
+
 def test_nothing_is_heard_where_nothing_can_be_said(espeak: Espeak, free: FreeHearing) -> None:
-    mute = Recogniser(Vocabulary(), lexicon((), lambda word, voice: ""), free, confidence=-9.0)
+    mute = Recogniser(Vocabulary(), lexicon((), lambda word, voice: ""), free, Limits(-9.0, -9.0))
     assert not mute.hear(said(espeak, "follow people")).words
 
 

@@ -28,7 +28,7 @@ def words(espeak: Espeak) -> Lexicon:
 
 @asynccontextmanager
 async def recognising() -> AsyncIterator[Recognising]:
-    one = Recognising(confidence=Settings().confidence)
+    one = Recognising(Settings().limits)
     yield one
     await one.close()
     assert one.pid is None

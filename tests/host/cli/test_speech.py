@@ -10,7 +10,7 @@ from tests.kit.payloads import Part
 from tests.kit.running_host import running
 
 from nondum.planning.asking import ASKED
-from nondum.planning.stop_words import STOPS
+from nondum.planning.stop_words import STOP_PATTERNS
 
 ECHO = """
 '''Hears what it has been told, and answers.'''
@@ -92,7 +92,7 @@ def test_listener_learns_what_can_be_said_and_when_that_changes(tmp_path: Path) 
         host.plug(host.drive("pupil", Part("pupil", PUPIL)))
         host.until("the pupil is ready", lambda view: are_ready(view, 1))
         host.plug(host.drive("beacon", Part("beacon", BEACON)))
-        learnt = sorted([*STOPS, *ASKED, "greet {class}", "shine [for {text}]"])
+        learnt = sorted([*STOP_PATTERNS, *ASKED, "greet {class}", "shine [for {text}]"])
         host.until_told(f"pupil heard {' '.join(['learnt', *learnt, 'people', 'person'])!r}")
         lamp = BEACON.replace("shine [for {words:text}]", "light up")
         host.plug(host.drive("lamp", Part("lamp", lamp)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 from tests.planning.strangers import ROVER
 
@@ -11,10 +12,12 @@ from nondum.planning.asking import ASKED
 from nondum.planning.contribution import Contribution
 from nondum.planning.merge import merge
 from nondum.planning.phrases import Phrasebook, phrasebook
-from nondum.planning.stop_words import STOPS
+from nondum.planning.stop_words import STOP_PATTERNS, is_stop
 from nondum.sdk.description import Fragment, Label, Phrase, PluginDescription
 
 DOMAIN = "(define (domain d) (:predicates (seen ?c - class) (met ?t - target)))"
+
+STOPPING = list(STOP_PATTERNS)
 
 
 def book(
@@ -39,20 +42,22 @@ def test_patterns_are_told_with_all_names_that_fit() -> None:
         book("[please] find {c:class} [in {words:text}]", classes=("person", "dog"), labels=labels)
     )
     assert told == {
-        "phrases": [*STOPS, *ASKED, "[please] find {class} [in {text}]"],
+        "phrases": [*STOPPING, *ASKED, "[please] find {class} [in {text}]"],
         "names": {"class": ["dog", "people", "person", "persons"]},
+        "stops": STOPPING,
     }
 
 
 def test_phrase_without_a_name_for_a_slot_cannot_be_said() -> None:
     told = sayings(book("find {c:class}", "meet {t:target}", classes=("dog",)))
-    assert told == {"phrases": [*STOPS, *ASKED, "find {class}"], "names": {"class": ["dog"]}}
+    assert told["phrases"] == [*STOPPING, *ASKED, "find {class}"]
+    assert told["names"] == {"class": ["dog"]}
 
 
 def test_names_that_no_packet_has_room_for_are_left_out() -> None:
     classes = tuple(f"thing-number-{n}-of-very-many" for n in range(2000))
     told = sayings(book("find {c:class}", classes=classes))
-    assert told["phrases"] == [*STOPS, *ASKED, "find {class}"]
+    assert told["phrases"] == [*STOPPING, *ASKED, "find {class}"]
     assert SAYINGS_BYTES / 4 < len(json.dumps(told)) <= SAYINGS_BYTES + 100
 
 
@@ -66,6 +71,13 @@ def test_phrases_are_left_out_when_names_do_not_suffice() -> None:
 def test_hosts_are_spoken_to_by_name_where_there_are_several() -> None:
     told = sayings(book("find {c:class}", classes=("dog",)), ["big-mule", "rover"])
     assert told == {
-        "phrases": [f"[{{addressee}}] {said}" for said in (*STOPS, *ASKED, "find {class}")],
+        "phrases": [f"[{{addressee}}] {said}" for said in (*STOPPING, *ASKED, "find {class}")],
         "names": {"class": ["dog"], "addressee": ["big mule", "rover"]},
+        "stops": [f"[{{addressee}}] {said}" for said in STOPPING],
     }
+
+
+def test_all_that_stops_the_robot_does() -> None:
+    for said in STOPPING:
+        assert is_stop(re.sub(r"[\[\]]", "", said))
+        assert is_stop(re.sub(r"\[.*?\]", "", said))

@@ -14,7 +14,7 @@ from nondum.planning.asking import ASKED
 from nondum.planning.pattern import Optional, Part, Slot, Word
 from nondum.planning.phrase import KnownPhrase
 from nondum.planning.phrases import Phrasebook
-from nondum.planning.stop_words import STOPS
+from nondum.planning.stop_words import STOP_PATTERNS
 
 SAYINGS_BYTES = 40_000
 """What a packet to a worker has room for, and some to spare."""
@@ -26,16 +26,18 @@ Sayings: TypeAlias = dict[str, object]
 
 
 def sayings(book: Phrasebook, hosts: Sequence[str] = ()) -> Sayings:
-    """`phrases`: patterns that can be said now; `names`: slot → words that may be said there.
+    """`phrases`: patterns that can be said now; `names`: slot → words that may be said there;
+    `stops`: those of the patterns that stop the robot.
 
-    What stops the robot comes first, then what it is asked about itself. Slots are called by the
+    These come first, then what it is asked about itself. Slots are called by the
     types of what they name. A phrase without a name for one of its slots cannot be said. Where
     there are several hosts, each can be addressed first. What a packet has no room for is left out,
     names first.
     """
     names: dict[str, list[str]] = {}
     addressee = f"[{{{ADDRESSEE}}}] " if hosts else ""
-    phrases: dict[str, None] = dict.fromkeys(f"{addressee}{said}" for said in (*STOPS, *ASKED))
+    stops = [f"{addressee}{said}" for said in STOP_PATTERNS]
+    phrases = dict.fromkeys((*stops, *(f"{addressee}{said}" for said in ASKED)))
     for phrase in book.phrases:
         slots = {slot: _names(book, slot) for slot in phrase.binding_slots()}
         if all(slots.values()):
@@ -48,7 +50,7 @@ def sayings(book: Phrasebook, hosts: Sequence[str] = ()) -> Sayings:
         if all(len(words) < 2 for words in names.values()):
             told = told[: len(told) // 2]
         names = {slot: words[: (len(words) + 1) // 2] for slot, words in names.items()}
-    return {"phrases": told, "names": names if told else {}}
+    return {"phrases": told, "names": names if told else {}, "stops": stops if told else []}
 
 
 def _names(book: Phrasebook, slot: Slot) -> list[str]:

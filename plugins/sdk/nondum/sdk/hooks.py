@@ -128,8 +128,9 @@ async def listen(ctx: Context) -> Mapping[str, str]:  # type: ignore[empty-body]
 async def learn_words(ctx: Context, vocabulary: Mapping[str, Any]) -> None:
     """Learn what can be said now; for those that listen, before and while they do.
 
-    `vocabulary` has `phrases`, patterns with `[optional]` parts and `{slots}`; and `names`: slot →
-    the words that may be said there, without articles. A slot without names takes any words. A host
+    `vocabulary` has `phrases`, patterns with `[optional]` parts and `{slots}`; `stops`, those of
+    them that stop the robot, of which none should be missed; and `names`: slot → the words that may
+    be said there, without articles. A slot without names takes any words. A host
     tells it anew each time that it changes.
     """
 
