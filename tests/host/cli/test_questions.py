@@ -52,7 +52,7 @@ ROWS: dict[str, set[str]] = {
 }
 VIEWS: dict[str, set[str]] = {
     "goals": {"can", "phrases", "given", "elsewhere", "problems"},
-    "plan": {"goal", "kind", "steps"},
+    "plan": {"goal", "kind", "steps", "beside"},
     "status": {
         "host",
         "revision",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -26,6 +27,15 @@ FOLLOW = "(following self person)"
 LOCALISE = "(bearing-known radiation-source self)"
 REPORT = "(reported person self)"
 LED = f"{HOST}__beacon__led"
+RUDE = replace(
+    BEACON,
+    fragments=tuple(
+        replace(one, text=re.sub(r"\(not \(idle \?u\)\) |\(idle \?u\)", "", one.text))
+        for one in BEACON.fragments
+    ),
+    units=(replace(BEACON.units[0], users=1),),
+)
+"""It does not say in its actions that they need the unit for themselves."""
 CHAIN = {
     "recorded-camera.stream",
     "people-detector.detect",
@@ -104,6 +114,17 @@ async def test_less_urgent_goal_waits_for_what_a_more_urgent_one_uses(robot: Rob
     robot.mind.halt(id="1")
     await robot.until_holding("2")
     assert robot.running == {"beacon.flash"}
+
+
+async def test_goal_whose_own_plan_is_stuck_once_another_made_way_is_suspended(
+    robot: Robot,
+) -> None:
+    robot.plug(RUDE)
+    robot.mind.give(pddl=f"(lit {LED})", kind="maintain")
+    await robot.until_holding("1")
+    robot.mind.give(pddl=f"(and (lit {LED}) (reported person self))", kind="maintain")
+    await robot.until_goal("suspended", "2")
+    assert [problem.code for problem in robot.mind.queue["2"].problems] == ["PLAN_STUCK"]
 
 
 async def test_goal_that_cannot_be_had_at_all_says_so_though_others_go_first(

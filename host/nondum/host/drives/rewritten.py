@@ -77,7 +77,11 @@ class Rewritten(Generic[_Slot]):
                 with contextlib.suppress(RuntimeError):  # the loop has ended meanwhile
                     loop.call_soon_threadsafe(self._found, found)
 
-            threading.Thread(target=work, name="slots", daemon=True).start()
+            try:
+                threading.Thread(target=work, name="slots", daemon=True).start()
+            except RuntimeError as error:  # no memory for it; the next change asks again
+                log.warning("slots are not looked at for what was built into them: %s", error)
+                self._is_looking = False
 
     def close(self) -> None:
         """Watch no more. A look that hangs is left behind."""

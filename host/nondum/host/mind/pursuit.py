@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import replace
 
 from nondum.host.catalogue.records import ComponentState
 from nondum.host.events import Emit, GoalEnded, GoalReached, PlanMade, PlanMissing
@@ -413,6 +414,8 @@ class Pursuit:
                 handed_over += one.tree.release()
                 self._tried.pop(self.queue[id].number, None)  # it is put aside, not given up
                 self._put_aside(id, goal.id, shared)
+        # Without those that it put aside the answer is the same.
+        self._tried[goal.number] = replace(found.situation, others=self._others(goal.id))
         self.queue.put(goal.id, GoalState.ACTIVE)
         self._grow(goal.id, found.task, found.plan, runs=handed_over)
         called = short_names.steps(found.names, {})
