@@ -54,7 +54,7 @@ Commands:
   pddl        Check, merge and plan PDDL files, without a host.
   peers       Other hosts: who is here, and whom this host trusts.
   place       Payloads that run on another host, and where one is to run.
-  plan        The plan that is being carried out.
+  plan        The plans that are being carried out, that of the most urgent goal first.
   retry       Try again what was refused or quarantined.
   say         Say something to the robot, as if it had heard it.
   status      The host, its payloads and its goals at a glance.

@@ -44,7 +44,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "pddl": ("pddl", "Check, merge and plan PDDL files, without a host."),
     "peers": ("peers", "Other hosts: who is here, and whom this host trusts."),
     "place": ("place", "Payloads that run on another host, and where one is to run."),
-    "plan": ("mind", "The plan that is being carried out."),
+    "plan": ("mind", "The plans that are being carried out, that of the most urgent goal first."),
     "retry": ("act", "Try again what was refused or quarantined."),
     "say": ("act", "Say something to the robot, as if it had heard it."),
     "status": ("status", "The host, its payloads and its goals at a glance."),
