@@ -69,6 +69,13 @@ def test_event_is_said_in_a_sentence(event: Event, said: str | None) -> None:
     assert announced(event, Snapshot("spot", revision=1, payloads=(LAMP,))) == said
 
 
+def test_release_that_was_refused_unread_is_named_without_a_version() -> None:
+    unread = replace(LAMP, key="3" * 16, digest="3" * 64, version="", release=0)
+    snapshot = Snapshot("spot", revision=1, payloads=(LAMP, unread))
+    gone = events.PayloadWithdrawn(unread.key, "its drive was pulled")
+    assert announced(gone, snapshot) == "org.example.lamp is withdrawn: its drive was pulled"
+
+
 OLD = replace(LAMP, step=Step.ACTIVE)
 NEW = replace(LAMP, key="2" * 16, digest="2" * 64, version="2", release=2, step=Step.STORED)
 

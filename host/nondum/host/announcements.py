@@ -197,7 +197,8 @@ def _name(key: str, snapshot: Snapshot) -> str:
     if payload is None:
         return f"payload {key}"
     is_one_of_many = sum(p.payload_id == payload.payload_id for p in snapshot.payloads) > 1
-    return f"{payload.payload_id} {payload.version}" if is_one_of_many else payload.payload_id
+    has_version = is_one_of_many and payload.version  # one that was refused unread has none
+    return f"{payload.payload_id} {payload.version}" if has_version else payload.payload_id
 
 
 def _joined(problems: Iterable[Problem]) -> str:

@@ -68,10 +68,9 @@ def _pieces(pattern: str) -> Iterator[tuple[bool, str]]:
 
 
 def _readings(text: str, names: Mapping[str, Iterable[str]]) -> Iterator[str]:
-    slots = _SLOT.findall(text)
-    for said in product(*(tuple(names.get(slot, ())) for slot in slots)):
-        words = iter(said)
-        yield _SLOT.sub(lambda _, words=words: next(words), text)  # type: ignore[misc]  # bound now
+    parts = enumerate(_SLOT.split(text))  # text and slots in turn
+    said = (tuple(names.get(part, ())) if number % 2 else (part,) for number, part in parts)
+    yield from map("".join, product(*said))
 
 
 def words_of(text: str) -> tuple[str, ...]:

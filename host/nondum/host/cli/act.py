@@ -29,7 +29,7 @@ _TRIPLE = (float, float, float)
     help="With --pddl: keep it true instead of reaching it.",
 )
 @click.option(
-    "--do", "kind", flag_value="do", help="With --pddl: do it anew, though it was done before."
+    "--do", "kind", flag_value="do", help="With --pddl: do it again, even if it was done before."
 )
 @click.option(
     "--priority",
