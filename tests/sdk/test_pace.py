@@ -7,7 +7,7 @@ from functools import reduce
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.sdk.pace import FIRST_S, PERIODS, STALL_S, Pace
+from nondum.sdk.pace import FIRST_S, LONGEST_FIRST_S, PERIODS, STALL_S, Pace
 
 periods = st.lists(st.floats(0.001, 30.0), min_size=1, max_size=30)
 
@@ -18,6 +18,11 @@ def paced(*periods_s: float) -> Pace:
 
 def test_after_one_nothing_is_known_yet() -> None:
     assert paced().overdue_s == FIRST_S
+
+
+def test_second_one_may_take_some_times_as_long_as_the_first() -> None:
+    assert Pace(8.0, first_took_s=8.0).overdue_s == 8.0 + PERIODS * 8.0
+    assert Pace(900.0, first_took_s=900.0).overdue_s == 900.0 + LONGEST_FIRST_S
 
 
 def test_what_comes_often_is_overdue_after_a_second() -> None:

@@ -1,4 +1,4 @@
-"""Inputs of a worker: one wrong message is passed over, and the stream goes on."""
+"""Ends of streams in a worker: what is wrong is passed over, and what is slow flows."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from tests.kit.clock import VirtualClock
 
 from nondum.sdk import Header, Text
+from nondum.sdk.pace import FIRST_S, PERIODS
 from nondum.sdk.packets import MemoryPackets
-from nondum.sdk.ports import InputPort
+from nondum.sdk.ports import InputPort, OutputPort
 from nondum.sdk.wire import pack
 
 pytestmark = pytest.mark.anyio
@@ -46,3 +48,29 @@ async def test_wrong_message_is_passed_over(caplog: pytest.LogCaptureFixture) ->
     await send(4, "again")
     assert port.newest() == Text(Header(1.0), "again")
     assert [record.getMessage().count("MESSAGE_FIELD") for record in caplog.records] == [1]
+
+
+async def test_stream_that_began_slowly_flows_until_its_second_message(clock: VirtualClock) -> None:
+    first_took_s = FIRST_S
+    flows: list[bool] = []
+    port = OutputPort("words", "text", lambda one: flows.append(one.is_flowing))
+    port.open()
+    await clock.advance(first_took_s)
+    port.send(Text(Header(1.0), "slow"))
+    await clock.advance(PERIODS * first_took_s - 0.1)
+    assert flows == [True]
+    await clock.advance(0.2)
+    assert flows == [True, False]
+    port.close()
+
+
+async def test_stream_that_began_at_once_ends_sooner(clock: VirtualClock) -> None:
+    flows: list[bool] = []
+    port = OutputPort("words", "text", lambda one: flows.append(one.is_flowing))
+    port.open()
+    port.send(Text(Header(1.0), "quick"))
+    await clock.advance(FIRST_S - 0.1)
+    assert flows == [True]
+    await clock.advance(0.2)
+    assert flows == [True, False]
+    port.close()

@@ -8,8 +8,9 @@ STALL_S = 1.0
 """Nothing is overdue sooner."""
 PERIODS = 3
 """What comes slowly is overdue when so many of its own periods have passed."""
-FIRST_S = 5.0
-"""How long a second one is waited for: nothing is known of the period yet."""
+FIRST_S, LONGEST_FIRST_S = 5.0, 30.0
+"""How long a second one is waited for at least and at most: nothing is known of the period yet but
+how long the first one took."""
 _KEPT = 0.8
 """What counts of the longest period when one comes sooner."""
 
@@ -23,12 +24,16 @@ class Pace:
     18.0
     >>> Pace(last_s=10.0).after(10.1).overdue_s
     11.1
+    >>> Pace(last_s=10.0, first_took_s=4.0).overdue_s
+    22.0
     """
 
     last_s: float
     """When the last one came."""
     period_s: float | None = None
     """The longest of late between two; None: only one has come."""
+    first_took_s: float = 0.0
+    """How long the first one was waited for."""
 
     def after(self, now_s: float) -> Pace:
         """The pace once one more has come."""
@@ -38,5 +43,6 @@ class Pace:
     def overdue_s(self) -> float:
         """When the next one is overdue."""
         if self.period_s is None:
-            return self.last_s + FIRST_S
+            wait_s = min(PERIODS * self.first_took_s, LONGEST_FIRST_S)
+            return self.last_s + max(FIRST_S, wait_s)
         return self.last_s + max(STALL_S, PERIODS * self.period_s)

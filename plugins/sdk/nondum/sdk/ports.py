@@ -34,6 +34,7 @@ class OutputPort:
         self._message_class = MESSAGES[kind]
         self._on_flow = on_flow
         self._users = 0
+        self._opened_s = 0.0
         self._pace: Pace | None = None
         """None: nothing has come since it was opened."""
         self._watch: asyncio.TimerHandle | None = None
@@ -57,13 +58,19 @@ class OutputPort:
         self.sent += 1
         loop = asyncio.get_running_loop()
         now_s = loop.time()
-        self._pace = self._pace.after(now_s) if self._pace is not None else Pace(now_s)
+        if self._pace is not None:
+            self._pace = self._pace.after(now_s)
+        else:
+            took_s = now_s - self._opened_s if self._users else 0.0
+            self._pace = Pace(now_s, first_took_s=took_s)
         if self._watch is None:
             self._watch = loop.call_later(STALL_S, self._look)
             self._on_flow(self)
 
     def open(self) -> None:
         """Count one more user."""
+        if not self._users:
+            self._opened_s = asyncio.get_running_loop().time()
         self._users += 1
 
     def release(self) -> None:
