@@ -108,7 +108,10 @@ def test_halting_now_halts_what_runs(daemon: RunningHost) -> None:
     assert daemon.run("halt").ok().out == "nothing was asked for, nothing was running\n"
 
 
-@pytest.mark.parametrize("words", [["stop"], ["goal", "stop"], ["goal", "halt", "now,", "please"]])
+@pytest.mark.parametrize(
+    "words",
+    [["stop"], ["goal", "stop"], ["goal", "halt", "now,", "please"], ["goal", "panther,", "stop"]],
+)
 def test_a_word_stops_the_robot(daemon: RunningHost, words: list[str]) -> None:
     id = daemon.run("goal", "shine", "--wait", "--json").ok().json["id"]
     assert daemon.run(*words).ok().out == f"goal {id} is halted\nhalting {SHINE_SHORT}\n"
@@ -272,3 +275,11 @@ def test_what_is_said_is_a_goal_or_stops_or_is_refused(daemon: RunningHost) -> N
     assert doing == "I was asked to shine, and I do, with beacon.\n"
     assert daemon.run("say", "stop").ok().out.startswith("stopped: 1 goal")
     daemon.run("say", "sing").refused(1, "PHRASE_UNKNOWN")
+
+
+def test_a_robot_goes_by_its_own_name_where_there_are_no_peers(daemon: RunningHost) -> None:
+    told = daemon.run("say", "panther,", "shine").ok().out
+    daemon.until_goal(told.split()[-1], "holds")
+    assert daemon.run("say", "Panther,", "stop!").ok().out.startswith("stopped: 1 goal")
+    given = daemon.run("goal", "panther,", "shine", "--wait", "--json").ok().json
+    assert (given["text"], given["holds"]) == ("shine", True)
