@@ -21,6 +21,13 @@ from nondum.sdk import hookimpl
 async def start(ctx):
     await asyncio.sleep(20)
 """
+POINTER = """
+from nondum.sdk import Phrase, hookimpl
+
+@hookimpl
+def phrases():
+    return [Phrase("[please] point at {t:target}", "(pointing self ?t)", kind="maintain")]
+"""
 SHINE = f"test-beacon.shine {LAMP} {BRIGHTNESS} panther"
 SHINE_SHORT = "test-beacon.shine lamp brightness panther"
 
@@ -118,6 +125,18 @@ def test_a_word_stops_the_robot(daemon: RunningHost, words: list[str]) -> None:
     daemon.until_goal(id, "halted")
 
 
+def test_the_journal_has_short_names_for_people(daemon: RunningHost) -> None:
+    daemon.run("goal", "shine", "--wait").ok()
+    daemon.run("halt", "--now").ok()
+    with daemon.started("journal", "--follow", "--since", "10min") as process:
+        assert process.stdout is not None
+        halted = next(line for line in process.stdout if "BehavioursHalted" in line)
+    assert SHINE_SHORT in halted
+    shown = daemon.run("journal", "--limit", "20").ok().out
+    assert SHINE_SHORT in shown
+    assert LAMP not in shown
+
+
 def test_a_robot_at_rest_can_be_stopped(daemon: RunningHost) -> None:
     stopped = daemon.run("goal", "stop", "--wait", "--json").ok().json
     assert stopped == {"goals": [], "halted": [], "peers": []}
@@ -196,6 +215,15 @@ def test_what_was_refused_is_told_and_tried_again(daemon: RunningHost) -> None:
     assert retried == {"payloads": ["org.example.broken"]}
     daemon.until_step("broken", "quarantined")
     daemon.pull("broken")
+    until_alone(daemon)
+
+
+def test_a_phrase_without_anything_to_name_is_shown_with_a_blank(daemon: RunningHost) -> None:
+    daemon.bring("pointer", Part("pointer", POINTER))
+    assert "point at <target>  (pointing self ?t)" in daemon.run("goals").ok().out
+    [row] = [r for r in daemon.run("goals", "--json").ok().json["can"] if "{" in r["words"]]
+    assert row["words"] == "[please] point at {t:target}"
+    daemon.pull("pointer")
     until_alone(daemon)
 
 
