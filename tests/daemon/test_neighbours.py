@@ -188,6 +188,8 @@ def test_actuators_are_not_offered_unless_the_integrator_says_so(tmp_path: Path)
         (row,) = [r for r in rover.ask("components") if r["component"] == "beacon@mule"]
         assert (row["units"], row["behaviours"]) == ([], [])
         assert row["problem"] == "its host does not offer lamp"
+        told = rover.until_told("beacon@mule is here")
+        assert told.endswith(": its host does not offer what it can do")
     more = 'offer_actuators = ["beacon"]\n'
     with neighbours(tmp_path / "again", "rover", "mule", more=more) as (rover, mule):
         mule.bring("light", beacon(log, type="pointer"))
@@ -324,6 +326,8 @@ def test_goal_of_a_host_that_is_gone_is_not_known_any_more(tmp_path: Path) -> No
         until_shared(mule, "beacon@rover")
         given = mule.run("goal", "rover,", "shine", "--wait", "--json").ok().json
         assert (given["state"], given["holds"]) == ("active", True)
+        [why] = mule.ask("why")["sentences"]
+        assert why.startswith(f"goal {given['id']} of rover, 'shine', is active")
         rover.kill()
         mule.until_told("the host rover is gone")
         (row,) = mule.ask("goals")["elsewhere"]

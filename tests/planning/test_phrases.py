@@ -124,6 +124,14 @@ def test_unknown_sentence_gets_near_phrases() -> None:
     assert '"point at the radiation source"' in problem.fix
 
 
+def test_who_speaks_where_nothing_knows_words_is_not_sent_to_look_for_some() -> None:
+    with pytest.raises(GoalRefused) as refused:
+        book().goal("follow me")
+    problem = refused.value.problems[0]
+    assert problem.code == "PHRASE_UNKNOWN"
+    assert problem.fix.startswith("plug in")
+
+
 def test_unknown_name_gets_known_ones() -> None:
     with pytest.raises(GoalRefused) as refused:
         book(POINTER, COMPTON).goal("point at the moon")

@@ -77,6 +77,7 @@ from nondum.host.workers.confinements import changes_user
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import Limits, Timing
 from nondum.host.workers.workers import Workers
+from nondum.planning.addressee import addressed_to
 from nondum.planning.attempts import Patience
 from nondum.planning.stop_words import is_stop
 from nondum.sdk.errors import ConfigRefused, NondumError, Problem
@@ -378,9 +379,8 @@ def _take(neighbours: Neighbourhood | None, mind: Mind, stopping: Stopping) -> T
         return neighbours.goals.take
 
     async def taken(words: str) -> str:
-        if is_stop(words):
-            return str(stopping.stop())
-        return wanted(mind, words)
+        _, said = addressed_to(words, [mind.beliefs.snapshot.host])
+        return str(stopping.stop()) if is_stop(said) else wanted(mind, said)
 
     return taken
 

@@ -46,6 +46,7 @@ from nondum.host.rows import (
 from nondum.host.stopping import Stopped, Stopping
 from nondum.host.whole_names import whole
 from nondum.host.workers.workers import Workers
+from nondum.planning.addressee import addressed_to
 from nondum.planning.goal import GoalKind
 from nondum.planning.stop_words import is_stop
 from nondum.sdk.errors import ConfigRefused, GoalRefused, InstallFailed, NondumError, Problem
@@ -106,8 +107,10 @@ class Orders:
             peer, words = await self.elsewhere.whose(words)
             if peer is not None:
                 return await self.elsewhere.give(peer, words, priority)
-            if is_stop(words):
-                return {"stopped": self.stopping.stop().to_dict()}
+        elif words is not None:
+            words = self._unaddressed(words)
+        if words is not None and is_stop(words):
+            return {"stopped": self.stopping.stop().to_dict()}
         try:
             given = self.mind.give(words=words, pddl=pddl, kind=kind, priority=priority, said=said)
         except GoalRefused as refused:
@@ -145,12 +148,18 @@ class Orders:
             coming = coming_in(self.catalogue.snapshot())
             if refused.code not in NOT_YET or not coming:
                 raise
-            if self.elsewhere is not None:
+            if self.elsewhere is None:
+                words = self._unaddressed(words)
+            else:
                 peer, words = await self.elsewhere.whose(words)
                 if peer is not None:
                     raise
         given = self._keep(words, is_translated=False, while_coming=True)
         return f"that is kept as goal {given.id}, for {coming}"
+
+    def _unaddressed(self, words: str) -> str:
+        """Words without this host's name before them."""
+        return addressed_to(words, [self.mind.beliefs.snapshot.host])[1]
 
     async def resume(self, arguments: Arguments) -> Row:
         """Take up a halted goal again, `id`. Raises `GoalRefused` (GOAL_NOT_HALTED, …)."""

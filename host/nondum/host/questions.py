@@ -24,6 +24,7 @@ from nondum.host.rows import (
     Row,
     component_row,
     drive_row,
+    goals_away,
     gone_back,
     host_state,
     input_row,
@@ -211,7 +212,8 @@ class Questions:
 
     async def why(self, arguments: Arguments) -> Row:
         """Why the robot does what it does, or cannot; refused payloads and drives included."""
-        view = self.mind.views.why()
+        given = self.elsewhere.given() if self.elsewhere else []
+        view = self.mind.views.why(list(goals_away(given)))
         told = [str(problem) for problem in problems_of(self.catalogue.snapshot(), self.places())]
         return {**view, "problems": list(dict.fromkeys([*view["problems"], *told]))}
 

@@ -28,6 +28,8 @@ from nondum.sdk.errors import Problem
 Row: TypeAlias = dict[str, Any]
 
 _AT_REST = frozenset({Step.GONE, Step.ACTIVE, Step.SUPERSEDED, Step.REFUSED, Step.QUARANTINED})
+_OVER = frozenset({"reached", "halted"})
+"""Of the states of a goal."""
 
 
 def host_state(snapshot: Snapshot, places: Mapping[str, str]) -> str:
@@ -51,6 +53,14 @@ def is_at_rest(payload: PayloadRecord) -> bool:
 def own_goal_row(row: Row, host: str) -> Row:
     """A goal of this host; rows of goals that were given to peers say that they are elsewhere."""
     return {**row, "host": host, "is_elsewhere": False}
+
+
+def goals_away(rows: Iterable[Row]) -> Iterator[str]:
+    """Those of the goals given to peers that are not over, in sentences."""
+    for row in rows:
+        if row["state"] not in _OVER:
+            told = f"goal {row['id']} of {row['host']}, {row['text']!r}, is {row['state']}"
+            yield ": ".join(filter(None, (told, row["reason"])))
 
 
 def coming_in(snapshot: Snapshot) -> str:

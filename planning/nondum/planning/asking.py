@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from enum import Enum
 
+from nondum.planning.addressee import addressed_to
 from nondum.planning.pattern import words_of
 
 
@@ -46,10 +47,7 @@ def question_in(sentence: str, host: str = "") -> Question | None:
     >>> question_in("Rover, what can you do for me?", "rover"), question_in("what can you see")
     (<Question.ABILITIES: 'what can you do'>, None)
     """
-    said = words_of(sentence)
-    for name in ((host,), tuple(host.split("-"))):
-        if said[: len(name)] == name:
-            said = said[len(name) :]
+    said = words_of(addressed_to(sentence, [host])[1])
     return next(
         (
             question

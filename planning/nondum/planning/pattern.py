@@ -81,12 +81,34 @@ def as_said(text: str) -> str:
         parts = parse_pattern(text)
     except PatternInvalid:
         return text
-    said = [
-        part.text if isinstance(part, Word) else "something"
-        for part in parts
-        if not isinstance(part, Optional) and not (isinstance(part, Slot) and part.is_free)
-    ]
-    return " ".join(said)
+    return " ".join(_spoken(parts, lambda slot: "" if slot.is_free else "something"))
+
+
+def with_blanks(text: str) -> str:
+    """A pattern with its slots as blanks to be filled in, without what may be left out.
+
+    >>> with_blanks("[please] point at {t:target}"), with_blanks("write {words:text}")
+    ('point at <target>', 'write <words>')
+    """
+    try:
+        parts = parse_pattern(text)
+    except PatternInvalid:
+        return text
+    return " ".join(_spoken(parts, _blank))
+
+
+def _blank(slot: Slot) -> str:
+    return f"<{slot.name if slot.is_free or not slot.types else ' or '.join(slot.types)}>"
+
+
+def _spoken(parts: Sequence[Part], filled: Callable[[Slot], str]) -> Iterator[str]:
+    """What must be said, with what a slot is `filled` with."""
+    for part in parts:
+        match part:
+            case Word(text):
+                yield text
+            case Slot() as slot if said := filled(slot):
+                yield said
 
 
 def parse_pattern(text: str) -> tuple[Part, ...]:

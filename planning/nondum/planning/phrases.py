@@ -160,6 +160,12 @@ class Phrasebook:
                 for slot in phrase.binding_slots():
                     if slot.name in said and not self._meant(slot, said[slot.name]):
                         return self._unknown_words(slot, said[slot.name])
+        if not self.phrases:
+            return Problem(
+                "PHRASE_UNKNOWN",
+                f"nothing here understands {sentence!r}: nothing is plugged in that knows words",
+                fix="plug in what can do it, or give the goal in PDDL",
+            )
         offers = self.offers()
         near = get_close_matches(" ".join(words), offers, n=3, cutoff=0.5)
         fix = _listed("say", near) if near else _listed("you can say", offers[:3])

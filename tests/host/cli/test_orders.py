@@ -21,6 +21,13 @@ from nondum.sdk import hookimpl
 async def start(ctx):
     await asyncio.sleep(20)
 """
+POINTER = """
+from nondum.sdk import Phrase, hookimpl
+
+@hookimpl
+def phrases():
+    return [Phrase("[please] point at {t:target}", "(pointing self ?t)", kind="maintain")]
+"""
 SHINE = f"test-beacon.shine {LAMP} {BRIGHTNESS} panther"
 SHINE_SHORT = "test-beacon.shine lamp brightness panther"
 
@@ -108,11 +115,26 @@ def test_halting_now_halts_what_runs(daemon: RunningHost) -> None:
     assert daemon.run("halt").ok().out == "nothing was asked for, nothing was running\n"
 
 
-@pytest.mark.parametrize("words", [["stop"], ["goal", "stop"], ["goal", "halt", "now,", "please"]])
+@pytest.mark.parametrize(
+    "words",
+    [["stop"], ["goal", "stop"], ["goal", "halt", "now,", "please"], ["goal", "panther,", "stop"]],
+)
 def test_a_word_stops_the_robot(daemon: RunningHost, words: list[str]) -> None:
     id = daemon.run("goal", "shine", "--wait", "--json").ok().json["id"]
     assert daemon.run(*words).ok().out == f"goal {id} is halted\nhalting {SHINE_SHORT}\n"
     daemon.until_goal(id, "halted")
+
+
+def test_the_journal_has_short_names_for_people(daemon: RunningHost) -> None:
+    daemon.run("goal", "shine", "--wait").ok()
+    daemon.run("halt", "--now").ok()
+    with daemon.started("journal", "--follow", "--since", "10min") as process:
+        assert process.stdout is not None
+        halted = next(line for line in process.stdout if "BehavioursHalted" in line)
+    assert SHINE_SHORT in halted
+    shown = daemon.run("journal", "--limit", "20").ok().out
+    assert SHINE_SHORT in shown
+    assert LAMP not in shown
 
 
 def test_a_robot_at_rest_can_be_stopped(daemon: RunningHost) -> None:
@@ -196,6 +218,15 @@ def test_what_was_refused_is_told_and_tried_again(daemon: RunningHost) -> None:
     until_alone(daemon)
 
 
+def test_a_phrase_without_anything_to_name_is_shown_with_a_blank(daemon: RunningHost) -> None:
+    daemon.bring("pointer", Part("pointer", POINTER))
+    assert "point at <target>  (pointing self ?t)" in daemon.run("goals").ok().out
+    [row] = [r for r in daemon.run("goals", "--json").ok().json["can"] if "{" in r["words"]]
+    assert row["words"] == "[please] point at {t:target}"
+    daemon.pull("pointer")
+    until_alone(daemon)
+
+
 def test_a_payload_is_installed_for_good_and_removed(daemon: RunningHost) -> None:
     drive = daemon.work / "drives/torch-to-install"
     torch = Part("torch", BEACON.replace("beacon", "torch"))
@@ -272,3 +303,11 @@ def test_what_is_said_is_a_goal_or_stops_or_is_refused(daemon: RunningHost) -> N
     assert doing == "I was asked to shine, and I do, with beacon.\n"
     assert daemon.run("say", "stop").ok().out.startswith("stopped: 1 goal")
     daemon.run("say", "sing").refused(1, "PHRASE_UNKNOWN")
+
+
+def test_a_robot_goes_by_its_own_name_where_there_are_no_peers(daemon: RunningHost) -> None:
+    told = daemon.run("say", "panther,", "shine").ok().out
+    daemon.until_goal(told.split()[-1], "holds")
+    assert daemon.run("say", "Panther,", "stop!").ok().out.startswith("stopped: 1 goal")
+    given = daemon.run("goal", "panther,", "shine", "--wait", "--json").ok().json
+    assert (given["text"], given["holds"]) == ("shine", True)

@@ -160,7 +160,7 @@ SHOWN = {
     "streams": STREAMS,
     "facts": FACTS,
     "goals": GOALS,
-    "plan": "no plan\n",
+    "plan": "no plan; `nondum why` says why\n",
     "tree": TREE,
     "why": WHY,
 }

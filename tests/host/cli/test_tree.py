@@ -40,6 +40,7 @@ def test_a_kept_step_says_why(shining: dict[str, Any]) -> None:
 def test_eighty_columns_show_it(daemon: RunningHost, shining: dict[str, Any]) -> None:
     shown = daemon.run("tree", COLUMNS="80").ok().out
     assert "∞ 1 test-beacon.shine  kept since " in shown
+    assert "with: u=lamp, o=brightness, h=panther" in shown
     assert "kept for: the goal: (lit panther)" in shown
     assert max(map(len, shown.splitlines())) <= 80
 

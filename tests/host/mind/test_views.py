@@ -17,6 +17,7 @@ from tests.planning.strangers import (
 )
 
 from nondum.host.catalogue.records import ComponentState, MountPose
+from nondum.host.events import BehaviourProgressed
 from nondum.sdk.description import (
     Behaviour,
     Fragment,
@@ -129,6 +130,13 @@ async def test_plan_shows_steps_and_why(robot: Robot) -> None:
         (1, "done", "done: what the rest of the plan needs of it holds"),
         (2, "established", "runs for the goal"),
     ]
+
+
+async def test_progress_stands_apart_from_why_a_step_runs(robot: Robot) -> None:
+    await point(robot)
+    call = robot.calls[-1]
+    robot.mind.on_event(BehaviourProgressed(call.component, call.behaviour, call.id, 0.5, "aimed"))
+    assert robot.mind.views.plan()["steps"][-1]["why"] == "runs for the goal; 50% aimed"
 
 
 async def test_no_plan_is_shown_as_none(robot: Robot) -> None:

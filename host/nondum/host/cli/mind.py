@@ -23,6 +23,7 @@ from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.failure import tell_problem
 from nondum.host.cli.status import show_told
 from nondum.host.cli.table import cell, table
+from nondum.planning.pattern import with_blanks
 from nondum.sdk.errors import GoalRefused
 
 if TYPE_CHECKING:
@@ -137,9 +138,12 @@ def goals(session: Session, follow: bool) -> None:
     render.as_json(view) if session.as_json else _show_goals(session.short(view))
 
 
+_NO_WORDS = "nothing can be asked for yet: nothing is plugged in that knows words"
+
+
 def _show_goals(view: dict[str, Any]) -> None:
-    shown = [{**row, "now": _outlook(row)} for row in view["can"]]
-    table(shown, ["words", "goal", "kind", "now", "from"], empty="nothing can be asked for yet")
+    shown = [{**row, "words": _words(row["words"]), "now": _outlook(row)} for row in view["can"]]
+    table(shown, ["words", "goal", "kind", "now", "from"], empty=_NO_WORDS)
     for problem in view["problems"]:
         render.sentence(problem, colour="red")
     click.echo()
@@ -153,6 +157,11 @@ def _show_goals(view: dict[str, Any]) -> None:
 def _reason(row: dict[str, Any]) -> str:
     how = f"to go on: nondum goal --resume {row['id']}" if row["resumable"] else ""
     return "; ".join(filter(None, (row["reason"], how)))
+
+
+def _words(said: str) -> str:
+    """A sentence; of a phrase that cannot be said, for nothing can be named in it, the pattern."""
+    return with_blanks(said) if "{" in said else said
 
 
 def _outlook(row: dict[str, Any]) -> str:
@@ -175,7 +184,7 @@ def plan(session: Session) -> None:
         if one["goal"]:
             click.echo(f"goal {one['id']}  {one['goal']}  {one['kind']}")
         steps = [{**row, "action": row["told"], "why": row["told_why"]} for row in one["steps"]]
-        table(steps, ["step", "action", "state", "why"], empty="no plan")
+        table(steps, ["step", "action", "state", "why"], empty="no plan; `nondum why` says why")
 
 
 @click.command()

@@ -44,14 +44,14 @@ def journal(
     asked: dict[str, Any] = {"subject": subject, "limit": rows_wanted, "since_s": since_s}
     if follow:
         for row in session.follow("follow_journal", **asked):
-            render.as_json_line(row) if session.as_json else _show_entry(row)
+            render.as_json_line(row) if session.as_json else _show_entry(session, row)
         return
     rows = session.ask("journal", **asked)
     if session.as_json:
         render.as_json(rows)
         return
-    rows = session.short(rows)
     shown = [{**row, "when": render.clock(row["when"]), "detail": _detail(row)} for row in rows]
+    shown = session.short(shown)
     columns = ["when", "subject", "event", "step", "detail"]
     if since_s:
         empty = "nothing happened since"
@@ -60,10 +60,10 @@ def journal(
     table(shown, columns, empty=empty)
 
 
-def _show_entry(row: dict[str, Any]) -> None:
+def _show_entry(session: Session, row: dict[str, Any]) -> None:
     """An entry as a line: what is still to come has no columns yet."""
-    said = [row["subject"], row["event"], row["step"], _detail(row)]
-    render.sentence("  ".join(filter(None, said)), mark=f"{render.clock(row['when'])}  ")
+    said = "  ".join(filter(None, [row["subject"], row["event"], row["step"], _detail(row)]))
+    render.sentence(session.short(said, anew=True), mark=f"{render.clock(row['when'])}  ")
 
 
 def _detail(row: dict[str, Any]) -> str:

@@ -39,20 +39,20 @@ def tree(session: Session, follow: bool, graphviz: bool, groot: bool) -> None:
     view = session.ask("tree")
     if session.as_json:
         render.as_json(view)
+    elif graphviz or groot:
+        click.echo(_drawn(view, as_dot=graphviz), nl=False)
     else:
-        click.echo(_drawn(view, as_dot=graphviz, as_xml=groot), nl=False)
+        click.echo("\n".join(outline(session.short(view), width=shown_width())))
 
 
-def _drawn(view: dict[str, Any], *, as_dot: bool, as_xml: bool) -> str:
+def _drawn(view: dict[str, Any], *, as_dot: bool) -> str:
     if as_dot:
         from nondum.host.cli.graphviz import graphviz
 
         return graphviz(view)
-    if as_xml:
-        from nondum.host.cli.groot import groot
+    from nondum.host.cli.groot import groot
 
-        return groot(view)
-    return "\n".join(outline(view, width=shown_width())) + "\n"
+    return groot(view)
 
 
 def _follow(session: Session) -> None:
@@ -60,7 +60,9 @@ def _follow(session: Session) -> None:
     for view in session.follow("follow_tree"):
         if session.as_json:
             render.as_json_line(view)
-        elif live.is_screen():
+            continue
+        view = session.short(view, anew=True)
+        if live.is_screen():
             live.draw(outline(view, width=shown_width()))
         else:
             click.echo("\n".join([*outline(view), ""]))

@@ -191,8 +191,11 @@ def of_the_robot(words: str) -> str:
 
     >>> of_the_robot("follow me to my car")
     'follow you to your car'
+    >>> of_the_robot("please follow me")
+    'follow you'
     """
-    return " ".join(_PERSONS.get(word.casefold(), word) for word in words.split())
+    said = (_PERSONS.get(word.casefold(), word) for word in words.split())
+    return " ".join(word for word in said if word.casefold().strip(",") != "please")
 
 
 _PERSONS = {

@@ -123,8 +123,11 @@ def _kept_out(old: Composition | None, new: Composition) -> list[str]:
 
 
 def _offers(component: _Component) -> str:
-    names = _abilities(component)
-    return f"it can {names}" if names else "it has no behaviours"
+    if names := _abilities(component):
+        return f"it can {names}"
+    if isinstance(component, PeerComponent) and component.description.behaviours:
+        return "its host does not offer what it can do"
+    return "it has no behaviours"
 
 
 def _offered(component: _Component) -> str:

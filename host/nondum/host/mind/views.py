@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 from py_trees.behaviour import Behaviour as Node
@@ -76,7 +76,7 @@ class Views:
             assert isinstance(leaf, StepLeaf)  # a task tree has no other children
             run = running.get(leaf.name)
             state = run.state.value if run else _STATES[leaf.status.value]
-            why = " ".join(filter(None, (leaf.why(), run.progress if run else "")))
+            why = "; ".join(filter(None, (leaf.why(), run.progress if run else "")))
             row = {"step": leaf.index + 1, "action": leaf.name, "state": state, "why": why}
             row |= {"component": run.component if run else None, "told": called[leaf.name]}
             steps.append(row | {"told_why": self._told(why, called)})
@@ -140,8 +140,9 @@ class Views:
 
         return goals
 
-    def why(self) -> Row:
-        """Why the robot does what it does, or cannot: `sentences` and `problems`."""
+    def why(self, away: Sequence[str] = ()) -> Row:
+        """Why the robot does what it does, or cannot: `sentences` and `problems`. `away` are those
+        on goals that were given to peers."""
         pursued = self._mind.pursuit.pursued
         sentences: list[str] = []
         for one in pursued:
@@ -157,7 +158,7 @@ class Views:
                 sentences.append(f"goal {goal.id}, {goal.text!r}, is {goal.state.value}{waits}")
                 problems += [str(problem) for problem in goal.problems]
         return {
-            "sentences": sentences or ["nothing is asked for"],
+            "sentences": [*sentences, *away] or ["nothing is asked for"],
             "problems": problems + [row["problem"] for row in self.kept_out()] + self._conflicts(),
             "told": self.told(self._last_few()),
         }

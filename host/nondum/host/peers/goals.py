@@ -21,7 +21,7 @@ from nondum.host.peers.remote_calls import Reaches
 from nondum.host.printable import printable
 from nondum.host.rows import Row
 from nondum.host.stopping import Stopped
-from nondum.planning.pattern import words_of
+from nondum.planning.addressee import addressed_to
 from nondum.planning.stop_words import STOPS, is_stop
 from nondum.sdk.errors import GoalRefused, NondumError, Problem
 from nondum.sdk.wire import Body
@@ -307,19 +307,3 @@ def _priority(errand: Errand) -> int:
         most = HIGHEST_PRIORITY
         raise CallFailed(Problem("CALL_MALFORMED", f"a priority is from -{most} to {most}"))
     return priority
-
-
-def addressed_to(words: str, hosts: Sequence[str]) -> tuple[str | None, str]:
-    """The host whose name words begin with, if they do, and the rest of them.
-
-    >>> addressed_to("big mule, search for people", ["rover", "big-mule"])
-    ('big-mule', 'search for people')
-    >>> addressed_to("search for people", ["rover"])
-    (None, 'search for people')
-    """
-    said = words_of(words)
-    for host in sorted(hosts, key=len, reverse=True):
-        for name in ((host,), tuple(host.split("-"))):
-            if said[: len(name)] == name and len(said) > len(name):
-                return host, " ".join(said[len(name) :])
-    return None, words

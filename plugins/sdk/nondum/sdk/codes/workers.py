@@ -93,7 +93,7 @@ CODES = (
     Code(
         "HALTED",
         "It was halted, as asked.",
-        "nothing; give the goal again when it is to go on",
+        "to have it go on, take up its goal again: nondum goal --resume ID",
     ),
     Code(
         "HALT_OVERDUE",
