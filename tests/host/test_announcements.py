@@ -76,6 +76,15 @@ def test_release_that_was_refused_unread_is_named_without_a_version() -> None:
     assert announced(gone, snapshot) == "org.example.lamp is withdrawn: its drive was pulled"
 
 
+def test_payload_that_was_rebuilt_is_told_as_such_without_a_version() -> None:
+    rebuilt = replace(LAMP, key="3" * 16, digest="3" * 64, version="1.1", release=2)
+    snapshot = Snapshot("spot", revision=1, payloads=(LAMP, rebuilt))
+    gone = events.PayloadWithdrawn(KEY, "it was built again in its place", rebuilt.key)
+    assert announced(gone, snapshot) == (
+        "org.example.lamp was rebuilt on its drive, and is judged again"
+    )
+
+
 OLD = replace(LAMP, step=Step.ACTIVE)
 NEW = replace(LAMP, key="2" * 16, digest="2" * 64, version="2", release=2, step=Step.STORED)
 

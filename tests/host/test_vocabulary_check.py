@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from nondum.host.vocabulary_check import judge
-from nondum.sdk.description import Fragment, Phrase, PluginDescription, Unit
+from nondum.sdk.description import Fragment, Input, Output, Phrase, PluginDescription, Unit
 
 
 def plugin(predicate: str) -> PluginDescription:
@@ -41,3 +43,41 @@ def test_a_phrase_that_asks_for_an_undeclared_word_is_a_problem() -> None:
 def test_a_fragment_that_no_host_would_plan_with_is_a_problem() -> None:
     description = PluginDescription("x", "1", fragments=(Fragment("domain.pddl", "(define (dom"),))
     assert judge({"x": description}).problems
+
+
+POSE, BASE = "did you mean 'pose'?", "did you mean 'base'?"
+
+
+@pytest.mark.parametrize(
+    ("slot", "code", "fix"),
+    [
+        pytest.param(Input("odometry", "poze"), "E-UNDECL", POSE, id="type of an input"),
+        pytest.param(Input("odometry", "pose", of="bas"), "E-UNDECL", BASE, id="of nothing"),
+        pytest.param(Input("odometry", "camera"), "E-TYPE", "", id="not a stream"),
+        pytest.param(Input("odometry", "pose", of="pose"), "E-TYPE", "", id="of what is no unit"),
+        pytest.param(
+            Output("odometry", "pose", of="bas"), "E-UNDECL", BASE, id="output of nothing"
+        ),
+        pytest.param(Output("odometry", "poze"), "E-UNDECL", POSE, id="type of an output"),
+    ],
+)
+def test_a_slot_that_nothing_could_fit_is_a_problem(
+    slot: Input | Output, code: str, fix: str
+) -> None:
+    """Nothing else would say so: no plan asks for an optional input."""
+    if isinstance(slot, Input):
+        unit = Unit("eye", "camera", inputs=(slot,))
+    else:
+        unit = Unit("eye", "camera", outputs=(slot,))
+    description = PluginDescription("x", "1", units=(unit,))
+    (problem,) = judge({"x": description}).problems
+    assert (problem.code, fix in problem.fix) == (code, True)
+
+
+def test_slots_may_be_of_what_the_payload_declares() -> None:
+    domain = "(define (domain x) (:types gait - stream leg - unit))"
+    units = (Unit("legs", "leg", inputs=(Input("gait", "gait", of="leg"),)),)
+    description = PluginDescription(
+        "x", "1", fragments=(Fragment("domain.pddl", domain),), units=units
+    )
+    assert judge({"x": description}).problems == ()

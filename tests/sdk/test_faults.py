@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import inspect
+import re
 from types import FunctionType
 
 import pytest
@@ -83,6 +85,24 @@ class CarelessCondition:
         ctx.know("at", ctx.host, value=WRONG)
 
 
+class Dying:
+    """Its condition, or what it spawned, ends with an error where nobody waits for an end."""
+
+    @hookimpl
+    async def start(self, ctx: Context) -> None:
+        ctx.spawn(asyncio.wait_for(self.tell(ctx), 60.0))
+
+    async def tell(self, ctx: Context) -> None:
+        if ctx.settings["dies"] == "spawned":
+            int("no number")
+
+    @condition("position", predicates=("at",))
+    async def position(self, ctx: Context) -> None:
+        if ctx.settings["dies"] == "condition":
+            raise RuntimeError("it is gone")
+        await ctx.sleep(3600.0)
+
+
 def line_of(function: object, text: str) -> str:
     """Where this file says something."""
     assert isinstance(function, FunctionType)
@@ -127,6 +147,33 @@ def test_wrong_value_of_a_condition_fails_the_test_at_once(worker: WorkerFactory
     bench = worker(CarelessCondition)
     with pytest.raises(AssertionError, match="MESSAGE_FIELD"):
         bench.wait_fact("at", "robot")
+
+
+@pytest.mark.parametrize(
+    ("dies", "code", "method", "text"),
+    [
+        ("condition", "CONDITION_RAISED", Dying.position, "raise RuntimeError"),
+        ("spawned", "SPAWNED_RAISED", Dying.tell, 'int("no'),
+    ],
+)
+def test_what_dies_unseen_fails_the_test_at_once(
+    worker: WorkerFactory, dies: str, code: str, method: object, text: str
+) -> None:
+    bench = worker(Dying, settings={"dies": dies})
+    with pytest.raises(AssertionError, match=f"{code} {re.escape(line_of(method, text))}"):
+        bench.wait_fact("at", "robot")
+
+
+def test_what_dies_may_be_expected(worker: WorkerFactory) -> None:
+    bench = worker(Dying, settings={"dies": "condition"})
+    assert bench.expect_fault("CONDITION_RAISED").message == "RuntimeError: it is gone"
+
+
+def test_condition_that_ends_by_a_wrong_message_is_told_once(worker: WorkerFactory) -> None:
+    bench = worker(CarelessCondition)
+    bench.expect_fault("MESSAGE_FIELD")
+    bench.wait_until(lambda: any("ended" in message for _, message in bench.logs), "its end")
+    assert bench.side.faults == []
 
 
 def test_wrong_message_that_no_test_waited_for_fails_it_at_its_end(worker: WorkerFactory) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -187,11 +188,27 @@ def test_failed_import_is_told(target: str, told: str) -> None:
     assert caught.value.code == "IMPORT_FAILED"
 
 
-def test_missing_dependency_is_told_with_where_it_is_to_be_declared() -> None:
+def test_missing_dependency_is_told_with_where_it_is_to_be_declared(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "needs_another.py").write_text("import no_such_module\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(WorkerFailed) as caught:
-        load("no_such_module_anywhere")
+        load("needs_another")
     (problem,) = caught.value.problems
-    assert "'no_such_module_anywhere' to `dependencies`" in problem.fix
+    assert problem.where.endswith("needs_another.py:1")
+    assert "'no_such_module' to `dependencies`" in problem.fix
+
+
+@pytest.mark.parametrize("target", ["no_such_module", "no_such_module.plugin", "tests.no_such:It"])
+def test_plugin_that_is_not_there_itself_is_no_missing_dependency(target: str) -> None:
+    """Its entry point is misspelt, or its tests run where it is not installed."""
+    with pytest.raises(WorkerFailed) as caught:
+        load(target)
+    (problem,) = caught.value.problems
+    assert (problem.code, problem.where) == ("IMPORT_FAILED", "")
+    assert "dependencies" not in problem.fix
+    assert "entry point" in problem.fix
 
 
 def test_class_that_cannot_be_made_is_told() -> None:

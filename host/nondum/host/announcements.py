@@ -74,6 +74,10 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return f"a person goes back to {name} (release {event.release}) from release {was}"
         case RetryAsked(why=why) if why:
             return f"{_name(event.payload, snapshot)} is tried again: {why}"
+        case PayloadWithdrawn(rebuilt_as=new) if new:
+            payload = _record(new, snapshot)
+            name = payload.payload_id if payload else f"payload {new}"
+            return f"{name} was rebuilt on its drive, and is judged again"
         case PayloadWithdrawn():
             return f"{_name(event.payload, snapshot)} is withdrawn: {event.reason}"
         case PayloadSentAway():

@@ -335,6 +335,8 @@ class PayloadWithdrawn(Event):
 
     payload: str
     reason: str
+    rebuilt_as: str = ""
+    """Key of the payload that was built in its place."""
 
 
 @dataclass(frozen=True, slots=True)

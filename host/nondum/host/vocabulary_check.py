@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from nondum.planning.contribution import Contribution
 from nondum.planning.core import core_graph, core_predicates
 from nondum.planning.domain import Merged
+from nondum.planning.inventory import kind_problems
 from nondum.planning.merge import merge
 from nondum.planning.phrases import phrasebook
 from nondum.sdk.description import PluginDescription
@@ -27,7 +28,8 @@ class Judged:
     """What merging a payload alone shows."""
 
     problems: tuple[Problem, ...]
-    """Why a host would keep its components out of the plan, and phrases that nobody could say."""
+    """Why a host would keep its components out of the plan, phrases that nobody could say, and
+    inputs that no stream could fit."""
     warnings: tuple[Problem, ...]
 
 
@@ -40,7 +42,27 @@ def judge(index: Mapping[str, PluginDescription]) -> Judged:
     merged = merge(contributions, HOST)
     kept_out = (problem for found in merged.quarantined.values() for problem in found)
     unsaid = phrasebook(contributions, merged).problems
-    return Judged((*kept_out, *unsaid), (*merged.warnings, *_own_words(merged)))
+    return Judged(
+        (*kept_out, *unsaid, *_wrong_slots(index, merged)), (*merged.warnings, *_own_words(merged))
+    )
+
+
+def _wrong_slots(index: Mapping[str, PluginDescription], merged: Merged) -> Iterator[Problem]:
+    """Optional inputs, and what outputs are of, whose types nobody declares. No plan asks for
+    them, so planning would not miss them: the input would be left without a stream, unseen."""
+    graph = merged.domain.types
+    for component, description in index.items():
+        if component in merged.quarantined:  # its own types are not known then
+            continue
+        for unit in description.units:
+            for slot in unit.inputs:
+                where = f"{component} input {f'{unit.name}.{slot.name}'!r}"
+                yield from kind_problems(slot.type, "stream", where, graph)
+            read = [(slot.name, slot.of) for slot in unit.inputs]
+            sent = [(slot.name, slot.of) for slot in unit.outputs]
+            for name, of in read + sent:
+                where = f"{component} `of` of {f'{unit.name}.{name}'!r}"
+                yield from kind_problems(of, "unit", where, graph) if of else ()
 
 
 def _own_words(merged: Merged) -> Iterator[Problem]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from nondum.planning.caret import nearest
 from nondum.planning.contribution import Contribution, StreamObject, UnitObject
 from nondum.planning.domain import Origin, bind
 from nondum.planning.effect import is_exact
@@ -19,7 +20,7 @@ from nondum.planning.syntax import (
     TypedName,
     type_text,
 )
-from nondum.planning.typegraph import ROOT, types_or_root
+from nondum.planning.typegraph import ROOT, TypeGraph, types_or_root
 from nondum.sdk.errors import Problem
 
 
@@ -63,15 +64,17 @@ def own_objects(contribution: Contribution, scope: Scope) -> dict[str, tuple[str
 
 
 def _check_kind(owned: UnitObject | StreamObject, local: str, kind: str, scope: Scope) -> None:
-    by = scope.report.by
-    where = f"{by} {kind} {local!r}"
-    if owned.type not in scope.graph:
-        problem = Problem("E-UNDECL", f"nobody declares type {owned.type!r}", where=where)
-    elif not scope.graph.is_kind_of(owned.type, kind):
-        problem = Problem("E-TYPE", f"type {owned.type!r} is not a kind of {kind}", where=where)
-    else:
-        return
-    scope.report.problems.append(problem)
+    where = f"{scope.report.by} {kind} {local!r}"
+    scope.report.problems.extend(kind_problems(owned.type, kind, where, scope.graph))
+
+
+def kind_problems(type: str, kind: str, where: str, graph: TypeGraph) -> Iterator[Problem]:
+    """What is wrong with a type that is to be a kind of another one (E-UNDECL, E-TYPE)."""
+    if type not in graph:
+        fix = nearest(type, graph.parents)
+        yield Problem("E-UNDECL", f"nobody declares type {type!r}", where=where, fix=fix)
+    elif not graph.is_kind_of(type, kind):
+        yield Problem("E-TYPE", f"type {type!r} is not a kind of {kind}", where=where)
 
 
 def objects_of(fragments: Sequence[FragmentSyntax], scope: Scope) -> tuple[ObjectClaim, ...]:

@@ -4,11 +4,12 @@ new one is in force, and is then gone."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import pytest
-from tests.host.lifecycle.states import PROBLEM, after, drive, found, way_to_active
+from tests.host.lifecycle.states import AT, PROBLEM, after, drive, found, way_to_active
 from tests.kit.host import LAMP, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 
@@ -16,6 +17,7 @@ from nondum.host import events
 from nondum.host.catalogue.records import Step
 from nondum.host.catalogue.state import HostState
 from nondum.host.events import Event
+from nondum.host.lifecycle.advance import advance
 from nondum.host.workers import Timing
 from nondum.sdk.errors import Problem
 from nondum.wheelhouse import build
@@ -76,6 +78,28 @@ def test_what_is_being_copied_is_withdrawn_at_once() -> None:
     state, _ = after(drive(), found("k1"), events.DriveRead("a", ("k1",)))
     state, _ = after(drive(), found("k2", release=2), SCANNED, state=state)
     assert steps(state) == {"k1": Step.REMOVING, "k2": Step.RECEIVED}
+
+
+@pytest.mark.parametrize("problem", [PROBLEM, UNSIGNED], ids=["wrong", "unsigned"])
+def test_what_was_refused_and_rebuilt_is_told_so_and_then_judged(problem: Problem) -> None:
+    """That it was rebuilt comes first, also where the new one is refused as soon as it is found."""
+    state, _ = after(drive(), found("k1"), events.PayloadRefused("k1", (PROBLEM,)))
+    state, _ = after(drive(), state=state)
+    outcome = advance(state, replace(found("k2", release=2), problems=(problem,)), AT)
+    told = [event for event in outcome.events if not isinstance(event, events.PayloadFound)]
+    assert told[:2] == [
+        events.PayloadWithdrawn("k1", "it was built again in its place", "k2"),
+        events.PayloadRefused("k2", (problem,)),
+    ]
+    assert steps(outcome.state) == {"k1": Step.REMOVING, "k2": Step.REFUSED}
+
+
+def test_what_was_rebuilt_on_one_of_its_drives_stays_for_the_other() -> None:
+    state, _ = after(drive(), drive("b"), found("k1"), found("k1", "b"))
+    state, _ = after(events.PayloadRefused("k1", (PROBLEM,)), state=state)
+    state, _ = after(drive(), found("k2", release=2), SCANNED, state=state)
+    assert steps(state) == {"k1": Step.REFUSED, "k2": Step.RECEIVED}
+    assert [*state.payloads["k1"].sources] == ["b"]
 
 
 def test_a_release_on_a_drive_of_its_own_stays() -> None:

@@ -519,6 +519,19 @@ async def test_what_failed_is_told_with_its_last_reason(robot: Robot) -> None:
     assert problem.message.endswith("failed 3 times: no light")
 
 
+async def test_what_failed_for_another_goal_is_not_told_as_a_reason(robot: Robot) -> None:
+    robot.broken |= {"recorded-camera", "compton-camera"}
+    plug_followers(robot)
+    robot.plug(COMPTON_CAMERA)
+    robot.mind.give(pddl=FOLLOW, kind="maintain")
+    await robot.until_goal("suspended")
+    robot.mind.give(pddl="(bearing-known radiation-source self)")
+    await robot.until_goal("suspended", "2")
+    for goal, mine, other in (("1", "recorded", "compton"), ("2", "compton", "recorded")):
+        [problem] = robot.mind.queue[goal].problems
+        assert (f"{mine}-camera." in problem.message, other in problem.message) == (True, False)
+
+
 async def test_pulled_camera_is_told_with_the_payload_that_brings_it_back(robot: Robot) -> None:
     await follow(robot)
     robot.unplug("recorded-camera")

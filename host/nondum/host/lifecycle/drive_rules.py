@@ -13,6 +13,7 @@ from nondum.host.events import (
     DriveRemoved,
     DrivesScanned,
     DriveUnreadable,
+    PayloadFound,
     PayloadWithdrawn,
 )
 from nondum.host.lifecycle import releases, safe_mode, tries
@@ -104,15 +105,26 @@ def on_drives_scanned(turn: Turn, event: DrivesScanned) -> None:
     turn.pending.extend(map(DriveRemoved, sorted(turn.missed)))
 
 
-def lose_source(turn: Turn, payload: PayloadRecord, drive: str, reason: str) -> None:
+def lose_source(
+    turn: Turn, payload: PayloadRecord, drive: str, reason: str, *, rebuilt_as: str = ""
+) -> None:
     """Take a drive from a payload's sources; with the last one the payload is withdrawn."""
     first = next(iter(payload.sources), None)
     sources = {name: folder for name, folder in payload.sources.items() if name != drive}
     turn.put_payload(replace(payload, sources=sources))
     if not sources:
-        turn.pending.append(PayloadWithdrawn(payload.key, reason))
+        turn.pending.append(PayloadWithdrawn(payload.key, reason, rebuilt_as))
     elif payload.step is Step.RECEIVED and first == drive:
         turn.effects.append(copy_of(turn.state.payloads[payload.key], turn.state))
+
+
+def drop_rewritten(turn: Turn, found: PayloadFound) -> None:
+    """Withdraw what lay where a payload was found, unless it is at work: that goes on until the
+    payload in its place is in force."""
+    for payload in _on(turn, found.drive):
+        if payload.sources[found.drive] == found.folder and payload.step not in _AT_WORK:
+            reason = "it was built again in its place"
+            lose_source(turn, payload, found.drive, reason, rebuilt_as=found.payload)
 
 
 def drop_replaced(turn: Turn, payload: PayloadRecord) -> None:

@@ -42,7 +42,7 @@ from nondum.host.events import (
 )
 from nondum.host.lifecycle import admission, causes, releases, replacement, safe_mode, tries
 from nondum.host.lifecycle.claims import granted
-from nondum.host.lifecycle.drive_rules import copy_of, drop_replaced, read
+from nondum.host.lifecycle.drive_rules import copy_of, drop_replaced, drop_rewritten, read
 from nondum.host.lifecycle.turn import Turn
 from nondum.host.transitions import TRANSITIONS, Transition
 
@@ -82,6 +82,7 @@ def on_payload_found(turn: Turn, event: PayloadFound) -> None:
         phases={"seen": turn.state.drives[event.drive].since},
     )
     releases.on_found(turn, event)
+    drop_rewritten(turn, event)
     problems = (
         *event.problems,
         *admission.release_problems(turn.state, event, turn.at),

@@ -14,6 +14,7 @@ from nondum.planning.contribution import Contribution
 from nondum.planning.domain import Merged
 from nondum.planning.explain import explain, suppliers
 from nondum.planning.goal import Goal
+from nondum.planning.ground import ground
 from nondum.planning.search import solve
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import FragmentRefused, Problem
@@ -92,10 +93,11 @@ def why_not(
     """
     try:
         diagnosis = explain(merged, facts, goal.expr, search=_tried_out)
+        in_the_way = _in_the_way(merged, goal, facts, failures or {})
     except FragmentRefused as refused:
         return refused.problems
-    if failures and not diagnosis.causes:
-        reasons = "; ".join(f"{name} {failures[name]}" for name in sorted(failures))
+    if in_the_way and not diagnosis.causes:
+        reasons = "; ".join(f"{name} {why}" for name, why in sorted(in_the_way.items()))
         message = f"there is no way without what failed again and again: {reasons}"
         return (Problem("NO_OTHER_WAY", message, fix="it is tried again after a while"),)
     gone = {known.contribution: known for known in seen}
@@ -104,6 +106,16 @@ def why_not(
         missing = tuple(map(silence.problem, diagnosis.causes))
         return (*missing, *_used_to_supply(brought))
     return (*diagnosis.problems(), *_used_to_supply(brought))
+
+
+def _in_the_way(
+    merged: Merged, goal: Goal, facts: frozenset[str], failures: Mapping[str, str]
+) -> Mapping[str, str]:
+    """Those of the failed actions that could serve the goal: others failed for other goals."""
+    if not failures:
+        return failures
+    useful = {action.name for action in ground(merged, facts, goal.expr).actions}
+    return {name: why for name, why in failures.items() if name in useful} or failures
 
 
 def _used_to_supply(gone: Iterable[Seen]) -> tuple[Problem, ...]:

@@ -217,7 +217,9 @@ class Bench:
                 raise AssertionError(f"waited {timeout_s} s in vain for {what}; logs: {self.logs}")
 
     def expect_fault(self, code: str, timeout_s: float = TIMEOUT_S) -> Problem:
-        """Wait for a wrong message that the plugin sends or says; it fails the test no more."""
+        """Wait for a mistake of the plugin's: a wrong message (MESSAGE_FIELD …), or an error that
+        ends a condition or spawned coroutine (CONDITION_RAISED, SPAWNED_RAISED). It fails the test
+        no more."""
         with self._changed:
             self._changed.wait_for(lambda: self.side.faults, timeout_s)
             found = [problem for problem in self.side.faults if problem.code == code]
@@ -265,11 +267,11 @@ class Bench:
         return self._wait(called())
 
     def _fail_for_faults(self) -> None:
-        """Raise `AssertionError` for a wrong message that the test did not expect."""
+        """Raise `AssertionError` for a mistake of the plugin's that the test did not expect."""
         if self.side.faults:
             told = "\n".join(map(str, self.side.faults))
             self.side.faults.clear()
-            raise AssertionError(f"the plugin made a wrong message:\n{told}")
+            raise AssertionError(f"the plugin made a mistake:\n{told}")
 
     def _tell(self, event: str, body: Mapping[str, Any]) -> None:
         self.on_loop(lambda: self.side.link.send_event(event, body))

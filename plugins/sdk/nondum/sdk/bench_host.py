@@ -59,7 +59,10 @@ class HostSide:
         self.logs: list[tuple[str, str]] = []
         """Level and message of what was logged."""
         self.faults: list[Problem] = []
-        """Wrong messages that the plugin has sent or said, with its lines."""
+        """Wrong messages that the plugin has sent or said, and errors that ended its conditions
+        and spawned coroutines, with its lines."""
+        self._places: set[str] = set()
+        """The lines of all that were."""
         self.outputs: dict[str, deque[Message]] = {}
         """Unread messages, by stream object."""
         self._runs: dict[int, Run] = {}
@@ -155,10 +158,18 @@ class HostSide:
                 change = self.flowing.add if body["flowing"] else self.flowing.discard
                 change(body["stream"])
             case "fault", _:
-                self.faults.append(Problem(**body["problem"]))
+                self._fault(Problem(**body["problem"]))
+            case "condition-ended", _:
+                problem = Problem(**body["problem"])
+                if problem.where not in self._places:  # else it ended by what was told before
+                    self._fault(problem)
             case "log", _:
                 self.logs.append((body["level"], body["message"]))
         self._on_change()
+
+    def _fault(self, problem: Problem) -> None:
+        self._places.add(problem.where)
+        self.faults.append(problem)
 
     def _know(self, fact: tuple[str, ...], value: Any) -> None:
         self.facts[fact] = None if value is None else value_from_wire(value)

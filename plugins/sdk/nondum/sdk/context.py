@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import AsyncIterator, Coroutine, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -17,6 +18,7 @@ from nondum.sdk.errors import BehaviourFailed, MessageInvalid, Problem
 from nondum.sdk.faults import Faults
 from nondum.sdk.messages import Message, value_to_wire
 from nondum.sdk.ports import InputPort, OutputPort
+from nondum.sdk.raised import module_of, raised_in
 from nondum.sdk.workplace import Device, Workplace
 
 _M = TypeVar("_M", bound=Message)
@@ -226,10 +228,14 @@ class Context:
         await asyncio.sleep(seconds)
 
     def spawn(self, work: Coroutine[Any, Any, Any]) -> None:
-        """Run a coroutine beside, until the behaviour (for `start`: the worker) ends."""
+        """Run a coroutine beside, until the behaviour (for `start`: the worker) ends.
+
+        One that ends with an error is told with its line, and nothing else ends.
+        """
+        module = module_of(work)
         task = asyncio.get_running_loop().create_task(work)
         self._tasks.add(task)
-        task.add_done_callback(self._on_spawned_done)
+        task.add_done_callback(partial(self._on_spawned_done, module))
 
     async def close(self, *, forget: bool = False) -> None:
         """End what the context opened and spawned; the SDK calls it.
@@ -261,7 +267,11 @@ class Context:
         if self._predicates is not None and predicate not in self._predicates:
             raise ValueError(f"this condition does not declare the predicate {predicate!r}")
 
-    def _on_spawned_done(self, task: asyncio.Task[Any]) -> None:
+    def _on_spawned_done(self, module: str, task: asyncio.Task[Any]) -> None:
         self._tasks.discard(task)
-        if not task.cancelled() and task.exception() is not None:
-            self.log.error("a spawned coroutine failed", exc_info=task.exception())
+        error = None if task.cancelled() else task.exception()
+        if error is None:
+            return
+        self.log.error("a spawned coroutine ended with an error", exc_info=error)
+        if not isinstance(error, MessageInvalid):  # that has been told where it was sent
+            self._workplace.fault(raised_in("SPAWNED_RAISED", error, module))

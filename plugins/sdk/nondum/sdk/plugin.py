@@ -10,7 +10,7 @@ import inspect
 import re
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import metadata
 from typing import Any
 
@@ -24,6 +24,10 @@ from nondum.sdk.raised import within_packages
 from nondum.sdk.signature import parse_signature
 from nondum.sdk.ticked import TickedBehaviour
 
+_NOT_THERE = (
+    "correct the entry point in pyproject.toml; if it is right, install the package where this "
+    "runs: `pip install -e .`"
+)
 _NAME = re.compile(r"[a-z0-9][a-z0-9_-]*")
 
 
@@ -228,7 +232,10 @@ def _import(target: str) -> object:
         for part in filter(None, attribute.split(".")):
             found = getattr(found, part)
     except Exception as error:
-        raise WorkerFailed(_told("IMPORT_FAILED", f"cannot import {target!r}", error)) from error
+        problem = _told("IMPORT_FAILED", f"cannot import {target!r}", error)
+        if isinstance(error, ModuleNotFoundError) and f"{module}.".startswith(f"{error.name}."):
+            problem = replace(problem, where="", fix=_NOT_THERE)  # the line is Python's own
+        raise WorkerFailed(problem) from error
     return found
 
 

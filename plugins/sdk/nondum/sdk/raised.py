@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 from nondum.sdk.errors import Problem
@@ -18,14 +19,28 @@ _SDK = str(Path(__file__).parent)
 
 def raised(code: str, error: BaseException, by: Callable[..., Any]) -> Problem:
     """The problem of an exception that left a function of the plugin; a traceback is in its log."""
-    return Problem(code, f"{type(error).__name__}: {error}"[:MAX_TEXT], where=raised_at(error, by))
+    return raised_in(code, error, str(getattr(by, "__module__", "")))
 
 
-def raised_at(error: BaseException, by: Callable[..., Any]) -> str:
-    """File and line, within `site-packages`: the innermost one of the plugin's own package, else of
+def raised_in(code: str, error: BaseException, module: str) -> Problem:
+    """The same, of an exception that left code of that module."""
+    text = f"{type(error).__name__}: {error}"[:MAX_TEXT]
+    return Problem(code, text, where=_raised_at(error, module))
+
+
+def module_of(work: Coroutine[Any, Any, Any]) -> str:
+    """The module of a coroutine that has not begun; nothing where it is Python's own, which only
+    waits for one of the plugin's."""
+    frame: FrameType | None = getattr(work, "cr_frame", None)
+    module = str(frame.f_globals.get("__name__", "")) if frame else ""
+    return "" if module.partition(".")[0] in sys.stdlib_module_names else module
+
+
+def _raised_at(error: BaseException, module: str) -> str:
+    """File and line, within `site-packages`: the innermost one of the module's package, else of
     whatever is not the SDK; nothing where an exception has lost them on its way."""
     frames = [f for f in traceback.extract_tb(error.__traceback__) if _SDK not in f.filename]
-    own = _home(by)
+    own = _home(module)
     mine = [frame for frame in frames if own and Path(frame.filename).is_relative_to(own)]
     if not frames:
         return ""
@@ -42,9 +57,8 @@ def within_packages(path: str) -> str:
     return path.rpartition("/site-packages/")[2]
 
 
-def _home(function: Callable[..., Any]) -> str:
-    """The folder of a function's package, or the file of a module that is in none."""
-    name = str(getattr(function, "__module__", ""))
-    top = sys.modules.get(name.partition(".")[0])
+def _home(module: str) -> str:
+    """The folder of a module's package, or the file of a module that is in none."""
+    top = sys.modules.get(module.partition(".")[0])
     file = getattr(top, "__file__", None) or ""
     return str(Path(file).parent) if file.endswith("__init__.py") else file

@@ -56,6 +56,12 @@ CODES = (
         "payload and plug it in again to have it started again",
     ),
     Code(
+        "SPAWNED_RAISED",
+        "A coroutine that the plugin spawned ended with an error, so what it did is done no more.",
+        "its author finds the reason at the line that is named and in `nondum logs`; pull the "
+        "payload and plug it in again to have it started again",
+    ),
+    Code(
         "COMPONENT_REMOVED",
         "The component was removed while it was in use.",
         "plug its payload in again if it is still needed",
