@@ -158,10 +158,6 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/inside/keeper.py": (
         *(f"{_TC}/test_service.py", *_IN_ROOMS, f"{_TH}/workers/test_host_death.py"),
     ),
-    f"{_H}/inside/open_files.py": (
-        f"{_TH}/workers/test_excesses.py::test_too_much_ends_that_worker_alone",
-        f"{_TC}/test_service.py",
-    ),
     f"{_H}/inside/kernel.py": (
         *(f"{_TI}/test_{each}.py" for each in ("kernel", "walls")),
         *(f"{_TH}/helper/test_worker_users.py", f"{_TC}/test_service.py", *_IN_ROOMS),
