@@ -18,6 +18,7 @@ from tests.kit.workers import HOST, WorkersUnderTest
 
 from nondum.host.confinement.users import FIRST_USER, Users, is_workers
 from nondum.host.events import WorkerLogged
+from nondum.host.helper.worker_users import OF_ROOT
 from nondum.host.lifecycle.folders import remove
 from nondum.host.workers import confinements, scratch
 from nondum.host.workers.confinements import Boxed
@@ -114,7 +115,7 @@ async def test_worker_is_the_same_user_after_a_restart_of_it_and_of_the_host(
 
 
 def test_no_two_scratch_folders_have_one_user(folder: Path) -> None:
-    users, places = Users(), [folder / f"payload-{n}" / "same" for n in range(40)]
+    users, places = Users(OF_ROOT), [folder / f"payload-{n}" / "same" for n in range(40)]
     for place in places:
         place.mkdir(parents=True)
     given = [users.of(place) for place in places]
@@ -122,7 +123,7 @@ def test_no_two_scratch_folders_have_one_user(folder: Path) -> None:
     assert [users.of(place) for place in places] == given
     for place, user in zip(places, given, strict=True):
         os.chown(place, user, user)
-    assert [Users().of(place) for place in reversed(places)] == given[::-1]
+    assert [Users(OF_ROOT).of(place) for place in reversed(places)] == given[::-1]
 
 
 def test_user_of_another_folder_is_not_taken_whoever_left_it_so(folder: Path) -> None:
@@ -130,12 +131,11 @@ def test_user_of_another_folder_is_not_taken_whoever_left_it_so(folder: Path) ->
     for place in (one, other):
         place.mkdir(parents=True)
         os.chown(place, FIRST_USER, FIRST_USER)
-    assert Users().of(one) != FIRST_USER
+    assert Users(OF_ROOT).of(one) != FIRST_USER
 
 
-def test_all_users_may_be_taken(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nondum.host.confinement.users.USERS", 2)
-    users = Users()
+def test_all_users_may_be_taken(folder: Path) -> None:
+    users = Users(range(FIRST_USER, FIRST_USER + 2))
     for name in ("one", "two", "three"):
         (folder / name / "it").mkdir(parents=True)
     assert {users.of(folder / "one/it"), users.of(folder / "two/it")} == {

@@ -155,13 +155,19 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
         *_IN_ROOMS,
         *(f"{_TH}/workers/test_{each}.py" for each in ("spare", "host_death")),
     ),
-    f"{_H}/inside/keeper.py": (*_IN_ROOMS, f"{_TH}/workers/test_host_death.py"),
-    f"{_H}/inside/kernel.py": (f"{_TI}/test_kernel.py", f"{_TI}/test_walls.py", *_IN_ROOMS),
+    f"{_H}/inside/keeper.py": (
+        *(f"{_TC}/test_service.py", *_IN_ROOMS, f"{_TH}/workers/test_host_death.py"),
+    ),
+    f"{_H}/inside/kernel.py": (
+        *(f"{_TI}/test_{each}.py" for each in ("kernel", "walls")),
+        *(f"{_TH}/helper/test_worker_users.py", f"{_TC}/test_service.py", *_IN_ROOMS),
+    ),
     f"{_H}/inside/limits.py": (f"{_TI}/test_limits.py",),
     f"{_H}/inside/look.py": (
         *(f"{_TI}/test_look.py", f"{_TC}/test_level.py", f"{_TC}/test_keeper.py"),
     ),
     f"{_H}/inside/room.py": (
+        f"{_TC}/test_service.py",
         *_IN_ROOMS[1:],
         f"{_TH}/workers/test_devices.py",
         f"{_TC}/test_walls.py::test_wall_of_a_room_matters[user namespaces]",
@@ -170,9 +176,13 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/helper/requests.py": (f"{_TH}/helper/test_requests.py",),
     f"{_H}/helper/disks.py": (f"{_TH}/helper/test_disks.py",),
     f"{_H}/helper/nodes.py": (f"{_TH}/helper/test_nodes.py",),
-    f"{_H}/helper/service.py": (f"{_TH}/helper/test_service.py", *_HELPER),
-    f"{_H}/helper/server.py": _HELPER,
-    f"{_H}/helper/client.py": _HELPER,
+    f"{_H}/helper/worker_users.py": (f"{_TH}/helper/test_worker_users.py",),
+    f"{_H}/helper/service.py": (
+        *(f"{_TH}/helper/test_{each}.py" for each in ("service", "worker_users")),
+        *_HELPER,
+    ),
+    f"{_H}/helper/server.py": (f"{_TH}/helper/test_worker_users.py", *_HELPER),
+    f"{_H}/helper/client.py": (*_HELPER, f"{_TC}/test_service.py"),
     # What other hosts say of themselves, and send.
     f"{_T}/discovery/announcement.py": (
         f"{_TT}/discovery/test_hint.py",

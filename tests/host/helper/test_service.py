@@ -68,7 +68,7 @@ def refused(root: Service, request: Request) -> str:
 
 
 def test_nodes_of_nobody_are_not_made(root: Service) -> None:
-    assert refused(root, requests.PutNode("", "line", 188, 0)) == "a node is some component's"
+    assert refused(root, requests.PutNode("", "line", 188, 0, None)) == "a node is some component's"
 
 
 def test_drives_are_mounted_once(root: Service) -> None:

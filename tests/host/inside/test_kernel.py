@@ -20,12 +20,23 @@ FAILS = {
     "filter_calls(b'')": "EINVAL",
     "restrict_to(-1)": "EBADF",
 }
+FAILS_ROOT = {
+    "copy_mount('/no-such')": "ENOENT",
+    "map_mount(-1, -1)": "EBADF",
+    "place_mount(-1, '/tmp')": "EBADF",
+}
 
 
 @pytest.mark.parametrize("call", FAILS)
 def test_what_the_kernel_does_not_do_is_told(call: str) -> None:
     nothing = "kernel.prctl(kernel.PR_SET_NO_NEW_PRIVS, 1)\n"  # or filters are for root only
     assert told(f"{nothing}tell(failure(lambda: kernel.{call}))") == FAILS[call]
+
+
+@needs_root
+@pytest.mark.parametrize("call", FAILS_ROOT)
+def test_mount_that_the_kernel_does_not_make_is_told(call: str) -> None:
+    assert told(f"tell(failure(lambda: kernel.{call}))") == FAILS_ROOT[call]
 
 
 def test_capability_that_cannot_be_kept_is_told() -> None:

@@ -18,7 +18,8 @@ def standing(wanted: Wanted, minimum: Level, kept_in: Path | None = None) -> Sta
     minimum.
     """
     least = minimum if wanted == "auto" else wanted
-    found = probe.findings(kept_in) if wanted == "auto" else probe.all_findings()
+    state = kept_in.parent if kept_in is not None else None
+    found = probe.findings(kept_in) if wanted == "auto" else probe.all_findings(state)
     if problems := tuple(level.refusals(found, wanted, least)):
         raise ConfigRefused(*problems)
     return level.chosen(found, wanted)

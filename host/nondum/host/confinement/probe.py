@@ -18,6 +18,7 @@ from typing import Any
 
 from nondum.host.confinement import bubblewrap, landlock, refusals, sight
 from nondum.host.confinement.level import Finding
+from nondum.host.helper import privileged
 from nondum.host.workers import scratch
 from nondum.host.workers.confinements import Boxed, Confinement, Held
 from nondum.host.workers.launcher import parameters
@@ -35,21 +36,25 @@ log = logging.getLogger(__name__)
 def findings(kept_in: Path | None = None) -> tuple[Finding, ...]:
     """The highest level that there is, above it those that there are not and why, highest first.
 
-    Takes a tenth of a second, or nothing if `kept_in`, a file, holds what still counts. Blocks; the
-    thread that calls must live until it returns. Raises nothing.
+    Takes a tenth of a second, or nothing if `kept_in`, a file of the state folder, holds what still
+    counts. Blocks; the thread that calls must live until it returns. Raises nothing.
     """
     key = _conditions()
     if kept_in is not None and (kept := _kept(kept_in, key)) is not None:
         return kept
-    found = tuple(_until_available(_each()))
-    if kept_in is not None:
+    state = kept_in.parent if kept_in is not None else None
+    found = tuple(_until_available(_each(state)))
+    if kept_in is not None and not _is_helper_at_fault(found):
         _keep(kept_in, key, found)
     return found
 
 
-def all_findings() -> tuple[Finding, ...]:
-    """What trying out every level has shown, highest first. Blocks, see `findings`."""
-    return tuple(_each())
+def all_findings(state: Path | None = None) -> tuple[Finding, ...]:
+    """What trying out every level has shown, highest first, for that state folder.
+
+    Blocks, see `findings`.
+    """
+    return tuple(_each(state))
 
 
 def _until_available(each: Iterator[Finding]) -> Iterator[Finding]:
@@ -59,33 +64,41 @@ def _until_available(each: Iterator[Finding]) -> Iterator[Finding]:
             return
 
 
-def _each() -> Iterator[Finding]:
+def _is_helper_at_fault(found: tuple[Finding, ...]) -> bool:
+    """Whether workers share a user although the helper is there: it may do better next time."""
+    has_helper = os.geteuid() != 0 and bool(privileged().users)
+    return has_helper and not any(finding.has_users for finding in found)
+
+
+def _each(state: Path | None) -> Iterator[Finding]:
     if not refusals.is_known(refusals.machine()):
         log.warning("system calls cannot be filtered on %s", refusals.machine())
     bwrap = bubblewrap.program()
-    yield sight.MISSING if bwrap is None else _rooms(bwrap)
+    yield sight.MISSING if bwrap is None else _rooms(bwrap, state)
     if not landlock.version():
         yield sight.failed(Level.RESTRICTED, "the kernel has no Landlock")
     else:
         yield _tried(Held())
 
 
-def _rooms(bwrap: str) -> Finding:
+def _rooms(bwrap: str, state: Path | None) -> Finding:
     """With a user for each worker, if that can be had."""
-    if os.geteuid() != 0:
-        return sight.sharing(_tried(Boxed(bwrap)), "only root can give each its own")
-    own = _tried(Boxed(bwrap, has_users=True))
+    if not privileged().users:
+        why = "only root, or the helper of the service, can give each its own"
+        return sight.sharing(_tried(Boxed(bwrap)), why)
+    # Whether files can be shown as those of another user is a matter of their file system.
+    own = _tried(Boxed(bwrap, has_users=True), state if os.geteuid() != 0 else None)
     if own.has_users:
         return own
     return sight.sharing(_tried(Boxed(bwrap)), f"of their own they cannot be had: {own.reason}")
 
 
-def _tried(confinement: Confinement) -> Finding:
-    with tempfile.TemporaryDirectory(prefix="nondum-probe-") as folder:
-        try:
+def _tried(confinement: Confinement, place: Path | None = None) -> Finding:
+    try:
+        with tempfile.TemporaryDirectory(prefix="nondum-probe-", dir=place) as folder:
             return sight.judged(confinement.level, _look(confinement, Path(folder)))
-        except (OSError, ValueError) as error:
-            return sight.failed(confinement.level, f"it could not be tried: {error}")
+    except (OSError, ValueError) as error:
+        return sight.failed(confinement.level, f"it could not be tried: {error}")
 
 
 def _look(confinement: Confinement, folder: Path) -> dict[str, Any]:
@@ -99,9 +112,11 @@ def _look(confinement: Confinement, folder: Path) -> dict[str, Any]:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with ours, theirs:
             with confinement.entry(spec, ground) as entry:
-                if entry.user is not None:
+                if entry.user is not None and not entry.maps_scratch:
                     scratch.give(spec.scratch, entry.user)
                 spare.become(parameters(spec, entry, looks=True), theirs, entry.ruleset)
+                if entry.user is not None and entry.maps_scratch:
+                    spare.map_scratch(entry.user)
             theirs.close()
             ours.settimeout(ANSWER_S)
             seen = ours.recv(_ANSWER_BYTES)
@@ -133,7 +148,8 @@ def _conditions() -> list[str]:
     bwrap = bubblewrap.program()
     files = [Path(p) for p in (bwrap, base_interpreter(), *_own_code()) if p is not None]
     stamps = [f"{file}:{file.stat().st_mtime_ns}" for file in files]
-    return [boot, platform.release(), sys.version, str(os.getuid()), *stamps]
+    users = f"{os.getuid()} and {privileged().users}"
+    return [boot, platform.release(), sys.version, users, *stamps]
 
 
 def _own_code() -> Sequence[Path]:

@@ -2,8 +2,8 @@
 
 The kernel counts some things by user, whatever namespace a process is in: descriptors under way
 over unix sockets, memory of pipes, watches of epoll. A room whose user namespace maps these users
-to themselves can have its worker become one of them. Writing such a map takes a process that may be
-any user outside (user_namespaces(7)): a daemon that is root.
+to themselves can have its worker become one of them. Writing such a map takes root: the daemon, or
+its helper (`nondum.host.helper.worker_users`).
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ import select
 import zlib
 from pathlib import Path
 
-FIRST_USER, USERS = 61184, 4336
-"""Ids of users that no account has: those that systemd gives out likewise (DynamicUser=)."""
-_USERS = f"0 0 1\n{FIRST_USER} {FIRST_USER} {USERS}\n"
-_GROUPS = f"0 0 {FIRST_USER + USERS}\n"
-"""The groups of devices are among them: `dialout`, `video`, …"""
+from nondum.host.helper import privileged
+from nondum.host.helper.worker_users import OF_ROOT, OF_SERVICE
+
+FIRST_USER, USERS = OF_ROOT.start, len(OF_ROOT)
+"""Ids of users that no account has, where the daemon is root."""
 MADE_S = 10.0
 """How long bubblewrap may take to make a user namespace."""
 _TOLD_BYTES = 4096
@@ -27,14 +27,16 @@ _TOLD_BYTES = 4096
 
 def is_workers(user: int) -> bool:
     """Whether an id is that of a worker."""
-    return user in range(FIRST_USER, FIRST_USER + USERS)
+    return user in OF_ROOT or user in OF_SERVICE
 
 
 class Users:
-    """Gives each scratch folder a user that no other one has. The folder's owner is what is kept
-    of it, so that what a worker has written is its own again after a restart of the daemon."""
+    """Gives each scratch folder a user that no other one has. Where the folders are given to these
+    users, the owner is what is kept of it, so that what a worker has written is its own again after
+    a restart of the daemon."""
 
-    def __init__(self) -> None:
+    def __init__(self, users: range) -> None:
+        self._users = users
         self._given: dict[Path, int] = {}
 
     def of(self, scratch: Path) -> int:
@@ -48,8 +50,8 @@ class Users:
             own = scratch.stat().st_uid
             self._given[scratch] = (
                 own
-                if is_workers(own) and own not in taken
-                else _free(zlib.crc32(os.fsencode(scratch)), taken)
+                if own in self._users and own not in taken
+                else _free(self._users, zlib.crc32(os.fsencode(scratch)), taken)
             )
         return self._given[scratch]
 
@@ -64,13 +66,13 @@ def _owners(scratch: Path) -> set[int]:
     return found
 
 
-def _free(start: int, taken: set[int]) -> int:
+def _free(users: range, start: int, taken: set[int]) -> int:
     """The first that is not taken, from some place on: hosts of one machine begin elsewhere."""
-    for step in range(USERS):
-        user = FIRST_USER + (start + step) % USERS
+    for step in range(len(users)):
+        user = users[(start + step) % len(users)]
         if user not in taken:
             return user
-    raise OSError(f"all {USERS} users of workers are taken")
+    raise OSError(f"all {len(users)} users of workers are taken")
 
 
 class NewNamespace:
@@ -100,15 +102,14 @@ class NewNamespace:
             os.close(descriptor)
 
     def map_users(self) -> None:
-        """Have its users be those of workers, and root; then it is left. Call it once. Blocks.
+        """Have its users be those of workers, and the daemon's; then it is left. Call it once.
 
-        Bubblewrap may have ended meanwhile. Raises `OSError`.
+        Blocks. Bubblewrap may have ended meanwhile. Raises `OSError`.
         """
         try:
             process = self._process()
             if process is not None:
-                (process / "uid_map").write_text(_USERS)
-                (process / "gid_map").write_text(_GROUPS)
+                privileged().map_users(process)
                 os.write(self._goes, b"!")
         finally:
             self.close()
@@ -118,7 +119,7 @@ class NewNamespace:
         os.close(self._tells)
         os.close(self._goes)
 
-    def _process(self) -> Path | None:
+    def _process(self) -> int | None:
         """The one in the namespace, as bubblewrap tells it; None if that ended before."""
         told, poll = b"", select.poll()
         poll.register(self._tells, select.POLLIN)
@@ -129,4 +130,4 @@ class NewNamespace:
             if not more:
                 return None
             told += more
-        return Path("/proc") / str(json.loads(told)["child-pid"])
+        return int(json.loads(told)["child-pid"])

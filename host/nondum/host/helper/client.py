@@ -10,12 +10,13 @@ import re
 import socket
 import stat
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from nondum.host.cgroups.cage import CageLimits, Usage
 from nondum.host.feedback.state import State
-from nondum.host.helper import requests
+from nondum.host.helper import requests, worker_users
 from nondum.host.helper.requests import Request
 from nondum.sdk import errors
 from nondum.sdk.errors import InstallFailed, NondumError, Problem
@@ -55,19 +56,33 @@ class HelperClient:
         """Have all drives detached."""
         self._try(requests.UnmountAll())
 
-    def put_node(self, component: str, need: str, node: Path) -> Path:
-        """Have a node made, of a device that this user may not open; else the device's own."""
-        if os.access(node, os.R_OK | os.W_OK):
-            return node
+    def put_node(self, component: str, need: str, node: Path, user: int | None = None) -> Path:
+        """Have a node made, of a device that the user may not open; else the device's own."""
         found = node.stat()
-        if not stat.S_ISCHR(found.st_mode):
+        is_open = os.access(node, os.R_OK | os.W_OK) if user is None else _is_open(found)
+        if is_open or not stat.S_ISCHR(found.st_mode):
             return node
         major, minor = os.major(found.st_rdev), os.minor(found.st_rdev)
-        return Path(self._ask(requests.PutNode(component, _word(need), major, minor))["at"])
+        return Path(self._ask(requests.PutNode(component, _word(need), major, minor, user))["at"])
 
     def take_node(self, component: str, need: str) -> None:
         """Have a node removed."""
         self._try(requests.TakeNode(component, _word(need)))
+
+    @property
+    def users(self) -> range:
+        """Those that the helper maps."""
+        return worker_users.OF_SERVICE
+
+    def map_users(self, pid: int) -> None:
+        """Have a new user namespace know them."""
+        with _as_os_error():
+            self._ask(requests.MapUsers(pid))
+
+    def map_folder(self, mount: int, user: int) -> None:
+        """Have a mount show this user's files as those of a worker's."""
+        with _as_os_error():
+            self._ask(requests.MapFolder(user), mount)
 
     def show_lamps(self, names: tuple[str, ...], state: State, kept: Path) -> None:
         """Have lamps show a state: those that the helper's own configuration names."""
@@ -104,18 +119,18 @@ class HelperClient:
         except NondumError as error:
             log.warning("%s", error)
 
-    def _ask(self, request: Request) -> dict[str, Any]:
+    def _ask(self, request: Request, *descriptors: int) -> dict[str, Any]:
         with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as asked:
             asked.settimeout(WAIT_S)
-            return self._asked(asked, request)
+            return self._asked(asked, request, *descriptors)
 
-    def _asked(self, asked: socket.socket, request: Request) -> dict[str, Any]:
+    def _asked(self, asked: socket.socket, request: Request, *descriptors: int) -> dict[str, Any]:
         """Ask over a socket; the first answer."""
         try:
             _connect(asked, self._path)
             # Who is turned away is answered before the question is heard.
             with contextlib.suppress(BrokenPipeError):
-                asked.send(requests.encode(request))
+                socket.send_fds(asked, [requests.encode(request)], descriptors)
             answer = _heard(asked)
         except OSError as error:
             raise _silent(str(error)) from error
@@ -206,10 +221,16 @@ class HelperTree:
 
     def _told(self, request: Request) -> dict[str, Any]:
         """Ask; what fails is an `OSError`, as it is with one's own cages."""
-        try:
+        with _as_os_error():
             return self._helper.ask(request)
-        except NondumError as error:
-            raise OSError(str(error)) from error
+
+
+@contextlib.contextmanager
+def _as_os_error() -> Iterator[None]:
+    try:
+        yield
+    except NondumError as error:
+        raise OSError(str(error)) from error
 
 
 def _connect(asked: socket.socket, path: Path) -> None:
@@ -229,6 +250,13 @@ def _heard(asked: socket.socket) -> bytes:
         return asked.recv(requests.ANSWER_BYTES)
     except ConnectionResetError:  # the question was not read, which is told first
         return asked.recv(requests.ANSWER_BYTES)
+
+
+def _is_open(node: os.stat_result) -> bool:
+    """Whether everybody may open it, or a group that workers have from this process."""
+    group = stat.S_IRGRP | stat.S_IWGRP if node.st_gid in os.getgroups() else 0
+    others = stat.S_IROTH | stat.S_IWOTH
+    return any(wanted and node.st_mode & wanted == wanted for wanted in (group, others))
 
 
 def _word(need: str) -> str:

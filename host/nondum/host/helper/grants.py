@@ -15,10 +15,11 @@ from nondum.sdk.errors import NondumError
 log = logging.getLogger(__name__)
 
 
-def reachable(component: str, need: str, node: str) -> str:
-    """The node of a granted device, or one that stands for it. Blocks: not for the loop."""
+def reachable(component: str, need: str, node: str, user: int | None = None) -> str:
+    """The node of a granted device, or one that stands for it, for the daemon's user or that of a
+    worker. Blocks: not for the loop."""
     try:
-        return str(privileged().put_node(component, need, Path(node)))
+        return str(privileged().put_node(component, need, Path(node), user))
     except (NondumError, OSError) as error:  # the plugin will be told when it opens it
         log.warning("%s of %s may not be opened: %s", need, component, error)
         return node

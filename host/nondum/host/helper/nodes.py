@@ -33,7 +33,7 @@ STORAGE = "08"
 
 @dataclass(frozen=True, slots=True)
 class Nodes:
-    """The folders below `base`, whose nodes belong to `uid`."""
+    """The folders below `base`, whose nodes belong to `uid`, the daemon's, or to a worker's."""
 
     base: Path
     uid: int
@@ -41,8 +41,13 @@ class Nodes:
     """Those of which devices may be had that do not hang on USB: root's word."""
     sys: Path = SYS
 
-    def put(self, component: str, need: str, major: int, minor: int) -> Path:
-        """Make a node for a device that was plugged in. Raises `NondumError` (HELPER_REFUSED)."""
+    def put(
+        self, component: str, need: str, major: int, minor: int, user: int | None = None
+    ) -> Path:
+        """Make a node for a device that was plugged in, for a user if not the daemon's.
+
+        Raises `NondumError` (HELPER_REFUSED).
+        """
         device = self._identity(major, minor)
         self._check(major, minor)
         self.prepare()
@@ -51,7 +56,7 @@ class Nodes:
         node, fresh = folder / need, folder / f".{need}"
         fresh.unlink(missing_ok=True)
         os.mknod(fresh, stat.S_IFCHR | 0o600, os.makedev(major, minor))
-        os.chown(fresh, self.uid, -1)
+        os.chown(fresh, self.uid if user is None else user, -1)
         fresh.rename(node)  # whoever looks finds the old one or the new one
         if self._identity(major, minor) != device:  # pulled meanwhile: its removal may be past
             node.unlink(missing_ok=True)

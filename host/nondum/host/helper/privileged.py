@@ -11,6 +11,7 @@ from nondum.host.cgroups.cages import NoTree
 from nondum.host.drives import mounting
 from nondum.host.feedback.lamps import Lamps
 from nondum.host.feedback.state import State
+from nondum.host.helper import worker_users
 from nondum.host.helper.client import SOCKET, HelperClient
 from nondum.host.stop_button import input_device
 from nondum.host.stop_button.presses import Presses
@@ -41,12 +42,29 @@ class Privileged(Protocol):
         """Detach all drives of a daemon that has died."""
         ...
 
-    def put_node(self, component: str, need: str, node: Path) -> Path:
-        """A node of a device that this daemon's user may open. Raises `NondumError`."""
+    def put_node(self, component: str, need: str, node: Path, user: int | None = None) -> Path:
+        """A node of a device that this daemon's user may open, or that of a worker.
+
+        Raises `NondumError`.
+        """
         ...
 
     def take_node(self, component: str, need: str) -> None:
         """Remove a node that was made for a component."""
+        ...
+
+    @property
+    def users(self) -> range:
+        """Users of the machine that workers may be; empty: none but the daemon's."""
+        ...
+
+    def map_users(self, pid: int) -> None:
+        """Have the user namespace that a process has just made know them. Raises `OSError`."""
+        ...
+
+    def map_folder(self, mount: int, user: int) -> None:
+        """Have a mount of a folder, which is not in place yet, show the daemon's files as those of
+        one of them. Raises `OSError`."""
         ...
 
     def show_lamps(self, names: tuple[str, ...], state: State, kept: Path) -> None:
@@ -92,12 +110,29 @@ class InProcess:
         """Detach all drives."""
         mounting.unmount_all(folder)
 
-    def put_node(self, component: str, need: str, node: Path) -> Path:
-        """Root opens the node itself."""
+    def put_node(self, component: str, need: str, node: Path, user: int | None = None) -> Path:
+        """Root opens the node itself, and lends it to workers (`nondum.host.workers.lending`)."""
         return node
 
     def take_node(self, component: str, need: str) -> None:
         """Nothing was made."""
+
+    @property
+    def users(self) -> range:
+        """Those of root."""
+        return worker_users.OF_ROOT
+
+    def map_users(self, pid: int) -> None:
+        """Write the map (see `Privileged`)."""
+        process = worker_users.opened(pid)
+        try:
+            worker_users.map_room_of_root(process)
+        finally:
+            os.close(process)
+
+    def map_folder(self, mount: int, user: int) -> None:
+        """Map root's files (see `Privileged`)."""
+        worker_users.map_folder(mount, (0, 0), user)
 
     def show_lamps(self, names: tuple[str, ...], state: State, kept: Path) -> None:
         """Set them (see `Privileged`)."""
@@ -135,6 +170,11 @@ class Unprivileged(InProcess):
 
     def unmount_all(self, folder: Path) -> None:
         """Nothing was mounted."""
+
+    @property
+    def users(self) -> range:
+        """None."""
+        return range(0)
 
 
 def privileged(socket: Path = SOCKET) -> Privileged:

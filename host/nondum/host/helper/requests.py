@@ -67,6 +67,8 @@ class PutNode:
     need: str
     major: int
     minor: int
+    user: int | None
+    """Whose it is: a worker's; None: the daemon's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +84,21 @@ class ClearNodes:
     """Remove all nodes of a component; empty: of all."""
 
     component: str
+
+
+@dataclass(frozen=True, slots=True)
+class MapUsers:
+    """Have a user namespace that a process of the daemon's has made know the users of workers."""
+
+    pid: int
+
+
+@dataclass(frozen=True, slots=True)
+class MapFolder:
+    """Have a mount, which comes as a descriptor, show the daemon's files as those of a worker."""
+
+    user: int
+    """The worker's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +187,8 @@ Request: TypeAlias = (
     | PutNode
     | TakeNode
     | ClearNodes
+    | MapUsers
+    | MapFolder
     | ShowLamps
     | EndLamps
     | ListCages

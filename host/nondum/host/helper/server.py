@@ -109,20 +109,26 @@ class Server:
 
 def answer(connection: socket.socket, service: Service) -> dict[str, Any]:
     """Take one question and do what it asks; the answer, or what is wrong."""
+    brought: list[int] = []
     try:
-        # Without room for descriptors none is taken over: the kernel closes them.
-        data, _, flags, _ = connection.recvmsg(requests.MAX_BYTES + 1)
+        # There is room for one descriptor: the kernel closes all others.
+        data, brought, flags, _ = socket.recv_fds(connection, requests.MAX_BYTES + 1, 1)
         if flags & (socket.MSG_TRUNC | socket.MSG_CTRUNC):
-            raise refused("a question is one short packet, and brings no descriptors")
+            raise refused("a question is one short packet")
         request = requests.parse(data)
+        if len(brought) != isinstance(request, requests.MapFolder):
+            raise refused(f"{type(request).__name__} came with {len(brought)} descriptors")
         if isinstance(request, requests.ListenToStopKey):
             return _listen(connection, service)
-        return service.serve(request)
+        return service.serve(request, *brought)
     except NondumError as error:
         return _failure(error)
     except OSError as error:
         text = f"{error.strerror or error} ({error.filename})" if error.filename else str(error)
         return _failure(InstallFailed(Problem("HELPER_FAILED", text, fix=_LOOK)))
+    finally:
+        for descriptor in brought:
+            os.close(descriptor)
 
 
 def _listen(connection: socket.socket, service: Service) -> dict[str, Any]:

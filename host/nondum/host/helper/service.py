@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import pwd
 import signal
+import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -15,7 +17,7 @@ from nondum.host.drives import mounting
 from nondum.host.drives.nodes import drive_name
 from nondum.host.feedback.lamps import Lamps
 from nondum.host.feedback.state import State
-from nondum.host.helper import requests
+from nondum.host.helper import requests, worker_users
 from nondum.host.helper.disks import Disks
 from nondum.host.helper.nodes import Nodes
 from nondum.host.helper.requests import Request, refused
@@ -40,8 +42,13 @@ class Service:
     stop_key: Callable[[], PressesOfDevice]
     """Listens to the one that root's configuration names now."""
 
-    def serve(self, request: Request) -> dict[str, Any]:
-        """Do what is asked. Raises `NondumError`, `OSError`."""
+    @property
+    def gid(self) -> int:
+        """The group of that user."""
+        return pwd.getpwuid(self.uid).pw_gid
+
+    def serve(self, request: Request, descriptor: int = -1) -> dict[str, Any]:
+        """Do what is asked, with what came with it. Raises `NondumError`, `OSError`."""
         match request:
             case requests.Mount():
                 return {"at": str(self._mount(request))}
@@ -49,14 +56,20 @@ class Service:
                 mounting.unmount(self.mounts / _folder(drive, use))
             case requests.UnmountAll():
                 mounting.unmount_all(self.mounts)
-            case requests.PutNode(component, need, major, minor):
+            case requests.PutNode(component, need, major, minor, user):
                 if not component:
                     raise refused("a node is some component's")
-                return {"at": str(self.nodes.put(component, need, major, minor))}
+                if user is not None:
+                    _check_user(user)
+                return {"at": str(self.nodes.put(component, need, major, minor, user))}
             case requests.TakeNode(component, need):
                 self.nodes.take(component, need)
             case requests.ClearNodes(component):
                 self.nodes.clear(component)
+            case requests.MapUsers(pid):
+                self._map_users(pid)
+            case requests.MapFolder(user):
+                self._map_folder(descriptor, user)
             case requests.ShowLamps(state):
                 self.lamps().show(State(state))
             case requests.EndLamps():
@@ -82,6 +95,23 @@ class Service:
             if target.is_dir() and not target.is_mount():
                 target.rmdir()
         return target
+
+    def _map_users(self, pid: int) -> None:
+        """The kernel takes one map for each namespace, and of one just below the machine's only."""
+        with self._held(pid):
+            process = worker_users.opened(pid)
+        try:
+            worker_users.map_room_of(process, self.uid, self.gid)
+        finally:
+            os.close(process)
+
+    def _map_folder(self, mount: int, user: int) -> None:
+        """What is not the daemon's is nobody's in such a mount, so nothing is gained by one."""
+        _check_user(user)
+        about = os.fstat(mount)
+        if not stat.S_ISDIR(about.st_mode) or about.st_uid != self.uid:
+            raise refused("that is no folder of yours")
+        worker_users.map_folder(mount, (self.uid, self.gid), user)
 
     def _serve_cage(self, request: Request) -> dict[str, Any]:
         tree = self.tree
@@ -119,6 +149,11 @@ class Service:
             signal.pidfd_send_signal(descriptor, 0)  # it is still the same
         finally:
             os.close(descriptor)
+
+
+def _check_user(user: int) -> None:
+    if user not in worker_users.OF_SERVICE:
+        raise refused("that is no user of workers", str(user))
 
 
 def _folder(drive: str, use: str) -> str:

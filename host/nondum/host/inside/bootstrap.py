@@ -26,7 +26,7 @@ PRELOADED = (
     *("resource", "traceback", "typing", "warnings"),
 )
 """What the SDK and pluggy import of the standard library, with what those import in turn."""
-INSIDE = ("kernel", "keeper", "limits", "look", "room", "walls")
+INSIDE = ("kernel", "keeper", "limits", "look", "open_files", "room", "walls")
 ORDER_BYTES = 128 * 1024
 DESCRIPTORS = 2
 """The link, and Landlock's ruleset."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import contextlib
+import itertools
 import json
 import os
 import select
@@ -15,13 +16,16 @@ import signal
 import socket
 import time
 from collections.abc import Collection, Mapping, Sequence
+from functools import partial
 from typing import Any
 
-from nondum.host.inside import kernel, room
+from nondum.host.inside import kernel, open_files, room
 
 GRACE_S = 2.0
 """What a worker has to leave everything safe once the host has ended."""
 ORDER_BYTES = 4096
+MOST_DELETED = 50_000
+"""Files that are open and deleted: so many are looked at."""
 HOST_GONE = 1
 """Exit status, when the host was gone before the worker."""
 
@@ -32,7 +36,7 @@ def keep(orders: socket.socket, given: Mapping[str, Any], links: Sequence[int]) 
     kernel.prctl(kernel.PR_SET_PDEATHSIG, 0)
     _close_all_but({0, 1, 2, orders.fileno(), *links})
     mask = os.umask(0o022)  # what is made here is for the worker, who may be another user
-    room.furnish(given)
+    room.furnish(given, partial(_have_mapped, orders))
     _say_who(orders, "keeper")
     worker = os.fork()
     if worker == 0:
@@ -53,6 +57,12 @@ def _close_all_but(needed: Collection[int]) -> None:
         if int(name) not in needed:
             with contextlib.suppress(OSError):  # that of the list itself
                 os.close(int(name))
+
+
+def _have_mapped(orders: socket.socket, mount: int) -> None:
+    """Have the host map the users of a mount; where it cannot, it ends this process."""
+    socket.send_fds(orders, [b"mount"], [mount])
+    orders.recv(ORDER_BYTES)
 
 
 def _say_who(orders: socket.socket, who: str) -> None:
@@ -97,7 +107,11 @@ class _Keeper:
         for standard in (1, 2):  # the worker's alone: the host waits for their end
             os.dup2(nothing, standard)
         kernel.prctl(kernel.PR_SET_NAME, kernel.text("keeper"))
-        kernel.keep_capabilities(kernel.CAP_SYS_ADMIN)
+        # Where the host may not look into its processes, this one does.
+        looks = (kernel.CAP_DAC_READ_SEARCH, kernel.CAP_SYS_PTRACE)
+        kernel.keep_capabilities(
+            kernel.CAP_SYS_ADMIN, *(looks if self._given["maps_scratch"] else ())
+        )
         if self._given["keeper_filter"] is not None:
             kernel.filter_calls(base64.b64decode(self._given["keeper_filter"]))
         return awoken
@@ -122,14 +136,25 @@ class _Keeper:
         if not data:
             return False
         order = json.loads(data)
-        error = ""
+        answer: dict[str, Any] = {"is": "done", "error": ""}
         try:
-            if order["do"] == "grant":
-                room.grant(self._given["outside"], order["need"], order["node"], order["own"])
-            else:
-                room.revoke(order["need"])
+            match order["do"]:
+                case "grant":
+                    room.grant(self._given["outside"], order["need"], order["node"], order["own"])
+                case "revoke":
+                    room.revoke(order["need"])
+                case _:
+                    answer |= self._seen()
         except OSError as failure:
-            error = str(failure)
+            answer["error"] = str(failure)
         with contextlib.suppress(OSError):
-            self._orders.send(json.dumps({"is": "done", "error": error}).encode())
+            self._orders.send(json.dumps(answer).encode())
         return True
+
+    def _seen(self) -> dict[str, int]:
+        """What the processes of the room have open."""
+        pids = [int(name) for name in os.listdir("/proc") if name.isdigit() and name != "1"]  # noqa: PTH208
+        deleted = itertools.islice(
+            open_files.deleted_sizes(self._given["scratch"], pids), MOST_DELETED
+        )
+        return {"descriptors": open_files.most(pids), "deleted_bytes": sum(deleted)}

@@ -22,10 +22,15 @@ MS_BIND, MS_SLAVE, MS_SHARED = 1 << 12, 1 << 19, 1 << 20
 MNT_DETACH = 2
 """From linux/mount.h."""
 CLONE_NEWNS, CLONE_NEWUSER = 0x20000, 0x10000000
-CAP_SYS_ADMIN = 21
+CAP_DAC_READ_SEARCH, CAP_SYS_PTRACE, CAP_SYS_ADMIN = 2, 19, 21
 _CAPABILITY_VERSION_3 = 0x20080522
 _LANDLOCK_RESTRICT_SELF = 446
+_OPEN_TREE, _MOVE_MOUNT, _MOUNT_SETATTR = 428, 429, 442
 """The same on all architectures."""
+_OPEN_TREE_CLONE, _MOVE_MOUNT_F_EMPTY_PATH = 1, 4
+_AT_FDCWD, _AT_EMPTY_PATH = -100, 0x1000
+_MOUNT_ATTR_NOSUID, _MOUNT_ATTR_NODEV, _MOUNT_ATTR_IDMAP = 2, 4, 0x100000
+"""From linux/mount.h and linux/fcntl.h."""
 
 
 def prctl(option: int, *arguments: int | ctypes.Array[ctypes.c_char]) -> int:
@@ -64,6 +69,31 @@ def mount(
 def unmount(target: str) -> None:
     """Take a mount out of sight; what is open stays so. See umount2(2)."""
     _checked(LIBC.umount2(os.fsencode(target), MNT_DETACH), f"umount {target}")
+
+
+def copy_mount(folder: str) -> int:
+    """A mount of a folder that is not in place yet, without those below it. See open_tree(2)."""
+    flags = _OPEN_TREE_CLONE | os.O_CLOEXEC
+    return _checked(
+        LIBC.syscall(_OPEN_TREE, _AT_FDCWD, os.fsencode(folder), flags), f"open_tree {folder}"
+    )
+
+
+def map_mount(mount: int, namespace: int) -> None:
+    """Have a mount that is not in place yet show files with the ids that a user namespace maps them
+    to, and no set-id bits and devices. See mount_setattr(2)."""
+    attributes = _MOUNT_ATTR_IDMAP | _MOUNT_ATTR_NOSUID | _MOUNT_ATTR_NODEV
+    described = struct.pack("=QQQQ", attributes, 0, 0, namespace)
+    size = ctypes.c_size_t(len(described))
+    _checked(
+        LIBC.syscall(_MOUNT_SETATTR, mount, b"", _AT_EMPTY_PATH, described, size), "mount_setattr"
+    )
+
+
+def place_mount(mount: int, target: str) -> None:
+    """Put one into place. See move_mount(2)."""
+    path, flags = os.fsencode(target), _MOVE_MOUNT_F_EMPTY_PATH
+    _checked(LIBC.syscall(_MOVE_MOUNT, mount, b"", _AT_FDCWD, path, flags), f"move_mount {target}")
 
 
 def unshare(flags: int) -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import contextlib
 import os
 import stat
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,17 +26,22 @@ _STAGED = "/run/nondum/staged"
 _BOUND = kernel.MS_BIND | kernel.MS_REMOUNT
 
 
-def furnish(room: Mapping[str, Any]) -> None:
+def furnish(room: Mapping[str, Any], map_mount: Callable[[int], None]) -> None:
     """Bring in what the worker may see. Raises `OSError`.
 
     `outside`: where the host's folders are seen. `code`: folders to read. `scratch`: the folder to
-    write. `nodes`: devices, as paths on the host, under their own names.
+    write; if the host `maps_scratch`, what is in it is the worker's there, and the host's on disk:
+    `map_mount` has a mount be so before it is in place. `nodes`: devices, as paths on the host,
+    under their own names.
     `shared_mb`: size of /dev/shm. `is_last`: whether user namespaces end here.
     """
     outside = room["outside"]
     for folder in room["code"]:
         bind(outside + folder, folder, kernel.MS_RDONLY if room["protects_code"] else 0)
-    bind(outside + room["scratch"], room["scratch"], 0)
+    if room["maps_scratch"]:
+        _bind_mapped(outside + room["scratch"], room["scratch"], map_mount)
+    else:
+        bind(outside + room["scratch"], room["scratch"], 0)
     _mount_memory("/dev/shm", room["shared_mb"] * 1024, "1777")  # of this namespace only
     Path("/tmp").chmod(0o1777)
     _mount_memory(DEVICES, 64, "755")
@@ -57,7 +62,7 @@ def move_in(room: Mapping[str, Any]) -> None:
 
     `sealed`: what may be read only, though its user might write it; `protected`: mounts likewise.
     `user`: one that is this worker's alone, also to the kernel, or null; `groups` that it has
-    beside. Raises `OSError`.
+    beside, or null: those of the host. Raises `OSError`.
     """
     kernel.unshare(kernel.CLONE_NEWNS)
     kernel.mount(None, DEVICES, None, kernel.MS_SLAVE)
@@ -80,11 +85,12 @@ def move_in(room: Mapping[str, Any]) -> None:
         Path("/proc/self/gid_map").write_text(f"{NOBODY} {group} 1")
 
 
-def _become(user: int, groups: Sequence[int]) -> None:
+def _become(user: int, groups: Sequence[int] | None) -> None:
     """Be another user from now on, for all that the kernel counts and asks."""
     for output in (1, 2):  # which may be opened by name: /dev/stderr
         os.fchown(output, user, user)
-    os.setgroups(groups)
+    if groups is not None:
+        os.setgroups(groups)
     os.setresgid(user, user, user)
     os.setresuid(user, user, user)
     kernel.prctl(kernel.PR_SET_DUMPABLE, 1)  # else what is its own in /proc is root's
@@ -128,6 +134,17 @@ def bind(source: str, target: str, more: int = 0) -> None:
     kernel.mount(source, target, None, kernel.MS_BIND)
     flags = _flags_of(target) | kernel.MS_NOSUID | kernel.MS_NODEV | more
     kernel.mount(None, target, None, _BOUND | flags)
+
+
+def _bind_mapped(source: str, target: str, map_mount: Callable[[int], None]) -> None:
+    """The same, with the users that files have there mapped, and the flags set, by who may."""
+    os.makedirs(target, exist_ok=True)  # noqa: PTH103
+    mount = kernel.copy_mount(source)
+    try:
+        map_mount(mount)
+        kernel.place_mount(mount, target)
+    finally:
+        os.close(mount)
 
 
 def _bind_node(source: str, target: str) -> None:

@@ -20,6 +20,7 @@ from nondum.host.confinement import bubblewrap, landlock, refusals
 from nondum.host.confinement.bubblewrap import Ground
 from nondum.host.confinement.filters import Rule
 from nondum.host.confinement.users import FIRST_USER, USERS, NewNamespace, Users
+from nondum.host.helper import privileged
 from nondum.host.inside import room
 from nondum.host.workers.spec import WorkerSpec, base_interpreter
 from nondum.wheelhouse.confinement import Level
@@ -57,6 +58,11 @@ class Entry:
     """Landlock's, by descriptor."""
     user: int | None = None
     """The user of the machine that the worker is, if not the host's."""
+
+    @property
+    def maps_scratch(self) -> bool:
+        """Whether its scratch folder stays the host's, and is shown as that user's."""
+        return self.room is not None and bool(self.room["maps_scratch"])
 
 
 class Confinement(Protocol):
@@ -189,10 +195,11 @@ class Boxed:
         without: Collection[str] = (),
     ) -> None:
         """`places` are folders in which most workers' code and scratch are: a spare sees them until
-        it becomes one. With `has_users`, which takes root, each worker is a user of its own.
+        it becomes one. With `has_users`, which takes root or the helper, each worker is a user of
+        its own.
         """
         self._bwrap, self._places = bwrap, places
-        self.has_users, self._users = has_users, Users()
+        self.has_users, self._users = has_users, Users(privileged().users)
         self.without = frozenset(without)
 
     def ground(self, spec: WorkerSpec | None) -> Ground:
@@ -229,6 +236,7 @@ class Boxed:
             "code": [str(folder) for folder in spec.site_packages],
             "protects_code": "code" not in kept,
             "scratch": str(spec.scratch),
+            "maps_scratch": user is not None and os.geteuid() != 0,
             "nodes": list(nodes),
             "shared_mb": SHARED_MB,
             "sealed": [] if "settings" in kept else bubblewrap.SEALED,
@@ -239,7 +247,7 @@ class Boxed:
             "inotify_instances": room.INOTIFY_INSTANCES if "inotify" not in kept else 128,
             "is_last": "user namespaces" not in kept,
             "user": user,
-            "groups": sorted(_groups_of(nodes)),
+            "groups": sorted(_groups_of(nodes)) if os.geteuid() == 0 else None,
             "changes_user": "user" not in kept,
             "keeper_filter": calls_refused(refusals.GROUPS, mounts_too),
         }

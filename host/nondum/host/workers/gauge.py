@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from nondum.host.cgroups import Cage, Usage
+from nondum.host.inside import open_files
 
 TICKS_HZ = os.sysconf("SC_CLK_TCK")
 
@@ -40,15 +41,8 @@ class Gauge:
         return {task: wanted_s for pid in self.pids() for task, wanted_s in _wanted_s(pid)}
 
     def descriptors(self) -> int:
-        """Open files of that process of its which has most, as far as they may be counted: those of
-        another user are told from Linux 6.2 on."""
-        return max((count for pid in self.pids() for count in _open_files(pid)), default=0)
-
-
-def _open_files(pid: int) -> Iterator[int]:
-    folder = Path(f"/proc/{pid}/fd")
-    with contextlib.suppress(OSError):  # it has ended, or may not be looked at
-        yield folder.stat().st_size or sum(1 for _ in folder.iterdir())
+        """Open files of that process of its which has most, as far as they may be counted."""
+        return open_files.most(self.pids())
 
 
 def _wanted_s(pid: int) -> Iterator[tuple[int, float]]:

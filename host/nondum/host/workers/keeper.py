@@ -12,16 +12,30 @@ import json
 import os
 import socket
 import struct
+from dataclasses import dataclass
 from typing import Any
 
 from nondum.host.inside.room import DEVICES
+from nondum.host.workers import scratch
 from nondum.sdk.errors import Problem, WorkerFailed
 
 ANSWER_S = 2.0
 """How long one order may take."""
+MOST_SILENCES = 5
+"""In a row, before what the worker holds open counts as too much."""
 _ANSWER_BYTES = 4096
-_CREDENTIALS = struct.Struct("=iII")
+CREDENTIALS = struct.Struct("=iII")
 """`struct ucred` (unix(7)): process, user, group."""
+
+
+@dataclass(frozen=True, slots=True)
+class OpenFiles:
+    """What the processes of a room have open."""
+
+    descriptors: int
+    """Of the one that has most."""
+    deleted_bytes: int
+    """In files of its disk that were deleted."""
 
 
 class Keeper:
@@ -34,6 +48,7 @@ class Keeper:
         self._turn = asyncio.Lock()
         self._worker: int | None = None
         self._pidfd: int | None = None
+        self._silences = 0
         self._answers: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
         asyncio.get_running_loop().add_reader(orders.fileno(), self._read)
 
@@ -64,6 +79,18 @@ class Keeper:
         """Have it vanish."""
         await self._ask({"do": "revoke", "need": need})
 
+    async def open_files(self) -> OpenFiles:
+        """What the room's processes have open.
+
+        A worker may keep its keeper from answering: again and again, that counts as too much.
+        """
+        answer = await self._ask({"do": "look"})
+        if answer["error"]:
+            self._silences += 1
+            return OpenFiles(0, scratch.FULL if self._silences >= MOST_SILENCES else 0)
+        self._silences = 0
+        return OpenFiles(answer["descriptors"], answer["deleted_bytes"])
+
     def take_pidfd(self) -> int | None:
         """The keeper's own process, for the caller to wait for and close; None if it is gone, or
         never said who it is. It ends last: everything in its room has ended before."""
@@ -89,7 +116,7 @@ class Keeper:
                 return {"error": str(error) or f"no answer for {ANSWER_S:g} s"}
 
     def _read(self) -> None:
-        room_for_credentials = socket.CMSG_SPACE(_CREDENTIALS.size)
+        room_for_credentials = socket.CMSG_SPACE(CREDENTIALS.size)
         with contextlib.suppress(BlockingIOError):
             while True:
                 try:
@@ -113,7 +140,7 @@ class Keeper:
 
 
 def _sender(more: list[tuple[int, int, bytes]]) -> int:
-    process: int = next(_CREDENTIALS.unpack(value)[0] for _, _, value in more)
+    process: int = next(CREDENTIALS.unpack(value)[0] for _, _, value in more)
     return process
 
 

@@ -94,6 +94,8 @@ class WorkerLauncher:
                     try:
                         spare.limit(spec.limits)
                         if spare.become(told, sock, entry.ruleset):
+                            if entry.user is not None and entry.maps_scratch:
+                                await asyncio.to_thread(spare.map_scratch, entry.user)
                             return spare.process(entry.user)
                     except OSError:
                         await spare.end()

@@ -1,7 +1,7 @@
 """Devices of the machine that belong to a worker's own user for as long as it has them.
 
 As login(1) does with terminals: only a node's owner and group may open it, and a worker that is a
-user of its own is neither. Takes root.
+user of its own is neither. Takes root: elsewhere the helper has made a node for that user.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class Lending:
 
     def __init__(self, user: int | None) -> None:
         """`user` is the worker's, if not the host's, which needs nothing."""
-        self._user = user
+        self._user = user if os.geteuid() == 0 else None
         self._lent: dict[str, tuple[str, int]] = {}
         """Name → node, and whose that was."""
 

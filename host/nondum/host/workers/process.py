@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from nondum.host.cgroups import Cage
-from nondum.host.workers.keeper import Keeper, node_of
+from nondum.host.workers.keeper import Keeper, OpenFiles, node_of
 
 DETACH_S = 2.0
 """How long a process that was killed is waited for; one in the kernel's hands may never end."""
@@ -77,6 +77,12 @@ class WorkerProcess:
         """Take a device away."""
         if self._keeper is not None:
             await self._keeper.revoke(need)
+
+    async def open_files(self) -> OpenFiles | None:
+        """What its processes have open, where the host cannot look at that by itself."""
+        if self._keeper is None or self.user is None or os.geteuid() == 0:
+            return None
+        return await self._keeper.open_files()
 
     async def wait(self, timeout_s: float) -> bool:
         """Wait for the exit at most so long; answer whether it came."""

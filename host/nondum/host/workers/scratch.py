@@ -13,10 +13,10 @@ import stat
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
+from nondum.host.inside.open_files import BLOCK, deleted_sizes
+
 MOST_ENTRIES = 50_000
 """Files and folders; more count as too much, whatever their size."""
-BLOCK = 512
-"""st_blocks, in bytes (stat(3type))."""
 FULL = 2**63
 """The size of what cannot be measured."""
 
@@ -27,7 +27,8 @@ def used_bytes(folder: Path, pids: Collection[int] = ()) -> int:
     Takes milliseconds for thousands of files: not for the loop.
     """
     used = 0
-    for count, size in enumerate(itertools.chain(_sizes(folder), _held(folder, pids))):
+    held = deleted_sizes(str(folder), pids)
+    for count, size in enumerate(itertools.chain(_sizes(folder), held)):
         used += size
         if count >= MOST_ENTRIES:
             return FULL
@@ -127,21 +128,3 @@ def _sizes(folder: Path) -> Iterator[int]:
             continue
         except OSError:  # a folder that is too deep to be named, or closed to us: it may hold much
             yield FULL
-
-
-def _held(folder: Path, pids: Collection[int]) -> Iterator[int]:
-    """Sizes of files that were deleted and are still open."""
-    try:
-        device = folder.stat().st_dev
-    except OSError:
-        return
-    seen: set[int] = set()
-    for pid in pids:
-        with contextlib.suppress(OSError):
-            for link in Path(f"/proc/{pid}/fd").iterdir():
-                with contextlib.suppress(OSError):
-                    found = link.stat()
-                    is_file = stat.S_ISREG(found.st_mode) and found.st_dev == device
-                    if is_file and not found.st_nlink and found.st_ino not in seen:
-                        seen.add(found.st_ino)
-                        yield found.st_blocks * BLOCK

@@ -13,6 +13,7 @@ import json
 import os
 import signal
 import socket
+import struct
 import subprocess
 from collections.abc import Collection, Mapping
 from typing import IO, Any
@@ -20,10 +21,11 @@ from typing import IO, Any
 from nondum.host.cgroups import Cage, CageLimits, Cages
 from nondum.host.confinement.bubblewrap import Ground
 from nondum.host.confinement.users import NewNamespace
+from nondum.host.helper import privileged
 from nondum.host.printable import printable
 from nondum.host.waiting import until_done
 from nondum.host.workers.confinements import Confinement
-from nondum.host.workers.keeper import Keeper
+from nondum.host.workers.keeper import CREDENTIALS, Keeper
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spec import Limits
 
@@ -33,6 +35,9 @@ ROOM_BYTES = 2048
 OWNER = "NONDUM_SPARE_OF"
 """Environment variable of interpreters that have not become a worker: whose they are."""
 SAID_BYTES = 64 * 1024
+MAPPED_S = 10.0
+"""How long one that becomes a worker may take to ask for its scratch folder."""
+_DESCRIPTOR = struct.Struct("@i")
 
 
 class Spare:
@@ -122,6 +127,24 @@ class Spare:
                 raise
             return False
         return True
+
+    def map_scratch(self, user: int) -> None:
+        """Have its scratch folder, which it sends a mount of, be a user's in its room. Blocks.
+
+        Call it after `become`. Raises `OSError`; then it is still to be closed.
+        """
+        self._orders.settimeout(MAPPED_S)
+        ancillary = socket.CMSG_SPACE(CREDENTIALS.size) + socket.CMSG_SPACE(_DESCRIPTOR.size)
+        _, more, _, _ = self._orders.recvmsg(SAID_BYTES, ancillary)
+        sent = [value for _, kind, value in more if kind == socket.SCM_RIGHTS]
+        if not sent:
+            raise ConnectionResetError("it ended before its scratch folder was there")
+        (mount,) = _DESCRIPTOR.unpack(sent[0])
+        try:
+            privileged().map_folder(mount, user)
+        finally:
+            os.close(mount)
+        self._orders.send(b"mapped")
 
     def process(self, user: int | None = None) -> WorkerProcess:
         """The worker that it has become, as that user if not as the host's.

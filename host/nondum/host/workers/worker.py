@@ -309,7 +309,7 @@ class Worker:
 
     def _reachable(self, name: str, own: str) -> str:
         """The node that it may open, for one of the machine's. Blocks."""
-        node = reachable(self.spec.component, name, own)
+        node = reachable(self.spec.component, name, own, self._process.user)
         self._lending.lend(name, node)
         return node
 
@@ -321,14 +321,21 @@ class Worker:
     async def _reading(self) -> Reading:
         is_flowing = any(isinstance(claim, StreamFlowing) for claim in self.claims)
         is_asked = bool(self._calls) or is_flowing
+        told = await self._process.open_files()
 
         def read() -> Reading:
+            if told is None:
+                descriptors = self._gauge.descriptors()
+                used = scratch.used_bytes(self.spec.scratch, self._gauge.pids())
+            else:
+                descriptors = told.descriptors
+                used = scratch.used_bytes(self.spec.scratch) + told.deleted_bytes
             return Reading(
                 at_s=self._loop.time(),
                 usage=self._gauge.usage(),
-                descriptors=self._gauge.descriptors(),
+                descriptors=descriptors,
                 wanted_s=self._gauge.wanted_s(),
-                scratch_bytes=scratch.used_bytes(self.spec.scratch, self._gauge.pids()),
+                scratch_bytes=used,
                 is_asked=is_asked,
             )
 

@@ -1,0 +1,84 @@
+"""A daemon of another user than root, with root's helper, whose /run is their own.
+
+`python -m tests.confinement.service` is root's end: it starts a helper, and, as the user,
+`service_checks.py`, which tells one JSON object: name of each check → why it failed, or nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pwd
+import socket
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+from nondum.host.helper.client import SOCKET
+from nondum.host.inside import kernel
+
+USER = pwd.getpwnam("daemon")
+GROUP = 29
+"""One that the user is in beside its own."""
+PYTHON, STATE = Path("/run/python"), Path("/run/state")
+LINE, LINE_OF_GROUP = Path("/run/nodes/line"), Path("/run/nodes/line-of-group")
+ROOT = Path(__file__).parents[2]
+
+
+def results() -> dict[str, str]:
+    """What the checks of `service_checks` have found. Takes root."""
+    command = ["unshare", "--mount", sys.executable, "-m", "tests.confinement.service"]
+    told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert told.returncode == 0, told.stderr
+    found: dict[str, str] = json.loads(told.stdout.splitlines()[-1])
+    return found
+
+
+def main() -> None:
+    """Root's end, in its mount namespace."""
+    kernel.mount("tmpfs", "/run", "tmpfs", kernel.MS_NOSUID, "mode=755")
+    PYTHON.mkdir()
+    kernel.mount(sys.base_prefix, str(PYTHON), None, kernel.MS_BIND)
+    STATE.mkdir()
+    os.chown(STATE, USER.pw_uid, USER.pw_gid)
+    LINE.parent.mkdir()
+    for line, mode, group in ((LINE, 0o600, 0), (LINE_OF_GROUP, 0o660, GROUP)):  # as /dev/full
+        os.mknod(line, stat.S_IFCHR, os.makedev(1, 7))
+        os.chown(line, 0, group)
+        line.chmod(mode)
+    SOCKET.parent.mkdir()
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening:
+        listening.bind(str(SOCKET))
+        os.chown(SOCKET, USER.pw_uid, USER.pw_gid)
+        listening.listen(64)
+        helper = subprocess.Popen(
+            [
+                *("sh", "-c", 'export LISTEN_PID=$$ LISTEN_FDS=1; exec "$@"', "sh"),
+                *(sys.executable, "-m", "nondum.host.helper", "--user", USER.pw_name),
+                *("--allow-subsystem", "mem"),
+            ],
+            preexec_fn=lambda: os.dup2(listening.fileno(), 3),
+            pass_fds=(3,),
+        )
+    try:
+        sys.stdout.write(_as_the_user())
+    finally:
+        helper.terminate()
+        helper.wait()
+
+
+def _as_the_user() -> str:
+    python = PYTHON / "bin" / f"python{sys.version_info.major}.{sys.version_info.minor}"
+    command = ["setpriv", "--no-new-privs", f"--reuid={USER.pw_uid}", f"--regid={USER.pw_gid}"]
+    command += [f"--groups={GROUP}", str(python), "-B", "-m", "tests.confinement.service_checks"]
+    paths = {"PYTHONPATH": ":".join(["", *filter(None, sys.path)]), "HOME": "/"}
+    done = subprocess.run(
+        command, env={**os.environ, **paths}, stdout=subprocess.PIPE, text=True, check=False
+    )
+    assert done.returncode == 0
+    return done.stdout
+
+
+if __name__ == "__main__":
+    main()
