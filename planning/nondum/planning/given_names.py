@@ -58,7 +58,8 @@ def of_components(
     payload_id: str, ids: Iterable[str], kept: Mapping[str, str], taken: Collection[str]
 ) -> dict[str, str]:
     """Id → name of each component of a payload. What it was called before (`kept`) stays; nothing
-    gets a name that another payload's component has (`taken`).
+    gets a name that another payload's component has (`taken`). What is called by its name here, as
+    what is remembered of a payload, keeps that.
 
     >>> of_components("org.example.b", ["gps", "clock"], {}, {"gps"})
     {'gps': 'gps--org-example-b', 'clock': 'clock'}
@@ -66,8 +67,13 @@ def of_components(
     names: dict[str, str] = {}
     for id in ids:
         busy = {*taken, *names.values(), *(name for own, name in kept.items() if own != id)}
-        names[id] = kept.get(id) or next(name for name in forms(id, payload_id) if name not in busy)
+        is_name = id in kept.values()
+        names[id] = kept.get(id) or (id if is_name else _free(forms(id, payload_id), busy))
     return names
+
+
+def _free(names: Iterable[str], busy: Collection[str]) -> str:
+    return next(name for name in names if name not in busy)
 
 
 def of_plugin(
