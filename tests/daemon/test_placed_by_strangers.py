@@ -229,15 +229,17 @@ def test_older_release_than_was_here_is_refused(mule: OpenHost, folder: Path, re
         assert refused(one, hands)[0] == "ROLLBACK"
 
 
-def test_component_that_is_here_already_is_refused(
+def test_component_of_the_id_of_one_that_is_here_is_taken_beside_it(
     mule: OpenHost, folder: Path, tmp_path: Path
 ) -> None:
     host, address = mule
     host.bring("lamp", beacon(tmp_path / "log"))
     hands = Hands(folder)
     with guest("rover", ("mule", address), handler=hands) as one:
-        assert refused(one, hands)[0] == "COMPONENT_TAKEN"
-    assert host.component("beacon") is not None
+        one.reports("mule", "place.take", until={"step": "active"}, **hands.offer())
+        host.until_component("beacon--org-example-light", "ready")
+        assert host.component("beacon") is not None
+    host.until_gone("light")
 
 
 def test_only_who_takes_a_payload_may_fetch_it(mule: OpenHost, folder: Path) -> None:

@@ -208,9 +208,10 @@ def test_rest_of_a_payload_helps_though_a_part_of_it_is_kept_out() -> None:
     assert used.caveats[0].code.startswith("E-PRED")
 
 
-def test_payload_with_a_component_that_is_here_says_so() -> None:
-    [unfit] = ask(followers(), FOLLOW, [of_plugin(MOBILE_BASE)]).unfit
-    assert unfit.caveats[0].code == "COMPONENT_TAKEN"
+def test_payload_of_which_all_is_here_in_another_release_is_not_told_of() -> None:
+    advice = ask(followers(), FOLLOW, [of_plugin(MOBILE_BASE)])
+    assert not advice.ways
+    assert not advice.unfit
 
 
 def test_payload_that_is_in_the_way_is_left_out() -> None:

@@ -15,6 +15,7 @@ from nondum.host.devices.view import device_of
 from nondum.host.mind.diagnosis import NO_SILENCE, Seen, moment, why_not, words_gone
 from nondum.host.mind.silence import Silence
 from nondum.host.shelf import Shelved, candidate_of, distinct, on_shelf
+from nondum.host.shelf_names import ShelfNames
 from nondum.planning.advise import Advice, Candidate, Here, advise, understood
 from nondum.planning.contribution import Contribution, id_at_home
 from nondum.planning.goal import GoalKind, goal_text, parse_goal
@@ -76,11 +77,11 @@ class Surroundings:
             for row in told["components"]
         )
         at_work = {contribution.component for contribution in present}
-        known = [
-            payload
-            for payload in distinct((*shelf, *remembered(seen)))
-            if not at_work.issuperset(payload.components)
+        own = [
+            (row["payload"], _description(row)) for row in told["components"] if row["host"] == host
         ]
+        called = ShelfNames.of(told["names"], own).called(distinct((*shelf, *remembered(seen))))
+        known = [payload for payload in called if not at_work.issuperset(payload.components)]
         candidates = tuple(candidate_of(payload, host, devices) for payload in known)
         return cls(
             Here(host, present, frozenset(told["facts"]), frozenset(told["excluded"])),
@@ -99,7 +100,7 @@ class Surroundings:
     def bare(cls, host: str, shelf: Iterable[Shelved]) -> Surroundings:
         """A host with nothing plugged in, and payloads from elsewhere."""
         told = {"host": host, "components": [], "facts": [f"self {host}"], "excluded": {}}
-        return cls.of({**told, "seen": []}, shelf)
+        return cls.of({**told, "names": {}, "seen": []}, shelf)
 
     def counsel(self, asked: str) -> Counsel:
         """Advise on a goal in words, or in PDDL where it begins with a parenthesis.

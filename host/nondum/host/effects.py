@@ -78,6 +78,8 @@ class StoreWheels(PayloadEffect):
 
     beside: str = ""
     """Key of the release of it that is in force, which would make room for it."""
+    renamed: Mapping[str, str] = field(default_factory=dict, hash=False)
+    """Id in the manifest → name on this host, of those components where that is another."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +90,8 @@ class ProbeComponents(PayloadEffect):
     """Key of the release of it that is in force, and goes on meanwhile."""
     after: str = ""
     """Key of a payload whose workers must have ended first."""
+    renamed: Mapping[str, str] = field(default_factory=dict, hash=False)
+    """Id in the manifest → name on this host, of those components where that is another."""
 
 
 @dataclass(frozen=True, slots=True)

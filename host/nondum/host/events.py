@@ -203,7 +203,7 @@ class PayloadVerified(Event):
 
     payload: str
     components: tuple[str, ...]
-    """Ids of the components that it brings."""
+    """Ids of the components that it brings, as its manifest has them."""
     index: Mapping[str, PluginDescription] = field(default_factory=dict, repr=False)
     """Component id → what its plugin says."""
 

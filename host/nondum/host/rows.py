@@ -23,6 +23,7 @@ from nondum.host.news import Progress
 from nondum.host.optional_inputs import Choice, Source
 from nondum.host.streams import StreamStatus
 from nondum.host.trust.vouched import NOBODY, Vouched
+from nondum.planning.given_names import MARK
 from nondum.sdk.errors import Problem
 
 Row: TypeAlias = dict[str, Any]
@@ -272,10 +273,16 @@ def journal_row(entry: JournalEntry) -> Row:
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> Problem:
-    """What is told of a name that is none."""
+    """What is told of a name that is none; of an id of manifests, all that have it are told.
+
+    >>> unknown("component", "gps", ["lamp", "gps--org-a", "gps--org-b"]).fix
+    "did you mean 'gps--org-a' or 'gps--org-b'?"
+    """
     names = sorted(known)
-    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-    fix = f"did you mean {near[0]!r}?" if near else f"there is: {', '.join(names) or 'none'}"
+    near = [one for one in names if one.startswith(f"{name}{MARK}")]
+    near = near or difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    meant = " or ".join(map(repr, near))
+    fix = f"did you mean {meant}?" if near else f"there is: {', '.join(names) or 'none'}"
     return Problem(f"{kind.upper()}_UNKNOWN", f"there is no {kind} {name!r}", fix=fix)
 
 

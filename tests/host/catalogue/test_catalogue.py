@@ -38,6 +38,7 @@ from nondum.host.catalogue.records import (
 )
 from nondum.host.catalogue.rows import as_json
 from nondum.host.catalogue.state import Highwater, HostState
+from nondum.planning.given_names import GivenNames
 from nondum.sdk.description import (
     Behaviour,
     Fragment,
@@ -75,8 +76,8 @@ def payload(key: str = "k1", step: Step = Step.ACTIVE) -> PayloadRecord:
         step=step,
         sources={"b": Path("/drives/b"), "a": Path("/drives/a")},
         phases={"seen": AT, "ready": Moment(2.5, 3.5)},
-        waits_for="k9",
-        components=("eye",),
+        components=("eye", "ear--org-example-eye"),
+        renamed={"ear": "ear--org-example-eye"},
         problems=(PROBLEM,),
     )
 
@@ -162,6 +163,11 @@ FULL = HostState(
     rollbacks={"org.example.eye": Rollback("digest-k1", 7, 9)},
     goals={"3": GoalRecord("3", "look at the lamp", "(seen lamp)", "achieve", -2)},
     former={"org.example.arm": former()},
+    names={
+        "org.example.eye": GivenNames(
+            {"eye": "eye", "ear": "ear--org-example-eye"}, {"eye": "eye--org-example-eye"}
+        ),
+    },
     tries={"k1": 2, "block:sdb1-7": 4},
     is_stopped=True,
 )
@@ -408,11 +414,23 @@ async def test_file_of_another_version_is_left_alone(tmp_path: Path) -> None:
     assert refused.value.code == "CATALOGUE_VERSION"
 
 
-OF_6 = replace(FULL, connections={})
+ALL_ITS_OWN = {"org.example.eye": GivenNames({"eye": "eye"})}
+OF_7 = replace(
+    FULL,
+    payloads={
+        key: replace(one, components=("eye",), renamed={}) for key, one in FULL.payloads.items()
+    },
+    names={**ALL_ITS_OWN, "org.example.arm": GivenNames({"arm": "arm", "hand": "hand"})},
+)
+OF_6 = replace(OF_7, connections={})
 OF_5 = replace(
     OF_6, devices={}, known_devices={}, components={"eye": component(device=None, nodes=())}
 )
-THE_7 = "DROP TABLE connections;"
+THE_8 = (
+    "DROP TABLE names; ALTER TABLE payloads DROP COLUMN renamed;"
+    "ALTER TABLE payloads ADD COLUMN waits_for TEXT NOT NULL DEFAULT '';"
+)
+THE_7 = f"{THE_8} DROP TABLE connections;"
 THE_6 = (
     f"{THE_7} ALTER TABLE highwater RENAME TO highest; CREATE TABLE highwater (fleet TEXT NOT NULL,"
     " payload_id TEXT NOT NULL, release INTEGER NOT NULL, digest TEXT NOT NULL,"
@@ -439,13 +457,15 @@ THE_4 = (
     "ALTER TABLE payloads ADD COLUMN attempts INTEGER NOT NULL DEFAULT 0;"
     "ALTER TABLE payloads DROP COLUMN was; ALTER TABLE highwater DROP COLUMN owner;"
 )
+OF_3 = replace(OF_4, former={}, names=ALL_ITS_OWN)
 OLDER = {
-    1: (f"{THE_4} DROP TABLE goals; DROP TABLE former;", replace(OF_4, goals={}, former={})),
-    2: (f"{THE_4} DROP TABLE former;", replace(OF_4, former={})),
+    1: (f"{THE_4} DROP TABLE goals; DROP TABLE former;", replace(OF_3, goals={})),
+    2: (f"{THE_4} DROP TABLE former;", OF_3),
     3: (THE_4, OF_4),
     4: (THE_5, OF_5),
     5: (THE_6, OF_6),
     6: (THE_7, OF_6),
+    7: (THE_8, OF_7),
 }
 """Schema → what makes it of the present one, and what it can hold of `FULL`."""
 
@@ -491,6 +511,34 @@ async def test_highest_release_of_any_fleet_is_taken_over(tmp_path: Path) -> Non
             "org.example.arm": Highwater(5, "arm", ""),
         }
         assert catalogue.state.rollbacks == {"org.example.eye": Rollback("b", 8, 9)}
+
+
+@pytest.mark.anyio
+@pytest.mark.parametrize(
+    ("remembered", "names"),
+    [
+        ('{"eye": {}, "hand": {}}', {"hand": "hand"}),
+        ("{", None),
+        ("[1]", None),
+    ],
+    ids=["one that another has", "no JSON", "no components"],
+)
+async def test_names_of_before_go_to_who_is_here_first(
+    tmp_path: Path, remembered: str, names: dict[str, str] | None
+) -> None:
+    """Schema 7 knew no names but the ids of manifests, and remembered payloads by them."""
+    async with opened(tmp_path) as catalogue:
+        await catalogue.commit(OF_7, ())
+    connection = sqlite3.connect(tmp_path / "catalogue.sqlite")
+    connection.executescript(f"{THE_8} PRAGMA user_version = 7;")
+    with connection:
+        connection.execute("UPDATE former SET components = ?", (remembered,))
+        row = ("org.example.eye@mule", "1.0", '{"ear": {}}', 3.0)
+        connection.execute("INSERT INTO former VALUES (?, ?, ?, ?)", row)
+    connection.close()
+    kept = {**ALL_ITS_OWN, **({"org.example.arm": GivenNames(names)} if names else {})}
+    async with opened(tmp_path) as catalogue:
+        assert catalogue.state.names == kept
 
 
 @pytest.mark.anyio

@@ -18,7 +18,7 @@ from nondum.host.catalogue.state import HostState
 from nondum.host.effects import Effect
 from nondum.host.events import Event
 from nondum.host.lifecycle.advance import advance
-from nondum.sdk.description import PluginDescription
+from nondum.sdk.description import Fragment, PluginDescription
 from nondum.sdk.errors import Problem
 
 AT = Moment(1.0, 2.0)
@@ -37,17 +37,20 @@ def found(
     return events.PayloadFound(key, drive, folder, f"digest-{key}", payload_id, "1.0", release)
 
 
-def component(id: str = "eye", payload: str = "k1", need: str = "") -> ComponentRecord:
+def component(
+    id: str = "eye", payload: str = "k1", need: str = "", words: str = "", called: str = ""
+) -> ComponentRecord:
+    """A component that is `called` something else than its id on this host, and says `words`."""
     claims = (DeviceClaim("port", {"ID_MODEL": need}, False),) if need else ()
     return ComponentRecord(
-        id=id,
+        id=called or id,
         payload=payload,
         payload_id="org.x",
         distribution=id,
         entry_point=id,
         version="1.0",
         state=ComponentState.READY,
-        description=PluginDescription(name=id, version="1.0"),
+        description=PluginDescription(name=id, version="1.0", fragments=saying(words)),
         venv=Path("/v"),
         site_packages=Path("/v/s"),
         scratch=Path("/s"),
@@ -56,8 +59,20 @@ def component(id: str = "eye", payload: str = "k1", need: str = "") -> Component
     )
 
 
+def saying(word: str) -> tuple[Fragment, ...]:
+    """Fragments that tell one plugin's words from another's."""
+    text = f"(define (domain {word}) (:predicates ({word} ?u - unit)))"
+    return (Fragment(f"{word}.pddl", text),) if word else ()
+
+
 def way_to_active(
-    key: str = "k1", drive: str = "a", id: str = "eye", need: str = "", payload_id: str = "org.x"
+    key: str = "k1",
+    drive: str = "a",
+    id: str = "eye",
+    need: str = "",
+    payload_id: str = "org.x",
+    words: str = "",
+    called: str = "",
 ) -> list[Event]:
     mounts = (MountPose(f"spot__{id}__camera", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "payload"),)
     return [
@@ -67,7 +82,7 @@ def way_to_active(
         events.PayloadStaged(key),
         events.WheelsStored(key, 1),
         events.ComponentsProbed(key),
-        events.PayloadActivated(key, (component(id, key, need),), mounts),
+        events.PayloadActivated(key, (component(id, key, need, words, called),), mounts),
     ]
 
 

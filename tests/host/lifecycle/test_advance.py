@@ -148,21 +148,6 @@ def test_implausible_release_is_refused() -> None:
     assert [p.code for p in state.payloads["k2"].problems] == ["RELEASE_JUMP"]
 
 
-def test_component_id_belongs_to_the_first() -> None:
-    rival = way_to_active("k2", "b", payload_id="org.y")[:3]
-    state, _ = after(drive("b"), *rival, state=active())
-    assert [p.code for p in state.payloads["k2"].problems] == ["COMPONENT_TAKEN"]
-    assert "eye" in state.components
-
-
-def test_component_id_is_waited_for_while_its_owner_leaves() -> None:
-    rival = way_to_active("k2", "b", payload_id="org.y")[:3]
-    waiting, _ = after(events.DriveRemoved("a"), drive("b"), *rival, state=active())
-    assert waiting.payloads["k2"].waits_for == "k1"
-    _, done = after(events.PayloadCleared("k1"), state=waiting)
-    assert effects.VerifyPayload("k2") in done
-
-
 def test_drive_is_released_when_all_is_copied() -> None:
     reading, before = after(drive(), found(), events.DriveRead("a", ("k1",)))
     assert effects.ReleaseDrive("a") not in before

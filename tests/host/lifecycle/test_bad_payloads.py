@@ -103,17 +103,6 @@ async def test_plugin_that_ends_again_and_again_is_quarantined(
     assert component.problems[0].code == "WORKER_CRASH_LOOP"
 
 
-async def test_second_payload_with_the_same_component_is_refused(
-    host: HostInProcess, tmp_path: Path
-) -> None:
-    other = "org.example.other"
-    make_payload(tmp_path / "bad", Part("good", LAMP), payload_id=other)
-    host.plug(tmp_path / "bad", "bad")
-    record = await host.until_step(other, Step.REFUSED)
-    assert [problem.code for problem in record.problems] == ["COMPONENT_TAKEN"]
-    assert host.snapshot.component("good") is not None
-
-
 async def test_drive_without_payload_is_told_and_let_go(
     host: HostInProcess, tmp_path: Path
 ) -> None:

@@ -106,23 +106,6 @@ def test_device_goes_to_a_component_that_has_another_name_now() -> None:
     assert set(state.components) == {"gaze", "arm"}
 
 
-def test_release_with_a_component_of_another_payload_is_refused_and_the_old_one_stays() -> None:
-    rival = way_to_active("k9", "c", "arm", payload_id="org.y")
-    before, _ = after(drive("c"), *rival, state=active())
-    newer = [*upgrade()[:2], events.PayloadVerified("k2", ("eye", "arm"))]
-    state, _ = after(drive("b"), *newer, state=before)
-    assert codes(state, "k2") == ["COMPONENT_TAKEN"]
-    assert steps(state)["k1"] is Step.ACTIVE
-
-
-def test_components_of_a_release_that_waits_are_held_for_it() -> None:
-    rival = way_to_active("k9", "c", "eye", payload_id="org.y")[:3]
-    entered = events.PayloadActivated("k2", (component("gaze", "k2"),))
-    state, _ = after(drive("b"), *upgrade(id="gaze")[:-1], entered, state=active())
-    state, _ = after(drive("c"), *rival, state=state)
-    assert codes(state, "k9") == ["COMPONENT_TAKEN"]
-
-
 # Failing
 
 

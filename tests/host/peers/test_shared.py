@@ -54,6 +54,17 @@ def test_what_is_offered_is_understood() -> None:
     }
 
 
+def test_component_with_a_name_of_its_host_is_one_like_any_other() -> None:
+    name = "watcher--org-example-south"
+    told = {
+        f"component/{name}": standing(snapshot(component()), Policy())["component/watcher"],
+        f"device/{name}": {"component": name},
+    }
+    record = record_of(ME, told)
+    assert [one.id for one in record.components] == [f"{name}@mule"]
+    assert (record.devices, record.problems) == ({name: f"{name}@mule"}, ())
+
+
 def test_actuators_are_withheld_and_with_them_what_only_they_do() -> None:
     (offered,) = record_of(ME, standing(snapshot(component()), Policy())).components
     assert [unit.name for unit in offered.description.units] == ["eye"]

@@ -18,7 +18,7 @@ from nondum.host.catalogue.records import ComponentRecord, JournalEntry, Rollbac
 from nondum.host.catalogue.state import HostState
 from nondum.sdk.errors import ConfigRefused, Problem
 
-SCHEMA = 7
+SCHEMA = 8
 
 _UPGRADES = {
     1: "CREATE TABLE goals (id TEXT PRIMARY KEY, text TEXT NOT NULL, pddl TEXT NOT NULL,"
@@ -67,6 +67,19 @@ _UPGRADES = {
     " ORDER BY rowid;"
     "DROP TABLE rollbacks; ALTER TABLE latest RENAME TO rollbacks;",
     6: "CREATE TABLE connections (input TEXT PRIMARY KEY, stream TEXT NOT NULL) STRICT;",
+    # A component had the id of its manifest: it stays the name of whoever has it, or had it last.
+    7: "CREATE TABLE names (payload_id TEXT PRIMARY KEY, components TEXT NOT NULL,"
+    " plugins TEXT NOT NULL) STRICT;"
+    "INSERT INTO names SELECT payload_id, json_group_object(own, own), '{}' FROM"
+    " (SELECT own, payload_id, row_number() OVER (PARTITION BY own ORDER BY left_s DESC) AS place"
+    " FROM (SELECT c.value AS own, payload_id, 9e999 AS left_s FROM payloads,"
+    " json_each(payloads.components) AS c WHERE step NOT IN ('received', 'copied', 'refused')"
+    " UNION SELECT c.key, payload_id, left_wall_s FROM former, json_each(CASE WHEN"
+    " json_valid(components) THEN components ELSE '{}' END) AS c"
+    " WHERE instr(payload_id, '@') = 0 AND typeof(c.key) = 'text')) WHERE place = 1"
+    " GROUP BY payload_id;"
+    "ALTER TABLE payloads DROP COLUMN waits_for;"
+    "ALTER TABLE payloads ADD COLUMN renamed TEXT NOT NULL DEFAULT '{}';",
 }
 """Schema → what makes the next one of it."""
 
@@ -180,6 +193,7 @@ def load(connection: sqlite3.Connection, host: str) -> HostState:
         goals={g.id: g for g in map(rows.goal, every("goals"))},
         former={f.key: f for f in map(rows.former, every("former")) if f is not None},
         highwater={row["payload_id"]: rows.highwater(row) for row in every("highwater")},
+        names={row["payload_id"]: rows.names(row) for row in every("names")},
         rollbacks={
             row["payload_id"]: Rollback(row["digest"], row["release"], row["below"])
             for row in every("rollbacks")
@@ -243,6 +257,7 @@ def _write_state(connection: sqlite3.Connection, before: HostState, after: HostS
                 connection, "highwater", {"payload_id": payload_id, **rows.highwater_row(newest)}
             )
     _write_rollbacks(connection, before, after)
+    _write_names(connection, before, after)
     _difference(connection, "payloads", "key", before.payloads, after.payloads, rows.payload_row)
     for payload in _changed(before.payloads, after.payloads):
         _replace_parts(connection, "sources", "payload", payload.key, rows.source_rows(payload))
@@ -257,6 +272,14 @@ def _write_rollbacks(connection: sqlite3.Connection, before: HostState, after: H
     for payload_id, back in after.rollbacks.items():
         row = {"digest": back.digest, "release": back.release, "below": back.below}
         _insert(connection, "rollbacks", {"payload_id": payload_id, **row})
+
+
+def _write_names(connection: sqlite3.Connection, before: HostState, after: HostState) -> None:
+    for payload_id in before.names.keys() - after.names.keys():
+        connection.execute("DELETE FROM names WHERE payload_id = ?", (payload_id,))
+    for payload_id, names in after.names.items():
+        if before.names.get(payload_id) != names:
+            _insert(connection, "names", rows.names_row(payload_id, names))
 
 
 def _host_row(state: HostState) -> rows.Row:

@@ -8,6 +8,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
+from nondum.planning.given_names import GivenNames
 from nondum.planning.goal import GoalKind
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
@@ -201,6 +202,7 @@ class ComponentRecord:
     """A component of an active payload."""
 
     id: str
+    """Its name on this host: the id in its manifest, unless another payload has one of that id."""
     payload: str
     """Key of its payload."""
     payload_id: str
@@ -210,6 +212,7 @@ class ComponentRecord:
     version: str
     state: ComponentState
     description: PluginDescription
+    """What its plugin says, under the plugin's name on this host."""
     venv: Path
     site_packages: Path
     scratch: Path
@@ -326,9 +329,10 @@ class PayloadRecord:
     """Drive → the payload's folder on it."""
     phases: Mapping[str, Moment]
     """`seen`, `verified`, `installed`, `ready` → when, as far as it has come."""
-    waits_for: str = ""
-    """Key of a payload that must be gone first: it brings the same components."""
     components: tuple[str, ...] = ()
+    """By their names on this host; empty until it was verified."""
+    renamed: Mapping[str, str] = field(default_factory=dict)
+    """Id in its manifest → name on this host, of those components where that is another."""
     problems: tuple[Problem, ...] = ()
     was: int = 0
     """The release that it took over from when it last became active; 0: none."""
@@ -337,6 +341,12 @@ class PayloadRecord:
     def drives(self) -> tuple[str, ...]:
         """Where it is, by name."""
         return tuple(sorted(self.sources))
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Id in its manifest → name on this host, of each component."""
+        ids = {name: id for id, name in self.renamed.items()}
+        return {ids.get(name, name): name for name in self.components}
 
 
 @dataclass(frozen=True, slots=True)
@@ -412,6 +422,8 @@ class Snapshot:
     safety: Safety = Safety.OFF
     tries: Mapping[str, int] = field(default_factory=dict)
     """What daemons died at, as `lifecycle/tries.py` counts it."""
+    names: Mapping[str, GivenNames] = field(default_factory=dict)
+    """Payload id → what its components and plugins are called here."""
 
     def everyone(self) -> Iterator[tuple[str, ComponentRecord | PeerComponent]]:
         """Each component, this host's own first, with the name of its host."""

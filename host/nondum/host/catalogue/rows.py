@@ -28,6 +28,7 @@ from nondum.host.catalogue.records import (
 )
 from nondum.host.catalogue.state import Highwater
 from nondum.host.events import plain
+from nondum.planning.given_names import GivenNames
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, Problem
 
@@ -105,8 +106,8 @@ def payload_row(payload: PayloadRecord) -> Row:
         "fleet": payload.fleet,
         "step": payload.step.value,
         "phases": as_json({name: _pair(moment) for name, moment in payload.phases.items()}),
-        "waits_for": payload.waits_for,
         "components": as_json(payload.components),
+        "renamed": as_json(payload.renamed),
         "problems": as_json(payload.problems),
         "was": payload.was,
     }
@@ -125,8 +126,8 @@ def payload(row: sqlite3.Row, sources: Iterable[sqlite3.Row]) -> PayloadRecord:
         step=Step(row["step"]),
         sources={source["drive"]: Path(source["folder"]) for source in sources},
         phases={name: Moment(*pair) for name, pair in phases.items()},
-        waits_for=row["waits_for"],
         components=tuple(json.loads(row["components"])),
+        renamed=json.loads(row["renamed"]),
         problems=_problems(row["problems"]),
         was=row["was"],
     )
@@ -299,6 +300,20 @@ def highwater_row(newest: Highwater) -> Row:
 def highwater(row: sqlite3.Row) -> Highwater:
     """The newest release of its row."""
     return Highwater(row["release"], row["digest"], row["owner"])
+
+
+def names_row(payload_id: str, names: GivenNames) -> Row:
+    """A row of `names`."""
+    return {
+        "payload_id": payload_id,
+        "components": as_json(names.components),
+        "plugins": as_json(names.plugins),
+    }
+
+
+def names(row: sqlite3.Row) -> GivenNames:
+    """What is called how, of its row."""
+    return GivenNames(json.loads(row["components"]), json.loads(row["plugins"]))
 
 
 def former_row(former: FormerPayload) -> Row:

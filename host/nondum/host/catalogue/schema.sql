@@ -28,8 +28,8 @@ CREATE TABLE payloads (
     fleet       TEXT NOT NULL,
     step        TEXT NOT NULL,
     phases      TEXT NOT NULL,           -- JSON {phase: [monotonic_s, wall_s]}
-    waits_for   TEXT NOT NULL,
-    components  TEXT NOT NULL,           -- JSON, as its manifest names them
+    components  TEXT NOT NULL,           -- JSON, by their names on this host
+    renamed     TEXT NOT NULL DEFAULT '{}', -- JSON {id in its manifest: name}, where they differ
     problems    TEXT NOT NULL,           -- JSON
     was         INTEGER NOT NULL DEFAULT 0 -- the release that it took over from
 ) STRICT;
@@ -128,6 +128,12 @@ CREATE TABLE highwater (                 -- never pruned
     release     INTEGER NOT NULL,        -- the newest, for whatever fleet
     digest      TEXT NOT NULL,
     owner       TEXT NOT NULL            -- role by which it was the first to come in
+) STRICT;
+
+CREATE TABLE names (                     -- what is called how on this host
+    payload_id  TEXT PRIMARY KEY,
+    components  TEXT NOT NULL,           -- JSON {id in its manifest: name}
+    plugins     TEXT NOT NULL            -- JSON {distribution: name}
 ) STRICT;
 
 CREATE TABLE rollbacks (                 -- earlier releases that people went back to

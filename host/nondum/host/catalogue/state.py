@@ -20,6 +20,7 @@ from nondum.host.catalogue.records import (
     Safety,
     Snapshot,
 )
+from nondum.planning.given_names import GivenNames
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +50,8 @@ class HostState:
     """Name of an optional input → the stream that a person has connected to it."""
     highwater: Mapping[str, Highwater] = field(default_factory=dict)
     """Payload id → newest release, for whatever fleet it was."""
+    names: Mapping[str, GivenNames] = field(default_factory=dict)
+    """Payload id → what its components and plugins are called here; kept until it is forgotten."""
     rollbacks: Mapping[str, Rollback] = field(default_factory=dict)
     """Payload id → the earlier release that a person went back to."""
     goals: Mapping[str, GoalRecord] = field(default_factory=dict)
@@ -88,6 +91,7 @@ class HostState:
             goals=tuple(self.goals.values()),
             former=tuple(self.former.values()),
             peers=tuple(sorted(self.peers.values(), key=lambda p: p.name)),
+            names=self.names,
             safety=self.safety,
             tries=self.tries,
         )

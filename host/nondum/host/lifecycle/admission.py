@@ -1,4 +1,4 @@
-"""Whether a payload may come in beside what is, and was, here: releases and components."""
+"""Whether a release of a payload may come in, after those that were here."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from datetime import datetime
 
-from nondum.host.catalogue.records import Moment, PayloadRecord, Step
+from nondum.host.catalogue.records import Moment, PayloadRecord
 from nondum.host.catalogue.state import Highwater, HostState
 from nondum.host.events import PayloadActivated, PayloadFound
 from nondum.host.lifecycle import releases
@@ -23,8 +23,6 @@ FARTHEST_DATE_S = 20 * 366 * 86400
 its date lets its release go as far ahead where this host's clock is behind."""
 
 _NOTHING = Highwater(0, "")
-
-_HOLDS_NOTHING = frozenset({Step.RECEIVED, Step.COPIED, Step.REFUSED, Step.GONE})
 
 
 def release_problems(state: HostState, found: PayloadFound, at: Moment) -> Iterator[Problem]:
@@ -108,32 +106,3 @@ def _date_s(found: PayloadFound) -> int:
     except ValueError:
         return floor_s
     return min(int(built.timestamp()), floor_s + FARTHEST_DATE_S)
-
-
-def rivals(state: HostState, payload: str, components: tuple[str, ...]) -> list[PayloadRecord]:
-    """Other payloads on this host that bring a component of the same id."""
-    return [
-        other
-        for other in state.payloads.values()
-        if other.key != payload
-        and other.step not in _HOLDS_NOTHING
-        and not _is_same_payload(state, other, payload)
-        and set(other.components) & set(components)
-    ]
-
-
-def _is_same_payload(state: HostState, other: PayloadRecord, payload: str) -> bool:
-    """Whether it is another release of the same one: one of them is in force at a time."""
-    known = state.payloads.get(payload)
-    return known is not None and known.payload_id == other.payload_id
-
-
-def taken(rival: PayloadRecord, components: tuple[str, ...]) -> Problem:
-    """The refusal of components that `rival` brought before."""
-    shared = ", ".join(sorted(set(rival.components) & set(components)))
-    return Problem(
-        "COMPONENT_TAKEN",
-        f"{rival.payload_id} {rival.version} already brings {shared}",
-        where=shared,
-        fix=f"pull {rival.payload_id} first",
-    )

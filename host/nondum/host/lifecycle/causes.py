@@ -53,7 +53,6 @@ HELPED_BY_RETRY = frozenset(
         "CHILD_DIED",
         "CHILD_LIMIT",
         "CHILD_STALLED",
-        "COMPONENT_TAKEN",
         "HELPER_BUSY",
         "HELPER_FAILED",
         "HELPER_SILENT",

@@ -9,7 +9,7 @@ import asyncio
 import logging
 import shutil
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -175,14 +175,14 @@ class Installation:
 
     async def store(self, effect: effects.StoreWheels) -> tuple[Event, ...]:
         """Fill the store and make the venvs."""
-        fresh = await self._install(effect.payload, admit_beside=effect.beside)
+        fresh = await self._install(effect.payload, effect.renamed, admit_beside=effect.beside)
         return (WheelsStored(effect.payload, fresh),)
 
     async def probe(self, effect: effects.ProbeComponents) -> tuple[Event, ...]:
         """Start all workers, or none. Raises `WorkerFailed` with what every one did wrong."""
         key = effect.payload
         if key not in self._prepared:  # a restart of the daemon, or another try
-            await self._install(key)
+            await self._install(key, effect.renamed)
         self._promises.make(key, self._needs[key])
         if effect.beside and (reason := await self._promises.why_not_beside(key, effect.beside)):
             return (BesideRefused(key, reason),)
@@ -288,7 +288,9 @@ class Installation:
         free_mb = shutil.disk_usage(self._folders.root).free // 2**20
         return free_mb - self._options.reserve_mb, free_memory_mb()
 
-    async def _install(self, key: str, *, admit_beside: str | None = None) -> int:
+    async def _install(
+        self, key: str, renamed: Mapping[str, str], *, admit_beside: str | None = None
+    ) -> int:
         """Run the job `install`; says how many wheels the store did not have.
 
         A payload that is to be let in, beside a release or "", is refused if its memory is
@@ -305,9 +307,9 @@ class Installation:
             self._promises.saw_gpu(Gpu(**told["gpu"]) if told["gpu"] else None)
         if told["uncompiled"]:
             self._uncompiled.add(key)
+        named = [(said, renamed.get(said["id"], said["id"])) for said in told["components"]]
         self._prepared[key] = tuple(
-            Prepared.parse(said, self._folders.scratch(key, said["id"]))
-            for said in told["components"]
+            Prepared.parse(said, name, self._folders.scratch(key, name)) for said, name in named
         )
         self._grants[key] = Grant.parse(told["grant"])
         self._goals[key] = tuple(told["goals"])

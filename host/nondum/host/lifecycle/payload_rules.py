@@ -19,7 +19,6 @@ from nondum.host.effects import (
     RestPayload,
     StoreWheels,
     SuspendPayload,
-    VerifyPayload,
 )
 from nondum.host.events import (
     Event,
@@ -40,7 +39,7 @@ from nondum.host.events import (
     TrustChanged,
     WheelsStored,
 )
-from nondum.host.lifecycle import admission, causes, releases, replacement, safe_mode, tries
+from nondum.host.lifecycle import admission, causes, naming, releases, replacement, safe_mode, tries
 from nondum.host.lifecycle.claims import granted
 from nondum.host.lifecycle.drive_rules import copy_of, drop_replaced, drop_rewritten, read
 from nondum.host.lifecycle.turn import Turn
@@ -97,21 +96,18 @@ def on_payload_found(turn: Turn, event: PayloadFound) -> None:
 
 
 def on_payload_verified(turn: Turn, event: PayloadVerified) -> None:
-    """Go on, unless another payload brings one of its components, or it would replace a release
-    that can be planned with by one that cannot."""
+    """Name its components and go on, unless it would replace a release that can be planned with by
+    one that cannot."""
     payload = turn.state.payloads.get(event.payload)
     if payload is None or payload.step is not Step.COPIED:
         return
-    rivals = admission.rivals(turn.state, event.payload, event.components)
-    staying = [rival for rival in rivals if rival.step is not Step.REMOVING]
-    if staying:
-        problems = tuple(admission.taken(rival, event.components) for rival in staying)
-        turn.pending.append(PayloadRefused(event.payload, problems))
-    elif rivals:
-        turn.put_payload(replace(payload, waits_for=rivals[0].key))
-    elif worse := replacement.problems(turn.state, payload, event.index):
+    payload = naming.named(turn.state, payload, event.components)
+    said = {payload.names[id]: description for id, description in event.index.items()}
+    index = naming.as_called(turn.state, payload.payload_id, said)
+    if worse := replacement.problems(turn.state, payload, index):
         turn.pending.append(PayloadRefused(event.payload, worse))
     else:
+        turn.put_payload(payload)
         on_payload_step(turn, event)
 
 
@@ -133,11 +129,13 @@ def on_payload_activated(turn: Turn, event: PayloadActivated) -> None:
     payload = turn.state.payloads.get(event.payload)
     if payload is None or payload.step is not Step.PROBED:
         return
-    index = {component.id: component.description for component in event.components}
+    said = {component.id: component.description for component in event.components}
+    index = naming.as_called(turn.state, payload.payload_id, said)
     if worse := replacement.problems(turn.state, payload, index):
         turn.pending.append(PayloadFailed(event.payload, worse))
     else:
-        on_payload_step(turn, event)
+        called = (replace(c, description=index[c.id]) for c in event.components)
+        on_payload_step(turn, replace(event, components=tuple(called)))
 
 
 def on_payload_tried(turn: Turn, event: RetryAsked) -> None:
@@ -188,7 +186,7 @@ def enter(
     """Bring a payload to the step that a row of a table leads to."""
     turn.events.append(event)
     effect = effect_for(row.effect, payload, turn.state) if row.effect and with_effect else None
-    payload = _told(replace(payload, step=row.to, waits_for=""), event)
+    payload = _told(replace(payload, step=row.to), event)
     if row.to in PHASES:
         payload = replace(payload, phases={**payload.phases, PHASES[row.to]: turn.at})
     turn.put_payload(payload)
@@ -207,8 +205,6 @@ def enter(
 def _told(payload: PayloadRecord, event: Event) -> PayloadRecord:
     """The payload with what an event says of it."""
     match event:
-        case PayloadVerified():
-            return replace(payload, components=event.components)
         case PayloadRefused() | PayloadFailed() | PayloadSentAway() | PayloadDistrusted():
             return replace(payload, problems=event.problems)
         case RetryAsked():
@@ -244,10 +240,12 @@ def kept(state: HostState) -> tuple[str, ...]:
 
 
 def on_forget_asked(turn: Turn, event: ForgetAsked) -> None:
-    """Forget a payload that was here."""
+    """Forget a payload that was here, and what it was called: others may have these names."""
     if event.payload in turn.state.former:
         turn.events.append(event)
         turn.forget(event.payload)
+        names = {id: one for id, one in turn.state.names.items() if id != event.payload}
+        turn.change(names=names)
 
 
 def effect_for(
@@ -260,7 +258,10 @@ def effect_for(
         return kind(payload.key, payload.components)
     if issubclass(kind, StoreWheels | ProbeComponents | ActivatePayload):
         old = releases.in_force(state, payload)
-        return kind(payload.key, beside=old.key if old else "")
+        beside = old.key if old else ""
+        if issubclass(kind, ActivatePayload):
+            return kind(payload.key, beside)
+        return kind(payload.key, beside, renamed=payload.renamed)
     return kind(payload.key)
 
 
@@ -271,7 +272,10 @@ def _activate(turn: Turn, payload: PayloadRecord, event: PayloadActivated) -> No
     turn.forget(payload.payload_id)
     turn.change(mounts={**_by_unit(event.mounts), **turn.state.mounts})
     reached = admission.reached(turn.state, payload, event)
-    turn.change(highwater={**turn.state.highwater, payload.payload_id: reached})
+    turn.change(
+        highwater={**turn.state.highwater, payload.payload_id: reached},
+        names=naming.remembering(turn.state, payload, event.components),
+    )
 
 
 def _entering(
@@ -312,11 +316,6 @@ def _by_unit(mounts: Iterable[MountPose]) -> dict[str, MountPose]:
 
 
 def _leave(turn: Turn, payload: PayloadRecord) -> None:
-    """Let in whoever waited for it; if it came back meanwhile, read its drives again."""
-    turn.effects.extend(
-        VerifyPayload(other.key)
-        for other in turn.state.payloads.values()
-        if other.waits_for == payload.key
-    )
+    """If it came back meanwhile, read its drives again."""
     for name in payload.sources:
         read(turn, turn.state.drives[name])

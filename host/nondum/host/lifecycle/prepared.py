@@ -23,6 +23,7 @@ class Prepared:
     """One component, installed and not yet active."""
 
     id: str
+    """Its name on this host."""
     distribution: str
     entry_point: str
     description: PluginDescription
@@ -36,10 +37,10 @@ class Prepared:
     """(unit, xyz, rpy) as the manifest has them."""
 
     @classmethod
-    def parse(cls, said: Mapping[str, Any], scratch: Path) -> Prepared:
+    def parse(cls, said: Mapping[str, Any], name: str, scratch: Path) -> Prepared:
         """Read what the job `install` told. It comes from our own child and is trusted."""
         return cls(
-            id=said["id"],
+            id=name,
             distribution=said["distribution"],
             entry_point=said["entry_point"],
             description=PluginDescription.parse(said["description"], where=said["id"]),

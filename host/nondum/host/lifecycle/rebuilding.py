@@ -25,7 +25,7 @@ from nondum.host.catalogue.records import (
 from nondum.host.catalogue.state import Highwater, HostState
 from nondum.host.drives.reader import Arguments, Report
 from nondum.host.effects import NoteInstalled
-from nondum.host.lifecycle import tries
+from nondum.host.lifecycle import naming, tries
 from nondum.host.lifecycle.folders import KEEPS_FOLDER
 from nondum.host.lifecycle.turn import Turn
 from nondum.sdk.errors import NondumError
@@ -122,8 +122,8 @@ def _with(state: HostState, one: Mapping[str, Any], at: Moment) -> HostState:
         step=Step.STORED,
         sources={drive.id: folder},
         phases={"seen": at},
-        components=tuple(one["components"]),
     )
+    record = naming.named(state, record, one["components"])
     newest = state.highwater.get(record.payload_id)
     reached = Highwater(record.release, record.digest)
     if newest is not None and newest.release >= record.release:

@@ -55,7 +55,7 @@ def _recover(turn: Turn, payload: PayloadRecord, found: HostState, *, is_missing
         problems = (_why_not(turn.state, payload, is_missing=is_missing),)
     if row.effect is not None:
         turn.effects.append(effect_for(row.effect, payload, turn.state))
-    turn.put_payload(replace(payload, step=row.to, waits_for="", problems=problems))
+    turn.put_payload(replace(payload, step=row.to, problems=problems))
     if row.to is not payload.step or row.to is Step.REMOVING:
         turn.events.append(Recovered(payload.key, payload.step.name))
 

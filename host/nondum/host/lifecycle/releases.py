@@ -160,7 +160,8 @@ def on_beside_refused(turn: Turn, event: BesideRefused) -> None:
     old = in_force(turn.state, payload)
     if old is not None:
         turn.pending.append(PayloadSuperseded(old.key, payload.key, event.reason))
-    turn.effects.append(ProbeComponents(payload.key, after=old.key if old else ""))
+    after = old.key if old else ""
+    turn.effects.append(ProbeComponents(payload.key, after=after, renamed=payload.renamed))
 
 
 def on_rollback_asked(turn: Turn, event: RollbackAsked) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict
 from typing import Protocol
 
 from py_trees.behaviour import Behaviour as Node
@@ -177,8 +178,8 @@ class Views:
 
     def composition(self) -> Row:
         """All that planning goes by, for tools that plan by themselves: `host`, `components`,
-        `facts`, `excluded` actions and why, `silence` of what is here, and the components `seen`
-        here before."""
+        `names` that payloads have here, `facts`, `excluded` actions and why, `silence` of what is
+        here, and the components `seen` here before."""
         beliefs, pursuit = self._mind.beliefs, self._mind.pursuit
         kept_out = dict(pursuit.left_out)
         return {
@@ -186,6 +187,7 @@ class Views:
             "components": [
                 {
                     "component": component.id,
+                    "payload": component.payload_id,
                     "host": host,
                     "rank": component.rank,
                     "description": component.description.to_dict(),
@@ -193,6 +195,7 @@ class Views:
                 for host, component in self._everyone()
                 if component.id not in kept_out
             ],
+            "names": {id: asdict(names) for id, names in beliefs.snapshot.names.items()},
             "facts": sorted(beliefs.world.bare_facts),
             "excluded": pursuit.failures,
             "silence": Silence.of(beliefs.snapshot).to_dict(),

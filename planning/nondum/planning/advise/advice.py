@@ -116,7 +116,10 @@ def _sifted(
     unfit: list[Candidate] = []
     for number, candidate in enumerate(candidates):
         sound = trials.sound(number) if number in suspects else candidate
-        (fit if sound.contributions else unfit).append(sound)
+        if sound.contributions:
+            fit.append(sound)
+        elif sound.caveats:  # else all of it is here, from another release
+            unfit.append(sound)
     return fit, unfit
 
 

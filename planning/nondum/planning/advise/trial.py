@@ -104,7 +104,7 @@ class Trials:
         return frozenset(kept)
 
     def taken(self, chosen: Chosen) -> Chosen:
-        """The candidates that bring a component of which there is one here already."""
+        """The candidates that bring a component which is here already, from another release."""
         return frozenset(n for n in chosen for c in self._contributions[n] if self._is_taken(c))
 
     def refused(self, chosen: Chosen) -> Chosen:
@@ -119,16 +119,16 @@ class Trials:
         )
 
     def sound(self, number: int) -> Candidate:
-        """A candidate without what would be kept out here; the caveats say why."""
+        """A candidate without what is here already, from another release of it, and without what
+        would be kept out here; the caveats say why."""
         candidate = self.candidates[number]
         found = merge((*self._here.contributions, *self._free(number)), self._here.host)
         caveats: list[Problem] = []
         kept: list[Contribution] = []
         for contribution in candidate.contributions:
             if self._is_taken(contribution):
-                message = f"component {contribution.component!r} is here already"
-                caveats.append(Problem("COMPONENT_TAKEN", message, where=candidate.name))
-            elif contribution.component in found.quarantined:
+                continue
+            if contribution.component in found.quarantined:
                 caveats += found.quarantined[contribution.component]
             else:
                 kept.append(contribution)

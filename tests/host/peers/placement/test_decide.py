@@ -73,7 +73,7 @@ def test_what_another_machine_may_have_is_looked_for(code: str) -> None:
     assert parcels(host(payload(Step.REFUSED, code)), {}).keys() == {"k1"}
 
 
-@pytest.mark.parametrize("code", ["SIG_MISSING", "HASH_MISMATCH", "ROLLBACK", "COMPONENT_TAKEN"])
+@pytest.mark.parametrize("code", ["SIG_MISSING", "HASH_MISMATCH", "ROLLBACK"])
 def test_what_is_wrong_or_not_trusted_is_not_handed_on(code: str) -> None:
     refused = payload(Step.REFUSED, "NO_MEMORY", code)
     assert not parcels(host(refused), {})

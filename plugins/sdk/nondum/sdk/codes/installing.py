@@ -10,11 +10,6 @@ CODES = (
         "nothing, or `nondum payload uninstall` it first",
     ),
     Code(
-        "COMPONENT_TAKEN",
-        "Another payload brings this component already.",
-        "pull the other payload first",
-    ),
-    Code(
         "DEVICE_MISSING",
         "A device that the component needs is not plugged in.",
         "plug the device in; the component starts by itself then",
