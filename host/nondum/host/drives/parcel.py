@@ -67,8 +67,8 @@ def outline(arguments: Arguments, report: Report) -> list[list[Any]]:
 
 
 def judge(arguments: Arguments, report: Report) -> dict[str, Any]:
-    """Whether a payload, of which the metadata is in `folder`, would run here: its components, and
-    the files that are still `needed`: path, hash and size of each wheel that the store has not.
+    """Whether a payload, of which the metadata is in `folder`, would run here: the files that are
+    still `needed`, path, hash and size of each wheel that the store has not.
 
     Raises `PayloadRefused` with all that keeps it from running here.
     """
@@ -92,8 +92,7 @@ def judge(arguments: Arguments, report: Report) -> dict[str, Any]:
     problems = preflight.preflight(staged.manifest, staged.locks, beside)
     if problems:
         raise PayloadRefused(*problems)
-    components = [component.id for component in staged.manifest.components]
-    return {"components": components, "needed": [_row(entry) for entry in needed]}
+    return {"needed": [_row(entry) for entry in needed]}
 
 
 def _listed(folder: Path) -> Contents:

@@ -136,7 +136,6 @@ class Taking:
             for row in await self._run(guest, "outline", {}):
                 await fetching.fetch(Listed(*row))
             judged = await self._run(guest, "judge", await self._judged(guest))
-            self._check_components(guest, tuple(judged["components"]))
             await self._fetch_wheels(guest, fetching, [Listed(*row) for row in judged["needed"]])
         except OSError as error:
             told = f"what is fetched cannot be written: {error.strerror}"
@@ -185,12 +184,6 @@ class Taking:
         if problems:
             raise PayloadRefused(*problems)
         guest.version = found.version
-
-    def _check_components(self, guest: Guest, components: tuple[str, ...]) -> None:
-        rivals = admission.rivals(self._state(), guest.key, components)
-        problems = [admission.taken(rival, components) for rival in rivals]
-        if problems:
-            raise PayloadRefused(*problems)
 
     async def _fetch_wheels(self, guest: Guest, fetching: Fetching, needed: list[Listed]) -> None:
         if not needed:
