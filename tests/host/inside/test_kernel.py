@@ -22,7 +22,7 @@ FAILS = {
 }
 FAILS_ROOT = {
     "copy_mount('/no-such')": "ENOENT",
-    "map_mount(-1, -1)": "EBADF",
+    "map_mount(-1, 2**31 - 1)": "EBADF",
     "place_mount(-1, '/tmp')": "EBADF",
 }
 
