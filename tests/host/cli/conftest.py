@@ -26,9 +26,9 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningHost]:
 
 
 class Answering(Protocol):
-    """Makes a socket whose daemon answers any one question with these bytes."""
+    """Makes a socket whose daemon answers questions, whatever they are, with these bytes in turn."""
 
-    def __call__(self, answer: bytes, *, hangs_up: bool = True) -> Path: ...
+    def __call__(self, *answers: bytes, hangs_up: bool = True) -> Path: ...
 
 
 @pytest.fixture
@@ -36,20 +36,21 @@ def answering(tmp_path: Path) -> Iterator[Answering]:
     listeners: list[socket.socket] = []
     threads: list[threading.Thread] = []
 
-    def serve(listener: socket.socket, answer: bytes, hangs_up: bool) -> None:
-        connection, _ = listener.accept()
-        with connection, connection.makefile("rb") as lines:
-            lines.readline()
-            connection.sendall(answer)
-            if not hangs_up:
-                lines.readline()  # until the other end leaves
+    def serve(listener: socket.socket, answers: tuple[bytes, ...], hangs_up: bool) -> None:
+        for answer in answers:
+            connection, _ = listener.accept()
+            with connection, connection.makefile("rb") as lines:
+                lines.readline()
+                connection.sendall(answer)
+                if not hangs_up:
+                    lines.readline()  # until the other end leaves
 
-    def answering(answer: bytes, *, hangs_up: bool = True) -> Path:
+    def answering(*answers: bytes, hangs_up: bool = True) -> Path:
         path = tmp_path / "answering.sock"
         listener = socket.socket(socket.AF_UNIX)
         listener.bind(str(path))
         listener.listen()
-        threads.append(threading.Thread(target=serve, args=(listener, answer, hangs_up)))
+        threads.append(threading.Thread(target=serve, args=(listener, answers, hangs_up)))
         threads[-1].start()
         listeners.append(listener)
         return path

@@ -71,6 +71,8 @@ Commands:
 """
 WHY = r"it is \u001b[2Jticked"
 TREE = f'{{"result":{{"name":"nondum","status":"RUNNING","why":"{WHY}","children":[]}}}}\n'.encode()
+NO_NAMES = b'{"result":{}}\n'
+"""Of units and streams: none has a shorter one."""
 HEAVY = (
     "asyncio",
     "rich",
@@ -246,7 +248,7 @@ def test_a_reader_that_leaves_ends_it_in_silence(answering: Answering) -> None:
     os.close(read)
     with open(write, "wb") as broken:  # noqa: PTH123  # it is a descriptor, not a path
         done = subprocess.run(
-            command("--control", answering(TREE), "tree"),
+            command("--control", answering(TREE, NO_NAMES), "tree"),
             stdout=broken,
             stderr=subprocess.PIPE,
             text=True,
@@ -258,11 +260,11 @@ def test_a_reader_that_leaves_ends_it_in_silence(answering: Answering) -> None:
 @pytest.mark.parametrize("wants_colour", [True, False], ids=["plain", "NO_COLOR"])
 def test_colour_is_for_terminals_that_want_it(answering: Answering, wants_colour: bool) -> None:
     environment = {} if wants_colour else {"NO_COLOR": "1"}
-    shown = in_terminal("--control", answering(TREE), "tree", **environment)
+    shown = in_terminal("--control", answering(TREE, NO_NAMES), "tree", **environment)
     assert "nondum" in shown
     assert ("\x1b[33m▶" in shown) == wants_colour
 
 
 def test_no_colour_in_a_pipe(answering: Answering) -> None:
-    ran = nondum("--control", answering(TREE), "tree").ok()
+    ran = nondum("--control", answering(TREE, NO_NAMES), "tree").ok()
     assert ran.out == "▶ nondum  — it is \\x1b[2Jticked\n"
