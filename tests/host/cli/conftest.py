@@ -26,7 +26,7 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningHost]:
 
 
 class Answering(Protocol):
-    """Makes a socket whose daemon answers questions, whatever they are, with these bytes in turn."""
+    """Makes a socket whose daemon answers questions, whatever they are, with these in turn."""
 
     def __call__(self, *answers: bytes, hangs_up: bool = True) -> Path: ...
 

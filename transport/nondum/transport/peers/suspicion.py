@@ -29,7 +29,9 @@ class Terms:
     longest_beat_s: float = 7.0
     """However seldom a peer says that it pings: a hostile one could name any number."""
     confirm_beats: float = 2.0
-    longest_confirm_s: float = 2.5
+    longest_confirm_s: float = 1.9
+    """A little longer than 100 hosts' beats: so a suspected peer's own next ping may still come."""
+    longest_resume_s: float = 2.5
 
     def suspect_s(self, beat_s: float) -> float:
         """Silence after which a peer is suspected.
@@ -43,7 +45,7 @@ class Terms:
         """How long a suspected peer has to answer.
 
         >>> Terms().confirm_s(0.3), Terms().confirm_s(1.8)
-        (0.6, 2.5)
+        (0.6, 1.9)
         """
         return min(self.confirm_beats * self._bounded(beat_s), self.longest_confirm_s)
 
@@ -51,7 +53,7 @@ class Terms:
         """Silence after which a peer is given up that no other peer has heard either.
 
         >>> round(Terms().limit_s(0.3), 2), round(Terms().limit_s(1.8), 2)
-        (1.35, 4.75)
+        (1.35, 4.15)
         """
         return self.suspect_s(beat_s) + self.confirm_s(beat_s)
 
@@ -61,7 +63,7 @@ class Terms:
         >>> Terms().resume_s(0.3), Terms().resume_s(1.8)
         (0.5, 2.5)
         """
-        return min(0.5 * self._bounded(beat_s) / 0.3, self.longest_confirm_s)
+        return min(0.5 * self._bounded(beat_s) / 0.3, self.longest_resume_s)
 
     def doubt_s(self, beat_s: float) -> float:
         """How long this host may have been silent itself before it must ask whether its peer, of
