@@ -155,6 +155,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
         *_IN_ROOMS,
         *(f"{_TH}/workers/test_{each}.py" for each in ("spare", "host_death")),
     ),
+    f"{_H}/workers/spare.py": (f"{_TH}/workers/test_spare.py",),
     f"{_H}/inside/keeper.py": (
         *(f"{_TC}/test_service.py", *_IN_ROOMS, f"{_TH}/workers/test_host_death.py"),
     ),

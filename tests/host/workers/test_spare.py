@@ -22,9 +22,10 @@ from tests.kit.workers import SDK, WorkersUnderTest
 from nondum.host.cgroups.cages import Cages, NoTree
 from nondum.host.inside.bootstrap import PRELOADED
 from nondum.host.workers import base_interpreter
+from nondum.host.workers.confinements import Unconfined
 from nondum.host.workers.launcher import MARK, WorkerLauncher, owner_mark
 from nondum.host.workers.leftovers import end_leftovers
-from nondum.host.workers.spare import OWNER
+from nondum.host.workers.spare import OWNER, Spare
 from nondum.sdk.errors import WorkerFailed
 
 pytestmark = pytest.mark.anyio
@@ -73,6 +74,16 @@ async def test_the_spare_becomes_the_next_worker(tested: WorkersUnderTest) -> No
     assert spare in ancestors(tested.workers.pids()["cam"])
     await tested.start("cam-2", QUIET)
     assert spare not in ancestors(tested.workers.pids()["cam-2"])
+
+
+def test_one_that_ends_instead_of_asking_for_its_scratch_folder_is_no_worker() -> None:
+    spare = Spare(Unconfined(), Unconfined().ground(None))
+    try:
+        spare.popen.kill()
+        with pytest.raises(ConnectionResetError):
+            spare.map_scratch(user=61184)
+    finally:
+        spare.close()
 
 
 async def test_a_worker_that_was_a_spare_lives_where_others_do(tested: WorkersUnderTest) -> None:
