@@ -123,6 +123,8 @@ def test_everything_wrong_is_told_at_once() -> None:
     assert len(told) == 6
     text = "\n".join(told)
     assert "swapped takes (ctx, h, u), but its action has (ctx, u, h)" in text
+    line = swapped.__code__.co_firstlineno
+    assert any(f"test_plugin.py:{line} behaviour 'swapped'" in one for one in told)
     assert "NoInitialise takes (ctx), but its action has (ctx, u)" in text
     assert "behaviour 'unreadable': cannot read the action" in text
     assert "two of the units are called 'a'" in text

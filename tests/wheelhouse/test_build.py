@@ -12,6 +12,7 @@ from tests.wheelhouse.hostile_wheels import WheelBuilder
 from tests.wheelhouse.locks import host
 from tests.wheelhouse.sources import PLUGIN, make_source
 
+from nondum.sdk import codes
 from nondum.sdk.errors import (
     ConfigRefused,
     InstallFailed,
@@ -23,7 +24,7 @@ from nondum.wheelhouse import build, contents, drive, index, lock, payload, pref
 from nondum.wheelhouse.confinement import Level
 from nondum.wheelhouse.cost import Cost, costs
 from nondum.wheelhouse.library_wheels import library_wheel
-from nondum.wheelhouse.resolve import Sources
+from nondum.wheelhouse.resolve import ADD_IT, Sources
 from nondum.wheelhouse.signatures import UnsignedAllowed
 from nondum.wheelhouse.target import Target, targets
 from nondum.wheelhouse.verification import verify
@@ -257,7 +258,10 @@ def test_a_wrong_manifest_is_told(built: Build, tmp_path: Path) -> None:
 
 def test_a_package_that_does_not_build_is_told(built: Build, tmp_path: Path) -> None:
     source = make_source(tmp_path / "src", fail="no compiler here")
-    assert refused(lambda: built(source), InstallFailed) == ["BUILD_FAILED"]
+    with pytest.raises(InstallFailed) as failed:
+        built(source)
+    (problem,) = failed.value.problems
+    assert (problem.code, problem.fix) == ("BUILD_FAILED", codes.remedy("BUILD_FAILED"))
 
 
 def test_every_target_without_a_wheel_is_told(built: Build, tmp_path: Path, wheels: Path) -> None:
@@ -268,7 +272,7 @@ def test_every_target_without_a_wheel_is_told(built: Build, tmp_path: Path, whee
     others = targets((OTHER.architecture,), ("3.12", "3.13"))
     with pytest.raises(InstallFailed) as failed:
         built(source, HERE, *others)
-    assert [p.code for p in failed.value.problems] == ["WHEEL_MISSING"] * 2
+    assert [(p.code, p.fix) for p in failed.value.problems] == [("WHEEL_MISSING", ADD_IT)] * 2
     assert all("native" in p.message for p in failed.value.problems)
     assert [OTHER.architecture in p.where for p in failed.value.problems] == [True, True]
 

@@ -18,7 +18,10 @@ from nondum.wheelhouse.target import Target
 
 TIMEOUT_S = 1800
 
+ADD_IT = "put its wheel into the folder that --wheels names"
 _RAISED = re.compile(r"\w+(Error|Exception)\b: .")
+_ABSENT = ("Could not find a version", "No matching distribution")
+"""What pip begins with when a wheel is not there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +48,7 @@ def make_wheel(package: Path, folder: Path, sources: Sources) -> Path:
         ["wheel", "--no-deps", "--wheel-dir", str(folder), *sources.options(), str(absolute)],
         "BUILD_FAILED",
         str(package),
+        offline=sources.offline,
     )
     (made,) = folder.glob("*.whl")
     return made
@@ -67,11 +71,12 @@ def fetch(wheel: Path, target: Target, folder: Path, sources: Sources) -> tuple[
         ],
         "WHEEL_MISSING",
         f"{wheel.name} for {target.architecture}, Python {target.python}",
+        offline=sources.offline,
     )
     return tuple(sorted(folder.glob("*.whl")))
 
 
-def _pip(arguments: Sequence[str], code: str, where: str) -> None:
+def _pip(arguments: Sequence[str], code: str, where: str, *, offline: bool) -> None:
     # `-I`: modules of the current folder are not run. Paths are relative to it all the same.
     pip = (sys.executable, "-I", "-m", "pip")
     command = [*pip, *arguments, "--quiet", "--disable-pip-version-check"]
@@ -83,7 +88,9 @@ def _pip(arguments: Sequence[str], code: str, where: str) -> None:
         problem = Problem(code, f"pip took longer than {TIMEOUT_S} s", where=where)
         raise InstallFailed(problem) from error
     if done.returncode:
-        raise InstallFailed(Problem(code, telling_line(done.stderr), where=where))
+        line = telling_line(done.stderr)
+        fix = ADD_IT if offline and line.startswith(_ABSENT) else ""
+        raise InstallFailed(Problem(code, line, where=where, fix=fix))
 
 
 def telling_line(said: str) -> str:

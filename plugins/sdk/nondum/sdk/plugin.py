@@ -173,7 +173,7 @@ def _parameter_problems(function: Callable[..., Any]) -> Iterator[Problem]:
     described = behaviour_of(function)
     if described is None:
         return
-    where = f"behaviour {described.name!r}"
+    where = f"{_place(function)} behaviour {described.name!r}".lstrip()
     if described.when_lost not in WHEN_LOST:
         need, have = " or ".join(map(repr, WHEN_LOST)), repr(described.when_lost)
         yield Problem(
@@ -198,6 +198,14 @@ def _parameter_problems(function: Callable[..., Any]) -> Iterator[Problem]:
             where=where,
             fix="give the function `ctx` and then the action's parameters, by name and in order",
         )
+
+
+def _place(function: Callable[..., Any]) -> str:
+    """File and line; nothing of a class without lines of its own."""
+    if isinstance(function, type) and issubclass(function, TickedBehaviour):
+        function = function.initialise
+    code = getattr(function, "__code__", None)
+    return f"{within_packages(code.co_filename)}:{code.co_firstlineno}" if code else ""
 
 
 def _parameters(function: Callable[..., Any]) -> Iterator[str]:
