@@ -1,7 +1,7 @@
 """What a host calls components and plugins, where two payloads have some of one name. Pure.
 
 What the first payload brings keeps its own name; the other's has the id of its payload behind it. A
-name is given once and then kept, whatever comes and goes.
+name that was given does not change while its payload is here.
 """
 
 from __future__ import annotations

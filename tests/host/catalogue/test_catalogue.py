@@ -414,13 +414,12 @@ async def test_file_of_another_version_is_left_alone(tmp_path: Path) -> None:
     assert refused.value.code == "CATALOGUE_VERSION"
 
 
-ALL_ITS_OWN = {"org.example.eye": GivenNames({"eye": "eye"})}
 OF_7 = replace(
     FULL,
     payloads={
         key: replace(one, components=("eye",), renamed={}) for key, one in FULL.payloads.items()
     },
-    names={**ALL_ITS_OWN, "org.example.arm": GivenNames({"arm": "arm", "hand": "hand"})},
+    names={},
 )
 OF_6 = replace(OF_7, connections={})
 OF_5 = replace(
@@ -457,7 +456,7 @@ THE_4 = (
     "ALTER TABLE payloads ADD COLUMN attempts INTEGER NOT NULL DEFAULT 0;"
     "ALTER TABLE payloads DROP COLUMN was; ALTER TABLE highwater DROP COLUMN owner;"
 )
-OF_3 = replace(OF_4, former={}, names=ALL_ITS_OWN)
+OF_3 = replace(OF_4, former={})
 OLDER = {
     1: (f"{THE_4} DROP TABLE goals; DROP TABLE former;", replace(OF_3, goals={})),
     2: (f"{THE_4} DROP TABLE former;", OF_3),
@@ -511,34 +510,6 @@ async def test_highest_release_of_any_fleet_is_taken_over(tmp_path: Path) -> Non
             "org.example.arm": Highwater(5, "arm", ""),
         }
         assert catalogue.state.rollbacks == {"org.example.eye": Rollback("b", 8, 9)}
-
-
-@pytest.mark.anyio
-@pytest.mark.parametrize(
-    ("remembered", "names"),
-    [
-        ('{"eye": {}, "hand": {}}', {"hand": "hand"}),
-        ("{", None),
-        ("[1]", None),
-    ],
-    ids=["one that another has", "no JSON", "no components"],
-)
-async def test_names_of_before_go_to_who_is_here_first(
-    tmp_path: Path, remembered: str, names: dict[str, str] | None
-) -> None:
-    """Schema 7 knew no names but the ids of manifests, and remembered payloads by them."""
-    async with opened(tmp_path) as catalogue:
-        await catalogue.commit(OF_7, ())
-    connection = sqlite3.connect(tmp_path / "catalogue.sqlite")
-    connection.executescript(f"{THE_8} PRAGMA user_version = 7;")
-    with connection:
-        connection.execute("UPDATE former SET components = ?", (remembered,))
-        row = ("org.example.eye@mule", "1.0", '{"ear": {}}', 3.0)
-        connection.execute("INSERT INTO former VALUES (?, ?, ?, ?)", row)
-    connection.close()
-    kept = {**ALL_ITS_OWN, **({"org.example.arm": GivenNames(names)} if names else {})}
-    async with opened(tmp_path) as catalogue:
-        assert catalogue.state.names == kept
 
 
 @pytest.mark.anyio

@@ -124,9 +124,18 @@ def test_a_component_that_comes_with_a_release_gets_a_name_then() -> None:
     assert state.payloads["k2"].names == {"eye": "eye", "arm": "arm--org-x"}
 
 
-def test_a_forgotten_payload_gives_up_its_names() -> None:
+def test_own_name_is_free_while_its_payload_is_away() -> None:
     gone, _ = after(*pulled("a", "k1"), state=active())
-    forgotten, _ = after(events.ForgetAsked("org.x"), state=gone)
+    assert not gone.names
+    state, _ = after(drive("b"), *way_to_active("k2", "b", payload_id="org.y"), state=gone)
+    assert state.payloads["k2"].components == ("eye",)
+    state, _ = after(drive("a"), *way_to_active()[:3], state=state)
+    assert state.payloads["k1"].components == ("eye--org-x",)
+
+
+def test_a_forgotten_payload_gives_up_its_other_name() -> None:
+    gone, _ = after(*pulled("a", "k1"), *pulled("b", "k2"), state=both())
+    forgotten, _ = after(events.ForgetAsked("org.y"), state=gone)
     kept, _ = after(drive("b"), *second()[:3], state=gone)
     free, _ = after(drive("b"), *second()[:3], state=forgotten)
     assert kept.payloads["k2"].components == (OTHER,)
@@ -141,7 +150,7 @@ def test_plugins_share_their_name_only_if_they_say_the_same(words: str, plugin: 
     state = both(words)
     assert state.components["eye"].description.name == "eye"
     assert state.components[OTHER].description.name == plugin
-    assert state.names["org.y"].plugins == {"eye": plugin}
+    assert state.names["org.y"].plugins == ({"eye": plugin} if plugin != "eye" else {})
 
 
 def test_a_plugin_keeps_its_name_when_the_other_one_is_gone() -> None:
@@ -163,7 +172,7 @@ PAYLOADS = {"org.x": "k1", "org.y": "k2", "org.x-y": "k3", "org.x.y": "k4"}
 
 @settings(max_examples=60)
 @given(st.lists(st.tuples(st.sampled_from(list(PAYLOADS)), st.booleans()), max_size=12))
-def test_whatever_comes_and_goes_each_component_has_one_name(
+def test_whatever_comes_and_goes_no_two_have_one_name_and_none_changes_it(
     happened: list[tuple[str, bool]],
 ) -> None:
     """Each payload is plugged in if it is not there, else pulled, or the daemon starts again."""
@@ -178,6 +187,8 @@ def test_whatever_comes_and_goes_each_component_has_one_name(
                 state, _ = after(events.ComponentsProbed(one.key), activated, state=state)
         elif key in state.payloads:
             state, _ = after(*pulled(key, key), state=state)
+            if told[payload_id] == "eye":  # its own is free then
+                del told[payload_id]
         else:
             way = way_to_active(key, key, payload_id=payload_id)
             state, _ = after(drive(key), *way[:-1], state=state)

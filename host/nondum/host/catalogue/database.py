@@ -67,17 +67,8 @@ _UPGRADES = {
     " ORDER BY rowid;"
     "DROP TABLE rollbacks; ALTER TABLE latest RENAME TO rollbacks;",
     6: "CREATE TABLE connections (input TEXT PRIMARY KEY, stream TEXT NOT NULL) STRICT;",
-    # A component had the id of its manifest: it stays the name of whoever has it, or had it last.
     7: "CREATE TABLE names (payload_id TEXT PRIMARY KEY, components TEXT NOT NULL,"
     " plugins TEXT NOT NULL) STRICT;"
-    "INSERT INTO names SELECT payload_id, json_group_object(own, own), '{}' FROM"
-    " (SELECT own, payload_id, row_number() OVER (PARTITION BY own ORDER BY left_s DESC) AS place"
-    " FROM (SELECT c.value AS own, payload_id, 9e999 AS left_s FROM payloads,"
-    " json_each(payloads.components) AS c WHERE step NOT IN ('received', 'copied', 'refused')"
-    " UNION SELECT c.key, payload_id, left_wall_s FROM former, json_each(CASE WHEN"
-    " json_valid(components) THEN components ELSE '{}' END) AS c"
-    " WHERE instr(payload_id, '@') = 0 AND typeof(c.key) = 'text')) WHERE place = 1"
-    " GROUP BY payload_id;"
     "ALTER TABLE payloads DROP COLUMN waits_for;"
     "ALTER TABLE payloads ADD COLUMN renamed TEXT NOT NULL DEFAULT '{}';",
 }

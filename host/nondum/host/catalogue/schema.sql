@@ -130,7 +130,7 @@ CREATE TABLE highwater (                 -- never pruned
     owner       TEXT NOT NULL            -- role by which it was the first to come in
 ) STRICT;
 
-CREATE TABLE names (                     -- what is called how on this host
+CREATE TABLE names (                     -- what has another name than its own
     payload_id  TEXT PRIMARY KEY,
     components  TEXT NOT NULL,           -- JSON {id in its manifest: name}
     plugins     TEXT NOT NULL            -- JSON {distribution: name}

@@ -1,8 +1,9 @@
 """What this host calls the components and plugins of a payload, by all that the state knows. Pure.
 
 Components are named once they are verified, since workers are started by these names; plugins as
-their components are entered, since only then is known what everyone else says. What a payload was
-called stays, also while it is away: goals, mounts and connections are told by these names.
+their components are entered, since only then is known what everyone else says. Another name than a
+component's own stays its payload's, also while that is away: nothing else can be meant by it. Its
+own is free while it is away, as its place on the host is.
 """
 
 from __future__ import annotations
@@ -64,5 +65,13 @@ def remembering(
     """All names that are kept, now that a payload is active with its components."""
     before = state.names.get(payload.payload_id, NO_NAMES)
     plugins = {c.distribution: c.description.name for c in components}
-    now = GivenNames({**before.components, **payload.names}, {**before.plugins, **plugins})
+    now = GivenNames(
+        _others({**before.components, **payload.names}), _others({**before.plugins, **plugins})
+    )
+    if now == NO_NAMES:
+        return {id: one for id, one in state.names.items() if id != payload.payload_id}
     return {**state.names, payload.payload_id: now}
+
+
+def _others(names: Mapping[str, str]) -> dict[str, str]:
+    return {own: name for own, name in names.items() if name != own}
