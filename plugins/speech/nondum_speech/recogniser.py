@@ -89,9 +89,11 @@ class Recogniser:
 
     def hear(self, sound: Sound) -> Heard:
         """Recognise one sentence, in about a quarter of the time that it took to say it."""
+        if self._grammatical is None:
+            return NOTHING
         samples = made_audible(sound)
-        sentence = self._sentence(samples)
-        if sentence is None:
+        sentence = decoded(self._grammatical, samples)
+        if sentence is None or not self._is_whole(sentence):
             return NOTHING
         words, phones = self._free.words(samples), self._free.phones(samples)
         if words is None or phones is None:
@@ -104,18 +106,11 @@ class Recogniser:
         limit = limits.stop_confidence if text in self._stops else limits.confidence
         return Heard(text, confidence, said=text if confidence >= limit else "")
 
-    def nearest(self, sound: Sound) -> str:
-        """The sentence that is nearest, whether it was said or not; empty where there is none."""
-        sentence = self._sentence(made_audible(sound))
-        return " ".join(sentence.words) if sentence else ""
-
-    def _sentence(self, samples: Samples) -> Decoding | None:
-        """The nearest one, if it is no mere beginning."""
-        if self._grammatical is None:
-            return None
-        sentence = decoded(self._grammatical, samples)
-        is_whole = sentence and self._grammatical.get_fsg().accept(" ".join(sentence.words))
-        return sentence if is_whole else None
+    def _is_whole(self, sentence: Decoding) -> bool:
+        """Whether it is no mere beginning of a sentence."""
+        assert self._grammatical is not None, "only asked of what it decoded"
+        accepts: bool = self._grammatical.get_fsg().accept(" ".join(sentence.words))
+        return accepts
 
 
 def _decoder_of(grammar: str, lexicon: Lexicon) -> Decoder:

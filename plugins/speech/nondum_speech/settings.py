@@ -19,9 +19,6 @@ class Settings:
     """What a sentence must reach to be taken as said; nearer zero is stricter."""
     stop_confidence: float = -1.15
     """The same for words that stop the robot."""
-    stop_while_speaking: bool = False
-    """Whether words that stop are listened for while the robot speaks. Not unless asked for: it
-    sometimes takes its own voice, or that of people who talk meanwhile, for one."""
     said: str = ""
     """Folder for a WAV file of each sentence said; empty: the default sound device."""
     voice: str = "en-us"
