@@ -21,7 +21,7 @@ from nondum.host.inside import kernel
 USER = pwd.getpwnam("daemon")
 GROUP = 29
 """One that the user is in beside its own."""
-PYTHON, STATE = Path("/run/python"), Path("/run/state")
+PYTHON, CODE, STATE = Path("/run/python"), Path("/run/code"), Path("/run/state")
 LINE, LINE_OF_GROUP = Path("/run/nodes/line"), Path("/run/nodes/line-of-group")
 ROOT = Path(__file__).parents[2]
 
@@ -40,6 +40,9 @@ def main() -> None:
     kernel.mount("tmpfs", "/run", "tmpfs", kernel.MS_NOSUID, "mode=755")
     PYTHON.mkdir()
     kernel.mount(sys.base_prefix, str(PYTHON), None, kernel.MS_BIND)
+    for folder, seen in _code().items():
+        seen.mkdir(parents=True)
+        kernel.mount(folder, str(seen), None, kernel.MS_BIND)
     STATE.mkdir()
     os.chown(STATE, USER.pw_uid, USER.pw_gid)
     LINE.parent.mkdir()
@@ -68,13 +71,25 @@ def main() -> None:
         helper.wait()
 
 
+def _code() -> dict[str, Path]:
+    """Folder that Python imports from → where the user sees it: who may not open the one above it,
+    as a checkout in root's home or tox's folder, may open that."""
+    folders = (path for path in dict.fromkeys(sys.path) if Path(path).is_dir())
+    return {folder: CODE / str(number) for number, folder in enumerate(folders)}
+
+
 def _as_the_user() -> str:
     python = PYTHON / "bin" / f"python{sys.version_info.major}.{sys.version_info.minor}"
     command = ["setpriv", "--no-new-privs", f"--reuid={USER.pw_uid}", f"--regid={USER.pw_gid}"]
     command += [f"--groups={GROUP}", str(python), "-B", "-m", "tests.confinement.service_checks"]
-    paths = {"PYTHONPATH": ":".join(["", *filter(None, sys.path)]), "HOME": "/"}
+    paths = {"PYTHONPATH": ":".join(map(str, _code().values())), "HOME": "/"}
     done = subprocess.run(
-        command, env={**os.environ, **paths}, stdout=subprocess.PIPE, text=True, check=False
+        command,
+        cwd="/",
+        env={**os.environ, **paths},
+        stdout=subprocess.PIPE,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0
     return done.stdout
