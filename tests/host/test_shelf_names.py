@@ -40,7 +40,7 @@ def told(**more: Any) -> dict[str, Any]:
     return {
         "host": "spot",
         "components": [{**here, "description": lamp("lit").to_dict()}],
-        "names": {"org.x": {"components": {"lamp": "lamp"}, "plugins": {"lamp": "lamp"}}},
+        "names": {},  # it has its own
         "facts": ["self spot", "ready spot__lamp__lamp"],
         "excluded": {},
         "seen": [],
@@ -78,12 +78,12 @@ def test_names_that_were_given_are_kept() -> None:
 
 @pytest.mark.parametrize("word", ["lit", "warm"])
 def test_releases_of_one_payload_have_one_name(word: str) -> None:
-    names = ShelfNames.of({}, [("org.x", lamp("lit"))])
+    names = ShelfNames.of({}, [("org.x", "lamp", lamp("lit"))])
     shelf = [on_shelf("org.y", word, "1.0"), on_shelf("org.y", word, "2.0")]
     assert len({name for one in names.called(shelf) for name in one.components}) == 1
 
 
 @pytest.mark.parametrize(("word", "plugin"), [("lit", "lamp"), ("warm", "lamp--org-y")])
 def test_plugins_share_a_name_if_they_say_the_same(word: str, plugin: str) -> None:
-    [one] = ShelfNames.of({}, [("org.x", lamp("lit"))]).called([on_shelf("org.y", word)])
+    [one] = ShelfNames.of({}, [("org.x", "lamp", lamp("lit"))]).called([on_shelf("org.y", word)])
     assert [description.name for description in one.components.values()] == [plugin]

@@ -78,7 +78,9 @@ class Surroundings:
         )
         at_work = {contribution.component for contribution in present}
         own = [
-            (row["payload"], _description(row)) for row in told["components"] if row["host"] == host
+            (row["payload"], row["component"], _description(row))
+            for row in told["components"]
+            if row["host"] == host
         ]
         called = ShelfNames.of(told["names"], own).called(distinct((*shelf, *remembered(seen))))
         known = [payload for payload in called if not at_work.issuperset(payload.components)]

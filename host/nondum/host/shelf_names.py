@@ -23,10 +23,18 @@ class ShelfNames:
 
     @classmethod
     def of(
-        cls, told: Mapping[str, Any], present: Iterable[tuple[str, PluginDescription]]
+        cls, told: Mapping[str, Any], present: Iterable[tuple[str, str, PluginDescription]]
     ) -> ShelfNames:
-        """By what a daemon tells of its names, and what its own components say."""
-        return cls({id: GivenNames(**names) for id, names in told.items()}, list(present))
+        """By what a daemon tells of the names that it has given, and by its own components: payload
+        id, name, and what its plugin says. What has no given name has its own."""
+        names = cls({id: GivenNames(**names) for id, names in told.items()})
+        for payload_id, component, description in present:
+            given = names.kept.get(payload_id, NO_NAMES)
+            names.kept[payload_id] = GivenNames(
+                _with(given.components, component), _with(given.plugins, description.name)
+            )
+            names.said.append((payload_id, description))
+        return names
 
     def called(self, payloads: Iterable[Shelved]) -> Iterator[Shelved]:
         """Payloads with their components and plugins by their names on the host."""
@@ -71,3 +79,7 @@ class ShelfNames:
             )
             for name in own
         }
+
+
+def _with(given: Mapping[str, str], name: str) -> Mapping[str, str]:
+    return given if name in given.values() else {**given, name: name}

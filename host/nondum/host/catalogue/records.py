@@ -423,7 +423,7 @@ class Snapshot:
     tries: Mapping[str, int] = field(default_factory=dict)
     """What daemons died at, as `lifecycle/tries.py` counts it."""
     names: Mapping[str, GivenNames] = field(default_factory=dict)
-    """Payload id → what its components and plugins are called here."""
+    """Payload id → what of it has another name here than its own."""
 
     def everyone(self) -> Iterator[tuple[str, ComponentRecord | PeerComponent]]:
         """Each component, this host's own first, with the name of its host."""

@@ -51,7 +51,7 @@ class HostState:
     highwater: Mapping[str, Highwater] = field(default_factory=dict)
     """Payload id → newest release, for whatever fleet it was."""
     names: Mapping[str, GivenNames] = field(default_factory=dict)
-    """Payload id → what its components and plugins are called here; kept until it is forgotten."""
+    """Payload id → what of it has another name here than its own; kept until it is forgotten."""
     rollbacks: Mapping[str, Rollback] = field(default_factory=dict)
     """Payload id → the earlier release that a person went back to."""
     goals: Mapping[str, GoalRecord] = field(default_factory=dict)

@@ -62,7 +62,7 @@ def as_called(
 def remembering(
     state: HostState, payload: PayloadRecord, components: Iterable[ComponentRecord]
 ) -> dict[str, GivenNames]:
-    """All names that are kept, now that a payload is active with its components."""
+    """All given names that are kept, now that a payload is active with its components."""
     before = state.names.get(payload.payload_id, NO_NAMES)
     plugins = {c.distribution: c.description.name for c in components}
     now = GivenNames(

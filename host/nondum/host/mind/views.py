@@ -178,7 +178,7 @@ class Views:
 
     def composition(self) -> Row:
         """All that planning goes by, for tools that plan by themselves: `host`, `components`,
-        `names` that payloads have here, `facts`, `excluded` actions and why, `silence` of what is
+        `names` that the host has given, `facts`, `excluded` actions and why, `silence` of what is
         here, and the components `seen` here before."""
         beliefs, pursuit = self._mind.beliefs, self._mind.pursuit
         kept_out = dict(pursuit.left_out)
