@@ -9,6 +9,8 @@ from tests.lab.lab import Lab
 from tests.lab.machine import Machine
 from tests.lab.plugins import opener, until_said
 
+from nondum.host.helper import worker_users
+
 DROP_IN = "/etc/systemd/system/nondum-helper.service.d/devices.conf"
 ALLOWED = """[Service]
 ExecStart=
@@ -42,6 +44,12 @@ while data := os.read(watching, 4096):
         data = data[16 + length:]
 """
 WATCHED = "/run/watched"
+USERS = """
+for pid in $(cat $(find /sys/fs/cgroup/system.slice/nondum.service -name cgroup.procs)); do
+  awk '/^Uid/ {print $2}' /proc/$pid/status
+done 2>/dev/null; true
+"""
+"""The kernel's users that processes of the service run as."""
 PAD = "/run/nondum-helper/devices/pad/it"
 """The node that the helper makes for a component."""
 KEYBOARD, MOUSE = "03:01:01", "03:01:02"
@@ -75,6 +83,7 @@ def _seen_through(lab: Lab, host: Installed) -> str:
     _see_left_alone(host)
     for id, least in GRANTED.items():  # by the workers of the daemon that was started anew
         until_said(host, id, "opened", least)
+    _see_users(machine)
     tablet, *others = plugged
     _see_node_go(machine, tablet)
     machine.pull_line(line)
@@ -87,6 +96,15 @@ def _seen_through(lab: Lab, host: Installed) -> str:
     machine.pull(stick)
     host.until_payload("org.example.instruments", "gone")
     return "; ".join(f"{id}: {said}" for id, said in told.items())
+
+
+def _see_users(machine: Machine) -> None:
+    """Each worker is a user of its own, and nothing that the helper does for it is forbidden it."""
+    users = {int(user) for user in machine.run(USERS).split()}
+    own = users.intersection(worker_users.OF_SERVICE)
+    assert len(own) >= len(GRANTED), f"processes of the service run as {sorted(users)}"
+    said = machine.run("journalctl -b -o cat --no-pager -u nondum-helper.service")
+    assert "31/SYS" not in said, said[-2000:]
 
 
 def _see_node_go(machine: Machine, tablet: str) -> None:
