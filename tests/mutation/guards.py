@@ -62,6 +62,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/drives/mounting.py": _MOUNTED,
     f"{_H}/drives/nodes.py": _CLAIMED,
     f"{_H}/drives/usb.py": (f"{_TH}/drives/test_usb.py",),
+    f"{_H}/dead_links.py": (f"{_TH}/drives/test_slots.py", f"{_TH}/devices/test_slots.py"),
     f"{_H}/drives/slots.py": (f"{_TH}/drives/test_slots.py",),
     f"{_H}/drives/reading.py": (
         f"{_TH}/trust/test_payload_trust.py"

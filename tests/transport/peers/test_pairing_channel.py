@@ -394,7 +394,8 @@ async def test_window_that_the_other_host_closed_first_is_what_the_end_tells(
         await clock.advance(pairing.WINDOW_S)
         problem = (await rover.sees(Failed)).problem
         assert (problem.code, problem.where) == ("PAIRING_OVER", "base")
-        told = {state.problem.code for state in rover.states if getattr(state, "problem", None)}
+        waiting = (state for state in rover.states if isinstance(state, Waiting) and state.problem)
+        told = {state.problem.code for state in waiting if state.problem}
         assert told == {"PAIRING_OVER"}
 
 
