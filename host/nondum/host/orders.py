@@ -141,7 +141,7 @@ class Orders:
 
     async def heard(self, words: str) -> str:
         """Want what a person has said: what becomes of it, in words. What means nothing yet is kept
-        while anything is being brought in. Raises `GoalRefused`."""
+        while anything is being installed. Raises `GoalRefused`."""
         try:
             return await self.take(words)
         except GoalRefused as refused:

@@ -10,6 +10,7 @@ import click
 from nondum.host.cli import render
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.table import table
+from nondum.planning.pattern import with_blanks
 
 
 def show(session: Session, rows: list[dict[str, Any]], columns: Sequence[str], empty: str) -> None:
@@ -54,6 +55,8 @@ def behaviours(session: Session) -> None:
     rows = session.ask("behaviours")
     if any(row["problem"] for row in rows):
         columns.append("problem")
+    if not session.as_json:
+        rows = [{**row, "phrases": list(map(with_blanks, row["phrases"]))} for row in rows]
     show(session, rows, columns, "no behaviours")
 
 

@@ -71,6 +71,18 @@ def size(count: int) -> str:
     return f"{count} B" if unit == "B" else f"{amount:.1f} {unit}"
 
 
+def goal(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A goal for a table: of why it is not reached the first line, and no remedies, which `why`
+    tells; an answer is whole.
+
+    >>> goal({"state": "suspended", "reason": "eye.see failed: DARK it is dark → light a lamp"})
+    {'state': 'suspended', 'reason': 'eye.see failed: DARK it is dark'}
+    """
+    if row["state"] == "reached":
+        return dict(row)
+    return {**row, "reason": row["reason"].partition("\n")[0].partition(" → ")[0]}
+
+
 def release(row: Mapping[str, Any]) -> str:
     """A release, and what became of the one before.
 
