@@ -79,7 +79,8 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             name = payload.payload_id if payload else f"payload {new}"
             return f"{name} was rebuilt on its drive, and is judged again"
         case PayloadWithdrawn():
-            return f"{_name(event.payload, snapshot)} is withdrawn: {event.reason}"
+            stays = _stays(event.payload, snapshot)  # it was refused, or waited
+            return f"{_name(event.payload, snapshot)} is withdrawn: {event.reason}{stays}"
         case PayloadSentAway():
             return f"{_name(event.payload, snapshot)} is to run on {event.host}, not here"
         case PayloadPlaced():
