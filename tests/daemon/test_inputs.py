@@ -84,7 +84,9 @@ def test_person_decides_what_an_input_gets_and_that_is_kept(own_host: RunningHos
     host = own_host
     drives = [host.bring("a-gps", GPS), host.bring("base", BASE), host.bring("eye", EYE)]
     until_fed(host, INPUT, ODOMETRY)
-    assert host.run("streams", "--connect", INPUT, FIX).code == 0
+    short = FIX.rpartition("__")[2]  # as the table of streams shows it
+    told = host.run("streams", "--connect", INPUT, short).ok().out
+    assert told == f"{INPUT} gets {short} from now on, and nothing else\n"
     until_fed(host, INPUT, FIX)
     host.stop()
     host.start()

@@ -205,7 +205,8 @@ class Orders:
 
         Raises `NondumError` (INPUT_UNKNOWN, STREAM_UNKNOWN, INPUT_STREAM).
         """
-        name, stream = arguments.text("input"), arguments.optional_text("stream") or ""
+        name, said = arguments.text("input"), arguments.optional_text("stream") or ""
+        stream = whole(said, self.mind.names)
         sockets = {choice.socket.name: choice.socket for choice in self.workers.streams.inputs()}
         before = dict(self.catalogue.snapshot().connections)
         if name not in sockets and (stream or name not in before):

@@ -38,7 +38,13 @@ def components(session: Session) -> None:
         columns.insert(columns.index("age"), "release")
     if not session.as_json:
         rows = [
-            {**row, "release": render.release(row), "age": render.age(row["age_s"])} for row in rows
+            {
+                **row,
+                "release": render.release(row),
+                "age": render.age(row["age_s"]),
+                "problem": render.without_excerpt(row["problem"]),
+            }
+            for row in rows
         ]
     show(session, rows, columns, "no components")
 

@@ -83,6 +83,15 @@ def goal(row: Mapping[str, Any]) -> dict[str, Any]:
     return {**row, "reason": row["reason"].partition("\n")[0].partition(" → ")[0]}
 
 
+def without_excerpt(problem: str) -> str:
+    r"""A problem for a table's cell: without the source that it shows below its place.
+
+    >>> without_excerpt("E-INIT a.pddl:1:7: is no fact\n    (:init (a))\n          ^\n→ correct it")
+    'E-INIT a.pddl:1:7: is no fact → correct it'
+    """
+    return " ".join(line for line in problem.split("\n") if not line.startswith("    "))
+
+
 def release(row: Mapping[str, Any]) -> str:
     """A release, and what became of the one before.
 
