@@ -89,7 +89,9 @@ class Wide:
     @behaviour("send", action="(send ?u - camera)")
     async def send(self, ctx: Context, u: str) -> None:
         size = 16384
-        data = mmap.mmap(-1, (size + 1) * size)  # pages that nobody touches cost no memory
+        data = memoryview(
+            mmap.mmap(-1, (size + 1) * size)
+        )  # pages that nobody touches cost no memory
         ctx.output("image").send(Image(Header(), size + 1, size, "mono8", size, data))
 
 

@@ -119,7 +119,7 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
         case DriveUnreadable():
             return f"drive {event.drive} cannot be used: {_joined(event.problems)}"
         case SafeModeLeft(why=why):
-            return f"safe mode is left: payloads are taken in again{f', as {why}' if why else ''}"
+            return f"safe mode is left: payloads are installed again{f', as {why}' if why else ''}"
         case DriveRetried(why=why) if why:
             return f"drive {event.drive} is looked at again: {why}"
         case CatalogueUnwritten() | CatalogueSetAside() | SafeModeEntered():
