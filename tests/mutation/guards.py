@@ -62,7 +62,6 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/drives/mounting.py": _MOUNTED,
     f"{_H}/drives/nodes.py": _CLAIMED,
     f"{_H}/drives/usb.py": (f"{_TH}/drives/test_usb.py",),
-    f"{_H}/dead_links.py": (f"{_TH}/drives/test_slots.py", f"{_TH}/devices/test_slots.py"),
     f"{_H}/drives/slots.py": (f"{_TH}/drives/test_slots.py",),
     f"{_H}/drives/reading.py": (
         f"{_TH}/trust/test_payload_trust.py"
@@ -339,6 +338,7 @@ ASIDE: Mapping[str, str] = {
     f"{_T}/peers/apart/service.py": "does what its own daemon says",
     f"{_T}/peers/routes.py": "tells why a peer is not reached",
     f"{_T}/peers/pairing_door.py": "tells that this machine cannot listen there",
+    f"{_H}/peers/namesakes.py": "says what people are told; `roster` refuses",
     f"{_T}/peers/pairing_problems.py": "says what people are told; `pairing_channel` refuses",
     f"{_H}/peers/finder.py": "hands on the addresses that the mesh takes",
     f"{_H}/peers/peering.py": "says that a peer is not there",
