@@ -84,7 +84,9 @@ def test_person_decides_what_an_input_gets_and_that_is_kept(own_host: RunningHos
     host = own_host
     drives = [host.bring("a-gps", GPS), host.bring("base", BASE), host.bring("eye", EYE)]
     until_fed(host, INPUT, ODOMETRY)
-    assert host.run("streams", "--connect", INPUT, FIX).code == 0
+    short = FIX.rpartition("__")[2]  # as the table of streams shows it
+    told = host.run("streams", "--connect", INPUT, short).ok().out
+    assert told == f"{INPUT} gets {short} from now on, and nothing else\n"
     until_fed(host, INPUT, FIX)
     host.stop()
     host.start()
@@ -126,7 +128,13 @@ def test_wrong_message_is_the_components_problem(host: RunningHost) -> None:
     host.bring("careless", Part("careless", CARELESS))
     told = host.until_told("MESSAGE_FIELD")
     assert "careless" in told
-    (row,) = (row for row in host.components() if row["component"] == "careless")
+
+    def ended(view: Any) -> dict[str, Any] | None:
+        rows = [row for row in view["components"] if row["component"] == "careless"]
+        return next((row for row in rows if "CONDITION_RAISED" in row["problem"]), None)
+
+    row = host.until("its condition has ended", ended)
+    assert row["problem"].count("MESSAGE_FIELD") == 1
     for said in ("careless", "test_careless.py:6", "pose.position", "MESSAGE_FIELD"):
         assert said in row["problem"]
     assert row["ready"]

@@ -29,7 +29,7 @@ async def start(ctx):
 
 
 class Slow:
-    """A payload that is being brought in until it is let."""
+    """A payload that is being installed until it is let."""
 
     def __init__(self, host: RunningHost) -> None:
         """The host has ears, too: see `says`."""

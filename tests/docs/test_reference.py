@@ -117,3 +117,11 @@ def test_commands_that_are_shown_exist(page: Path, line: str) -> None:
     known = {option for param in command.get_params(context) for option in param.opts}
     used = {word.partition("=")[0] for word in words if re.match(r"--?[a-z]", word)}
     assert "[OPTIONS]" in line or used <= known, (page, used - known)
+
+
+def test_bench_begins_as_the_readme_of_a_new_package_says() -> None:
+    template = (ROOT / "wheelhouse/nondum/wheelhouse/template/README.md").read_text("utf-8")
+    bench = (ROOT / "docs/bench.md").read_text("utf-8")
+    for command in ("pip install -e .", "pytest"):
+        assert f"\n    {command}" in template
+        assert f"\n    {command}" in bench

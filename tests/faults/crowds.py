@@ -42,7 +42,7 @@ class Crowd:
     children: int
     """The most processes that read drives at the same time, as far as was seen."""
     most_at_once: int
-    """The most payloads that were being brought in at the same time."""
+    """The most payloads that were being installed at the same time."""
     queued: int
     """How many drives and payloads were shown as waiting."""
     active: int

@@ -104,6 +104,11 @@ NEW = replace(LAMP, key="2" * 16, digest="2" * 64, version="2", release=2, step=
             f"org.example.lamp 2 does not work, 1 (release 1) stays: {WRONG[1]}",
         ),
         (
+            events.PayloadWithdrawn(NEW.key, "its drive was pulled"),
+            Step.REMOVING,
+            "org.example.lamp 2 is withdrawn: its drive was pulled, 1 (release 1) stays",
+        ),
+        (
             events.BesideRefused(NEW.key, "it runs alone"),
             Step.STORED,
             "org.example.lamp 2 takes the place of the release before it, not beside it: "

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from nondum.host.cli.render import size
 from nondum.host.machine import (
     BUSY,
     HOT_C,
@@ -158,6 +159,14 @@ FULL_AND_LOW = Machine(batteries=(Battery("A", 90, "discharging"), Battery("B", 
 def test_people_are_warned_when_it_is_bad_and_not_before(well: Machine, bad: Machine) -> None:
     assert len(list(bad.warnings())) == 1
     assert not list(well.warnings())
+
+
+def test_small_disk_that_is_nearly_empty_is_not_called_full() -> None:
+    """What is told is what the reserve leaves, in the unit of the status line."""
+    (told,) = Machine(disk=Disk("/state", 188, 200, 64)).warnings()
+    assert all(amount in told for amount in ("124 MB", "188 MB", "64 MB"))
+    assert "full" not in told
+    assert size(188 << 20) == "188.0 MB"
 
 
 def test_views_carry_all_of_it() -> None:

@@ -85,6 +85,13 @@ def test_what_was_made_anew_is_in_order(source: Path) -> None:
     assert codes(source) == []
 
 
+def test_places_have_the_version_of_the_project_though_it_is_not_installed(source: Path) -> None:
+    WRONG["fragment"][1](source)
+    change(source, "pyproject.toml", 'version = "0.1.0"', 'version = "3.7"')
+    (problem,) = check(source)
+    assert " 3.7 " in f"{problem.where} {problem.message}"
+
+
 def test_all_components_are_told_at_once(source: Path) -> None:
     change(source, PLUGIN, "u: str, h: str", "h: str")
     append(source, "payload.toml", OTHERS)

@@ -10,6 +10,7 @@ import pytest
 from tests.planning.strangers import ROVER, at_rest, components, planner, task
 
 from nondum.host.optional_inputs import choose, sockets_of, sources_of
+from nondum.planning.domain import bind
 from nondum.planning.goal import goal_text
 from nondum.planning.ground import ground
 from nondum.planning.merge import merge
@@ -104,6 +105,17 @@ def test_words_become_the_plan_that_is_meant(
     assert isinstance(answer, Plan)
     steps = [grounded.actions[step].name.split()[0] for step in answer.steps]
     assert [step.partition(".")[2] for step in steps] == schemas
+
+
+@pytest.mark.parametrize("words", ["look for people", "report people", "search for people"])
+def test_who_asks_again_for_somebody_wants_another_look(
+    words: str, shipped: dict[str, PluginDescription]
+) -> None:
+    names = ("recorded-camera", "people-detector", "visual-tracker", "speaker")
+    contributions = components(shipped[name] for name in names)
+    asked = phrasebook(contributions, merge(contributions, ROVER)).goal(words)
+    assert asked.kind == "do"
+    assert f"found person {ROVER}" in {bind(atom, {}) for atom in asked.expr.positive}
 
 
 @pytest.mark.parametrize("words", ["where are you", "please tell me where you are"])

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+import threading
+from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.sdk import greeter
 
-from nondum.sdk import Bearing, Header, Text, WorkerFailed
+from nondum.sdk import Bearing, Header, Text, ThreadContext, WorkerFailed, condition
+from nondum.sdk import bench as sdk_bench
 from nondum.sdk.bench import Bench, WorkerFactory
 
 
@@ -145,3 +148,27 @@ def test_wrong_requests_are_refused(
     with pytest.raises(WorkerFailed) as caught:
         bench.ask(verb, **body)
     assert caught.value.code == code
+
+
+class Stuck:
+    """Waits for its device as plain functions must not: nothing wakes it when it is halted."""
+
+    def __init__(self) -> None:
+        self.device = threading.Event()
+
+    @condition("warm", predicates=())
+    def warm(self, ctx: ThreadContext) -> None:
+        self.device.wait()
+
+
+def test_function_that_does_not_return_is_named_with_its_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sdk_bench, "STOP_S", 0.2)
+    stuck = Stuck()
+    bench = Bench(stuck, scratch=tmp_path)
+    line = Stuck.warm.__code__.co_firstlineno + 2
+    with pytest.raises(AssertionError, match=rf"WORKER_HUNG.* in warm, .*test_bench.py:{line} "):
+        bench.stop()
+    bench.stop()
+    stuck.device.set()

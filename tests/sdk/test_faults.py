@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import inspect
+import mmap
 import re
 from types import FunctionType
 
@@ -13,6 +14,7 @@ from nondum.sdk import (
     Context,
     Fragment,
     Header,
+    Image,
     MessageInvalid,
     Output,
     Pose,
@@ -75,6 +77,22 @@ class Careless:
                 ctx.output("fix").send(message)
             except MessageInvalid as error:
                 ctx.log.info("%s", error.code)
+
+
+class Wide:
+    """Sends an image with one row more than a message may have."""
+
+    @hookimpl
+    def units(self) -> tuple[Unit, ...]:
+        return (Unit("it", "camera", outputs=(Output("image", "image"),)),)
+
+    @behaviour("send", action="(send ?u - camera)")
+    async def send(self, ctx: Context, u: str) -> None:
+        size = 16384
+        data = memoryview(
+            mmap.mmap(-1, (size + 1) * size)
+        )  # pages that nobody touches cost no memory
+        ctx.output("image").send(Image(Header(), size + 1, size, "mono8", size, data))
 
 
 class CarelessCondition:
@@ -201,3 +219,12 @@ def test_behaviour_may_go_on_and_each_mistake_is_told_once(worker: WorkerFactory
 def test_place_is_the_nearest_caller_outside_the_sdk() -> None:
     here = test_place_is_the_nearest_caller_outside_the_sdk
     assert author_place() == line_of(here, "== line_of(here")
+
+
+def test_message_that_no_reader_takes_is_refused_where_it_is_sent(worker: WorkerFactory) -> None:
+    bench = worker(Wide)
+    call = bench.behave("send", u="it")
+    problem = bench.expect_fault("MESSAGE_TOO_LONG")
+    assert call.wait().state == "failed"
+    assert problem.where == line_of(Wide.send, ".send(Image")
+    assert (problem.need, problem.have) == ("at most 268435456 bytes", "268451840 bytes")

@@ -79,7 +79,8 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             name = payload.payload_id if payload else f"payload {new}"
             return f"{name} was rebuilt on its drive, and is judged again"
         case PayloadWithdrawn():
-            return f"{_name(event.payload, snapshot)} is withdrawn: {event.reason}"
+            stays = _stays(event.payload, snapshot)  # it was refused, or waited
+            return f"{_name(event.payload, snapshot)} is withdrawn: {event.reason}{stays}"
         case PayloadSentAway():
             return f"{_name(event.payload, snapshot)} is to run on {event.host}, not here"
         case PayloadPlaced():
@@ -118,7 +119,7 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
         case DriveUnreadable():
             return f"drive {event.drive} cannot be used: {_joined(event.problems)}"
         case SafeModeLeft(why=why):
-            return f"safe mode is left: payloads are taken in again{f', as {why}' if why else ''}"
+            return f"safe mode is left: payloads are installed again{f', as {why}' if why else ''}"
         case DriveRetried(why=why) if why:
             return f"drive {event.drive} is looked at again: {why}"
         case CatalogueUnwritten() | CatalogueSetAside() | SafeModeEntered():

@@ -6,6 +6,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable, Collection, Iterable
 
+from nondum.host import missing_devices
 from nondum.host.catalogue.records import PayloadRecord
 from nondum.host.mind.answers import abilities, activity
 from nondum.host.mind.mind import Mind
@@ -48,7 +49,9 @@ class Answering:
         coming = sum(not is_at_rest(payload) for payload in self._payloads())
         if question is Question.ABILITIES:
             found = await asyncio.to_thread(views.goals())
-            return abilities(found["can"], coming)
+            components = self._mind.beliefs.snapshot.components
+            waiting = filter(None, map(missing_devices.waits_to_act, components))
+            return abilities(found["can"], coming, tuple(waiting))
         plan = views.plan()
         steps = [row for one in (plan, *plan["beside"]) for row in one["steps"]]
         lent = {*self._busy()} - {row["component"] for row in steps}

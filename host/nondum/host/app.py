@@ -161,7 +161,8 @@ async def _run(
     executor = Executor(config.host.name, folders, workers, bus.emit, _install_options(config))
     manager = ComponentManager(catalogue, executor, bus)
     manager.leave_alone(*safety)
-    for source in (*drive_sources(config, folders), *more_drives):
+    drives, devices = drive_sources(config, folders), device_sources(config)
+    for source in (*drives, *more_drives):
         manager.add_source(source)
     stop_hook = StopHook(config.stop)
     stopping = Stopping(lambda: mind, workers, stop_hook.run_soon)
@@ -214,6 +215,7 @@ async def _run(
             *stop_hook.warnings,
             *stop_button.warnings,
             *map(str, cages.problems()),
+            *map(str, (*slot_problems(drives), *slot_problems(devices))),
             *of_peers,
         )
 
@@ -257,6 +259,7 @@ async def _run(
         executor.trust.summary,
         elsewhere,
         lambda: machine.look(folders.root, config.install.reserve_mb),
+        lambda: slot_problems(devices),
     )
     trust = TrustOrders(executor.trust, bus.emit)
     stop_button = StopButton(config.stop, lambda: _pressed(mind, stop_all))
@@ -315,7 +318,7 @@ async def _run(
             trying_again.run(),
             clock.run(),
             trials.hold(catalogue.snapshot, tally, bus.emit),
-            *(source.watch(bus.emit) for source in device_sources(config)),
+            *(source.watch(bus.emit) for source in devices),
         )
     finally:
         await control.close()
@@ -422,6 +425,12 @@ def device_sources(config: HostConfig) -> list[DeviceSource]:
     if config.devices.udev:
         sources.append(UdevSource())
     return sources
+
+
+def slot_problems(sources: Sequence[DriveSource | DeviceSource]) -> tuple[Problem, ...]:
+    """What is wrong in the slot folders among some sources."""
+    slots = (one for one in sources if isinstance(one, SlotSource | DeviceSlotSource))
+    return tuple(problem for one in slots for problem in one.problems)
 
 
 def _make_slots(config: HostConfig) -> None:

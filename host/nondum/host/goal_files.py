@@ -50,7 +50,7 @@ class Wish:
     is_translated: bool = True
     """Whether it counts as what components take it to mean: a person was not asked."""
     while_coming: bool = False
-    """It is given up once nothing is being brought in that could make it mean something."""
+    """It is given up once nothing is being installed that could make it mean something."""
 
 
 def of_people(goals: Iterable[GoalRecord]) -> Iterator[GoalRecord]:
@@ -85,7 +85,7 @@ class GoalFiles:
         self._waiting: set[str] = set()
         """Goal ids of the wishes that are no goals yet."""
         self._coming = ""
-        """What was being brought in when it was looked at last, see `coming_in`."""
+        """What was being installed when it was looked at last, see `coming_in`."""
         self._news = asyncio.Event()
 
     @property

@@ -145,9 +145,9 @@ def _of_disk(disk: Disk) -> Iterator[str]:
     left_mb = disk.free_mb - disk.reserve_mb
     free = f"{disk.free_mb} MB are free at {disk.path}, of which {disk.reserve_mb} MB are kept free"
     if left_mb <= 0:
-        yield f"the disk is full ({free}): no payload is taken in until there is room"
+        yield f"the disk has no room for payloads ({free}): none is installed until there is"
     elif left_mb < LOW_MB:
-        yield f"the disk is nearly full ({free}): a payload may need more"
+        yield f"the disk has room for {left_mb} MB of payloads ({free}): one may need more"
 
 
 def _is_low(battery: Battery) -> bool:

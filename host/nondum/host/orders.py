@@ -141,7 +141,7 @@ class Orders:
 
     async def heard(self, words: str) -> str:
         """Want what a person has said: what becomes of it, in words. What means nothing yet is kept
-        while anything is being brought in. Raises `GoalRefused`."""
+        while anything is being installed. Raises `GoalRefused`."""
         try:
             return await self.take(words)
         except GoalRefused as refused:
@@ -205,7 +205,8 @@ class Orders:
 
         Raises `NondumError` (INPUT_UNKNOWN, STREAM_UNKNOWN, INPUT_STREAM).
         """
-        name, stream = arguments.text("input"), arguments.optional_text("stream") or ""
+        name, said = arguments.text("input"), arguments.optional_text("stream") or ""
+        stream = whole(said, self.mind.names)
         sockets = {choice.socket.name: choice.socket for choice in self.workers.streams.inputs()}
         before = dict(self.catalogue.snapshot().connections)
         if name not in sockets and (stream or name not in before):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar, cast
 
@@ -81,6 +81,8 @@ class Questions:
 
     machine: Callable[[], Machine] = Machine
     """Looks at the machine that this host runs on; blocks."""
+    wrong_slots: Callable[[], Iterable[Problem]] = tuple
+    """Of the files in device slots that stand for no device."""
 
     async def status(self, arguments: Arguments) -> Row:
         """The host, its payloads and its goals at a glance."""
@@ -121,7 +123,7 @@ class Questions:
 
     async def components(self, arguments: Arguments) -> list[Row]:
         """What the robot is made of."""
-        pids = self.workers.pids()
+        pids, since = self.workers.pids(), self.workers.since_wall_s()
         snapshot = self.catalogue.snapshot()
         payloads = {payload.key: payload for payload in snapshot.payloads}
         own = [
@@ -136,8 +138,11 @@ class Questions:
             told = [row["problem"], troubles.get(row["component"], "")]
             if why := kept_out.get(row["component"]):
                 told.append(f"kept out of planning: {why}")
-            told += map(str, self.workers.faults(row["component"]))
+            for fault in self.workers.faults(row["component"]):
+                if fault.message not in row["problem"]:  # else it has ended a condition
+                    told.append(str(fault))
             row["problem"] = "; ".join(filter(None, told))
+            row["since"] = since.get(row["component"])
             row["confinement"] = str(self.workers.launcher.level) if row["pid"] else None
         return own + [
             offered_row(offered, peer.name)
@@ -165,6 +170,10 @@ class Questions:
     async def devices_why(self, arguments: Arguments) -> list[Row]:
         """Every device of this host, and how it fared with every rule of every component."""
         return view.why_rows(self.catalogue.snapshot())
+
+    async def device_slots(self, arguments: Arguments) -> list[Row]:
+        """What is wrong with files that are to stand for devices: problems."""
+        return [problem.to_dict() for problem in self.wrong_slots()]
 
     async def known_devices(self, arguments: Arguments) -> list[Row]:
         """What was ever plugged in here, as far as is remembered; what was seen last comes last."""

@@ -65,7 +65,7 @@ def goals_away(rows: Iterable[Row]) -> Iterator[str]:
 
 
 def coming_in(snapshot: Snapshot) -> str:
-    """What is being brought in: "3 payloads are still being installed". Empty: nothing."""
+    """What is being installed: "3 payloads are still being installed". Empty: nothing."""
     payloads = sum(
         not is_at_rest(payload) and payload.step is not Step.REMOVING
         for payload in snapshot.payloads

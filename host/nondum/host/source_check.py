@@ -7,6 +7,7 @@ in the group of `nondum.sdk.source_check`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from nondum.host import vocabulary_check
@@ -40,4 +41,6 @@ def check(folder: Path) -> Sequence[Problem]:
 
 
 def _described(folder: Path, component: ComponentManifest) -> PluginDescription:
-    return describe(load(source.entry_point(folder, component), component.distribution))
+    described = describe(load(source.entry_point(folder, component), component.distribution))
+    declared = source.declared_version(folder, component.distribution)
+    return replace(described, version=declared or described.version)

@@ -42,6 +42,7 @@ def answering(
         "components": questions.components,
         "connect": orders.connect,
         "composition": questions.composition,
+        "device_slots": questions.device_slots,
         "devices": questions.devices,
         "devices_why": questions.devices_why,
         "fact": questions.fact,

@@ -29,6 +29,15 @@ def whole(text: str, names: Mapping[str, str]) -> str:
     return _WORD.sub(lambda word: found.get(word[0], word[0]), text)
 
 
+def has_unknown(value: Any, names: Mapping[str, str]) -> bool:
+    """Whether plain data speak of a unit or stream that has no short name among these.
+
+    >>> has_unknown(["rover__eye__camera"], {}), has_unknown("a", {})
+    (True, False)
+    """
+    return any(name not in names for name in _WHOLE.findall(repr(value)))
+
+
 def all_shortened(value: Any, names: Mapping[str, str]) -> Any:
     """Plain data with short names in all of its texts; keys stay.
 

@@ -37,13 +37,15 @@ class Speaker:
 
     @hookimpl
     def phrases(self) -> tuple[Phrase, ...]:
-        """How people ask for it."""
+        """How people ask for it: who asks again wants to know what is there now, so that what was
+        found before does not count."""
         patterns = (
             "[please] report {c:class}",
             "[please] tell me of {c:class}",
             "[please] search for {c:class} [and tell me]",
         )
-        return tuple(Phrase(pattern, "(reported ?c self)") for pattern in patterns)
+        goal = "(and (found ?c self) (reported ?c self))"
+        return tuple(Phrase(pattern, goal, kind="do") for pattern in patterns)
 
     @hookimpl
     async def start(self, ctx: Context) -> None:

@@ -60,7 +60,7 @@ def fragments() -> tuple[Fragment, ...]:
 
 @hookimpl
 def phrases() -> tuple[Phrase, ...]:
-    return (Phrase("[please] look for {c:class}", "(found ?c self)"),)
+    return (Phrase("[please] look for {c:class}", "(found ?c self)", kind="do"),)
 
 
 @hookimpl

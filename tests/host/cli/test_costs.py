@@ -9,7 +9,7 @@ from nondum.wheelhouse.contents import Contents, Entry
 from nondum.wheelhouse.cost import LARGE_BYTES, Cost
 from nondum.wheelhouse.target import Target
 
-MB = 1_000_000
+MB = 1 << 20
 ARM = Cost(Target("aarch64", "3.12"), 90 * MB, 80 * MB)
 X86 = Cost(Target("x86_64", "3.12"), 60 * MB, 50 * MB)
 

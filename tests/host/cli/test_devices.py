@@ -13,6 +13,7 @@ from tests.daemon.plugins import gauge
 from tests.kit.command_line import nondum
 from tests.kit.payloads import make_payload
 from tests.kit.running_host import RunningHost, running
+from tests.kit.until import until
 
 SERVING = {"ID_MODEL": "Gauge", "ID_VENDOR_ID": "0403", "ID_MODEL_ID": "6001"}
 OTHER = {"ID_MODEL": "Knob", "SUBSYSTEM": "hidraw"}
@@ -65,6 +66,24 @@ def test_why_tells_every_rule_and_what_was_found(daemon: RunningHost) -> None:
     assert "✓ ID_MODEL = Gauge: Gauge" in daemon.run("devices", "--why", "line").ok().out
     kept = daemon.run("devices", "--why", "keys").ok().out
     assert "it is a keyboard" in kept
+
+
+def slots_told(daemon: RunningHost) -> list[str]:
+    return [told for told in daemon.ask("status")["warnings"] if "SLOT" in told]
+
+
+def test_slot_that_leads_nowhere_is_told_by_devices_and_status(daemon: RunningHost) -> None:
+    link = daemon.devices / "lamp.toml"
+    link.symlink_to("lamp.toml")
+    try:
+        until("the link is told", lambda: len(slots_told(daemon)) == 1)
+        assert f"SLOT_DANGLING {link}" in slots_told(daemon)[0]
+        ran = daemon.run("devices")
+        assert (ran.code, f"warning: SLOT_DANGLING {link}" in ran.err) == (0, True)
+        daemon.run("devices", "--json").ok()
+    finally:
+        link.unlink()
+    until("it is told no more", lambda: not slots_told(daemon))
 
 
 def test_device_may_be_named_by_its_node(daemon: RunningHost) -> None:

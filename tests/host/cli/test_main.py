@@ -227,6 +227,18 @@ def test_a_daemon_that_goes_while_it_is_followed_is_told(answering: Answering) -
     assert '"name":"nondum"' in ran.out
 
 
+def test_names_are_asked_for_again_only_when_another_one_is_shown(answering: Answering) -> None:
+    """The daemon answers as often as it is asked here: who asks once more finds nobody."""
+    other = TREE.replace(WHY.encode(), b"rover__eye__camera")
+    assert other != TREE
+    named = b'{"result":{"rover__eye__camera":"camera"}}\n'
+    control = answering(TREE + TREE + other + other, NO_NAMES, named)
+    ran = nondum("--control", control, "tree", "--follow")
+    shown = [line for line in ran.out.splitlines() if "nondum" in line]
+    assert len(shown) == 4, ran.out
+    assert ran.out.count("camera") == 2 and "rover__" not in ran.out
+
+
 def test_ctrl_c_ends_following_in_silence(answering: Answering) -> None:
     control = answering(TREE, hangs_up=False)
     process = subprocess.Popen(

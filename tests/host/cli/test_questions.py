@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import re
 import time
 from datetime import datetime
 from typing import Any
 
 import pytest
+from tests.host.cli.conftest import Answering
 from tests.kit.beacon import BEACON_ID, BRIGHTNESS, LAMP
+from tests.kit.command_line import nondum
 from tests.kit.running_host import RunningHost
+from tests.kit.until import until as until_seen
 
 GOAL_KEYS = {"id", "goal", "text", "kind", "priority", "state", "reason", "problems", "holds"}
 ROWS: dict[str, set[str]] = {
@@ -32,6 +36,7 @@ ROWS: dict[str, set[str]] = {
         "was",
         "built",
         "age_s",
+        "since",
     },
     "facts": {"fact", "age_s", "source", "value"},
     "journal": {
@@ -110,8 +115,8 @@ beacon     ready  test-beacon  1.0      org.example.beacon  AGE  lamp   LEVEL   
 """
 BEHAVIOURS = """\
 BEHAVIOUR  COMPONENT  KIND       RUNNING  PHRASES
-greet      beacon     finishing  no       greet {c}
-shine      beacon     lasting    no       shine [for {words:text}]
+greet      beacon     finishing  no       greet <c>
+shine      beacon     lasting    no       shine
 """
 UNITS = """\
 UNIT  TYPE   COMPONENT  READY  XYZ  RPY  MOUNT
@@ -245,6 +250,13 @@ def test_logs_are_lines_with_time_component_and_level(daemon: RunningHost) -> No
     assert "WHEN  beacon  stdout  plain words" in shown
 
 
+def test_silent_logs_say_who_runs_and_since_when(daemon: RunningHost) -> None:
+    (row,) = daemon.ask("components")
+    since = datetime.fromtimestamp(row["since"]).strftime("%T")
+    told = f"nothing was written: beacon runs since {since}\n"
+    until_seen(told, lambda: daemon.run("logs", "--since", "1s").ok().out == told)
+
+
 def test_logs_of_a_stranger_are_refused_with_the_nearest(daemon: RunningHost) -> None:
     daemon.run("logs", "baecon").refused(1, "COMPONENT_UNKNOWN").refused(1, "'beacon'?")
 
@@ -304,3 +316,28 @@ def test_following_draws_what_asking_does(daemon: RunningHost, follow: list[str]
         assert process.stdout is not None
         first = process.stdout.readline()
     assert first.startswith(("host panther", "✓ nondum"))
+
+
+WAITS = "(ready head) does not hold: turret waits for its devices head and relay"
+LACKS = [WAITS, "(idle head) does not hold", "there is no bearing"]
+FAILED = "turret.aim failed 3 times: AIM_LOST it moved → wait\nAIM_SEEN there → look"
+
+
+@pytest.mark.parametrize("is_json", [False, True])
+def test_a_row_of_goals_tells_the_first_cause_alone_and_json_all(
+    answering: Answering, is_json: bool
+) -> None:
+    can = {"words": "aim", "goal": "(aimed)", "kind": "do", "now": "cannot", "lacks": LACKS}
+    goal = {"id": "1", "text": "aim", "goal": "(aimed)", "kind": "do", "resumable": False}
+    given = [{**goal, "state": "suspended", "reason": FAILED}]
+    given += [{**goal, "state": "reached", "reason": "at 3° → 4°"}]
+    view = {"can": [{**can, "from": []}], "given": given, "elsewhere": [], "problems": []}
+    answers = [json.dumps({"result": answer}).encode() + b"\n" for answer in (view, {})]
+    if is_json:
+        ran = nondum("--control", answering(answers[0]), "goals", "--json")
+        assert ran.json == view
+        return
+    shown = nondum("--control", answering(*answers), "goals").ok().out
+    assert f"cannot: {WAITS}; 2 more, see `nondum why aim`" in shown
+    assert "it moved" in shown and "at 3° → 4°" in shown
+    assert not any(left in shown for left in (*LACKS[1:], "→ wait", "AIM_SEEN"))

@@ -22,9 +22,16 @@ CAMERA = '[device]\nnode = "/dev/video0"\n[device.properties]\nID_BUS = "usb"\n'
 
 @asynccontextmanager
 async def watching(*folders: Path) -> AsyncIterator[asyncio.Queue[Event]]:
+    """What a source of these folders tells while the context lasts."""
+    async with telling(DeviceSlotSource(folders)) as told:
+        yield told
+
+
+@asynccontextmanager
+async def telling(source: DeviceSlotSource) -> AsyncIterator[asyncio.Queue[Event]]:
     """What a source tells while the context lasts."""
     told: asyncio.Queue[Event] = asyncio.Queue()
-    task = asyncio.create_task(DeviceSlotSource(folders).watch(told.put_nowait))
+    task = asyncio.create_task(source.watch(told.put_nowait))
     try:
         yield told
     finally:
@@ -83,6 +90,33 @@ async def test_broken_file_hurts_no_other(tmp_path: Path, caplog: pytest.LogCapt
     assert event.device == "b"
     assert "DEVICE_SLOT" in caplog.text
     assert told.empty()
+
+
+@pytest.mark.anyio
+async def test_files_that_stand_for_no_device_are_problems_until_they_are_mended(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "files").mkdir()
+    slots, file = tmp_path / "slots", tmp_path / "files/eye.toml"
+    slots.mkdir()
+    file.write_text(CAMERA)
+    (slots / "a.toml").write_text("[device\n")
+    (slots / "eye.toml").symlink_to("files/eye.toml")  # that is slots/files/eye.toml
+    (slots / "front.toml").write_text(CAMERA)
+    source = DeviceSlotSource([slots])
+    async with telling(source) as told:
+        await heard(told)
+        found = {Path(problem.where).name: problem for problem in source.problems}
+        assert {name: problem.code for name, problem in found.items()} == {
+            "a.toml": "DEVICE_SLOT",
+            "eye.toml": "SLOT_DANGLING",
+        }
+        assert str(slots / "files/eye.toml") in found["eye.toml"].message
+        (slots / "a.toml").unlink()
+        (slots / ".next").symlink_to(file)
+        (slots / ".next").rename(slots / "eye.toml")
+        assert isinstance(await heard(told), DeviceAppeared)
+        assert source.problems == ()
 
 
 @pytest.mark.anyio

@@ -47,7 +47,7 @@ CARDS = " 0 [Loopback       ]: Loopback - Loopback\n                      Loopba
         (daemon.judge_helper("Permission denied", 1000), "ok", "daemon's user alone"),
         (daemon.judge_helper("No such file or directory", 1000), "bad", "nondum-helper.socket"),
         (daemon.judge_helper("Connection refused", 0), "ok", "root"),
-        (space.judge_free(64, 64, 4096), "bad", "no payload is taken in"),
+        (space.judge_free(64, 64, 4096), "bad", "no payload is installed"),
         (space.judge_free(900, 64, 4096), "warn", "quota_mb"),
         (space.judge_free(9000, 64, 4096), "ok", "9000 MB are free"),
         (drives.judge(Disk("sda", 9, True, Owner.DRIVE, "")), "ok", "read as a drive"),

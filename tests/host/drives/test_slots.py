@@ -22,8 +22,14 @@ pytestmark = pytest.mark.anyio
 
 @contextlib.asynccontextmanager
 async def watched(*folders: Path) -> AsyncIterator[asyncio.Queue[Event]]:
+    async with telling(SlotSource(folders)) as told:
+        yield told
+
+
+@contextlib.asynccontextmanager
+async def telling(source: SlotSource) -> AsyncIterator[asyncio.Queue[Event]]:
     told: asyncio.Queue[Event] = asyncio.Queue()
-    task = asyncio.create_task(SlotSource(folders).watch(told.put_nowait))
+    task = asyncio.create_task(source.watch(told.put_nowait))
     try:
         yield told
     finally:
@@ -66,6 +72,25 @@ async def test_swapped_drive_is_another_drive(tmp_path: Path) -> None:
         (slots / ".next").rename(slots / "a")
         assert await told.get() == DriveRemoved("a")
         assert await told.get() == DriveInserted("a", slots / "a", "slot")
+
+
+async def test_link_that_leads_nowhere_is_a_problem_until_it_leads_somewhere(
+    tmp_path: Path,
+) -> None:
+    """As `ln -s usb slots/` makes one, typed beside `usb`."""
+    slots, drive = tmp_path / "slots", tmp_path / "usb"
+    drive.mkdir()
+    slots.mkdir()
+    (slots / "usb").symlink_to("usb")
+    source = SlotSource([slots])
+    async with telling(source) as told:
+        assert await told.get() == DrivesScanned("slot", ())
+        (problem,) = source.problems
+        assert (problem.code, problem.where) == ("SLOT_DANGLING", str(slots / "usb"))
+        (slots / ".next").symlink_to(drive)
+        (slots / ".next").rename(slots / "usb")
+        assert isinstance(await told.get(), DriveInserted)
+        await until_async("the link is no problem any more", lambda: not source.problems)
 
 
 async def test_files_and_hidden_entries_are_no_drives(tmp_path: Path) -> None:

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from tests.host.mind.robot import Robot
 from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT
 
-from nondum.host.catalogue.records import ComponentState
+from nondum.host.answering import Answering
+from nondum.host.catalogue.records import ComponentState, DeviceClaim
 from nondum.host.mind.answers import LONGEST, abilities, activity, of_the_robot
 from nondum.sdk.description import Label, PluginDescription
 
@@ -42,15 +43,32 @@ def answered(robot: Robot, coming: int = 0) -> str:
 @pytest.mark.anyio
 async def test_robot_says_what_it_can_do_and_what_it_lacks(robot: Robot) -> None:
     assert answered(robot) == "I can do nothing yet: nothing is plugged in that knows words."
-    assert answered(robot, 2) == "I can do nothing yet: 2 payloads are being taken in."
+    assert answered(robot, 2) == "I can do nothing yet: 2 payloads are being installed."
     robot.plug(POINTING)
     assert answered(robot) == "I can do nothing now: to point at something I need a target."
     robot.plug(SENSING)
     assert answered(robot) == f"I can {POINT}."
-    assert answered(robot, 1) == f"I can {POINT}; a payload is being taken in."
+    assert answered(robot, 1) == f"I can {POINT}; a payload is being installed."
     robot.set_state("pan-tilt-unit", ComponentState.RESTARTING)
     await robot.until(lambda: POINT not in answered(robot) or "I need" in answered(robot))
     assert answered(robot) == f"I can do nothing now: to {POINT} I need the head to be ready."
+
+
+@pytest.mark.anyio
+async def test_component_that_waits_for_its_device_is_said_instead_of_what_it_lacks(
+    robot: Robot,
+) -> None:
+    answering = Answering(robot.mind, lambda: (), lambda: ())
+    waits = "pan-tilt-unit waits for its device head (then it can point)"
+    robot.plug(POINTING)
+    needs = (DeviceClaim("head", {"usb": "*:*"}, optional=False),)
+    unit = replace(robot.components["pan-tilt-unit"], devices=needs)
+    robot.components["pan-tilt-unit"] = unit
+    robot.see()
+    told = await answering.own("what can you do")
+    assert told == f"I can do nothing now: {waits}; to point at something I need a target."
+    robot.plug(SENSING)  # now it is the device alone
+    assert await answering.own("what can you do") == f"I can do nothing now: {waits}."
 
 
 @pytest.mark.anyio
@@ -100,7 +118,7 @@ def test_a_long_list_is_cut_to_what_can_be_spoken() -> None:
 
 def test_lent_components_and_payloads_that_come_are_told_beside() -> None:
     assert activity([], [], {"eye"}) == "I do nothing of my own: eye runs for another host."
-    assert activity([], [], (), 2) == "I do nothing: 2 payloads are being taken in."
+    assert activity([], [], (), 2) == "I do nothing: 2 payloads are being installed."
     goals = [goal("sing", "queued"), goal("dance", "active", holds=True)]
     assert activity(goals, [step("band@mule")], {"eye"}) == (
         "I was asked to dance, and I do, with band; eye runs for another host; "

@@ -63,6 +63,14 @@ async def test_parts_are_ticked_in_order(robot: Robot) -> None:
     assert view["children"][3]["why"] == "nothing is asked for"
 
 
+async def test_world_model_counts_in_words_that_fit(robot: Robot) -> None:
+    robot.plug()
+    robot.mind.tick()
+    counted = len(robot.mind.beliefs.world.facts)
+    assert counted == 1
+    assert robot.mind.views.tree()["children"][1]["why"] == "1 fact holds"
+
+
 async def test_integrators_guard_interrupts_the_task(released: None) -> None:
     tree = load_system_tree(f"{__name__}:cautious_tree")
     robot = Robot(Planners.installed(memory_mb=512), system_tree=tree)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from nondum.host.peers.namesakes import RECENT_S, Namesakes
 from nondum.sdk.errors import Problem
+from nondum.transport.discovery import Hint, Source
 from nondum.transport.peers import DialFailed, HostKeys, PeerKey, PeerUp, Reason, Refusal
 
 TAKEN = Problem("PEER_NAME_TAKEN", "two hosts are called base", where="base", fix="rename one")
@@ -15,7 +16,12 @@ class Look:
 
     def __init__(self) -> None:
         self.now_s, self.hinted = 0.0, set[PeerKey]()
-        self.namesakes = Namesakes(lambda: self.now_s, lambda: self.hinted)
+        self.called = "base"
+        self.namesakes = Namesakes("rover", lambda: self.now_s, self.hints)
+
+    def hints(self) -> list[Hint]:
+        at = ("tcp://10.77.0.9:7410",)
+        return [Hint(key, self.called, 1, at, Source.MULTICAST) for key in self.hinted]
 
     def codes(self) -> list[str]:
         return [problem.code for problem in self.namesakes.problems]
@@ -55,3 +61,21 @@ def test_other_refusals_are_no_matter_of_names() -> None:
     look = Look()
     look.namesakes.on_fleet(turned_away(Problem("PEER_DUPLICATE", "an old connection came late")))
     assert look.codes() == []
+
+
+def test_stranger_of_the_own_name_is_told_while_it_is_announced() -> None:
+    look = Look()
+    look.hinted |= {KEY, HostKeys.generate().public}
+    assert look.codes() == []
+    look.called = "rover"
+    assert look.codes() == ["PEER_NAME_TAKEN"]
+    look.hinted.clear()
+    assert look.codes() == []
+
+
+def test_host_that_was_not_let_in_is_not_told_twice() -> None:
+    look = Look()
+    look.called = "rover"
+    look.hinted.add(KEY)
+    look.namesakes.on_fleet(turned_away())
+    assert look.codes() == ["PEER_NAME_TAKEN"]

@@ -11,8 +11,9 @@ from typing import Any
 
 import pytest
 from tests.host.peers.hints import Hinted, Network
+from tests.kit.clock import VirtualClock
 
-from nondum.host.peers.pairing_desk import PairingDesk
+from nondum.host.peers.pairing_desk import LOOK_S, PairingDesk
 from nondum.host.peers.trust_keeper import TRUST_NAME, TrustKeeper
 from nondum.transport.peers import HostKeys, PeerKey, PeerRefused, fingerprint
 
@@ -93,6 +94,23 @@ async def test_people_who_say_yes_make_hosts_trust_each_other(pair: tuple[Host, 
     for one, other in ((rover, base), (base, rover)):
         again = await TrustKeeper.open(one.keeper.folder, one.keeper.host.name)
         assert again.trust.paired == {other.keeper.key: other.keeper.host.name}
+
+
+async def test_code_is_told_once_whoever_is_heard_of_meanwhile(
+    tmp_path: Path, clock: VirtualClock
+) -> None:
+    """The host that is asked may hear of the other one only when both show the code."""
+    network = Network()
+    async with host(tmp_path, network, "rover") as rover, host(tmp_path, network, "base") as base:
+        for one in (rover, base):
+            one.begins()
+        for one in (rover, base):
+            await clock.advance_until(one.sees("comparing"))
+        key = HostKeys.generate().public
+        network.hints[key] = Hinted(key, "other", ("tcp://127.0.0.1:1",), 1)
+        await clock.advance(2 * LOOK_S)
+        for one in (rover, base):
+            assert [row["step"] for row in one.rows].count("comparing") == 1
 
 
 async def test_window_is_announced_while_it_is_open(tmp_path: Path) -> None:

@@ -378,6 +378,27 @@ async def test_yes_holds_for_a_later_try_with_the_same_host() -> None:
             await base.sees(Agreed)
 
 
+async def test_window_that_the_other_host_closed_first_is_what_the_end_tells(
+    clock: VirtualClock,
+) -> None:
+    """Who dials a host whose window is closed finds that nobody answers there: that is no news."""
+    async with end("rover") as rover:
+        async with end("base") as base:
+            rover.asks(base)
+            await clock.advance_until(rover.sees(Comparing))
+            rover.says_yes()
+            await clock.advance(channel.BEAT_S)
+        await clock.advance_until(rover.gives_up("PAIRING_OVER"))
+        for _ in range(40):
+            await clock.advance_until(asyncio.sleep(0.5))
+        await clock.advance(pairing.WINDOW_S)
+        problem = (await rover.sees(Failed)).problem
+        assert (problem.code, problem.where) == ("PAIRING_OVER", "base")
+        waiting = (state for state in rover.states if isinstance(state, Waiting) and state.problem)
+        told = {state.problem.code for state in waiting if state.problem}
+        assert told == {"PAIRING_OVER"}
+
+
 async def test_yes_to_one_host_is_none_to_another() -> None:
     async with end("rover") as rover:
         async with end("base") as base:

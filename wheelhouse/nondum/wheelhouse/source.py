@@ -62,12 +62,16 @@ def description_problems(
 def entry_point(package: Path, component: ComponentManifest) -> str:
     """The entry point of a component's plugin, as the folder's `pyproject.toml` declares it; of
     another distribution, as it is installed. Raises `PayloadRefused` (ENTRY_POINT, …)."""
-    project = _project(package / PROJECT)
-    if canonicalize_name(str(project.get("name", ""))) == component.distribution:
-        declared = _table(_table(project, "entry-points"), ENTRY_POINT_GROUP)
-        if declared:
-            return chosen(declared, component.distribution, component.id)
+    project = _project_of(package, component.distribution)
+    if declared := _table(_table(project, "entry-points"), ENTRY_POINT_GROUP):
+        return chosen(declared, component.distribution, component.id)
     return installed_entry_point(component.distribution, component.id)
+
+
+def declared_version(package: Path, distribution: str) -> str:
+    """The version of a distribution in the folder's `pyproject.toml`, which need not be installed;
+    empty: that says none. Raises `PayloadRefused`."""
+    return str(_project_of(package, distribution).get("version", ""))
 
 
 def installed_entry_point(
@@ -106,6 +110,13 @@ def _no_entry_point(distribution: str, component: str, have: str) -> PayloadRefu
             fix=f'add [project.entry-points."{ENTRY_POINT_GROUP}"] to its pyproject.toml',
         )
     )
+
+
+def _project_of(package: Path, distribution: str) -> Mapping[str, Any]:
+    """What the folder's `pyproject.toml` declares of a distribution; nothing if it is another's."""
+    project = _project(package / PROJECT)
+    is_meant = canonicalize_name(str(project.get("name", ""))) == distribution
+    return project if is_meant else {}
 
 
 def _project(path: Path) -> Mapping[str, Any]:

@@ -70,8 +70,8 @@ def goal(
     A goal to maintain, such as "follow me", replaces older ones to maintain of the same or a lower
     priority, if their plans need the same: which ones is shown. Of JSON, they are `replaces`.
 
-    Words that mean nothing yet, since their payload is still being brought in, are kept with --keep
-    and given once they do; with --wait, while anything is being brought in. With --wait, exits with
+    Words that mean nothing yet, since their payload is still being installed, are kept with --keep
+    and given once they do; with --wait, while anything is being installed. With --wait, exits with
     1 when there is no plan; the goal then waits for what is missing, until it is halted.
 
     \b

@@ -10,6 +10,7 @@ import click
 from nondum.host.cli import render
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.table import table
+from nondum.planning.pattern import with_blanks
 
 
 def show(session: Session, rows: list[dict[str, Any]], columns: Sequence[str], empty: str) -> None:
@@ -37,7 +38,13 @@ def components(session: Session) -> None:
         columns.insert(columns.index("age"), "release")
     if not session.as_json:
         rows = [
-            {**row, "release": render.release(row), "age": render.age(row["age_s"])} for row in rows
+            {
+                **row,
+                "release": render.release(row),
+                "age": render.age(row["age_s"]),
+                "problem": render.without_excerpt(row["problem"]),
+            }
+            for row in rows
         ]
     show(session, rows, columns, "no components")
 
@@ -54,6 +61,8 @@ def behaviours(session: Session) -> None:
     rows = session.ask("behaviours")
     if any(row["problem"] for row in rows):
         columns.append("problem")
+    if not session.as_json:
+        rows = [{**row, "phrases": list(map(with_blanks, row["phrases"]))} for row in rows]
     show(session, rows, columns, "no behaviours")
 
 

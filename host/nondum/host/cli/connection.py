@@ -11,7 +11,7 @@ from typing import Any, TypeVar, cast
 import click
 
 from nondum.host.control.client import ControlClient
-from nondum.host.whole_names import all_shortened
+from nondum.host.whole_names import all_shortened, has_unknown
 from nondum.sdk.errors import HostUnreachable
 
 _Shown = TypeVar("_Shown")
@@ -50,11 +50,11 @@ class Session:
 
     def short(self, shown: _Shown, *, anew: bool = False) -> _Shown:
         """Texts, or rows of them, with short names of units and streams; JSON keeps whole ones.
-        `anew` asks again which there are.
+        `anew` asks again which there are, if a name is shown that was not there before.
 
         Raises `NondumError`.
         """
-        if self._names is None or anew:
+        if self._names is None or (anew and has_unknown(shown, self._names)):
             self._names = self.ask("names")
         return cast(_Shown, all_shortened(shown, self._names))
 

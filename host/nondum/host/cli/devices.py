@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from nondum.host.cli import render
+from nondum.host.cli import failure, render
 from nondum.host.cli.advise import wheelhouse_option
 from nondum.host.cli.connection import Session, json_option
 from nondum.host.cli.table import cell, table
@@ -60,7 +60,11 @@ def devices(
             click.echo("no devices")
     else:
         _show(rows, drivers)
-    if gone and not session.as_json:
+    if session.as_json:
+        return
+    for problem in session.ask("device_slots"):
+        failure.tell_problem(Problem(**problem), as_warning=True)
+    if gone:
         _show_gone(gone)
 
 

@@ -38,5 +38,5 @@ def disks(session: Session) -> None:
     if session.as_json:
         render.as_json(rows)
         return
-    shown = [{**row, "size": f"{row['size'] / 1e6:,.0f} MB"} for row in rows]
+    shown = [{**row, "size": render.size(row["size"])} for row in rows]
     table(shown, ["disk", "size", "usb", "whose", "why"], empty="There are no disks.")

@@ -142,7 +142,8 @@ _NO_WORDS = "nothing can be asked for yet: nothing is plugged in that knows word
 
 
 def _show_goals(view: dict[str, Any]) -> None:
-    shown = [{**row, "words": _words(row["words"]), "now": _outlook(row)} for row in view["can"]]
+    can = [{**row, "words": _words(row["words"])} for row in view["can"]]
+    shown = [{**row, "now": _outlook(row)} for row in can]
     table(shown, ["words", "goal", "kind", "now", "from"], empty=_NO_WORDS)
     for problem in view["problems"]:
         render.sentence(problem, colour="red")
@@ -150,7 +151,8 @@ def _show_goals(view: dict[str, Any]) -> None:
     columns = ["id", "text", "goal", "kind", "state", "reason"]
     if view["elsewhere"]:
         columns.insert(1, "host")
-    given = [{**row, "reason": _reason(row)} for row in (*view["given"], *view["elsewhere"])]
+    rows = map(render.goal, (*view["given"], *view["elsewhere"]))
+    given = [{**row, "reason": _reason(row)} for row in rows]
     table(given, columns, empty="no goal was given")
 
 
@@ -165,7 +167,10 @@ def _words(said: str) -> str:
 
 
 def _outlook(row: dict[str, Any]) -> str:
-    return ": ".join(filter(None, (row["now"], "; ".join(row["lacks"]))))
+    """The first of what is missing: `nondum why` tells all of it."""
+    first, more = "".join(row["lacks"][:1]), len(row["lacks"]) - 1
+    told = f"{first}; {more} more, see `nondum why {row['words']}`" if more > 0 else first
+    return ": ".join(filter(None, (row["now"], told)))
 
 
 @click.command()

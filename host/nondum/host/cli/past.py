@@ -102,9 +102,22 @@ def logs(session: Session, component: str | None, since_s: int | None, follow: b
         render.as_json(rows)
         return
     if not rows:
-        click.echo("nothing was written")
+        render.sentence(_silent(session, component))
     for row in rows:
         _show_line(row)
+
+
+def _silent(session: Session, component: str | None) -> str:
+    """Who has written nothing, and since when it runs: that is how a healthy component looks."""
+    known = [row for row in session.ask("components") if "@" not in row["component"]]
+    asked = [row for row in known if component in (None, row["component"])]
+    told = [
+        f"{row['component']} runs since {render.moment(row['since'])}"
+        if row["since"]
+        else f"{row['component']} is {row['state']}"
+        for row in asked
+    ]
+    return f"nothing was written: {', '.join(told) or 'no component is here'}"
 
 
 def _show_line(row: dict[str, Any]) -> None:

@@ -58,17 +58,38 @@ def age(seconds: float | None) -> str:
 
 
 def size(count: int) -> str:
-    """Bytes as people read them.
+    """Bytes as people read them, in units of 1024, as all amounts of memory and disk are told.
 
-    >>> size(0), size(921_600), size(61_440_000)
-    ('0 B', '921.6 kB', '61.4 MB')
+    >>> size(0), size(921_600), size(188 << 20), size(12_000 << 20)
+    ('0 B', '900.0 kB', '188.0 MB', '11.7 GB')
     """
     amount = float(count)
     for unit in ("B", "kB", "MB", "GB"):
-        if amount < 1000.0 or unit == "GB":
+        if amount < 1024.0 or unit == "GB":
             break
-        amount /= 1000.0
+        amount /= 1024.0
     return f"{count} B" if unit == "B" else f"{amount:.1f} {unit}"
+
+
+def goal(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A goal for a table: of why it is not reached the first line, and no remedies, which `why`
+    tells; an answer is whole.
+
+    >>> goal({"state": "suspended", "reason": "eye.see failed: DARK it is dark → light a lamp"})
+    {'state': 'suspended', 'reason': 'eye.see failed: DARK it is dark'}
+    """
+    if row["state"] == "reached":
+        return dict(row)
+    return {**row, "reason": row["reason"].partition("\n")[0].partition(" → ")[0]}
+
+
+def without_excerpt(problem: str) -> str:
+    r"""A problem for a table's cell: without the source that it shows below its place.
+
+    >>> without_excerpt("E-INIT a.pddl:1:7: is no fact\n    (:init (a))\n          ^\n→ correct it")
+    'E-INIT a.pddl:1:7: is no fact → correct it'
+    """
+    return " ".join(line for line in problem.split("\n") if not line.startswith("    "))
 
 
 def release(row: Mapping[str, Any]) -> str:
@@ -111,7 +132,7 @@ def machine(told: Mapping[str, Any]) -> list[str]:
     ...         "load": {"one_min": 0.42},
     ...     }
     ... )
-    ['battery 81 % (discharging)', 'disk 12.6 GB free', '48 °C', 'load 0.42']
+    ['battery 81 % (discharging)', 'disk 11.7 GB free', '48 °C', 'load 0.42']
     """
     words = [f"battery {_fullness(battery)}" for battery in told["batteries"]]
     if told["disk"]:

@@ -61,7 +61,8 @@ def show(view: dict[str, Any]) -> None:
         render.sentence(names, mark="peers: ")
     if view["goals"]:
         click.echo()
-        table(view["goals"], ["id", "text", "kind", "state", "reason"], empty="")
+        columns = ["id", "text", "kind", "state", "reason"]
+        table(list(map(render.goal, view["goals"])), columns, empty="")
     if view["told"]:
         click.echo()
     show_told(view["told"])

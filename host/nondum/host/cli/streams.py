@@ -109,7 +109,7 @@ def _connect(session: Session, name: str, stream: str | None) -> None:
     elif stream is None:
         click.echo(f"{name}: the host picks again what it gets")
     else:
-        click.echo(f"{name} gets {stream} from now on, and nothing else")
+        click.echo(session.short(f"{name} gets {stream} from now on, and nothing else"))
 
 
 def with_rate(row: dict[str, Any]) -> dict[str, Any]:

@@ -181,7 +181,11 @@ def _goals(given: Sequence[View]) -> Iterator[Line]:
         mark, colour = _GOALS[goal["state"]]
         mark = "∞" if goal["holds"] and goal["state"] == "active" else mark
         words = f"{goal['id']} {goal['text']}"
-        yield Line("  ".join(filter(None, (words, goal["state"], goal["reason"]))), mark, colour)
+        yield Line(
+            "  ".join(filter(None, (words, goal["state"], render.goal(goal)["reason"]))),
+            mark,
+            colour,
+        )
     if not given:
         yield Line("nothing was asked for")
 

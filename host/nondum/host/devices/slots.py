@@ -13,6 +13,7 @@ device is pulled. Files whose names begin with a dot, or end in anything but `.t
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.catalogue.records import DeviceNode, DeviceRecord
+from nondum.host.dead_links import leads_nowhere
 from nondum.host.devices.hardware import described
 from nondum.host.devices.source import Sightings
 from nondum.host.events import Emit
@@ -36,7 +38,12 @@ class DeviceSlotSource:
 
     def __init__(self, folders: Sequence[Path]) -> None:
         self._folders = tuple(folders)
-        self._refused: dict[Path, str] = {}
+        self._refused: dict[Path, Problem] = {}
+
+    @property
+    def problems(self) -> tuple[Problem, ...]:
+        """Of the files that stand for no device."""
+        return tuple(self._refused.values())
 
     async def watch(self, emit: Emit) -> None:
         """Tell what is there, then what comes and goes (see `DeviceSource`)."""
@@ -48,24 +55,27 @@ class DeviceSlotSource:
                 await changed.wait()
 
     def _present(self) -> Iterator[tuple[str, DeviceRecord]]:
+        refused: dict[Path, Problem] = {}
         for folder in self._folders:
             for path in sorted(folder.glob("[!.]*.toml")):
                 name = path.stem if len(self._folders) == 1 else f"{folder.name}/{path.stem}"
                 try:
                     found = device_of(name, parse_slot(_read(path), str(path)))
-                except ConfigRefused as refused:
-                    self._refuse(path, str(refused))
-                    continue
-                except OSError:  # it has just gone
-                    continue
-                self._refused.pop(path, None)
-                yield name, found
+                except ConfigRefused as wrong:
+                    refused[path] = wrong.problems[0]
+                except OSError:
+                    with contextlib.suppress(OSError):  # it has just gone
+                        refused[path] = leads_nowhere(path)
+                else:
+                    yield name, found
+        self._refuse(refused)
 
-    def _refuse(self, path: Path, why: str) -> None:
+    def _refuse(self, refused: dict[Path, Problem]) -> None:
         """Say it once: a file that is being written is looked at several times."""
-        if self._refused.get(path) != why:
-            self._refused[path] = why
-            log.warning("%s", why)
+        for path, problem in refused.items():
+            if self._refused.get(path) != problem:
+                log.warning("%s", problem)
+        self._refused = refused
 
 
 def device_of(name: str, nodes: Sequence[DeviceNode]) -> DeviceRecord:

@@ -41,7 +41,7 @@ def judge_free(free_mb: int, reserve_mb: int, quota_mb: int) -> Finding:
     """Whether payloads have room. Pure."""
     if free_mb <= reserve_mb:
         told = f"{free_mb} MB are free, and {reserve_mb} MB stay free whatever is plugged in"
-        return bad("disk", told, "make room: no payload is taken in until then")
+        return bad("disk", told, "make room: no payload is installed until then")
     if free_mb < reserve_mb + quota_mb // 4:
         told = f"{free_mb} MB are free, of which {reserve_mb} MB are reserved; wheels may need more"
         return warn("disk", told, f"make room, or lower `quota_mb` ({quota_mb}) under [install]")

@@ -11,10 +11,11 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
+from nondum.host.dead_links import dead_links, leads_nowhere
 from nondum.host.drives.rewritten import Rewritten
 from nondum.host.events import DriveInserted, DriveRemoved, DrivesScanned, Emit
 from nondum.host.inotify import folders_watched
@@ -36,6 +37,8 @@ class SlotSource:
     def __init__(self, folders: Sequence[Path]) -> None:
         self._folders = tuple(folders)
         self._seen: dict[str, _Identity] = {}
+        self.problems: tuple[Problem, ...] = ()
+        """Of links that lead nowhere yet."""
 
     async def watch(self, emit: Emit) -> None:
         """Tell what is there, then what comes and goes, until cancelled."""
@@ -57,9 +60,9 @@ class SlotSource:
         places: dict[_Slot, Path] = {
             (drive, identity): identity[0] for drive, identity in self._seen.items()
         }
-        for folder in self._folders:
-            for entry in _dangling(folder):
-                places[entry.path, None] = Path(entry.path)
+        links = [link for folder in self._folders for link in _dead_links(folder)]
+        places |= {(str(link), None): link for link in links}
+        self.problems = tuple(_problems(links))
         return places
 
     def _again(self, emit: Emit, slot: _Slot) -> None:
@@ -109,14 +112,17 @@ def _scanned(folder: Path) -> list[os.DirEntry[str]]:
         return []
 
 
-def _dangling(folder: Path) -> Iterator[os.DirEntry[str]]:
+def _dead_links(folder: Path) -> list[Path]:
     """Links to what is not there; those to what is are drives, or files."""
-    for entry in _scanned(folder):
-        if entry.is_symlink() and not entry.name.startswith("."):
-            try:
-                entry.stat()
-            except OSError:
-                yield entry
+    with contextlib.suppress(OSError):  # it was told when its entries were read
+        return list(dead_links(folder))
+    return []
+
+
+def _problems(links: Iterable[Path]) -> Iterator[Problem]:
+    for link in links:
+        with contextlib.suppress(OSError):  # it has just gone
+            yield leads_nowhere(link)
 
 
 def _identity(entry: os.DirEntry[str]) -> _Identity | None:

@@ -62,7 +62,7 @@ def _of_payload(payload: PayloadRecord, known: Known) -> Iterator[Concern]:
         told = f"{name} does not work"
         yield refusal(State.HELP, about, told, payload.problems, payload=name)
     elif not is_at_rest(payload):
-        doing = "is being removed" if payload.step is Step.REMOVING else "is being brought in"
+        doing = "is being removed" if payload.step is Step.REMOVING else "is being installed"
         yield Concern(State.WORKING, about, f"{name} {doing}", payload=name)
 
 

@@ -16,11 +16,12 @@ LONGEST = 160
 _LENGTHS = ((6, 2), (5, 1), (4, 1), (3, 1), (2, 1), (1, 1), (3, 0), (2, 0), (1, 0))
 """So many things that can be done, and that are missing, are tried to be named."""
 _NOTHING = "I can do nothing yet"
+_WAITS = " waits for its device"
 
 
-def abilities(can: Sequence[Row], coming: int = 0) -> str:
+def abilities(can: Sequence[Row], coming: int = 0, waiting: Sequence[str] = ()) -> str:
     """What the robot can do, and what it lacks for more; `can` are the rows of `offers`, `coming`
-    is how many payloads are being taken in.
+    is how many payloads are being installed, `waiting` says which component waits for what.
 
     >>> lacks = ["there is no pointer, which turret.aim needs, for (pointing rover source)"]
     >>> can = [
@@ -31,10 +32,12 @@ def abilities(can: Sequence[Row], coming: int = 0) -> str:
     >>> abilities(can)
     'I can follow you and look for you; to point at the source I need a pointer.'
     >>> abilities([], coming=2)
-    'I can do nothing yet: 2 payloads are being taken in.'
+    'I can do nothing yet: 2 payloads are being installed.'
+    >>> abilities([], waiting=["turret waits for its device head (then it can point)"])
+    'I can do nothing now: turret waits for its device head (then it can point).'
     """
     able = _words(row for row in can if row["now"] in ("can", "holds"))
-    lacking = _lacking(row for row in can if row["now"] == "cannot")
+    lacking = [*waiting, *_lacking(row for row in can if row["now"] == "cannot")]
     if not able and (coming or not lacking):
         return f"{_NOTHING}: {_coming(coming) or 'nothing is plugged in that knows words'}."
     end = f"; {_coming(coming)}" if coming else ""
@@ -102,6 +105,8 @@ def _lacking(rows: Iterable[Row]) -> list[str]:
     concrete = sorted(rows, key=lambda row: "{" in row["words"])
     wanted: dict[str, dict[str, str]] = {}
     for row in concrete:
+        if any(_WAITS in lack for lack in row["lacks"]):  # that is said of the component
+            continue
         need = next(filter(None, map(_need, row["lacks"])), "")
         wanted.setdefault(need, {}).setdefault(row["goal"], of_the_robot(as_said(row["words"])))
     return [
@@ -171,7 +176,7 @@ def _a(noun: str) -> str:
 def _coming(count: int) -> str:
     if not count:
         return ""
-    return "a payload is being taken in" if count == 1 else f"{count} payloads are being taken in"
+    return "a payload is being installed" if count == 1 else f"{count} payloads are being installed"
 
 
 def _goals(count: int) -> str:

@@ -314,7 +314,8 @@ class Mind:
     def _believe(self) -> str:
         for problem in self.beliefs.new_conflicts():
             self.people.tell(str(problem))
-        return f"{len(self.beliefs.world.facts)} facts hold"
+        facts = len(self.beliefs.world.facts)
+        return "1 fact holds" if facts == 1 else f"{facts} facts hold"
 
     def _choose(self) -> str:
         self.pursuit.step()

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
+from nondum.host import missing_devices
 from nondum.host.catalogue.records import ComponentRecord, PeerComponent, Snapshot
 from nondum.planning.cause import Cause, Lack
 from nondum.planning.contribution import object_name
@@ -99,8 +100,7 @@ def _unready(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
 
 
 def _why_not_ready(component: ComponentRecord) -> str:
-    missing = [c.name for c in component.devices if c.device is None and not c.optional]
-    if missing:
-        return f"{component.id} waits for its device {', '.join(missing)}"
+    if told := missing_devices.waits(component):
+        return f"{component.id} {told}"
     reason = f", {component.problems[0].message}" if component.problems else ""
     return f"{component.id} is {component.state.value}{reason}"

@@ -90,7 +90,7 @@ class Neighbourhood:
         )
         clock = asyncio.get_running_loop().time
         self._strangers = Strangers(emit, clock)
-        self._namesakes = Namesakes(clock, lambda: {hint.key for hint in self._hints()})
+        self._namesakes = Namesakes(host, clock, self._hints)
         self.desk = Desk()
         self.desk.add("behave", self.serving.behave, self.serving.orphaned)
         self.desk.hear("values", self.serving.values)

@@ -116,7 +116,7 @@ class PairingDesk:
 
         `step` is waiting, comparing, confirmed (here, not yet there), agreed or failed; `code`,
         `name` and `fingerprint` are of the host that it is compared with; `candidates` those that
-        could be, with `name` and `fingerprint`; `problem` what went wrong last.
+        could be, with `name` and `fingerprint`, while none is; `problem` what went wrong last.
         """
         return self._window.row() if self._window else None
 
@@ -205,10 +205,7 @@ class _Window:
             "name": "",
             "fingerprint": "",
             "seconds_left": round(self.host.seconds_left),
-            "candidates": [
-                {"name": one.name, "fingerprint": fingerprint(one.key)}
-                for one in self._found.values()
-            ],
+            "candidates": [],
             "problem": None,
         }
         return found | self._state_row(self._shown)
@@ -217,7 +214,11 @@ class _Window:
         match state:
             case Waiting(tries_left, problem):
                 told = problem.to_dict() if problem else None
-                return {"tries_left": tries_left, "problem": told}
+                found = [
+                    {"name": one.name, "fingerprint": fingerprint(one.key)}
+                    for one in self._found.values()
+                ]
+                return {"tries_left": tries_left, "candidates": found, "problem": told}
             case Comparing(code, name, _, is_confirmed):
                 step = "confirmed" if is_confirmed else "comparing"
                 return {

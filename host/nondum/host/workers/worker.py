@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -86,6 +87,8 @@ class Worker:
         """
         self._on_crowded = on_crowded
         self.spec, self._timing, self._emit = spec, timing, emit
+        self.since_wall_s = time.time()
+        """When it was launched, in seconds since 1970."""
         self.claims = Claims()
         """What it says is so."""
         self.faults = Faults()

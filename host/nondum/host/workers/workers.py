@@ -310,6 +310,10 @@ class Workers:
         """The process of each running worker, by component."""
         return {worker.spec.component: worker.pid for worker in self._running()}
 
+    def since_wall_s(self) -> dict[str, float]:
+        """When each running worker was launched, in seconds since 1970, by component."""
+        return {worker.spec.component: worker.since_wall_s for worker in self._running()}
+
     def pids_of(self, payload: str) -> tuple[int, ...]:
         """The processes of a payload's workers, as far as they are known."""
         every = (*self._supervisors.values(), *self._others)

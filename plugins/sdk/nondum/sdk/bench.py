@@ -7,6 +7,7 @@ worker process, so that what passes here passes there. Needs no Linux.
 from __future__ import annotations
 
 import asyncio
+import concurrent.futures
 import contextlib
 import threading
 from collections.abc import Callable, Coroutine, Mapping
@@ -21,10 +22,13 @@ from nondum.sdk.errors import Problem
 from nondum.sdk.geometry import Transform
 from nondum.sdk.messages import Message, Vector, value_to_wire
 from nondum.sdk.plugin import describe, load
+from nondum.sdk.raised import held_up
 from nondum.sdk.signature import parse_signature
 
 TIMEOUT_S = 30.0
 """How long the bench waits for anything before the test fails."""
+STOP_S = 10.0
+"""How long it waits for the plugin's end. A host ends a worker sooner."""
 
 _T = TypeVar("_T")
 
@@ -115,7 +119,9 @@ class Bench:
         → node. `mounts`: unit → position in metres and roll, pitch, yaw in radians, on the body.
         Raises what the plugin's description or start hook raises, as `WorkerFailed`.
         """
-        self.description: PluginDescription = describe(load(plugin))
+        loaded = load(plugin)
+        self._module = loaded.module
+        self.description: PluginDescription = describe(loaded)
         """What the plugin says about itself."""
         self.host = host
         """The host's name, which is also its object and body frame."""
@@ -248,10 +254,13 @@ class Bench:
         return self._wait(self.side.link.request(verb, body))
 
     def stop(self) -> None:
-        """Halt all, run the stop hook, and end. Stopping twice is allowed."""
+        """Halt all, run the stop hook, and end. Stopping twice is allowed.
+
+        A plugin whose code goes on all the same fails the test with WORKER_HUNG, and its lines.
+        """
         if self._thread.is_alive():
             try:
-                self._wait(self.side.stop())
+                self._wait(self.side.stop(), STOP_S)
                 self._fail_for_faults()
             finally:
                 self._loop.call_soon_threadsafe(self._loop.stop)
@@ -283,8 +292,16 @@ class Bench:
     def _object(self, name: str) -> str:
         return self.objects.get(name, name)
 
-    def _wait(self, work: Coroutine[Any, Any, _T]) -> _T:
-        return asyncio.run_coroutine_threadsafe(work, self._loop).result(2 * TIMEOUT_S)
+    def _wait(self, work: Coroutine[Any, Any, _T], timeout_s: float = 2 * TIMEOUT_S) -> _T:
+        future = asyncio.run_coroutine_threadsafe(work, self._loop)
+        if not concurrent.futures.wait([future], timeout_s).done:
+            future.cancel()
+            places = "; ".join(held_up(self._module))
+            where = f", held up in {places}" if places else ""
+            told = f"it did not answer within {timeout_s:g} s{where}"
+            fix = "wait with the context (`ctx.sleep`, `ctx.input(…).next`), which ends when halted"
+            raise AssertionError(str(Problem("WORKER_HUNG", told, where=self._module, fix=fix)))
+        return future.result()
 
 
 class WorkerFactory:

@@ -43,6 +43,11 @@ class Plugin:
     version: str
 
     @property
+    def module(self) -> str:
+        """The module that it is written in."""
+        return _module_of(self.subject)
+
+    @property
     def hook(self) -> pluggy.HookRelay:
         """The hooks, each answering with a list: empty when the plugin does not implement it."""
         return self.manager.hook
@@ -269,9 +274,12 @@ def _invalid(message: str) -> WorkerFailed:
     return WorkerFailed(Problem("DESCRIPTION_INVALID", message))
 
 
+def _module_of(subject: object) -> str:
+    return subject.__name__ if inspect.ismodule(subject) else type(subject).__module__
+
+
 def _package_of(subject: object) -> str:
-    module = subject.__name__ if inspect.ismodule(subject) else type(subject).__module__
-    return module.partition(".")[0]
+    return _module_of(subject).partition(".")[0]
 
 
 def _normalised(name: str) -> str:

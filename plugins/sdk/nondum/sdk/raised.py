@@ -1,8 +1,9 @@
-"""What is told of an exception that a plugin raised: what, and where its author has to look."""
+"""What is told of a plugin's code that raised, or does not return: where its author has to look."""
 
 from __future__ import annotations
 
 import sys
+import threading
 import traceback
 from collections.abc import Callable, Coroutine
 from pathlib import Path
@@ -48,6 +49,16 @@ def _raised_at(error: BaseException, module: str) -> str:
     return f"{within_packages(last.filename)}:{last.lineno}"
 
 
+def held_up(module: str) -> list[str]:
+    """Where the other threads are in code of that module's package: `read, gps/plugin.py:33`."""
+    own, frames = _home(module), sys._current_frames()
+    threads = {*threading.enumerate()} - {threading.main_thread(), threading.current_thread()}
+    stacks = [traceback.extract_stack(frames[t.ident]) for t in threads if t.ident in frames]
+    found = [[f for f in stack if Path(f.filename).is_relative_to(own)] for stack in stacks if own]
+    mine = [stack[-1] for stack in found if stack]
+    return sorted(f"{f.name}, {within_packages(f.filename)}:{f.lineno}" for f in mine)
+
+
 def within_packages(path: str) -> str:
     """A file as its author knows it: without the folder of packages that it was installed in.
 
@@ -59,6 +70,6 @@ def within_packages(path: str) -> str:
 
 def _home(module: str) -> str:
     """The folder of a module's package, or the file of a module that is in none."""
-    top = sys.modules.get(module.partition(".")[0])
-    file = getattr(top, "__file__", None) or ""
+    whose = (sys.modules.get(name) for name in (module.partition(".")[0], module))
+    file = next(filter(None, (getattr(one, "__file__", None) for one in whose)), "")
     return str(Path(file).parent) if file.endswith("__init__.py") else file

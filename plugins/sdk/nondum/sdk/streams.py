@@ -27,7 +27,7 @@ from typing import Any
 from nondum.sdk.errors import MessageInvalid, Problem, ProtocolViolation
 from nondum.sdk.messages import Buffer, Message, message_from_wire
 from nondum.sdk.packets import Handle, Packets, discard
-from nondum.sdk.slots import MappedSlots, Slot, SlotRing
+from nondum.sdk.slots import MAX_SLOT_BYTES, MappedSlots, Slot, SlotRing
 from nondum.sdk.wire import MAX_PACKET, pack, unpack
 
 LENT = 2
@@ -94,16 +94,18 @@ class Producer:
     def send(self, message: Message) -> None:
         """Hand a message to every consumer that can take it; never waits.
 
-        Raises `MessageInvalid` for wrong values or a header that fits no packet.
+        Raises `MessageInvalid` for wrong values, a header that fits no packet, and more data than
+        a reader takes.
         """
         message.check()
         if not self._outlets:
             return
         header, buffer = message.to_wire()
+        length = 0 if buffer is None else memoryview(buffer).nbytes
+        _check_length(length)
         self._seq += 1
         shared = [outlet for outlet in self._outlets.values() if outlet.packets.shares_memory]
         apart = [outlet for outlet in self._outlets.values() if not outlet.packets.shares_memory]
-        length = 0 if buffer is None else memoryview(buffer).nbytes
         if buffer is not None and length > INLINE_BYTES and shared:
             self._offer_slot(shared, header, buffer, length)
         elif shared:
@@ -322,6 +324,16 @@ class Consumer:
         self._packets.close()
         self._on_closed(violation)
         self.close()
+
+
+def _check_length(length: int) -> None:
+    """A reader would take a longer one for a breach of the protocol, and the sender never know."""
+    if length > MAX_SLOT_BYTES:
+        told, need = "its data are too long for one message", f"at most {MAX_SLOT_BYTES} bytes"
+        fix = "send less at once: a smaller image, or several messages"
+        raise MessageInvalid(
+            Problem("MESSAGE_TOO_LONG", told, need=need, have=f"{length} bytes", fix=fix)
+        )
 
 
 def _packed(fields: list[Any], limit: int) -> bytes:

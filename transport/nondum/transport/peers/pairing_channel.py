@@ -100,6 +100,8 @@ class PairingHost:
         self._try: Try | None = None
         self._confirmed: PeerKey | None = None
         """Whose code the person here has said yes to: it is that host's also in a later try."""
+        self._came_to_nothing: Problem | None = None
+        """What became of the last try with the host that is asked now."""
         self._timers: list[asyncio.TimerHandle] = []
         self.state: PairingState = Idle()
 
@@ -134,6 +136,7 @@ class PairingHost:
             return
         if self._dial is not None:
             self._dial.close()
+        self._came_to_nothing = None
         self._dial = Dial(
             key,
             addresses,
@@ -240,7 +243,8 @@ class PairingHost:
             self._give_up(pairing_problems.VANISHED, None)
 
     def _on_dial_failed(self, event: DialFailed) -> None:
-        if isinstance(self.state, Waiting):
+        """A host that has closed its window is silent: why it has says more than that."""
+        if isinstance(self.state, Waiting) and self._came_to_nothing is None:
             self._become(self._waiting(event.problem))
 
     # One try
@@ -344,6 +348,7 @@ class PairingHost:
             _part(current.link, told)
         else:
             current.link.cut()
+        self._came_to_nothing = problem
         self._become(self._waiting(problem))
         if self._dial is not None:
             self._dial.again()

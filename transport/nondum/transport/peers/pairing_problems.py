@@ -80,6 +80,8 @@ def unmet(last: Problem | None) -> Problem:
     """The time was over and no code was shown; `last` is what became of the last try."""
     if last is None:
         return Problem("PAIRING_OVER", _TIME_IS_OVER, fix=_BOTH)
+    if last.code == "PAIRING_OVER":
+        return replace(last, message=f"{_TIME_IS_OVER}; {last.message}", fix=_BOTH)
     told = f"{_TIME_IS_OVER}; the last try ended with {last.code}: {last.message}"
     return Problem("PAIRING_OVER", told, fix=last.fix or _BOTH)
 

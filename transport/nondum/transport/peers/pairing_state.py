@@ -20,7 +20,7 @@ class Waiting:
 
     tries_left: int
     problem: Problem | None = None
-    """What became of the last try, or of the last address that was dialled."""
+    """What became of the last try; before there was one, of the last address that was dialled."""
 
 
 @dataclass(frozen=True, slots=True)

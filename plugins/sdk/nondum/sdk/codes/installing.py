@@ -106,6 +106,12 @@ CODES = (
         "install the release that you want; `nondum status` shows what is here",
     ),
     Code(
+        "SLOT_DANGLING",
+        "A link in a slot folder leads nowhere, so nothing is plugged in by it.",
+        "link to the whole path: `ln -sfn /whole/path LINK`",
+        causes="a path in a link counts from the link's folder, not from where `ln` was typed",
+    ),
+    Code(
         "STORE_DAMAGED",
         "A stored file is not what was stored.",
         "nothing: it is unpacked again from the payload; if it happens again, the disk is failing",

@@ -136,7 +136,7 @@ CODES = (
     ),
     Code(
         "PHRASE_EARLY",
-        "No phrase fits the words yet, and payloads are still being brought in.",
+        "No phrase fits the words yet, and payloads are still being installed.",
         "ask again in a moment, or have the words kept: `nondum goal --keep WORDS`",
     ),
     Code(
