@@ -259,6 +259,28 @@ def test_helper_that_is_told_to_end_as_it_forks_ends(place: Path) -> None:
     assert helper.process.wait() == 0
 
 
+def test_helper_that_gets_no_more_processes_says_so_and_goes_on(place: Path) -> None:
+    helper = started(
+        place,
+        "-c",
+        "import errno\n"
+        "from nondum.host.confinement import refusals\n"
+        "from nondum.host.confinement.filters import Rule\n"
+        "from nondum.host.helper.__main__ import main\n"
+        "from nondum.host.inside import kernel\n"
+        "calls = ('fork', 'vfork', 'clone', 'clone3')\n"
+        "rules = tuple(Rule(call, errno.EAGAIN) for call in calls)\n"
+        "kernel.filter_calls(refusals.filter_of({'all': rules}, refusals.machine()))\n"
+        "main()",
+    )
+    for _ in range(2):
+        with pytest.raises(NondumError) as refused:
+            served(lambda: helper.client.ask(requests.ListCages()))
+        assert refused.value.code == "HELPER_BUSY"
+    helper.process.terminate()
+    assert helper.process.wait() == 0
+
+
 @pytest.fixture
 def drive(tmp_path: Path) -> Iterator[Path]:
     """The node of a loop device with a file on it."""
