@@ -244,6 +244,12 @@ def test_flood_is_answered_or_turned_away(helper: Helper) -> None:
     until("the helper serves again", serves)
 
 
+def test_helper_forks_as_a_process_of_one_thread(helper: Helper) -> None:
+    assert helper.is_well()
+    status = Path(f"/proc/{helper.process.pid}/status").read_text(encoding="ascii")
+    assert "\nThreads:\t1\n" in status
+
+
 def test_helper_that_is_told_to_end_as_it_forks_ends(place: Path) -> None:
     """Exceptions in callbacks of a fork are dropped, also those of a signal handler."""
     helper = started(

@@ -55,7 +55,8 @@ def map_folder(mount: int, owner: tuple[int, int], user: int) -> None:
 def namespace(owner: tuple[int, int], user: int) -> Iterator[int]:
     """A user namespace in which the owner is called as it is, and is another user outside.
 
-    The owner makes it, so that the kernel counts it as one of theirs. Raises `OSError`.
+    The owner makes it, so that the kernel counts it as one of theirs. The process that calls has no
+    other thread: a lock that one held would stay locked in the fork. Raises `OSError`.
     """
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with ours, theirs:
