@@ -158,10 +158,11 @@ async def worker_that_ends_is_started_again(tested: WorkersUnderTest) -> None:
 
 async def rooms_are_found_to_have_users(tested: WorkersUnderTest) -> None:
     file = STATE / "confinement.json"
-    (found,) = probe.findings(file)
+    place = STATE / "probes"
+    (found,) = probe.findings(file, place)
     assert (found.has_users, found.reason) == (True, ""), found.reason
-    assert probe.findings(file) == (found,)
-    assert not list(STATE.glob("nondum-probe-*"))
+    assert probe.findings(file, place) == (found,)
+    assert not list(place.iterdir())
 
 
 async def where_files_cannot_be_mapped_workers_share_a_user_and_it_is_told(
@@ -232,7 +233,7 @@ async def found_by(check: Check) -> str:
     """Why a check failed; empty if it did not."""
     folder = STATE / check.__name__
     folder.mkdir()
-    standing = choice.standing("auto", Level.NONE, STATE / "standing.json")
+    standing = choice.standing("auto", Level.NONE, STATE / "standing.json", STATE / "probes")
     confinement = choice.confinement(standing, (folder, SDK, LIBRARIES))
     tested = WorkersUnderTest(folder, replace(TIMING, look_s=0.2), confinement)
     tested.workers.launcher = Kept(confinement)
