@@ -6,15 +6,16 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import pip
 import pytest
 
 from nondum_dev.places import CHECKOUT
 from nondum_dev.problem import DoesNotFit, SetUpFailed
 
-pytestmark = pytest.mark.slow
 INSTALLER = """
 import pathlib, sys
 here = pathlib.Path(__file__).parent
@@ -24,6 +25,13 @@ answers = (here / "answers").read_text().split()
 (here / "answers").write_text(" ".join(answers[1:]))
 sys.exit(int(answers[0]) if answers else 0)
 """
+PYTHON = f"""#!/bin/sh -e
+[ "$2" = venv ] || exec {sys.executable} "$@"
+for folder; do :; done
+{sys.executable} -m venv --without-pip "${{folder:?}}"
+ln -s {Path(pip.__file__).parent} "$folder"/lib/python3*/site-packages
+"""
+"""Makes environments without ensurepip, which takes a while."""
 
 
 @dataclass
@@ -54,6 +62,8 @@ def checkout(tmp_path: Path) -> Checkout:
     (installer / "requirements.lock").touch()
     (installer / "__main__.py").write_text(INSTALLER)
     (tmp_path / "bin").mkdir()
+    (tmp_path / "bin/python3").write_text(PYTHON)
+    (tmp_path / "bin/python3").chmod(0o755)
     (tmp_path / "bin/apt-get").symlink_to("/bin/false")  # what this machine lacks, it lacks
     return Checkout(tmp_path)
 
