@@ -21,10 +21,11 @@ def main(words: Sequence[str]) -> int:
         else:
             own = [Own.parse(word, is_editable=True) for word in told.editable]
             own += [Own.parse(word) for word in told.what if _is_path(word)]
-            install(own, told.group, [word for word in told.what if not _is_path(word)])
+            words = [word for word in told.what if not _is_path(word)]
+            install(own, told.group, words, keep=told.keep)
     except SetUpFailed as error:
         print(f"run: {error}", file=sys.stderr)
-        return 1
+        return error.status
     return 0
 
 
@@ -41,6 +42,7 @@ def _arguments(words: Sequence[str]) -> argparse.Namespace:
     installs.add_argument("what", nargs="*", help="folders, wheels, and names of packages")
     installs.add_argument("--editable", "-e", action="append", default=[], metavar="FOLDER")
     installs.add_argument("--group", action="append", default=[])
+    installs.add_argument("--keep", action="store_true", help="the checkout's that are installed")
     for of_pip in ("--no-deps", "--force-reinstall"):
         installs.add_argument(of_pip, action="store_true", help="taken from tox; always so")
     return parser.parse_args(words)

@@ -13,7 +13,14 @@ from nondum.host.workers.confinements import Boxed
 
 
 @pytest.fixture
-async def tested(tmp_path: Path) -> AsyncIterator[WorkersUnderTest]:
-    tested = WorkersUnderTest(tmp_path, confinement=Boxed(shutil.which("bwrap") or "bwrap"))
+def has_users() -> bool:
+    """Whether each worker is a user of its own."""
+    return False
+
+
+@pytest.fixture
+async def tested(tmp_path: Path, has_users: bool) -> AsyncIterator[WorkersUnderTest]:
+    confinement = Boxed(shutil.which("bwrap") or "bwrap", has_users=has_users)
+    tested = WorkersUnderTest(tmp_path, confinement=confinement)
     yield tested
     await tested.workers.close(grace_s=1.0)

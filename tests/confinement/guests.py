@@ -8,36 +8,21 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from tests.kit.workers import HOST, WorkersUnderTest
+from tests.kit.guest import do, guest_spec
+from tests.kit.workers import WorkersUnderTest
 
 from nondum.planning.running import RunState
-from nondum.sdk.description import Behaviour, Unit
-
-DO = Behaviour("do", "(do ?u - sensor)")
-PLUGIN = """
-import os, shutil, socket, subprocess, sys, tty
-from nondum.sdk import Unit, behaviour, hookimpl
-
-@hookimpl
-def units():
-    return (Unit("it", "sensor"),)
-
-@behaviour("do", action="(do ?u - sensor)")
-async def do(ctx, u):
-    device = ctx.device("line")
-    {body}
-"""
 
 
 async def guest(tested: WorkersUnderTest, body: str, permissions: tuple[str, ...] = ()) -> None:
-    source = PLUGIN.replace("{body}", body.replace("\n", "\n    "))
-    spec = tested.spec("guest", source, behaviours=(DO,), units=(Unit("it", "sensor"),))
+    """Start one; its `device` is what it was given as `line`."""
+    spec = guest_spec(tested, f"device = ctx.device('line')\n{body}")
     await tested.workers.start(replace(spec, permissions=permissions))
 
 
 async def does(tested: WorkersUnderTest) -> str:
     """Have it do its thing; why it failed, if so."""
-    call = tested.behave("guest", "do", u=f"{HOST}__guest__it")
+    call = do(tested)
     return "" if await call.ended() is RunState.SUCCEEDED else call.reason
 
 
@@ -58,3 +43,7 @@ def status(pid: int) -> dict[str, str]:
 def parent(pid: int) -> int:
     fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
     return int(fields[1])
+
+
+def owner(path: Path) -> int:
+    return path.stat().st_uid

@@ -16,11 +16,12 @@ from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from pathlib import Path
 
-from tests.confinement.guests import DO, status
+from tests.confinement.guests import status
 from tests.confinement.service import GROUP, LINE, LINE_OF_GROUP, STATE, USER
 from tests.host.workers.flooding import fills_and_streams
 from tests.host.workers.streaming import sees
-from tests.kit.workers import HOST, LIBRARIES, SDK, TIMING, WorkersUnderTest
+from tests.kit.guest import do, guest_spec
+from tests.kit.workers import LIBRARIES, SDK, TIMING, WorkersUnderTest
 
 from nondum.host.confinement import choice, probe
 from nondum.host.confinement.users import Users
@@ -32,7 +33,6 @@ from nondum.host.workers import Limits, WorkerLauncher, WorkerSpec, scratch
 from nondum.host.workers.confinements import Confinement
 from nondum.host.workers.process import WorkerProcess
 from nondum.planning.running import RunState
-from nondum.sdk.description import Unit
 from nondum.wheelhouse.confinement import Level
 
 Check = Callable[[WorkersUnderTest], Awaitable[None]]
@@ -64,18 +64,7 @@ held.flush()
 many = [os.dup(1) for _ in range(100)]
 print('here', flush=True)
 """
-OPENS = """
-import os
-from nondum.sdk import Unit, behaviour, hookimpl
-
-@hookimpl
-def units():
-    return (Unit("it", "sensor"),)
-
-@behaviour("do", action="(do ?u - sensor)")
-async def do(ctx, u):
-    os.close(os.open(ctx.device('line').node, os.O_RDWR | os.O_NOCTTY))
-"""
+OPENS = "os.close(os.open(ctx.device('line').node, os.O_RDWR | os.O_NOCTTY))"
 
 
 async def started(tested: WorkersUnderTest, component: str, source: str = NOTHING) -> Path:
@@ -133,11 +122,10 @@ async def keeper_that_is_kept_from_answering_counts_as_too_much(tested: WorkersU
 
 
 async def device_is_the_workers_and_no_other_ones(tested: WorkersUnderTest) -> None:
-    units = (Unit("it", "sensor"),)
     for name in ("one", "other"):
-        await tested.start(name, OPENS, behaviours=(DO,), units=units)
+        await tested.workers.start(guest_spec(tested, OPENS, name=name))
     await tested.workers.attach("one", "line", str(LINE), {})
-    call = tested.behave("one", "do", u=f"{HOST}__one__it")
+    call = do(tested, "one")
     assert await call.ended() is RunState.SUCCEEDED, call.reason
     node = Path("/run/nondum-helper/devices/one/line")
     (user,) = set(status(tested.workers.pids()["one"])["Uid"].split())
@@ -170,10 +158,11 @@ async def worker_that_ends_is_started_again(tested: WorkersUnderTest) -> None:
 
 async def rooms_are_found_to_have_users(tested: WorkersUnderTest) -> None:
     file = STATE / "confinement.json"
-    (found,) = probe.findings(file)
+    place = STATE / "probes"
+    (found,) = probe.findings(file, place)
     assert (found.has_users, found.reason) == (True, ""), found.reason
-    assert probe.findings(file) == (found,)
-    assert not list(STATE.glob("nondum-probe-*"))
+    assert probe.findings(file, place) == (found,)
+    assert not list(place.iterdir())
 
 
 async def where_files_cannot_be_mapped_workers_share_a_user_and_it_is_told(
@@ -244,7 +233,7 @@ async def found_by(check: Check) -> str:
     """Why a check failed; empty if it did not."""
     folder = STATE / check.__name__
     folder.mkdir()
-    standing = choice.standing("auto", Level.NONE, STATE / "standing.json")
+    standing = choice.standing("auto", Level.NONE, STATE / "standing.json", STATE / "probes")
     confinement = choice.confinement(standing, (folder, SDK, LIBRARIES))
     tested = WorkersUnderTest(folder, replace(TIMING, look_s=0.2), confinement)
     tested.workers.launcher = Kept(confinement)

@@ -3,29 +3,23 @@
 from __future__ import annotations
 
 import os
-import pty
 import resource
 import shutil
-import stat
 import subprocess
-from collections.abc import AsyncIterator, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from tests.confinement.guests import DO, open_folder, status
-from tests.kit.workers import HOST, WorkersUnderTest
+from tests.confinement.guests import open_folder, owner, status
+from tests.kit.workers import WorkersUnderTest
 
 from nondum.host.confinement.users import FIRST_USER, Users, is_workers
 from nondum.host.events import WorkerLogged
 from nondum.host.helper.worker_users import OF_ROOT
 from nondum.host.lifecycle.folders import remove
-from nondum.host.workers import confinements, scratch
+from nondum.host.workers import scratch
 from nondum.host.workers.confinements import Boxed
-from nondum.host.workers.lending import Lending
 from nondum.host.workers.spare import Spare
-from nondum.planning.running import RunState
-from nondum.sdk.description import Unit
 
 pytestmark = [
     pytest.mark.anyio,
@@ -47,25 +41,11 @@ os.chmod('games', 0)
 os.chmod('.', 0)
 print('here', flush=True)
 """
-OPENS = """
-import os
-from nondum.sdk import Unit, behaviour, hookimpl
-
-@hookimpl
-def units():
-    return (Unit("it", "sensor"),)
-
-@behaviour("do", action="(do ?u - sensor)")
-async def do(ctx, u):
-    os.close(os.open({path}, os.O_RDWR | os.O_NOCTTY))
-"""
 
 
 @pytest.fixture
-async def tested(tmp_path: Path) -> AsyncIterator[WorkersUnderTest]:
-    tested = WorkersUnderTest(tmp_path, confinement=Boxed(BWRAP, has_users=True))
-    yield tested
-    await tested.workers.close(grace_s=1.0)
+def has_users() -> bool:
+    return True
 
 
 @pytest.fixture
@@ -214,83 +194,6 @@ def test_scratch_that_is_too_deep_to_be_given_is_emptied(folder: Path) -> None:
     assert not any(place.iterdir())
 
 
-@pytest.fixture
-def line() -> Iterator[str]:
-    """A serial line that only root may open."""
-    far, near = pty.openpty()
-    node = os.ttyname(near)
-    Path(node).chmod(0o600)
-    yield node
-    os.close(far)
-    os.close(near)
-
-
-async def opens(tested: WorkersUnderTest) -> bool:
-    call = tested.behave("guest", "do", u=f"{HOST}__guest__it")
-    return await call.ended() is RunState.SUCCEEDED
-
-
-async def test_device_is_the_workers_for_as_long_as_it_has_it(
-    tested: WorkersUnderTest, line: str
-) -> None:
-    source = OPENS.format(path="ctx.device('line').node")
-    units = (Unit("it", "sensor"),)
-    await tested.start("guest", source, behaviours=(DO,), units=units)
-    for _ in range(2):
-        await tested.workers.attach("guest", "line", line, {})
-        assert await opens(tested)
-        assert is_workers(owner(Path(line)))
-        await tested.workers.detach("guest", "line")
-        assert owner(Path(line)) == 0
-    await tested.workers.attach("guest", "line", line, {})
-    await tested.workers.stop("guest")
-    assert owner(Path(line)) == 0
-
-
-def test_device_that_everybody_may_open_stays_whose_it_is() -> None:
-    lending = Lending(FIRST_USER)
-    lending.lend("it", "/dev/full")
-    assert owner(Path("/dev/full")) == 0
-
-
-def test_device_that_a_daemon_which_died_has_lent_is_roots_again(line: str) -> None:
-    os.chown(line, FIRST_USER + 1, -1)
-    lending = Lending(FIRST_USER)
-    lending.lend("it", line)
-    lending.take_back("it")
-    assert owner(Path(line)) == 0
-
-
-def test_node_that_is_another_device_by_now_is_left_alone(line: str) -> None:
-    lending = Lending(FIRST_USER)
-    lending.lend("it", line)
-    os.chown(line, 1, -1)
-    lending.take_back("it")
-    assert owner(Path(line)) == 1
-
-
-@pytest.fixture
-def sounds() -> Iterator[Path]:
-    """A folder of devices that the group 29 may open, as `/dev/snd` is."""
-    folder = Path(f"/dev/nondum-{os.getpid()}")
-    folder.mkdir()
-    os.mknod(folder / "zero", stat.S_IFCHR, os.makedev(1, 5))
-    os.chown(folder / "zero", 0, 29)
-    (folder / "zero").chmod(0o660)
-    yield folder
-    shutil.rmtree(folder)
-
-
-async def test_worker_is_in_the_groups_of_what_its_permissions_stand_for(
-    tested: WorkersUnderTest, sounds: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(confinements, "NODES", {"audio": (str(sounds),)})
-    source = OPENS.format(path=repr(str(sounds / "zero")))
-    spec = tested.spec("guest", source, behaviours=(DO,), units=(Unit("it", "sensor"),))
-    await tested.workers.start(replace(spec, permissions=("audio",)))
-    assert await opens(tested)
-
-
 async def test_worker_whose_code_only_root_may_read_works_as_the_hosts_user(
     tested: WorkersUnderTest, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -352,7 +255,3 @@ async def test_worker_inherits_nothing_of_how_it_got_its_user(tested: WorkersUnd
     said = await tested.until(WorkerLogged, lambda event: event.message.startswith("pipes"))
     assert said.message == "pipes [] []"
     await tested.until(WorkerLogged, lambda event: event.message == "by name")
-
-
-def owner(path: Path) -> int:
-    return path.stat().st_uid

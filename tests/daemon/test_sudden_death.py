@@ -44,6 +44,16 @@ def test_killed_daemon_comes_back_with_the_same_components(
     }
 
 
+def test_nothing_temporary_is_left_of_a_daemon_that_was_killed(own_host: RunningHost) -> None:
+    host = own_host
+    host.kill()
+    for left in ("planning/planner-of-before", "probes/nondum-probe-1"):
+        (host.state / left / "inner").mkdir(parents=True)
+    host.start()
+    assert not (host.state / "planning/planner-of-before").exists()
+    assert not (host.state / "probes/nondum-probe-1").exists()
+
+
 def test_killed_worker_is_started_again_and_others_never_notice(host: RunningHost) -> None:
     host.bring("write", scribe())
     host.bring("talk", talker())

@@ -40,7 +40,9 @@ _ADMISSION = tuple(f"{_TT}/peers/test_{each}.py" for each in ("gate", "admission
 _PEER_KEYS = (f"{_TT}/peers/test_keys.py",)
 _PAIRING = tuple(f"{_TT}/peers/test_{each}.py" for each in ("pairing", "pairing_channel"))
 _TC, _TI = "tests/confinement", f"{_TH}/inside"
-_IN_ROOMS = tuple(f"{_TC}/test_{each}.py" for each in ("keeper", "mounts", "users", "room"))
+_IN_ROOMS = tuple(
+    f"{_TC}/test_{each}.py" for each in ("keeper", "mounts", "users", "lending", "room")
+)
 _PEER_CALLS = tuple(f"{_TT}/peers/test_{each}.py" for each in ("calls", "once", "allowance"))
 
 GUARDS: Mapping[str, tuple[str, ...]] = {

@@ -15,6 +15,7 @@ from tests.kit.payloads import make_wheel
 
 from nondum_dev.consistency import Checked
 from nondum_dev.places import CHECKOUT, LOCK, PACKAGING
+from nondum_dev.problem import DoesNotFit
 
 FITS = "a 1.0 has requirement b<2, but you have b 2.1."
 MISSING = "a 1.0 requires {}, which is not installed."
@@ -77,5 +78,5 @@ def test_environment_that_does_not_fit_is_not_set_up(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "venv/beside/pddl.py").exists(), "what is overruled lies beside"
     done = install("needy")
-    assert done.returncode == 1
+    assert done.returncode == DoesNotFit.status
     assert "needy 1.0 has requirement its-need<2, but you have its-need 2.0." in done.stderr

@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 
 from nondum.host.cgroups.cage import NAME as CAGE
 from nondum.host.helper.requests import COMPONENT
-from nondum.planning.given_names import LONGEST, forms, of_components, of_plugin
+from nondum.planning.given_names import (
+    LONGEST,
+    GivenNames,
+    forms,
+    of_components,
+    of_plugin,
+    plugins_of_others,
+)
 from nondum.planning.parse import parse_formula
 from nondum.sdk.description import Fragment
 from nondum.wheelhouse.names import COMPONENT_ID
@@ -110,6 +117,17 @@ def test_plugins_share_a_name_that_means_the_same(
 
 def test_a_plugin_keeps_the_name_that_it_had() -> None:
     assert of_plugin("gps", "org.b", [A], "gps--org-b", {}) == "gps--org-b"
+
+
+def test_a_name_that_was_given_stays_its_payload_s_while_that_is_away() -> None:
+    """Two payload ids may make one name."""
+    away = {"org.a-b": GivenNames(plugins={"gps": "gps--org-a-b", "clock": "clock"})}
+    given = plugins_of_others(away, "org.a.b")
+    name = of_plugin("gps", "org.a.b", [A], None, {"gps": [B]}, given)
+    assert name not in ("gps", "gps--org-a-b")
+    assert of_plugin("clock", "org.a.b", [A], None, {}, given) == "clock"
+    assert of_plugin("gps", "org.a-b", [A], "gps--org-a-b", {"gps": [B]}, given) == "gps--org-a-b"
+    assert plugins_of_others(away, "org.a-b") == frozenset()
 
 
 def test_a_plugin_gives_up_a_name_that_means_something_else_meanwhile() -> None:

@@ -168,11 +168,8 @@ async def test_violation_closes_the_link(
     assert link.is_closed
 
 
-@pytest.mark.anyio
-async def test_steady_events_pass_and_a_flood_does_not(pair: tuple[WorkerLink, Ends]) -> None:
-    _, ends = pair
-    packet = encode(Event("heartbeat", None, {}))
-    loop = asyncio.get_running_loop()
+async def flood(ends: Ends, packet: bytes) -> None:
+    """Send a packet again and again, until the link is closed."""
     while not ends.closed.is_set():
         try:
             ends.sock.send(packet)
@@ -181,6 +178,14 @@ async def test_steady_events_pass_and_a_flood_does_not(pair: tuple[WorkerLink, E
         except (BrokenPipeError, ConnectionResetError):
             break
     await ends.closed.wait()
+
+
+@pytest.mark.anyio
+async def test_steady_events_pass_and_a_flood_does_not(pair: tuple[WorkerLink, Ends]) -> None:
+    _, ends = pair
+    packet = encode(Event("heartbeat", None, {}))
+    loop = asyncio.get_running_loop()
+    await flood(ends, packet)
     assert ends.violations == ["BACKPRESSURE"]
     assert 5000 <= len(ends.events) < 50_000
     assert loop.is_running()
@@ -217,13 +222,6 @@ async def test_flood_of_bytes_ends_the_link_as_one_of_packets_does(
 ) -> None:
     _, ends = pair
     packet = encode(Event("log", None, {"message": "x" * 60_000}))
-    while not ends.closed.is_set():
-        try:
-            ends.sock.send(packet)
-        except BlockingIOError:
-            await asyncio.sleep(0)
-        except (BrokenPipeError, ConnectionResetError):
-            break
-    await ends.closed.wait()
+    await flood(ends, packet)
     assert ends.violations == ["BACKPRESSURE"]
     assert len(ends.events) < 2000

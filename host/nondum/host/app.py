@@ -49,7 +49,7 @@ from nondum.host.lifecycle.bus import Bus
 from nondum.host.lifecycle.children import watched_without_threads
 from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
-from nondum.host.lifecycle.folders import Folders, let_pass, make_private
+from nondum.host.lifecycle.folders import Folders, let_pass, make_private, remove_temporary
 from nondum.host.lifecycle.installation import InstallOptions
 from nondum.host.lifecycle.lanes import in_thread
 from nondum.host.lifecycle.tally import Tally
@@ -120,6 +120,7 @@ async def _run_as(
     ending = asyncio.create_task(_when(stop, held.will_end))
     try:
         await in_thread(make_private, folders)
+        await in_thread(remove_temporary, folders)
         tally = Tally(folders.root)
         safety = await in_thread(tally.begin, asked)
         keep = config.journal.keep
@@ -152,6 +153,7 @@ async def _run(
         config.workers.confinement,
         config.workers.minimum_confinement,
         folders.confinement,
+        folders.probes,
     )
     confinement = choice.confinement(standing, folders.of_workers)
     if changes_user(confinement):

@@ -69,6 +69,7 @@ class ShelfNames:
             if id != payload.id:
                 others.setdefault(description.name, set()).add(words_of(description))
         own = {one.name for one in payload.components.values()}
+        given = given_names.plugins_of_others(self.kept, payload.id)
         return {
             name: given_names.of_plugin(
                 name,
@@ -76,6 +77,7 @@ class ShelfNames:
                 {words_of(one) for one in payload.components.values() if one.name == name},
                 kept.plugins.get(name),
                 others,
+                given,
             )
             for name in own
         }

@@ -34,8 +34,12 @@ def distributions(checkout: Path) -> list[Path]:
 
 def own_names(checkout: Path) -> frozenset[str]:
     """Their names, which no index is asked for."""
-    tables = (_table(folder)["project"] for folder in distributions(checkout))
-    return frozenset(canonical(str(table["name"])) for table in tables)
+    return frozenset(map(name_in, distributions(checkout)))
+
+
+def name_in(folder: Path) -> str:
+    """The name of the distribution in a folder."""
+    return canonical(str(_table(folder)["project"]["name"]))
 
 
 def of_distribution(folder: Path, extras: Iterable[str] | None = ()) -> Iterator[str]:

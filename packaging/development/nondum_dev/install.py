@@ -19,7 +19,7 @@ from nondum_dev import asked, lockfile
 from nondum_dev.consistency import Checked
 from nondum_dev.overruled import OVERRULED
 from nondum_dev.places import BESIDE, CHECKOUT, LOCK, LOCK_NAME
-from nondum_dev.problem import SetUpFailed
+from nondum_dev.problem import DoesNotFit, SetUpFailed
 
 PIP = (sys.executable, "-P", "-m", "pip", "--disable-pip-version-check")
 
@@ -49,13 +49,18 @@ class Own:
             yield asked.EDITABLE
 
 
-def install(own: Sequence[Own], groups: Iterable[str], requirements: Iterable[str]) -> None:
-    """Install these. Raises `SetUpFailed`, with nothing of the checkout installed, if something is
-    not in the lock, or is not what the lock says; and if what is installed does not fit."""
+def install(
+    own: Sequence[Own], groups: Iterable[str], requirements: Iterable[str], *, keep: bool = False
+) -> None:
+    """Install these; with `keep`, what of the checkout is installed already is left as it is.
+
+    Raises `SetUpFailed`, with nothing of the checkout installed, if something is not in the lock,
+    or is not what the lock says; `DoesNotFit` if what is installed then does not fit."""
     wanted = [line for each in own for line in each.foreign()]
     wanted += [line for group in groups for line in asked.of_group(CHECKOUT, group)]
     _foreign([*wanted, *requirements])
-    _own(own)
+    there = _installed() if keep else frozenset()
+    _own([each for each in own if each.path.is_file() or asked.name_in(each.path) not in there])
     _check()
 
 
@@ -83,11 +88,15 @@ def _locked(entries: Sequence[lockfile.Entry], *words: str) -> None:
 
 def _remove(names: Iterable[str]) -> None:
     """Take these out of the environment, where they were before they were put beside it."""
-    there = {lockfile.canonical(found.name) for found in metadata.distributions()}
-    if known := sorted(there & set(names)):
+    if known := sorted(_installed() & set(names)):
         subprocess.run(
             (*PIP, "-q", "uninstall", "-y", *known), stdin=subprocess.DEVNULL, check=False
         )
+
+
+def _installed() -> frozenset[str]:
+    """The names of all distributions in the environment."""
+    return frozenset(lockfile.canonical(found.name) for found in metadata.distributions())
 
 
 def _own(own: Sequence[Own]) -> None:
@@ -103,9 +112,9 @@ def _check() -> None:
         (*PIP, "check"), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True
     )
     if flaws := Checked(done.returncode, done.stdout).flaws(asked.own_names(CHECKOUT)):
-        raise SetUpFailed(
+        raise DoesNotFit(
             f"what is installed in {sys.prefix} does not fit together: {' '.join(flaws)} If the "
-            "lock says so, lock what fits (`./run lock`); else delete that folder: it is made anew"
+            "lock says so, lock what fits (`./run lock`); else delete that folder: it is made again"
         )
 
 

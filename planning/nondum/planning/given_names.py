@@ -82,15 +82,29 @@ def of_plugin(
     words: Collection[Words],
     kept: str | None,
     others: Mapping[str, Collection[Words]],
+    given: Collection[str] = (),
 ) -> str:
     """What the actions of a payload's plugin are called by, if it says `words`.
 
     `others` are the names of other payloads' plugins, and what they say. A name is shared only by
     plugins that say the same: then they are one distribution, and each one's units can do all of
-    it.
+    it. Names that were `given` to plugins of other payloads stay theirs while they are away.
     """
-    every = chain((kept,) if kept else (), forms(own, payload_id))
+    every = chain(
+        (kept,) if kept else (), (name for name in forms(own, payload_id) if name not in given)
+    )
     return next(name for name in every if name not in others or len({*words, *others[name]}) == 1)
+
+
+def plugins_of_others(names: Mapping[str, GivenNames], payload_id: str) -> frozenset[str]:
+    """The names that were given to plugins of all payloads but one, other than their own."""
+    return frozenset(
+        name
+        for id, given in names.items()
+        if id != payload_id
+        for own, name in given.plugins.items()
+        if own != name
+    )
 
 
 def words_of(description: PluginDescription) -> Words:

@@ -19,8 +19,8 @@ from nondum.sdk import (
     behaviour,
     hookimpl,
 )
+from nondum.sdk.serial_line import SerialLine
 from nondum_compton_camera.kinematics import Instrument
-from nondum_compton_camera.line import Line
 from nondum_compton_camera.observation import Observation
 from nondum_compton_camera.settings import Settings
 
@@ -79,7 +79,7 @@ async def localise(ctx: Context, u: str, t: str, h: str) -> None:
     if device is None:
         raise _failed("DEVICE_MISSING", "the camera is not plugged in", "plug it in")
     observation = Observation(Instrument(line_kev=settings.line_kev))
-    with Line(device.node, int(settings.baud)) as line:
+    with SerialLine(device.node, int(settings.baud)) as line:
         try:
             async with asyncio.timeout(settings.timeout_s):
                 await _observe(ctx, line, observation, math.radians(settings.accuracy_deg))
@@ -91,7 +91,9 @@ async def localise(ctx: Context, u: str, t: str, h: str) -> None:
         ctx.know("bearing-known", t, h, value=Bearing(header, found.direction, found.sigma_rad))
 
 
-async def _observe(ctx: Context, line: Line, observation: Observation, accuracy_rad: float) -> None:
+async def _observe(
+    ctx: Context, line: SerialLine, observation: Observation, accuracy_rad: float
+) -> None:
     while not observation.is_good(accuracy_rad):
         observation.add(await _heard(line, observation))
         if observation.is_due:
@@ -99,7 +101,7 @@ async def _observe(ctx: Context, line: Line, observation: Observation, accuracy_
             _tell(ctx, observation, accuracy_rad)
 
 
-async def _heard(line: Line, observation: Observation) -> bytes:
+async def _heard(line: SerialLine, observation: Observation) -> bytes:
     try:
         async with asyncio.timeout(_SILENCE_S):
             return await line.receive()

@@ -20,9 +20,10 @@ from nondum.sdk import (
     behaviour,
     condition,
     hookimpl,
+    serial_line,
 )
+from nondum.sdk.serial_line import SerialLine
 from nondum.sdk.settings import parse_settings
-from nondum_gps.line import Line, LineLost
 from nondum_gps.reading import Reading
 from nondum_gps.reception import Reception
 from nondum_gps.settings import Settings
@@ -93,18 +94,23 @@ class Gps:
     async def _listen(self, ctx: Context, device: Device, output: OutputStream) -> None:
         self._reception = Reception(self._settings, _now_s())
         try:
-            with Line(device.node, self._settings.baud) as line:
+            with SerialLine(device.node, self._settings.baud) as line:
                 self._trouble = ""
                 await self._follow(ctx, device, line, output)
-        except LineLost as lost:
-            if str(lost) != self._trouble:  # it is tried again and again
-                ctx.log.warning("%s: %s", device.node, lost)
-            self._trouble = str(lost)
+        except BehaviourFailed as lost:
+            if lost.code != serial_line.FAILED:
+                raise
+            trouble = lost.problems[0].message
+            if trouble != self._trouble:  # it is tried again and again
+                ctx.log.warning("%s: %s", device.node, trouble)
+            self._trouble = trouble
         finally:
             self._reception = Reception(self._settings, _now_s())
             ctx.forget(KNOWN, ctx.host)
 
-    async def _follow(self, ctx: Context, device: Device, line: Line, output: OutputStream) -> None:
+    async def _follow(
+        self, ctx: Context, device: Device, line: SerialLine, output: OutputStream
+    ) -> None:
         """Send every reading, and keep the fact true while there is a fix."""
         reception, number, was_lost = self._reception, 0, False
         while _device(ctx) == device:
@@ -131,7 +137,7 @@ class Gps:
         if device is None:
             raise _failed("DEVICE_MISSING", "no receiver is plugged in", "plug one in")
         if self._trouble:
-            raise _failed("SERIAL_FAILED", f"{device.node}: {self._trouble}", "check the cable")
+            raise _failed(serial_line.FAILED, f"{device.node}: {self._trouble}", "check the cable")
         fix = self._reception.fix(_now_s())
         if fix is None:
             raise BehaviourFailed(self._reception.problem(_now_s()))
@@ -146,7 +152,7 @@ def _now_s() -> float:
     return asyncio.get_running_loop().time()
 
 
-async def _received(line: Line) -> bytes:
+async def _received(line: SerialLine) -> bytes:
     """What has come; nothing where nothing comes for a while."""
     try:
         async with asyncio.timeout(_AGAIN_S):

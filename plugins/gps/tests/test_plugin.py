@@ -9,7 +9,7 @@ import pytest
 from simulated_receiver import NO_FIX, SimulatedReceiver, gga, gsa, gsv, rmc
 
 from nondum.sdk import GpsFix, NondumError
-from nondum_gps.line import Line
+from nondum.sdk.serial_line import SerialLine
 
 PLUGIN = "nondum_gps.plugin:Gps"
 KNOWN = ("position-known", "robot")
@@ -144,11 +144,11 @@ def test_port_that_cannot_be_opened_is_told_once(
 ) -> None:
     attempts = threading.Semaphore(0)
 
-    def counted(node: str, baud: int) -> Line:
+    def counted(node: str, baud: int) -> SerialLine:
         attempts.release()
-        return Line(node, baud)
+        return SerialLine(node, baud)
 
-    monkeypatch.setattr("nondum_gps.plugin.Line", counted)
+    monkeypatch.setattr("nondum_gps.plugin.SerialLine", counted)
     bench = worker(PLUGIN, devices={"receiver": "/dev/there-is-none"})
     for _ in range(3):
         assert attempts.acquire(timeout=30)

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from nondum.sdk.errors import BehaviourFailed, Problem
+from nondum.sdk.serial_line import SerialLine
 from nondum_pan_tilt_unit.aim import Axis
-from nondum_pan_tilt_unit.line import Line
 from nondum_pan_tilt_unit.replies import LimitHit, Replies, Reply
 
 BAUD = 9600
@@ -41,7 +41,7 @@ class Aim:
 class Head:
     """A unit that has been set up by `ready`."""
 
-    def __init__(self, line: Line, *, answer_s: float = ANSWER_S) -> None:
+    def __init__(self, line: SerialLine, *, answer_s: float = ANSWER_S) -> None:
         """`answer_s`: how long a command's answer is waited for."""
         self._line, self._answer_s = line, answer_s
         self._replies = Replies()

@@ -18,9 +18,9 @@ from nondum.sdk import (
     behaviour,
     hookimpl,
 )
+from nondum.sdk.serial_line import SerialLine
 from nondum_pan_tilt_unit import head, relay
 from nondum_pan_tilt_unit.head import Head
-from nondum_pan_tilt_unit.line import Line
 from nondum_pan_tilt_unit.pointer import Pointer
 from nondum_pan_tilt_unit.relay import Laser
 from nondum_pan_tilt_unit.settings import Settings
@@ -98,8 +98,8 @@ def _pointer(ctx: Context) -> Iterator[Pointer]:
     """Open both devices; on leaving, the laser is switched off before they are closed."""
     nodes, settings = [_node(ctx, name) for name in (HEAD, LASER)], Settings.parse(ctx.settings)
     with (
-        Line(nodes[0], head.BAUD) as head_line,
-        Line(nodes[1], relay.BAUD) as laser_line,
+        SerialLine(nodes[0], head.BAUD) as head_line,
+        SerialLine(nodes[1], relay.BAUD) as laser_line,
         Pointer(
             Head(head_line, answer_s=settings.answer_s), Laser(laser_line), settings
         ) as pointer,
@@ -122,7 +122,7 @@ def _darken(ctx: Context) -> None:
     if device is None:
         return
     try:
-        with Line(device.node, relay.BAUD) as line:
+        with SerialLine(device.node, relay.BAUD) as line:
             Laser(line).off()
     except BehaviourFailed as error:
         ctx.log.warning("the laser could not be switched off: %s", error)

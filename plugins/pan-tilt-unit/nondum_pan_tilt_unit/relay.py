@@ -6,7 +6,7 @@ answers, and keeps its state until told otherwise or unplugged.
 
 from __future__ import annotations
 
-from nondum_pan_tilt_unit.line import Line
+from nondum.sdk.serial_line import SerialLine
 
 BAUD = 9600
 _START = 0xA0
@@ -25,7 +25,7 @@ def command(channel: int, *, on: bool) -> bytes:
 class Laser:
     """A laser on channel 1 of a relay. Switching is one short write: it needs no event loop."""
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: SerialLine) -> None:
         self._line = line
 
     def on(self) -> None:

@@ -9,8 +9,8 @@ import pytest
 from ptu_bench import Bench
 
 from nondum.sdk.errors import BehaviourFailed
+from nondum.sdk.serial_line import SerialLine
 from nondum_pan_tilt_unit.head import BAUD, Aim, Head
-from nondum_pan_tilt_unit.line import Line
 
 pytestmark = pytest.mark.anyio
 SPEED = math.radians(60)
@@ -18,7 +18,7 @@ SPEED = math.radians(60)
 
 @pytest.fixture
 async def head(bench: Bench) -> AsyncIterator[Head]:
-    with Line(bench.node("head"), BAUD) as line:
+    with SerialLine(bench.node("head"), BAUD) as line:
         yield Head(line)
 
 
@@ -81,11 +81,11 @@ async def test_a_head_that_does_not_get_there_is_told(bench: Bench, head: Head) 
 
 async def test_no_such_port_is_told() -> None:
     with pytest.raises(BehaviourFailed, match="SERIAL_FAILED /dev/nondum-no-such"):
-        Line("/dev/nondum-no-such", BAUD)
+        SerialLine("/dev/nondum-no-such", BAUD)
 
 
 async def test_a_pulled_cable_is_told(bench: Bench) -> None:
-    with Line(bench.node("head"), BAUD) as line:
+    with SerialLine(bench.node("head"), BAUD) as line:
         head = Head(line)
         await head.ready(speed_rad_s=SPEED)
         bench.unplug()

@@ -175,6 +175,18 @@ async def ticked(folder: Path) -> None:
     await until_async("a tick of the file system", lambda: written_ns() > now_ns)
 
 
+@contextlib.asynccontextmanager
+async def plugged(folder: Path) -> AsyncIterator[tuple[asyncio.Queue[Event], Path, Path]]:
+    """What is told from now on, the folder of slots, and the drive in slot `a` of it."""
+    slots, drive = folder / "slots", folder / "drive"
+    async with watched(slots) as told:
+        await told.get()
+        (slots / "a").symlink_to(drive)
+        await told.get()
+        await ticked(folder)
+        yield told, slots, drive
+
+
 def write_payload(drive: Path, text: str, name: str = "org.example.lamp") -> None:
     """Put a payload's list there as `payload build` does: the folder is whole when it appears."""
     folder = drive / "nondum" / name
@@ -211,25 +223,15 @@ async def test_payload_that_is_built_anew_in_place_is_told_without_a_removal(
 
 
 async def test_signature_that_comes_later_is_told(tmp_path: Path) -> None:
-    slots, drive = tmp_path / "slots", tmp_path / "drive"
-    write_payload(drive, "first")
-    async with watched(slots) as told:
-        await told.get()
-        (slots / "a").symlink_to(drive)
-        await told.get()
-        await ticked(tmp_path)
+    write_payload(tmp_path / "drive", "first")
+    async with plugged(tmp_path) as (told, slots, drive):
         disk.write(drive / "nondum/org.example.lamp/CONTENTS.sig", b"signed")
         assert await told.get() == DriveInserted("a", slots / "a", "slot")
 
 
 async def test_payload_that_comes_and_one_that_goes_are_told(tmp_path: Path) -> None:
-    slots, drive = tmp_path / "slots", tmp_path / "drive"
-    drive.mkdir()
-    async with watched(slots) as told:
-        await told.get()
-        (slots / "a").symlink_to(drive)
-        await told.get()
-        await ticked(tmp_path)
+    (tmp_path / "drive").mkdir()
+    async with plugged(tmp_path) as (told, slots, drive):
         write_payload(drive, "first")
         assert await told.get() == DriveInserted("a", slots / "a", "slot")
         await ticked(tmp_path)
@@ -239,13 +241,8 @@ async def test_payload_that_comes_and_one_that_goes_are_told(tmp_path: Path) -> 
 
 async def test_what_is_not_listed_yet_is_not_told(tmp_path: Path) -> None:
     """A folder that is being copied by hand: nothing is known of it before its list is there."""
-    slots, drive = tmp_path / "slots", tmp_path / "drive"
-    write_payload(drive, "first")
-    async with watched(slots) as told:
-        await told.get()
-        (slots / "a").symlink_to(drive)
-        await told.get()
-        await ticked(tmp_path)
+    write_payload(tmp_path / "drive", "first")
+    async with plugged(tmp_path) as (told, slots, drive):
         (drive / "nondum/org.example.other/wheels").mkdir(parents=True)
         (drive / "nondum/org.example.lamp/notes.txt").write_text("mine")
         await ticked(tmp_path)

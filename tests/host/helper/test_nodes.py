@@ -198,6 +198,34 @@ def test_nodes_of_numbers_that_are_something_else_now_go(tmp_path: Path) -> None
     made.drop_unfit()
 
 
+def test_folder_that_another_process_removes_meanwhile_is_passed_over(tmp_path: Path) -> None:
+    plug(tmp_path / "sys", f"{INTERFACE}/ttyUSB0/tty/ttyUSB0", "188:0", "tty")
+    made = nodes(tmp_path)
+    node = made.put("eye", "line", 188, 0)
+    (made.base / "arm").symlink_to("gone")  # listed, and not there when it is looked into
+    made.drop(188, 0)
+    assert not node.exists()
+    assert not made.are_there
+
+
+def test_node_goes_of_whose_device_nothing_can_be_told_any_more(tmp_path: Path) -> None:
+    sys = tmp_path / "sys"
+    plug(sys, f"{INTERFACE}/0003:1/hidraw/hidraw0", "240:0", "hidraw", interface="03 00")
+    made = nodes(tmp_path)
+    node = made.put("eye", "line", 240, 0)
+    at = os.open(sys / INTERFACE / "0003:1", os.O_RDONLY)
+    for _ in range(20):  # a folder that cannot be listed by its name
+        os.mkdir("d" * 250, dir_fd=at)
+        below = os.open("d" * 250, os.O_RDONLY, dir_fd=at)
+        os.close(at)
+        at = below
+    os.close(at)
+    with pytest.raises(OSError):
+        made.put("eye", "line", 240, 0)
+    made.drop_unfit()
+    assert not node.exists()
+
+
 def test_integrator_may_grant_what_does_not_hang_on_usb(tmp_path: Path) -> None:
     plug(tmp_path / "sys", "devices/platform/csi/video4linux/video0", "81:0", "video4linux")
     assert "USB" in refused(nodes(tmp_path), (81, 0))

@@ -31,6 +31,7 @@ WORDS: dict[str, st.SearchStrategy[Any]] = {
     "tasks": st.integers(1, 2**22),
     "cpu_weight": st.integers(1, 10_000),
     "processors": st.floats(0, 10_000),
+    "pid": st.integers(0, 2**31 - 1),
 }
 REQUESTS: st.SearchStrategy[Request] = st.sampled_from(get_args(Request)).flatmap(
     lambda kind: st.builds(kind, **{f.name: WORDS.get(f.name, NUMBERS) for f in fields(kind)})
@@ -89,10 +90,14 @@ def test_no_field_takes_another_kind_of_value(request: Request, data: st.DataObj
         {"verb": "PutNode", "component": "a", "need": "x", "major": -1, "minor": 1},
         {"verb": "FillCage", "cage": "../x.1", "pid": 1},
         {"verb": "FillCage", "cage": "a.1", "pid": 1.0},
+        {"verb": "FillCage", "cage": "a.1", "pid": 2**31},
+        {"verb": "MapUsers", "pid": 2**31},
         {"verb": "LimitCage", "cage": "a.1", "memory_mb": 0, "tasks": 1, "cpu_weight": 1,
          "processors": 0.0},
         {"verb": "LimitCage", "cage": "a.1", "memory_mb": 1, "tasks": 1, "cpu_weight": 1,
          "processors": float("nan")},
+        pytest.param({"verb": "LimitCage", "cage": "a.1", "memory_mb": 1, "tasks": 1,
+         "cpu_weight": 1, "processors": 10**400}, id="more than a float holds"),
     ],
     ids=str,
 )  # fmt: skip

@@ -244,6 +244,12 @@ def test_flood_is_answered_or_turned_away(helper: Helper) -> None:
     until("the helper serves again", serves)
 
 
+def test_helper_forks_as_a_process_of_one_thread(helper: Helper) -> None:
+    assert helper.is_well()
+    status = Path(f"/proc/{helper.process.pid}/status").read_text(encoding="ascii")
+    assert "\nThreads:\t1\n" in status
+
+
 def test_helper_that_is_told_to_end_as_it_forks_ends(place: Path) -> None:
     """Exceptions in callbacks of a fork are dropped, also those of a signal handler."""
     helper = started(
@@ -256,6 +262,28 @@ def test_helper_that_is_told_to_end_as_it_forks_ends(place: Path) -> None:
         "main()",
     )
     assert helper.is_well(), "the child that was forked answers"
+    assert helper.process.wait() == 0
+
+
+def test_helper_that_gets_no_more_processes_says_so_and_goes_on(place: Path) -> None:
+    helper = started(
+        place,
+        "-c",
+        "import errno\n"
+        "from nondum.host.confinement import refusals\n"
+        "from nondum.host.confinement.filters import Rule\n"
+        "from nondum.host.helper.__main__ import main\n"
+        "from nondum.host.inside import kernel\n"
+        "calls = ('fork', 'vfork', 'clone', 'clone3')\n"
+        "rules = tuple(Rule(call, errno.EAGAIN) for call in calls)\n"
+        "kernel.filter_calls(refusals.filter_of({'all': rules}, refusals.machine()))\n"
+        "main()",
+    )
+    for _ in range(2):
+        with pytest.raises(NondumError) as refused:
+            served(lambda: helper.client.ask(requests.ListCages()))
+        assert refused.value.code == "HELPER_BUSY"
+    helper.process.terminate()
     assert helper.process.wait() == 0
 
 

@@ -212,6 +212,34 @@ def test_namespace_that_the_kernel_does_not_make_is_told() -> None:
     assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
 
 
+def children() -> set[int]:
+    """Of this process."""
+    tasks = Path("/proc/self/task").iterdir()
+    return {int(pid) for task in tasks for pid in (task / "children").read_text().split()}
+
+
+def test_process_that_its_owner_has_stopped_is_not_left() -> None:
+    before = children()
+    with worker_users.namespace((SERVED.pw_uid, SERVED.pw_gid), WORKER):
+        (maker,) = children() - before
+        os.kill(maker, signal.SIGSTOP)
+    assert children() == before
+
+
+def test_process_that_is_stopped_before_it_has_made_one_is_not_waited_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    before = children()
+    monkeypatch.setattr(worker_users, "MADE_S", 0.1)
+    monkeypatch.setattr(os, "setgroups", lambda _: os.kill(os.getpid(), signal.SIGSTOP))
+    with (
+        pytest.raises(TimeoutError),
+        worker_users.namespace((SERVED.pw_uid, SERVED.pw_gid), WORKER),
+    ):
+        pass
+    assert children() == before
+
+
 def test_one_descriptor_comes_with_a_folder_and_none_with_anything_else(root: Service) -> None:
     read, write = os.pipe()
     cases: list[tuple[Request, int]] = [

@@ -9,7 +9,14 @@ import pytest
 
 from nondum.host.catalogue.records import PayloadRecord, Step
 from nondum.host.catalogue.state import HostState
-from nondum.host.lifecycle.folders import Folders, let_pass, make_private, remove, sweep
+from nondum.host.lifecycle.folders import (
+    Folders,
+    let_pass,
+    make_private,
+    remove,
+    remove_temporary,
+    sweep,
+)
 
 NOTE = "installed/known.json"
 
@@ -54,6 +61,14 @@ def test_sweep_keeps_what_a_step_needs(tmp_path: Path, step: Step, kept: set[str
     sweep(folders, state(step))
     left = {path.relative_to(tmp_path).as_posix() for path in tmp_path.glob("*/*")}
     assert left == kept
+
+
+def test_temporary_files_of_a_daemon_that_was_killed_are_removed(tmp_path: Path) -> None:
+    folders = Folders(tmp_path)
+    for left in (folders.planning / "no-more", folders.probes / "nondum-probe-1" / "payload"):
+        left.mkdir(parents=True, mode=0)
+    remove_temporary(folders)
+    assert not list(tmp_path.iterdir())
 
 
 def modes(folder: Path) -> dict[str, int]:

@@ -201,3 +201,17 @@ def test_whatever_comes_and_goes_no_two_have_one_name_and_none_changes_it(
             assert told.setdefault(one.payload_id, name) == name
             assert state.components[name].payload_id == one.payload_id
     assert len({*told.values()}) == len(told)
+
+
+def test_a_plugin_s_other_name_stays_its_payload_s_while_that_is_away() -> None:
+    """Of `org.y-z` and `org.y.z` the name of a second plugin would be the same."""
+    before, _ = after(
+        drive("b"),
+        *way_to_active("k2", "b", payload_id="org.y-z", words="look", called="eye--org-y-z"),
+        *pulled("b", "k2"),
+        state=active(),
+    )
+    assert before.names["org.y-z"].plugins == {"eye": "eye--org-y-z"}
+    other = way_to_active("k3", "c", payload_id="org.y.z", words="other", called="it")
+    state, _ = after(drive("c"), *other, state=before)
+    assert state.components["it"].description.name.startswith("eye--org-y-z--")

@@ -11,21 +11,7 @@ from tests.kit.workers import TIMING, WorkersUnderTest
 
 from nondum.host.events import WorkerExited, WorkerStrained
 from nondum.host.workers.gauge import Gauge
-from nondum.sdk.description import Behaviour
 
-DO = Behaviour("do", "(do ?u - sensor)")
-PLUGIN = """
-import asyncio, os, subprocess, sys, threading, time
-from nondum.sdk import Unit, behaviour, hookimpl
-
-@hookimpl
-def units():
-    return (Unit("it", "sensor"),)
-
-@behaviour("do", action="(do ?u - sensor)")
-async def do(ctx, u):
-    {body}
-"""
 FORK = "while True:\n    try:\n        os.fork()\n    except OSError:\n        pass"
 WATCHED = replace(TIMING, look_s=0.1, spin_s=0.5, missed=1_000_000)
 """Looked at often; time passes faster than workers show signs of life, and none of them hangs."""

@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 from tests.host.workers.streaming import CAMERA, STREAM, WATCH, WATCHER
+from tests.kit.guest import do, guest_spec
 from tests.kit.workers import HOST, WorkersUnderTest, camera
 
 from nondum.host.events import WorkerLogged
 from nondum.host.workers import Limits
-from nondum.sdk.description import Behaviour, Unit
+from nondum.sdk.description import Unit
 
-HOSTILE = """
-import array, os, socket, time
-from nondum.sdk import Unit, behaviour, hookimpl
-
+FILLS = """
 kept = []
-
-@hookimpl
-def units():
-    return (Unit("it", "sensor"),)
 
 def fill(one, count):
     # Until it is refused.
@@ -54,28 +48,21 @@ def by_a_child():
     if os.fork() == 0:
         openly()
         time.sleep(600)
-
-@behaviour("do", action="(do ?u - sensor)")
-async def do(ctx, u):
-    {way}()
-    await ctx.sleep(600)
 """
 FEW_FILES, MORE_FILES = Limits(descriptors=200), Limits(descriptors=400)
 """The kernel counts by user: other programs of this one, with usual limits, are not to notice, and
 what they have under way for a moment is not to matter."""
-DO = Behaviour("do", "(do ?u - sensor)")
 
 
 async def fills_and_streams(tested: WorkersUnderTest, way: str) -> None:
     """One worker sends descriptors until it may not; then another one begins to send frames."""
-    units = (Unit("it", "sensor"),)
-    source = HOSTILE.replace("{way}", way)
-    await tested.start("hostile", source, behaviours=(DO,), units=units, limits=MORE_FILES)
+    body = f"{way}()\nawait ctx.sleep(600)"
+    await tested.workers.start(guest_spec(tested, body, FILLS, name="hostile", limits=MORE_FILES))
     cameras = (camera(),)
     await tested.start("cam", CAMERA, behaviours=(STREAM,), units=cameras, limits=FEW_FILES)
     eye = (Unit("eye", "detector"),)
     await tested.start("watcher", WATCHER, behaviours=(WATCH,), units=eye)
-    tested.behave("hostile", "do", u=f"{HOST}__hostile__it")
+    do(tested, "hostile")
     await tested.until(WorkerLogged, lambda event: event.message == "filled 109")
     frames = f"{HOST}__cam__frames"
     tested.behave("cam", "stream", u=f"{HOST}__cam__camera", o=frames)

@@ -9,22 +9,20 @@ from pathlib import Path
 import anyio
 import pytest
 from tests.host.workers.excesses import (
-    DO,
     FORK,
-    PLUGIN,
     WATCHED,
     exited_by_forking,
     strained_by_spinning,
 )
 from tests.kit.clock import VirtualClock
+from tests.kit.guest import do, guest_spec
 from tests.kit.processes import is_alive
-from tests.kit.workers import HOST, WorkersUnderTest
+from tests.kit.workers import WorkersUnderTest
 
 from nondum.host.cgroups import Cages
 from nondum.host.events import WorkerExited, WorkerLogged
 from nondum.host.workers import Limits, WorkerLauncher
 from nondum.planning.running import RunState
-from nondum.sdk.description import Unit
 
 pytestmark = pytest.mark.anyio
 
@@ -50,12 +48,11 @@ async def caged(tmp_path: Path, clock: VirtualClock) -> AsyncIterator[WorkersUnd
 
 
 async def begin(tested: WorkersUnderTest, name: str, body: str) -> None:
-    source = PLUGIN.replace("{body}", body.replace("\n", "\n    "))
-    await tested.start(name, source, behaviours=(DO,), units=(Unit("it", "sensor"),), limits=SMALL)
+    await tested.workers.start(guest_spec(tested, body, name=name, limits=SMALL))
 
 
 async def done(tested: WorkersUnderTest, name: str) -> RunState:
-    return await tested.behave(name, "do", u=f"{HOST}__{name}__it").ended()
+    return await do(tested, name).ended()
 
 
 HELD = (
@@ -108,7 +105,7 @@ async def test_too_much_ends_that_worker_alone(
     caged: WorkersUnderTest, clock: VirtualClock, body: str, code: str
 ) -> None:
     await begin(caged, "guest", body)
-    call = caged.behave("guest", "do", u=f"{HOST}__guest__it")
+    call = do(caged)
     if body == FORK:
         exited = await exited_by_forking(caged, clock)
     else:
@@ -132,7 +129,7 @@ async def test_what_cannot_be_deleted_is_told_and_holds_nothing_up(
         "await asyncio.sleep(60)"
     )
     await begin(caged, "guest", body)
-    caged.behave("guest", "do", u=f"{HOST}__guest__it")
+    do(caged)
     try:
         exited = await clock.advance_until(caged.until(WorkerExited))
         assert exited.reason.startswith("SCRATCH_FULL"), exited.reason
@@ -155,7 +152,7 @@ async def test_worker_that_ends_by_its_limit_of_tasks_says_so(caged: WorkersUnde
         "    os._exit(1)"
     )
     await begin(caged, "guest", body)
-    caged.behave("guest", "do", u=f"{HOST}__guest__it")
+    do(caged)
     exited = await caged.until(WorkerExited)
     assert exited.reason.startswith("WORKER_TASKS"), exited.reason
     await caged.until_ready(3)
@@ -186,7 +183,7 @@ async def test_what_left_the_group_and_cleared_its_marks_ends_with_the_cage(
         "await asyncio.Event().wait()"
     )
     await begin(caged, "guest", body)
-    caged.behave("guest", "do", u=f"{HOST}__guest__it")
+    do(caged)
     said = await caged.until(WorkerLogged, lambda line: line.message.startswith("child"))
     pid = int(said.message.split()[1])
     assert is_alive(pid)

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 from tests.kit.clock import VirtualClock
+from tests.kit.guest import do, guest_spec
 from tests.kit.until import arrived
 from tests.kit.workers import HOST, TIMING, WorkersUnderTest
 
@@ -22,7 +23,6 @@ from nondum.host.events import Event, WorkerLogged, WorkerReady
 from nondum.host.workers import Workers, WorkerSpec
 from nondum.host.workers.process import WorkerProcess
 from nondum.planning.running import RunState
-from nondum.sdk.description import Behaviour, Unit
 from nondum.sdk.errors import WorkerFailed
 from nondum.sdk.wire import PROTOCOL_VERSIONS
 from nondum.wheelhouse.confinement import Level
@@ -142,19 +142,9 @@ async def other(tmp_path: Path, clock: VirtualClock) -> AsyncIterator[WorkersUnd
     """A good worker, which answers before and after."""
     # Its signs of life are real, and whole start-up times pass here.
     tested = WorkersUnderTest(tmp_path, replace(TIMING, missed=1_000_000))
-    source = (
-        "from nondum.sdk import Unit, behaviour, hookimpl\n"
-        "@hookimpl\ndef units():\n    return (Unit('it', 'sensor'),)\n"
-        "@behaviour('do', action='(do ?u - sensor)')\nasync def do(ctx, u):\n    pass\n"
-    )
-    await tested.start(
-        "good",
-        source,
-        behaviours=(Behaviour("do", "(do ?u - sensor)"),),
-        units=(Unit("it", "sensor"),),
-    )
+    await tested.workers.start(guest_spec(tested, "pass", name="good"))
     yield tested
-    assert await tested.behave("good", "do", u=f"{HOST}__good__it").ended() is RunState.SUCCEEDED
+    assert await do(tested, "good").ended() is RunState.SUCCEEDED
     assert len(tested.told(WorkerReady)) == 1
     await clock.advance_until(tested.workers.close())
 

@@ -9,9 +9,10 @@ from dataclasses import replace
 
 import pytest
 from tests.kit.clock import VirtualClock
+from tests.kit.guest import do, guest_spec, plugin
 from tests.kit.processes import is_alive, until_gone
 from tests.kit.until import arrived
-from tests.kit.workers import HOST, WorkersUnderTest
+from tests.kit.workers import WorkersUnderTest
 
 from nondum.host.events import (
     BehaviourEstablished,
@@ -25,20 +26,11 @@ from nondum.host.events import (
 from nondum.host.workers import Call, Limits
 from nondum.host.workers.supervision import RESTARTS, WINDOW_S
 from nondum.planning.running import RunState
-from nondum.sdk.description import Behaviour, Condition, Unit
+from nondum.sdk.description import Condition
 
 pytestmark = pytest.mark.anyio
 
-UNIT = f"{HOST}__guest__it"
-DO = Behaviour("do", "(do ?u - sensor)")
-PLUGIN = '''
-import asyncio, os, signal, socket, subprocess, sys, time
-from nondum.sdk import Unit, behaviour, hookimpl
-
-@hookimpl
-def units():
-    return (Unit("it", "sensor"),)
-
+LINK = '''
 def link():
     """What a hostile plugin does not get by its context."""
     for name in os.listdir("/proc/self/fd"):
@@ -48,28 +40,19 @@ def link():
             continue
         if found.family == socket.AF_UNIX and found.type == socket.SOCK_SEQPACKET:
             return found
-
-{more}
-
-@behaviour("do", action="(do ?u - sensor)")
-async def do(ctx, u):
-    {body}
 '''
 
 
 async def guest(
     tested: WorkersUnderTest, body: str, more: str = "", limits: Limits | None = None
 ) -> None:
-    source = PLUGIN.replace("{more}", more).replace("{body}", body.replace("\n", "\n    "))
-    await tested.start(
-        "guest", source, behaviours=(DO,), units=(Unit("it", "sensor"),), limits=limits
-    )
+    await tested.workers.start(guest_spec(tested, body, LINK + more, limits=limits))
 
 
 async def exits_with(tested: WorkersUnderTest, body: str, code: str) -> None:
     """What a behaviour does ends its worker for this reason."""
     await guest(tested, body)
-    call = tested.behave("guest", "do", u=UNIT)
+    call = do(tested)
     await is_replaced(tested, call, code)
 
 
@@ -95,7 +78,7 @@ async def test_killed_worker_is_replaced(tested: WorkersUnderTest) -> None:
 
 async def test_blocked_loop_is_a_hang(tested: WorkersUnderTest, clock: VirtualClock) -> None:
     await guest(tested, "print('blocks', flush=True)\ntime.sleep(3600)")
-    call = tested.behave("guest", "do", u=UNIT)
+    call = do(tested)
     await tested.until(WorkerLogged, lambda line: line.message == "blocks")
     await clock.advance(tested.timing.silence_s)
     await is_replaced(tested, call, "WORKER_HUNG")
@@ -105,10 +88,8 @@ async def test_hang_is_told_with_the_line_that_holds_up_the_loop(
     tested: WorkersUnderTest, clock: VirtualClock
 ) -> None:
     await guest(tested, "time.sleep(3600)")
-    call = tested.behave("guest", "do", u=UNIT)
-    line = (
-        PLUGIN.replace("{body}", "time.sleep(3600)").splitlines().index("    time.sleep(3600)") + 1
-    )
+    call = do(tested)
+    line = plugin("time.sleep(3600)", LINK).splitlines().index("    time.sleep(3600)") + 1
     dumped = f'guest_plugin.py", line {line} in do'
     await tested.until(WorkerLogged, lambda said: dumped in said.message)
     await tested.until(WorkerLogged, lambda said: "sdk/worker.py" in said.message)
@@ -217,7 +198,7 @@ async def test_closed_link_ends_the_worker(tested: WorkersUnderTest, clock: Virt
     """After a while in which it may end by itself."""
     body = "link().shutdown(socket.SHUT_RDWR)\nawait asyncio.to_thread(time.sleep, 3600)"
     await guest(tested, body)
-    tested.behave("guest", "do", u=UNIT)
+    do(tested)
     await clock.advance_until(tested.until(WorkerExited))
 
 
@@ -249,7 +230,7 @@ async def test_crash_loop_ends_in_quarantine(tested: WorkersUnderTest) -> None:
 async def test_quarantined_component_may_try_again(tested: WorkersUnderTest) -> None:
     crash = "import pathlib\nif pathlib.Path('bad').exists(): os._exit(9)"
     await guest(tested, "open('bad', 'w').close(); os._exit(9)", crash)
-    tested.behave("guest", "do", u=UNIT)
+    do(tested)
     await tested.until(WorkerFailed)
     await tested.workers.restart("guest")
     assert len(tested.told(WorkerFailed)) == 2
@@ -271,7 +252,7 @@ async def test_behaviour_that_does_not_halt_costs_its_worker(
     )
     await guest(tested, body)
     pid = tested.workers.pids()["guest"]
-    call = tested.behave("guest", "do", u=UNIT)
+    call = do(tested)
     await tested.until(BehaviourEstablished)
     call.halt()
     await clock.advance(tested.timing.halt_s * 0.9)
@@ -360,7 +341,7 @@ await asyncio.Event().wait()
 async def test_children_go_with_their_worker(tested: WorkersUnderTest, body: str, end: str) -> None:
     await guest(tested, body)
     pid = tested.workers.pids()["guest"]
-    tested.behave("guest", "do", u=UNIT)
+    do(tested)
     said = await tested.until(WorkerLogged, lambda line: line.message.startswith("child"))
     child = tested.pid("guest", said.message.split()[1])
     assert is_alive(child)
@@ -377,7 +358,7 @@ async def test_flood_of_output_is_bounded(tested: WorkersUnderTest, clock: Virtu
         "for _ in range(40):\n    os.write(1, b'x' * 60_000 + b'\\n')\n    await asyncio.sleep(0)"
     )
     await guest(tested, body)
-    call = tested.behave("guest", "do", u=UNIT)
+    call = do(tested)
     assert await clock.advance_until(call.ended()) is RunState.SUCCEEDED
     await tested.workers.stop("guest")
     assert any(line.startswith("LOG_DROPPED") for line in tested.lines("guest"))
@@ -387,7 +368,7 @@ async def test_flood_of_output_is_bounded(tested: WorkersUnderTest, clock: Virtu
 
 async def test_control_characters_do_not_reach_terminals(tested: WorkersUnderTest) -> None:
     await guest(tested, r"print('\x1b[2Jhello')")
-    await tested.behave("guest", "do", u=UNIT).ended()
+    await do(tested).ended()
     await tested.until(WorkerLogged, lambda line: "hello" in line.message)
     assert r"\x1b[2Jhello" in tested.lines("guest")
 
@@ -436,24 +417,19 @@ async def test_protocol_is_enforced(tested: WorkersUnderTest, body: str, code: s
 
 
 async def test_others_never_notice(tested: WorkersUnderTest, clock: VirtualClock) -> None:
-    await tested.start(
-        "good",
-        PLUGIN.replace("{more}", "").replace("{body}", "pass"),
-        behaviours=(DO,),
-        units=(Unit("it", "sensor"),),
-    )
+    await tested.workers.start(guest_spec(tested, "pass", name="good"))
     await guest(tested, "while True: os.write(1, b'y' * 4096)")
-    tested.behave("guest", "do", u=UNIT)
+    do(tested)
     for _ in range(20):
         await clock.advance(0.1)  # a little more of the flood is read
-        call = tested.behave("good", "do", u=f"{HOST}__good__it")
+        call = do(tested, "good")
         assert await call.ended() is RunState.SUCCEEDED
     assert "good" in tested.workers.pids()
 
 
 async def test_memory_hog_hurts_itself_only(tested: WorkersUnderTest) -> None:
     await guest(tested, "bytearray(1 << 30)", limits=Limits(memory_mb=256))
-    call = tested.behave("guest", "do", u=UNIT)
+    call = do(tested)
     assert await call.ended() is RunState.FAILED
     assert "MemoryError" in call.reason
 
@@ -462,7 +438,7 @@ async def test_descriptors_run_out_for_the_leaker_only(tested: WorkersUnderTest)
     await guest(
         tested, "kept = [open('/dev/null') for _ in range(500)]", "", Limits(descriptors=64)
     )
-    call = tested.behave("guest", "do", u=UNIT)
+    call = do(tested)
     assert await call.ended() is RunState.FAILED
     assert "Too many open files" in call.reason
 
@@ -486,5 +462,5 @@ async def test_nothing_is_inherited(
         "assert kinds == own, kinds"
     )
     await guest(tested, body)
-    call = tested.behave("guest", "do", u=UNIT)
+    call = do(tested)
     assert await call.ended() is RunState.SUCCEEDED, call.reason

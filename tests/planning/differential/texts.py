@@ -48,6 +48,14 @@ def text(name: str, domain: str, problem: str, shortest: int | None) -> Text:
     )
 
 
+DERIVED = """(:predicates (near ?x ?y) (link ?x ?y) (joined ?x ?y) (cut ?x) (lonely ?x))
+           (:derived (joined ?x ?y)
+             (and (not (cut ?x)) (or (link ?x ?y) (exists (?z) (and (link ?x ?z) (joined ?z ?y))))))
+           (:derived (lonely ?x) (forall (?y) (not (joined ?x ?y))))
+           (:action connect :parameters (?x ?y)
+             :precondition (and (near ?x ?y) (not (joined ?x ?y))) :effect (link ?x ?y))
+           (:action cut :parameters (?x) :precondition (and) :effect (cut ?x))"""
+
 TEXTS = (
     text(
         "strips",
@@ -193,26 +201,14 @@ TEXTS = (
     ),
     text(
         "derived",
-        """(:predicates (near ?x ?y) (link ?x ?y) (joined ?x ?y) (cut ?x) (lonely ?x))
-           (:derived (joined ?x ?y)
-             (and (not (cut ?x)) (or (link ?x ?y) (exists (?z) (and (link ?x ?z) (joined ?z ?y))))))
-           (:derived (lonely ?x) (forall (?y) (not (joined ?x ?y))))
-           (:action connect :parameters (?x ?y)
-             :precondition (and (near ?x ?y) (not (joined ?x ?y))) :effect (link ?x ?y))
-           (:action cut :parameters (?x) :precondition (and) :effect (cut ?x))""",
+        DERIVED,
         """(:objects a b c d) (:init (link a b) (link c d) (near a d) (near b c) (near c a))
            (:goal (and (joined a d) (lonely b)))""",
         1,
     ),
     text(
         "derived-with-a-plan",
-        """(:predicates (near ?x ?y) (link ?x ?y) (joined ?x ?y) (cut ?x) (lonely ?x))
-           (:derived (joined ?x ?y)
-             (and (not (cut ?x)) (or (link ?x ?y) (exists (?z) (and (link ?x ?z) (joined ?z ?y))))))
-           (:derived (lonely ?x) (forall (?y) (not (joined ?x ?y))))
-           (:action connect :parameters (?x ?y)
-             :precondition (and (near ?x ?y) (not (joined ?x ?y))) :effect (link ?x ?y))
-           (:action cut :parameters (?x) :precondition (and) :effect (cut ?x))""",
+        DERIVED,
         """(:objects a b c d) (:init (link a b) (link c d) (near a d) (near b c) (near c a))
            (:goal (and (joined a d) (lonely c)))""",
         2,

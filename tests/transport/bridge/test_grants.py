@@ -7,7 +7,7 @@ import contextlib
 
 import pytest
 import zmq
-from tests.transport.bridge.ends import PATIENCE_S, Owner, owner, stalling, within
+from tests.transport.bridge.ends import PATIENCE_S, Granted, Owner, Raw, owner, stalling, within
 
 from nondum.sdk.errors import Problem
 from nondum.sdk.wire import pack
@@ -103,13 +103,25 @@ async def test_withdrawn_grant_cannot_be_claimed() -> None:
         assert (await within(host.read(READER, granted).over)).code == "STREAM_NOT_GRANTED"
 
 
+def claimed(host: Owner) -> tuple[Granted, Raw]:
+    """A stream that was granted to the reader, who claims it."""
+    granted = host.grant(READER)
+    raw = host.raw(READER, granted)
+    raw.say(packets.asked(Claim(1, granted.outgoing.token)))
+    return granted, raw
+
+
+async def opened(host: Owner) -> tuple[Granted, Raw]:
+    """The same, and it is open."""
+    granted, raw = claimed(host)
+    assert await raw.hears() == Opened("image")
+    return granted, raw
+
+
 async def test_ended_stream_is_cut() -> None:
     """Not merely told: a reader that does not listen gets no more, either."""
     async with owner() as host:
-        granted = host.grant(READER)
-        raw = host.raw(READER, granted)
-        raw.say(packets.asked(Claim(1, granted.outgoing.token)))
-        assert await raw.hears() == Opened("image")
+        granted, raw = await opened(host)
         granted.outgoing.end(Problem("STREAM_ENDED", "withdrawn"))
         assert isinstance(await raw.hears(), Over)
         assert not granted.outgoing.has_room
@@ -155,10 +167,7 @@ async def test_reader_that_closes_is_noticed_at_once() -> None:
 )
 async def test_reader_that_breaks_the_rules_loses_its_stream(parts: tuple[bytes, ...]) -> None:
     async with owner() as host:
-        granted = host.grant(READER)
-        raw = host.raw(READER, granted)
-        raw.say(packets.asked(Claim(1, granted.outgoing.token)))
-        assert await raw.hears() == Opened("image")
+        granted, raw = await opened(host)
         raw.say(*parts)
         told = await raw.hears()
         assert isinstance(told, Over)
@@ -169,9 +178,7 @@ async def test_reader_that_breaks_the_rules_loses_its_stream(parts: tuple[bytes,
 
 async def test_flood_of_signs_of_life_is_cut() -> None:
     async with owner() as host:
-        granted = host.grant(READER)
-        raw = host.raw(READER, granted)
-        raw.say(packets.asked(Claim(1, granted.outgoing.token)))
+        granted, raw = claimed(host)
         for _ in range(100):
             raw.say(packets.asked(packets.Ping(1.0)))
         assert (await within(granted.over)).code == "BRIDGE_PACKET"
@@ -206,10 +213,7 @@ async def test_claim_in_another_version_is_told_so() -> None:
 
 async def test_readers_are_told_that_the_bridge_ends() -> None:
     async with owner() as host:
-        granted = host.grant(READER)
-        raw = host.raw(READER, granted)
-        raw.say(packets.asked(Claim(1, granted.outgoing.token)))
-        assert await raw.hears() == Opened("image")
+        _, raw = await opened(host)
         host.exporter.close()
         told = await raw.hears()
         assert isinstance(told, Over)
@@ -218,10 +222,7 @@ async def test_readers_are_told_that_the_bridge_ends() -> None:
 
 async def test_oversized_message_cuts_its_sender_only() -> None:
     async with owner() as host:
-        granted = host.grant(READER)
-        raw = host.raw(READER, granted)
-        raw.say(packets.asked(Claim(1, granted.outgoing.token)))
-        assert await raw.hears() == Opened("image")
+        granted, raw = await opened(host)
         raw.say(b"x" * 100_000)
         assert (await within(granted.over)).code == "STREAM_LOST"
         await works(host)
@@ -230,10 +231,7 @@ async def test_oversized_message_cuts_its_sender_only() -> None:
 async def test_message_without_an_end_is_cut() -> None:
     """ZeroMQ bounds messages, but not how many parts they have."""
     async with owner() as host:
-        granted = host.grant(READER)
-        raw = host.raw(READER, granted)
-        raw.say(packets.asked(Claim(1, granted.outgoing.token)))
-        assert await raw.hears() == Opened("image")
+        granted, raw = await opened(host)
         raw.say(*([b"x" * 1000] * 1000), b"the end that comes too late")
         assert (await within(granted.over)).code in {"BRIDGE_PACKET", "STREAM_LOST"}
         await works(host)
@@ -275,9 +273,7 @@ async def test_bridge_listens_at_addresses_of_this_machine_only() -> None:
 
 async def test_signs_of_life_tell_the_owners_clock() -> None:
     async with owner() as host:
-        granted = host.grant(READER)
-        raw = host.raw(READER, granted)
-        raw.say(packets.asked(Claim(1, granted.outgoing.token)))
+        _, raw = claimed(host)
         raw.say(packets.asked(packets.Ping(42.0)))
         assert await raw.hears() == Opened("image")
         answer = await raw.hears()

@@ -11,15 +11,16 @@ from nondum.sdk.errors import ConfigRefused
 from nondum.wheelhouse.confinement import Level
 
 
-def standing(wanted: Wanted, minimum: Level, kept_in: Path | None = None) -> Standing:
+def standing(
+    wanted: Wanted, minimum: Level, kept_in: Path | None = None, place: Path | None = None
+) -> Standing:
     """The level to run at: the best one, or the one that is `wanted`. Blocks, see `probe.findings`.
 
     Raises `ConfigRefused` (CONFINEMENT_UNAVAILABLE) where that is not to be had, or below the
     minimum.
     """
     least = minimum if wanted == "auto" else wanted
-    state = kept_in.parent if kept_in is not None else None
-    found = probe.findings(kept_in) if wanted == "auto" else probe.all_findings(state)
+    found = probe.findings(kept_in, place) if wanted == "auto" else probe.all_findings(place)
     if problems := tuple(level.refusals(found, wanted, least)):
         raise ConfigRefused(*problems)
     return level.chosen(found, wanted)

@@ -33,28 +33,25 @@ _ANSWER_BYTES = 65_536
 log = logging.getLogger(__name__)
 
 
-def findings(kept_in: Path | None = None) -> tuple[Finding, ...]:
+def findings(kept_in: Path | None = None, place: Path | None = None) -> tuple[Finding, ...]:
     """The highest level that there is, above it those that there are not and why, highest first.
 
     Takes a tenth of a second, or nothing if `kept_in`, a file of the state folder, holds what still
-    counts. Blocks; the thread that calls must live until it returns. Raises nothing.
+    counts. Processes try it in `place`, a folder of the state folder, or among temporary files.
+    Blocks; the thread that calls must live until it returns. Raises nothing.
     """
     key = _conditions()
     if kept_in is not None and (kept := _kept(kept_in, key)) is not None:
         return kept
-    state = kept_in.parent if kept_in is not None else None
-    found = tuple(_until_available(_each(state)))
+    found = tuple(_until_available(_each(place)))
     if kept_in is not None and not _is_helper_at_fault(found):
         _keep(kept_in, key, found)
     return found
 
 
-def all_findings(state: Path | None = None) -> tuple[Finding, ...]:
-    """What trying out every level has shown, highest first, for that state folder.
-
-    Blocks, see `findings`.
-    """
-    return tuple(_each(state))
+def all_findings(place: Path | None = None) -> tuple[Finding, ...]:
+    """What trying out every level has shown, highest first. Blocks, see `findings`."""
+    return tuple(_each(place))
 
 
 def _until_available(each: Iterator[Finding]) -> Iterator[Finding]:
@@ -70,31 +67,33 @@ def _is_helper_at_fault(found: tuple[Finding, ...]) -> bool:
     return has_helper and not any(finding.has_users for finding in found)
 
 
-def _each(state: Path | None) -> Iterator[Finding]:
+def _each(place: Path | None) -> Iterator[Finding]:
     if not refusals.is_known(refusals.machine()):
         log.warning("system calls cannot be filtered on %s", refusals.machine())
     bwrap = bubblewrap.program()
-    yield sight.MISSING if bwrap is None else _rooms(bwrap, state)
+    yield sight.MISSING if bwrap is None else _rooms(bwrap, place)
     if not landlock.version():
         yield sight.failed(Level.RESTRICTED, "the kernel has no Landlock")
     else:
-        yield _tried(Held())
+        yield _tried(Held(), place)
 
 
-def _rooms(bwrap: str, state: Path | None) -> Finding:
+def _rooms(bwrap: str, place: Path | None) -> Finding:
     """With a user for each worker, if that can be had."""
     if not privileged().users:
         why = "only root, or the helper of the service, can give each its own"
-        return sight.sharing(_tried(Boxed(bwrap)), why)
-    # Whether files can be shown as those of another user is a matter of their file system.
-    own = _tried(Boxed(bwrap, has_users=True), state if os.geteuid() != 0 else None)
+        return sight.sharing(_tried(Boxed(bwrap), place), why)
+    own = _tried(Boxed(bwrap, has_users=True), place)
     if own.has_users:
         return own
+    # Whether files can be shown as those of another user is a matter of their file system.
     return sight.sharing(_tried(Boxed(bwrap)), f"of their own they cannot be had: {own.reason}")
 
 
 def _tried(confinement: Confinement, place: Path | None = None) -> Finding:
     try:
+        if place is not None:
+            place.mkdir(exist_ok=True)
         with tempfile.TemporaryDirectory(prefix="nondum-probe-", dir=place) as folder:
             return sight.judged(confinement.level, _look(confinement, Path(folder)))
     except (OSError, ValueError) as error:

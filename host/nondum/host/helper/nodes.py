@@ -70,11 +70,12 @@ class Nodes:
                 node.unlink(missing_ok=True)
 
     def drop_unfit(self) -> None:
-        """Remove all nodes whose number is not a device's any more that may be given."""
+        """Remove all nodes whose number is not a device's any more that may be given, and those of
+        which that cannot be told: what sysfs shows of a device can go while it is looked at."""
         for node in self._made():
             try:
                 self._check(*_number(node))
-            except NondumError:
+            except (NondumError, OSError):
                 node.unlink(missing_ok=True)
 
     @property
@@ -97,8 +98,12 @@ class Nodes:
                 folder.rmdir()
 
     def _made(self) -> list[Path]:
-        folders = list(self.base.iterdir()) if self.base.is_dir() else []
-        return [node for folder in folders for node in folder.iterdir()]
+        """All nodes. Other processes of the helper make and remove them, and their folders."""
+        made: list[Path] = []
+        for folder in self.base.iterdir() if self.base.is_dir() else ():
+            with contextlib.suppress(FileNotFoundError):
+                made += folder.iterdir()
+        return made
 
     def _identity(self, major: int, minor: int) -> int | None:
         """Of the device that has a number now: sysfs gives no two folders one inode."""

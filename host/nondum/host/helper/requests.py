@@ -213,6 +213,8 @@ _FORMS = {
     "state": STATE,
 }
 _MOST = 2**63 - 1
+_MOST_OF: Mapping[str, int] = {"pid": 2**31 - 1}
+"""Above it the kernel's calls do not take them."""
 
 
 def encode(request: Request) -> bytes:
@@ -265,8 +267,7 @@ def _typed(name: str, hint: Any, value: Any) -> Any:
         return value
     if value is None and hint == (int | None):
         return None
-    if hint is float and type(value) in (int, float):
-        return float(value)
-    if type(value) is not int or not 0 <= value <= _MOST:
+    kinds = (int, float) if hint is float else (int,)
+    if type(value) not in kinds or not 0 <= value <= _MOST_OF.get(name, _MOST):
         raise refused(f"{name} is no number")
-    return value
+    return float(value) if hint is float else value

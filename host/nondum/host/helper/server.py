@@ -92,7 +92,15 @@ class Server:
             elif len(self._children) >= MOST_CHILDREN:
                 _say(connection, _failure(_busy()))
             else:
-                self._children.add(_child(lambda: self._answer(connection)))
+                self._start(connection)
+
+    def _start(self, connection: socket.socket) -> None:
+        """Have a child answer. This process goes on without one: its end would leave the nodes of
+        devices that are pulled meanwhile."""
+        try:
+            self._children.add(_child(lambda: self._answer(connection)))
+        except OSError:
+            _say(connection, _failure(_busy()))
 
     def _answer(self, connection: socket.socket) -> None:
         self._listening.close()
@@ -179,10 +187,8 @@ def _failure(error: NondumError) -> dict[str, Any]:
 
 
 def _busy() -> InstallFailed:
-    problem = Problem(
-        "HELPER_BUSY", f"the helper does {MOST_CHILDREN} things at once already", fix=_LOOK
-    )
-    return InstallFailed(problem)
+    text = "the helper does as many things at once as it may"
+    return InstallFailed(Problem("HELPER_BUSY", text, fix=_LOOK))
 
 
 _LOOK = "`journalctl -u nondum-helper` says more"

@@ -7,6 +7,7 @@ shows the files of one user as those of another (mount_setattr(2), Linux 5.12).
 from __future__ import annotations
 
 import os
+import signal
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,6 +19,8 @@ OF_ROOT = range(61184, 65520)
 OF_SERVICE = range(69632, 73968)
 """For a daemon that is not: neither systemd nor shadow gives these out (systemd.io/UIDS-GIDS), so
 that it gets no power over the processes of other services."""
+MADE_S = 5.0
+"""How long a process may take to make a user namespace: its owner may have stopped it."""
 _MESSAGE_BYTES = 16
 
 
@@ -52,7 +55,8 @@ def map_folder(mount: int, owner: tuple[int, int], user: int) -> None:
 def namespace(owner: tuple[int, int], user: int) -> Iterator[int]:
     """A user namespace in which the owner is called as it is, and is another user outside.
 
-    The owner makes it, so that the kernel counts it as one of theirs.
+    The owner makes it, so that the kernel counts it as one of theirs. The process that calls has no
+    other thread: a lock that one held would stay locked in the fork. Raises `OSError`.
     """
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with ours, theirs:
@@ -61,6 +65,7 @@ def namespace(owner: tuple[int, int], user: int) -> Iterator[int]:
             ours.close()
             _make(theirs, owner)
         theirs.close()
+        ours.settimeout(MADE_S)
         try:
             _, descriptors, _, _ = socket.recv_fds(ours, _MESSAGE_BYTES, 1)
             if not descriptors:
@@ -74,12 +79,13 @@ def namespace(owner: tuple[int, int], user: int) -> Iterator[int]:
                 os.close(process)
                 os.close(descriptors[0])
         finally:
-            ours.close()
+            os.kill(maker, signal.SIGKILL)  # the only one that a stopped process heeds
             os.waitpid(maker, 0)
 
 
 def _make(told: socket.socket, owner: tuple[int, int]) -> None:
-    """In a process of its own: make the namespace, and stay until it is mapped. Does not return."""
+    """In a process of its own: make the namespace, and stay until it is killed, or its parent has
+    ended. Does not return."""
     try:
         os.setgroups([])
         os.setresgid(owner[1], owner[1], owner[1])

@@ -86,6 +86,11 @@ class Folders:
         """The temporary files of planners."""
         return self.root / "planning"
 
+    @property
+    def probes(self) -> Path:
+        """Where it is found out how workers can be confined."""
+        return self.root / "probes"
+
     def staging(self, payload: str) -> Path:
         """A payload while it is copied and checked."""
         return self.root / "staging" / payload
@@ -159,6 +164,12 @@ def _change_mode(path: Path, mode: int) -> None:
         path.chmod(mode)
     except OSError as error:  # of a file system without modes, or another user's
         log.warning("%s is open to other users: %s", path, error)
+
+
+def remove_temporary(folders: Folders) -> None:
+    """Delete the temporary files of a daemon that was killed. Blocks."""
+    for folder in (folders.planning, folders.probes):
+        remove(folder)
 
 
 def sweep(folders: Folders, state: HostState) -> tuple[Path, ...]:

@@ -52,10 +52,11 @@ def as_called(
     for other in state.components.values():
         if other.payload_id != payload_id:
             others.setdefault(other.description.name, set()).add(words_of(other.description))
+    given = given_names.plugins_of_others(state.names, payload_id)
     called = {}
     for own in {description.name for description in said.values()}:
         words = {words_of(one) for one in said.values() if one.name == own}
-        called[own] = given_names.of_plugin(own, payload_id, words, kept.get(own), others)
+        called[own] = given_names.of_plugin(own, payload_id, words, kept.get(own), others, given)
     return {component: replace(one, name=called[one.name]) for component, one in said.items()}
 
 

@@ -127,6 +127,11 @@ CODES = (
         "see `nondum logs`; plug in a release that works",
     ),
     Code(
+        "SERIAL_FAILED",
+        "A plugin cannot open, read or write its serial line.",
+        "check the cable; no other program may have the line open",
+    ),
+    Code(
         "USB_LIBRARY",
         "A plugin cannot use a USB device itself: pyusb or libusb is not to be had.",
         "its author: lock pyusb with it (`nondum-sdk[usb]`); whoever runs the host: install libusb "

@@ -1,4 +1,7 @@
-"""A serial line on the event loop; what goes wrong with it is `BehaviourFailed` SERIAL_FAILED."""
+"""A serial line on the event loop, by pyserial; what goes wrong with it fails the behaviour.
+
+A plugin that imports this locks pyserial with it (`nondum-sdk[serial]`).
+"""
 
 from __future__ import annotations
 
@@ -12,14 +15,28 @@ import serial
 
 from nondum.sdk.errors import BehaviourFailed, Problem
 
+FAILED = "SERIAL_FAILED"
+_WRITE_TIMEOUT_S = 0.5
 
-class Line:
-    """An open port, ours alone. A context manager: leaving it closes the port."""
+
+class SerialLine:
+    """An open port, ours alone. A context manager: leaving it closes the port.
+
+    All of it raises `BehaviourFailed` (SERIAL_FAILED): the port cannot be opened, read or written,
+    or its device has gone.
+    """
 
     def __init__(self, node: str, baud: int) -> None:
         self._node = node
         with self._translated():
-            self._port = serial.Serial(node, baud, timeout=0, exclusive=True)
+            self._port = serial.Serial(
+                node, baud, timeout=0, write_timeout=_WRITE_TIMEOUT_S, exclusive=True
+            )
+
+    def send(self, data: bytes) -> None:
+        """Write at once; never waits longer than half a second."""
+        with self._translated():
+            self._port.write(data)
 
     async def receive(self) -> bytes:
         """The bytes that have come, after waiting for the first of them."""
@@ -33,7 +50,7 @@ class Line:
         with self._translated():
             return bytes(self._port.read(max(1, self._port.in_waiting)))
 
-    def __enter__(self) -> Line:
+    def __enter__(self) -> SerialLine:
         return self
 
     def __exit__(
@@ -52,5 +69,5 @@ class Line:
         # device is pulled between open and tcsetattr, are not.
         except (OSError, termios.error) as error:
             raise BehaviourFailed(
-                Problem("SERIAL_FAILED", str(error), where=self._node, fix="check the cable")
+                Problem(FAILED, str(error), where=self._node, fix="check the cable")
             ) from error
