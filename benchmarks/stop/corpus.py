@@ -8,8 +8,14 @@ from nondum.planning.asking import ASKED
 from nondum.planning.stop_words import STOP_PATTERNS
 from nondum_speech.grammar import Vocabulary
 
-KNOWN = Vocabulary((*STOP_PATTERNS, *ASKED, *VOCABULARY.phrases), VOCABULARY.names, STOP_PATTERNS)
-"""What a host with the shipped plugins tells those who listen, as `mind.sayings` does."""
+_TO = "[{addressee}] "
+KNOWN = Vocabulary(
+    tuple(_TO + said for said in (*STOP_PATTERNS, *ASKED, *VOCABULARY.phrases)),
+    {**VOCABULARY.names, "addressee": ("rover",)},
+    tuple(_TO + said for said in STOP_PATTERNS),
+)
+"""What a host called rover with the shipped plugins tells those who listen, as `mind.sayings`
+does."""
 
 ALIKE = (
     "top",
@@ -34,4 +40,32 @@ ALIKE = (
     "do not wait for me",
 )
 """Sounds much like a word that stops, or has one in it, and stops nothing."""
+OF_ROBOT = (
+    "I was asked to follow you, and I do, with recorded-camera, people-detector and mobile-base.",
+    "I can follow you and look for you; to point at something I need a target.",
+    "I am doing nothing; nobody has given me a goal.",
+    "I have found people.",
+    "speech heard 'follow me': that is goal 3",
+    "speech heard 'stop': goal 3 is halted",
+    "org.nondum.thermal-camera is refused: the payload is not signed",
+    "the host scout is here",
+    "the host scout is gone: it does not answer any more",
+    "goal 2, 'search for people', is suspended",
+    "goal 1 was reached",
+    "drive usb carries no payload",
+    "the drive may be pulled: org.nondum.speaker works, and stays when it is gone",
+    "there is no image, which people-detector.detect needs, for visual-tracker.track",
+    "recorded-camera may use: video",
+    "org.nondum.people-detector 0.2.0 took over from release 1",
+    "halting visual-tracker.track tracker people steering rover person",
+    "the catalogue is written again, with all that happened meanwhile",
+    "safe mode is left: payloads are taken in again",
+    "the clock is set: it is believed again",
+    "pan-tilt-unit waits for its device: plug it in",
+    "compton-camera goes on without a condition: it ended with an error",
+    "everything was stopped; nothing is planned until somebody gives a goal",
+    "the stop key is not there",
+)
+"""What a robot with the shipped plugins says: of each kind of sentence one, and some with a word in
+them that stops."""
 OTHERS = (*PHRASES, *ASKED, *ALIKE, *NEAR, *FAR)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import logging
 import tempfile
 import time
 from collections.abc import AsyncIterator, Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from benchmarks.speech import VOICES
-from benchmarks.stop.corpus import KNOWN, OTHERS
+from benchmarks.stop.corpus import KNOWN, OF_ROBOT, OTHERS
 from benchmarks.stop.results import Hearing, Spoken
+from benchmarks.stop.room import Room
 
 from nondum.planning.stop_words import STOPS, is_stop
 from nondum_speech.ears import Ears
@@ -25,21 +28,37 @@ from nondum_speech.sound import RATE_HZ, Sound
 
 NOISES_DB = (20, 10, 5)
 """White noise, so far below the voice."""
-OWN_DB = (20, 10, 0)
-"""The robot's own voice, so far below the person's, if it were listened to."""
-OWN_WORDS = "I was asked to follow you, and I do, with the camera, the detector and the base."
-OWN_VOICE = "en-us"
+OWN_DB = (10, 0, -10)
+"""The robot's own voice at its microphone, so far below the person's."""
+OWN_LEVEL, HISS_LEVEL = 400.0, 4.0
+"""Root mean square of the robot's voice at its microphone, and of a room's hiss."""
+BEFORE = 3
+"""So many sentences the robot has said before anything is measured."""
+INTERRUPTS_S = (0.5, 2.0)
+"""A person begins so long after the robot's voice is heard, or before it ends."""
 LEAD_S, TAIL_S = 1.0, 2.0
 PIECE = RATE_HZ // 50
 """Samples that come at once from a microphone: 20 ms."""
 WORDS_PER_MINUTE = 160
 SILENT_PART = 0.02
 """Below such a part of the loudest sample a voice has ended."""
-SPEAKS = "while the robot speaks (its ears are shut)"
-
+ALONE = "the robot speaks, and nobody else"
 
 Says = Callable[[str], None]
 Waves = npt.NDArray[Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What comes from the microphone, and what of it is whose, in samples."""
+
+    samples: Waves
+    begin: int
+    """Where the person's words begin, and end."""
+    end: int
+    own: Sound | None = None
+    """What the robot says, from the first sample on, and until when."""
+    own_end: int = 0
 
 
 class Listener:
@@ -47,54 +66,82 @@ class Listener:
 
     def __init__(self, espeak: Espeak) -> None:
         self._espeak = espeak
-        self._noise = np.random.default_rng(7)
         log = logging.getLogger("benchmarks.stop")
-        self._ears = Ears(espeak, log, Settings().limits)
+        self._ears = Ears(espeak, log, Settings().limits, listens_on=True)
+        self._room = Room(7)
+        self._chance = np.random.default_rng(7)
+        self._own = itertools.cycle(OF_ROBOT)
 
     async def learn(self) -> None:
-        """Know what a host with the shipped plugins tells."""
+        """Know what a host with the shipped plugins tells, and how the own voice is heard."""
         await self._ears.learn(KNOWN)
+        for _ in range(BEFORE):
+            await self.alone(next(self._own))
 
     def said(self, text: str, voice: str) -> Sound:
         """A person's words."""
         return self._espeak.say(text, voice=voice, words_per_minute=WORDS_PER_MINUTE)
 
-    async def heard(
-        self,
-        text: str,
-        voice: str,
-        *,
-        noise_db: int | None = None,
-        own_db: int | None = None,
-        is_speaking: bool = False,
-    ) -> Spoken:
-        """Say something under noise, or the robot's own voice, or while it speaks."""
+    async def heard(self, text: str, voice: str, *, noise_db: int | None = None) -> Spoken:
+        """Say something, perhaps under noise."""
         said = self.said(text, voice)
-        end = int(LEAD_S * RATE_HZ) + _end(said)
         samples = _among_silence(said)
-        level = float(np.std(said.samples))
         if noise_db is not None:
-            samples = samples + self._noise.normal(0, _below(level, noise_db), len(samples))
-        if own_db is not None:
-            samples = samples + self._own(len(samples), _below(level, own_db))
-        whole = np.clip(samples, -32768, 32767).astype(np.int16)
-        shut = self._ears.deafened() if is_speaking else contextlib.nullcontext()
-        with shut:
-            return await self._attended(whole, end, text, voice)
+            level = _below(float(np.std(said.samples)), noise_db)
+            samples = samples + self._chance.normal(0, level, len(samples))
+        begin = int(LEAD_S * RATE_HZ)
+        return await self._attended(Scene(samples, begin, begin + _end(said)), text, voice)
 
-    async def _attended(self, samples: Waves, end: int, text: str, voice: str) -> Spoken:
+    async def heard_over(self, text: str, voice: str, *, own_db: int) -> Spoken:
+        """Say something while the robot speaks, whose voice is so much weaker."""
+        said = self.said(text, voice)
+        own, heard, start = self._spoken_by_robot(next(self._own))
+        words = self._room.person(said.samples.astype(np.float64))
+        words *= OWN_LEVEL * 10 ** (own_db / 20) / max(1.0, float(np.std(words)))
+        latest = max(start, start + len(own.samples) - len(said.samples))
+        begin = min(start + int(RATE_HZ * self._chance.uniform(*INTERRUPTS_S)), latest)
+        samples = np.zeros(max(len(heard), begin + len(words)) + int(TAIL_S * RATE_HZ))
+        samples[: len(heard)] += heard
+        samples[begin : begin + len(words)] += words
+        scene = Scene(samples, begin, begin + _end(said), own, start + len(own.samples))
+        return await self._attended(scene, text, voice)
+
+    async def alone(self, text: str) -> Spoken:
+        """Have the robot say something, to nobody."""
+        own, heard, start = self._spoken_by_robot(text)
+        scene = Scene(np.pad(heard, (0, RATE_HZ)), 0, len(heard), own, start + len(own.samples))
+        return await self._attended(scene, text, Settings().voice)
+
+    def _spoken_by_robot(self, text: str) -> tuple[Sound, Waves, int]:
+        """What it plays, what is heard of it, and from which sample on."""
+        own = self.said(text, Settings().voice)
+        start = int(self._room.start_s() * RATE_HZ)
+        heard = self._room.own(own.samples.astype(np.float64))
+        heard *= OWN_LEVEL / max(1.0, float(np.std(own.samples)))
+        heard = np.pad(heard, (start, 0))
+        return own, heard + self._chance.normal(0, HISS_LEVEL, len(heard)), start
+
+    async def _attended(self, scene: Scene, text: str, voice: str) -> Spoken:
         found: list[tuple[str, float, float]] = []
         queue = self._ears.sentences
+        samples = np.clip(scene.samples, -32768, 32767).astype("<i2")
 
         async def pieces() -> AsyncIterator[bytes]:
-            for start in range(0, len(samples), PIECE):
-                piece = samples[start : start + PIECE]
-                began_s = time.perf_counter()
-                yield piece.tobytes()
-                took_s = time.perf_counter() - began_s  # asked for more: it has heard that
-                while not queue.empty():
-                    late_s = (start + len(piece) - end) / RATE_HZ
-                    found.append((queue.get_nowait(), late_s + took_s, late_s))
+            with contextlib.ExitStack() as saying:
+                if scene.own is not None:
+                    saying.enter_context(self._ears.saying(scene.own))
+                for start in range(0, len(samples), PIECE):
+                    if start >= scene.own_end:
+                        saying.close()
+                    piece = samples[start : start + PIECE]
+                    began_s = time.perf_counter()
+                    yield piece.tobytes()
+                    took_s = time.perf_counter() - began_s  # asked for more: it has heard that
+                    while not queue.empty():
+                        words, until = queue.get_nowait(), start + len(piece)
+                        late_s = (until - scene.end) / RATE_HZ
+                        if until > scene.begin:
+                            found.append((words, late_s + took_s, late_s))
 
         await self._ears.attend(pieces())
         stops = [one for one in found if is_stop(one[0])]
@@ -102,11 +149,6 @@ class Listener:
             return Spoken(text, voice, None, is_stop=False)
         heard, after_s, sound_s = (stops or found)[0]
         return Spoken(text, voice, heard, bool(stops), after_s, sound_s)
-
-    def _own(self, length: int, level: float) -> Waves:
-        own = self.said(OWN_WORDS, OWN_VOICE).samples.astype(np.float64)
-        repeated = np.resize(own, length)
-        return repeated * (level / max(1.0, float(np.std(own))))
 
 
 async def measured(
@@ -116,21 +158,27 @@ async def measured(
     listener = Listener(espeak)
     await listener.learn()
 
-    async def heard(texts: Sequence[str], **how: Any) -> tuple[Spoken, ...]:
-        return tuple([await listener.heard(t, v, **how) for t in texts for v in voices])
+    async def heard(texts: Sequence[str], noise_db: int | None) -> tuple[Spoken, ...]:
+        return tuple([await listener.heard(t, v, noise_db=noise_db) for t in texts for v in voices])
+
+    async def heard_over(texts: Sequence[str], own_db: int) -> tuple[Spoken, ...]:
+        return tuple(
+            [await listener.heard_over(t, v, own_db=own_db) for t in texts for v in voices]
+        )
 
     found = []
     for noise_db in (None, *NOISES_DB):
         name = "quiet" if noise_db is None else f"white noise, {noise_db} dB below"
         say(f"spoken: {name}")
-        stops = await heard(STOPS, noise_db=noise_db)
-        found.append(Hearing(name, stops, await heard(sentences, noise_db=noise_db)))
-    say(f"spoken: {SPEAKS}")
-    found.append(Hearing(SPEAKS, await heard(STOPS, is_speaking=True)))
+        stops = await heard(STOPS, noise_db)
+        found.append(Hearing(name, stops, await heard(sentences, noise_db)))
     for own_db in OWN_DB:
-        name = f"its own voice, {own_db} dB below, if its ears were open"
+        name = f"while the robot speaks, its voice {_told(own_db)}"
         say(f"spoken: {name}")
-        found.append(Hearing(name, await heard(STOPS, own_db=own_db)))
+        stops = await heard_over(STOPS, own_db)
+        found.append(Hearing(name, stops, await heard_over(sentences, own_db)))
+    say(f"spoken: {ALONE}")
+    found.append(Hearing(ALONE, (), tuple([await listener.alone(text) for text in OF_ROBOT])))
     return found
 
 
@@ -155,3 +203,12 @@ def _among_silence(sound: Sound) -> Waves:
 
 def _below(level: float, decibels: float) -> float:
     return float(level / 10 ** (decibels / 20))
+
+
+def _told(decibels: int) -> str:
+    """How loud the robot's voice is, next to the person's.
+
+    >>> _told(10), _told(0), _told(-10)
+    ('10 dB below', 'as loud', '10 dB above')
+    """
+    return f"{abs(decibels)} dB {'below' if decibels > 0 else 'above'}" if decibels else "as loud"

@@ -251,6 +251,11 @@ def test_stop_that_is_heard_stops_every_host(pair: Hosts, tmp_path: Path) -> Non
     say(said, "rover, halt")
     mule.until_told("'rover, halt': rover has stopped")
     rover.until_goal(other, "halted")
+    third = rover.want("(written rover)")
+    rover.until_goal(third, "holds")
+    say(said, "river, halt")
+    mule.until_told("'river, halt': stopped, with rover")
+    rover.until_goal(third, "halted")
 
 
 def test_goal_that_is_heard_goes_to_the_peer_that_can_have_it(pair: Hosts, tmp_path: Path) -> None:
@@ -318,6 +323,7 @@ def test_word_that_stops_may_be_typed_for_one_host(pair: Hosts, tmp_path: Path) 
     assert mule.ask("goal", words="rover, stop")["stopped"]["peers"] == ["rover"]
     rover.until_goal(goal, "halted")
     assert mule.ask("goal", words="mule, halt")["stopped"]["peers"] == []
+    assert mule.ask("goal", words="river, halt")["stopped"]["peers"] == ["rover"]
 
 
 def test_goal_of_a_host_that_is_gone_is_not_known_any_more(tmp_path: Path) -> None:

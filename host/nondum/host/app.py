@@ -69,7 +69,7 @@ from nondum.host.service.telling import Telling
 from nondum.host.service.words import words
 from nondum.host.stop_button.button import StopButton
 from nondum.host.stop_button.hook import StopHook
-from nondum.host.stopping import Stopped, Stopping
+from nondum.host.stopping import Stopped, Stopping, is_stop_for_stranger
 from nondum.host.trust.clock import ClockWatch
 from nondum.host.trust.orders import TrustOrders
 from nondum.host.trust.payload_trust import TrustOptions
@@ -385,7 +385,8 @@ def _take(neighbours: Neighbourhood | None, mind: Mind, stopping: Stopping) -> T
 
     async def taken(words: str) -> str:
         _, said = addressed_to(words, [mind.beliefs.snapshot.host])
-        return str(stopping.stop()) if is_stop(said) else wanted(mind, said)
+        is_for_all = is_stop(said) or is_stop_for_stranger(said, mind)
+        return str(stopping.stop()) if is_for_all else wanted(mind, said)
 
     return taken
 

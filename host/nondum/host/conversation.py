@@ -166,9 +166,8 @@ def given_goal(row: Mapping[str, Any], *, of: str = "") -> str:
 
 
 def _hosts(composition: Composition) -> tuple[str, ...]:
-    """Those who can be spoken to; none where there is only one."""
-    peers = tuple(peer.name for peer in composition.snapshot.peers)
-    return (composition.host, *peers) if peers else ()
+    """Those who can be spoken to."""
+    return (composition.host, *(peer.name for peer in composition.snapshot.peers))
 
 
 async def _awaited(answer: Answer) -> None:

@@ -43,7 +43,7 @@ from nondum.host.rows import (
     payload_row,
     unknown,
 )
-from nondum.host.stopping import Stopped, Stopping
+from nondum.host.stopping import Stopped, Stopping, is_stop_for_stranger
 from nondum.host.whole_names import whole
 from nondum.host.workers.workers import Workers
 from nondum.planning.addressee import addressed_to
@@ -111,6 +111,8 @@ class Orders:
             words = self._unaddressed(words)
         if words is not None and is_stop(words):
             return {"stopped": self.stopping.stop().to_dict()}
+        if words is not None and is_stop_for_stranger(words, self.mind):
+            return {"stopped": (await self.stop_all()).to_dict()}
         try:
             given = self.mind.give(words=words, pddl=pddl, kind=kind, priority=priority, said=said)
         except GoalRefused as refused:

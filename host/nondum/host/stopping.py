@@ -11,6 +11,8 @@ from typing import Any
 
 from nondum.host.mind.mind import Mind
 from nondum.host.workers.workers import Workers
+from nondum.planning.stop_words import is_stop_for_other
+from nondum.sdk.errors import GoalRefused
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +68,22 @@ class Stopping:
         stopped = Stopped(goals, behaviours)
         self._told(stopped)
         return stopped
+
+
+def is_stop_for_stranger(words: str, mind: Mind) -> bool:
+    """Whether words stop somebody whose name no host here has, and no phrase makes a goal of them.
+
+    The callers look for the names of known hosts first. As no one knows who was meant, all stop.
+    """
+    if not is_stop_for_other(words):
+        return False
+    if mind.composition is None:
+        return True
+    try:
+        mind.composition.book.goal(words)
+    except GoalRefused:
+        return True
+    return False
 
 
 def _counted(number: int, what: str) -> str:

@@ -1,6 +1,7 @@
 """What is heard, one sentence after the other, whatever it came from.
 
-Words change while people speak: a sentence is heard by what could be said when it ended.
+Words change while people speak: a sentence is heard by what could be said when it ended. While this
+machine itself speaks, no sentences are heard, only words that stop.
 """
 
 from __future__ import annotations
@@ -18,24 +19,28 @@ from nondum_speech.lexicon import lexicon
 from nondum_speech.recogniser import Limits
 from nondum_speech.recognising import RecogniserEnded, Recognising
 from nondum_speech.sentences import Sentences, sentences_of
-from nondum_speech.sound import Sound, SoundInvalid, read_wav
+from nondum_speech.sound import Sound, SoundInvalid, from_bytes, read_wav
 
 LOOK_S = 0.2
 WAITING = 8
 """So many sentences may wait for a host that does not ask; then the oldest is forgotten."""
 ECHO_BYTES = 16_000
-"""Half a second: after the own voice has ended, its echo is not listened to either."""
+"""Half a second: so long after the own voice has ended, its echo may be heard."""
 
 
 class Ears:
     """Turns sounds into sentences said; they wait in `sentences`."""
 
-    def __init__(self, espeak: Espeak, log: logging.Logger, limits: Limits) -> None:
+    def __init__(
+        self, espeak: Espeak, log: logging.Logger, limits: Limits, *, listens_on: bool
+    ) -> None:
+        """`listens_on`: words that stop are listened for while this machine speaks."""
         self.sentences: asyncio.Queue[str] = asyncio.Queue()
         self._espeak, self._log = espeak, log
         self._recognising = Recognising(limits)
         self._learnt = asyncio.Event()
-        self._speaking = 0
+        self._listens_on = listens_on
+        self._saying: Sound | None = None
 
     async def learn(self, vocabulary: Vocabulary) -> None:
         """Hear other words from now on; tell which ones cannot be heard well."""
@@ -62,25 +67,31 @@ class Ears:
             await asyncio.sleep(LOOK_S)
 
     async def attend(self, pieces: AsyncIterator[bytes]) -> None:
-        """Hear a flow of samples, as long as it flows; the own voice is not listened to."""
-        cutter, deaf = Sentences(), 0
+        """Hear a flow of samples, as long as it flows; of the own voice nothing is understood."""
+        cutter, own, echo = Sentences(), None, 0
         async for piece in pieces:
-            if self._speaking:
-                cutter, deaf = Sentences(), ECHO_BYTES
-            elif deaf > 0:
-                deaf -= len(piece)
+            if self._saying is not None:
+                if self._saying is not own:
+                    cutter, own = Sentences(), self._saying
+                    await self._begin(own)
+                echo = ECHO_BYTES
+                await self._hear_stop(piece)
+            elif echo > 0:
+                echo -= len(piece)
+                await self._hear_stop(piece)
             else:
+                own = None
                 for sentence in cutter.heard(piece):
                     await self._hear(sentence)
 
     @contextlib.contextmanager
-    def deafened(self) -> Iterator[None]:
-        """Do not listen to a microphone: this machine speaks, of goals too."""
-        self._speaking += 1
+    def saying(self, sound: Sound) -> Iterator[None]:
+        """Understand no sentences from a microphone: this machine says `sound`, of goals too."""
+        self._saying = sound
         try:
             yield
         finally:
-            self._speaking -= 1
+            self._saying = None
 
     async def _hear_file(self, inbox: Inbox, path: Path) -> None:
         try:
@@ -108,9 +119,30 @@ class Ears:
             self._log.info("heard %.1f s of no known sentence%s", sentence.seconds, near)
             return
         self._log.info("heard %r (%.2f)", heard.said, heard.confidence)
+        self._keep(heard.said)
+
+    async def _begin(self, own: Sound) -> None:
+        if self._listens_on:
+            with contextlib.suppress(RecogniserEnded):  # what comes next tells it
+                await self._recognising.says(own)
+
+    async def _hear_stop(self, piece: bytes) -> None:
+        """Of what is heard while this machine speaks, hear words that stop."""
+        if not self._listens_on:
+            return
+        try:
+            words = await self._recognising.stop_in(from_bytes(piece))
+        except RecogniserEnded as ended:
+            self._log.warning("words that stop were not listened for: %s", ended)
+            return
+        if words:
+            self._log.info("heard %r while speaking", words)
+            self._keep(words)
+
+    def _keep(self, words: str) -> None:
         if self.sentences.qsize() == WAITING:
             self.sentences.get_nowait()
-        self.sentences.put_nowait(heard.said)
+        self.sentences.put_nowait(words)
 
     def _pronounced(self, word: str, accent: str) -> str:
         return self._espeak.phonemes(word, voice=accent)

@@ -21,6 +21,7 @@ PHONE_WORDS = {f"phone.{phone.lower()}": phone for phone in PHONES}
 
 _PART = re.compile(r"\{([\w-]+)\}|([\[\]])|([^\s\[\]{}]+)")
 _SLOT = re.compile(r"\{([\w-]+)\}")
+_OPTIONAL_SLOT = re.compile(r"\[\s*\{([\w-]+)\}\s*\]")
 _BREAKS = re.compile(r"[^\w'-]+")
 _ARTICLES = ("the", "a", "an")
 _FREE = "free"
@@ -123,9 +124,11 @@ def _sayable(names: Iterable[str], sayable: frozenset[str]) -> Iterator[str]:
 def _expansion(
     phrase: str, rules: Mapping[str, str], names: Mapping[str, object], sayable: frozenset[str]
 ) -> str | None:
-    """A pattern in the grammar's form; None when it cannot be said."""
+    """A pattern in the grammar's form; None when it cannot be said. An optional slot whose names
+    cannot be said is left out: a robot that cannot be named can be stopped."""
     parts: list[str] = []
-    for slot, bracket, word in _PART.findall(phrase):
+    said = _OPTIONAL_SLOT.sub(lambda s: s[0] if s[1] in rules or s[1] not in names else "", phrase)
+    for slot, bracket, word in _PART.findall(said):
         if slot and slot not in names:
             parts.append(f"<{_FREE}>")
         elif slot and slot in rules:

@@ -48,7 +48,8 @@ class Speech:
         self._outlet = find_outlet(settings.said, os.environ, scratch=ctx.scratch)
         if self._outlet is None:
             ctx.log.info("no sound player is here: what is said will be printed only")
-        self._ears = Ears(self._espeak, ctx.log, settings.limits)
+        listens = settings.stop_while_speaking
+        self._ears = Ears(self._espeak, ctx.log, settings.limits, listens_on=listens)
         inbox = Inbox(Path(settings.inbox) if settings.inbox else ctx.scratch / "inbox")
         ctx.log.info("WAV files in %s are heard", inbox.folder)
         ctx.spawn(self._ears.watch(inbox))
@@ -77,14 +78,14 @@ class Speech:
 
     @hookimpl
     async def speak(self, ctx: Context, text: str) -> None:
-        """Say anything, one sentence at a time; the microphone does not hear it."""
+        """Say anything, one sentence at a time; only words that stop are heard meanwhile."""
         assert self._ears is not None, "asked only once started"
         ctx.log.info("says: %s", text)
         if self._outlet is None:
             return
         async with self._one_voice:
             sound = await self._sound(text)
-            with self._ears.deafened():
+            with self._ears.saying(sound):
                 try:
                     await self._outlet.play(sound.to_wav())
                 except (OSError, TimeoutError) as error:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 
@@ -29,6 +29,8 @@ from nondum_speech.sound import Samples, Sound
 
 PHONES_WEIGH = 0.5
 """What phones count beside words; see the benchmark."""
+CLEARLY = 0.25
+"""Log-likelihood a frame, by which another sentence must be nearer than words that stop."""
 _UNSAID = "something"
 """Stands for free words that are none of the dictionary's."""
 
@@ -84,16 +86,14 @@ class Recogniser:
         self._free, self._limits = free, limits
         spoken = (sentences(pattern, vocabulary.names) for pattern in vocabulary.stops)
         self._stops = frozenset(said for pattern in spoken for said in pattern)
-        grammar = jsgf(vocabulary, frozenset(lexicon.pronunciations))
-        self._grammatical = _decoder_of(grammar, lexicon) if grammar else None
+        self._grammatical = _decoder_of(vocabulary, lexicon)
+        self._stopping = _decoder_of(replace(vocabulary, phrases=vocabulary.stops), lexicon)
 
     def hear(self, sound: Sound) -> Heard:
         """Recognise one sentence, in about a quarter of the time that it took to say it."""
-        if self._grammatical is None:
-            return NOTHING
         samples = made_audible(sound)
-        sentence = decoded(self._grammatical, samples)
-        if sentence is None or not self._is_whole(sentence):
+        sentence = _sentence(self._grammatical, samples)
+        if sentence is None:
             return NOTHING
         words, phones = self._free.words(samples), self._free.phones(samples)
         if words is None or phones is None:
@@ -106,14 +106,31 @@ class Recogniser:
         limit = limits.stop_confidence if text in self._stops else limits.confidence
         return Heard(text, confidence, said=text if confidence >= limit else "")
 
-    def _is_whole(self, sentence: Decoding) -> bool:
-        """Whether it is no mere beginning of a sentence."""
-        assert self._grammatical is not None, "only asked of what it decoded"
-        accepts: bool = self._grammatical.get_fsg().accept(" ".join(sentence.words))
-        return accepts
+    def stop_in(self, sound: Sound) -> str:
+        """Words that stop, unless another sentence that can be said is clearly nearer to what
+        somebody said, or nothing fits; else "". What else may have been said is not asked: it is
+        for sounds that are known to be a person's, and damaged."""
+        samples = made_audible(sound)
+        stop = _sentence(self._stopping, samples)
+        if stop is None:
+            return ""
+        other = _sentence(self._grammatical, samples)
+        worse = other.acoustic - stop.acoustic if other else 0.0
+        return " ".join(stop.words) if worse <= CLEARLY * frames_of(samples) else ""
 
 
-def _decoder_of(grammar: str, lexicon: Lexicon) -> Decoder:
+def _sentence(by: Decoder | None, samples: Samples) -> Decoding | None:
+    """The nearest sentence of a grammar, if it is no mere beginning of one."""
+    if by is None:
+        return None
+    sentence = decoded(by, samples)
+    return sentence if sentence and by.get_fsg().accept(" ".join(sentence.words)) else None
+
+
+def _decoder_of(vocabulary: Vocabulary, lexicon: Lexicon) -> Decoder | None:
+    grammar = jsgf(vocabulary, frozenset(lexicon.pronunciations))
+    if grammar is None:
+        return None
     phones = "".join(f"{word} {phone}\n" for word, phone in PHONE_WORDS.items())
     with tempfile.TemporaryDirectory() as folder:
         dictionary, rules = Path(folder, "words.dict"), Path(folder, "said.gram")

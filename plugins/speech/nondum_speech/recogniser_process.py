@@ -11,27 +11,57 @@ import pickle
 import sys
 from typing import Any, BinaryIO
 
-from nondum_speech.recogniser import NOTHING, FreeHearing, Heard, Recogniser
-from nondum_speech.requests import LENGTH, Learn, framed
-from nondum_speech.sound import Sound
+from pywebrtc_audio import EchoCanceller
+
+from nondum_speech.interruptions import Interruptions
+from nondum_speech.own_voice import OwnVoice
+from nondum_speech.recogniser import NOTHING, FreeHearing, Recogniser
+from nondum_speech.requests import LENGTH, Learn, Piece, Says, framed
+from nondum_speech.sound import RATE_HZ, Sound
 
 
 def main() -> None:
     """Answer until standard input ends."""
     out = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # whatever else is printed
-    free: FreeHearing | None = None
-    recogniser: Recogniser | None = None
+    ears = _Ears()
     while (request := _read(sys.stdin.buffer)) is not None:
-        answer: Heard | None = None
-        if isinstance(request, Learn):
-            free = free or FreeHearing()
-            words, lexicon = request.vocabulary, request.lexicon
-            recogniser = Recogniser(words, lexicon, free, request.limits)
-        elif isinstance(request, Sound):
-            answer = recogniser.hear(request) if recogniser else NOTHING
-        out.write(framed(answer))
+        out.write(framed(ears.answer(request)))
         out.flush()
+
+
+class _Ears:
+    """All that this process hears with."""
+
+    def __init__(self) -> None:
+        self._free: FreeHearing | None = None
+        self._recogniser: Recogniser | None = None
+        self._interruptions: Interruptions | None = None
+        self._canceller = EchoCanceller(RATE_HZ)
+
+    def answer(self, request: object) -> object:
+        """Do what is asked."""
+        match request:
+            case Learn(vocabulary, lexicon, limits):
+                self._free = self._free or FreeHearing()
+                self._recogniser = Recogniser(vocabulary, lexicon, self._free, limits)
+            case Sound():
+                return self._recogniser.hear(request) if self._recogniser else NOTHING
+            case Says(sound):
+                self._interruptions = Interruptions(OwnVoice(sound, self._canceller))
+            case Piece(sound):
+                return self._stop_in(sound)
+        return None
+
+    def _stop_in(self, piece: Sound) -> str:
+        """Words that stop, once a sentence of the robot's own."""
+        if self._interruptions is None or self._recogniser is None:
+            return ""
+        said = (self._recogniser.stop_in(other) for other in self._interruptions.heard(piece))
+        words = next(filter(None, said), "")
+        if words:
+            self._interruptions = None
+        return words
 
 
 def _read(source: BinaryIO) -> Any:

@@ -16,7 +16,7 @@ from typing import Any
 from nondum_speech.grammar import Vocabulary
 from nondum_speech.lexicon import Lexicon
 from nondum_speech.recogniser import NOTHING, Heard, Limits
-from nondum_speech.requests import LENGTH, Learn, framed
+from nondum_speech.requests import LENGTH, Learn, Piece, Says, framed
 from nondum_speech.sound import Sound
 
 
@@ -48,6 +48,17 @@ class Recognising:
         """Recognise one sentence. Raises `RecogniserEnded`."""
         heard: Heard = await self._asked(sound) if self._learn else NOTHING
         return heard
+
+    async def says(self, sound: Sound) -> None:
+        """The robot itself says this from now on. Raises `RecogniserEnded`."""
+        if self._learn:
+            await self._asked(Says(sound))
+
+    async def stop_in(self, piece: Sound) -> str:
+        """Words that stop, if somebody said them in what is heard while the robot says something;
+        pieces come as they were heard, one after the other. Raises `RecogniserEnded`."""
+        words: str = await self._asked(Piece(piece)) if self._learn else ""
+        return words
 
     async def close(self) -> None:
         """End the process."""

@@ -1,4 +1,8 @@
-"""What the recogniser's own process is asked: `Learn` some words, or hear a `Sound`."""
+"""What the recogniser's own process is asked.
+
+`Learn` some words; hear a `Sound` that is one sentence; or hear what comes while the robot itself
+`Says` something, a `Piece` at a time.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,7 @@ from dataclasses import dataclass
 from nondum_speech.grammar import Vocabulary
 from nondum_speech.lexicon import Lexicon
 from nondum_speech.recogniser import Limits
+from nondum_speech.sound import Sound
 
 LENGTH = struct.Struct("!I")
 
@@ -20,6 +25,21 @@ class Learn:
     vocabulary: Vocabulary
     lexicon: Lexicon
     limits: Limits
+
+
+@dataclass(frozen=True, slots=True)
+class Says:
+    """The robot says this from now on: what comes are pieces of what is heard meanwhile. Answered
+    with None."""
+
+    sound: Sound
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """What was heard next. Answered with words that stop, if somebody else said them, or ""."""
+
+    sound: Sound
 
 
 def framed(value: object) -> bytes:

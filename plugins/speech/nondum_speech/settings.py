@@ -19,6 +19,9 @@ class Settings:
     """What a sentence must reach to be taken as said; nearer zero is stricter."""
     stop_confidence: float = -1.15
     """The same for words that stop the robot."""
+    stop_while_speaking: bool = True
+    """Whether words that stop are listened for while the robot speaks. What other people say
+    meanwhile is often taken for one."""
     said: str = ""
     """Folder for a WAV file of each sentence said; empty: the default sound device."""
     voice: str = "en-us"

@@ -42,6 +42,11 @@ def test_name_that_cannot_be_pronounced_is_left_out_alone() -> None:
     ]
 
 
+def test_robot_whose_name_cannot_be_pronounced_can_be_stopped() -> None:
+    vocabulary = Vocabulary(("[{who}] [please] stop", "find {who}"), {"who": ("дом",)})
+    assert rules(vocabulary, "дом") == ["public <said> = [please] stop;"]
+
+
 def test_nothing_to_say_is_no_grammar() -> None:
     assert jsgf(Vocabulary(), frozenset()) is None
     assert not rules(Vocabulary(("find {thing}",), {"thing": ("дом",)}), "дом")

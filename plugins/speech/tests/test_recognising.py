@@ -7,8 +7,12 @@ import os
 import signal
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from dataclasses import replace
 
 import pytest
+from overhearing import overheard, pieces
+from recorded import ROBOT
+from recorded import said as recorded
 
 from nondum_speech.espeak import Espeak
 from nondum_speech.grammar import Vocabulary
@@ -18,7 +22,11 @@ from nondum_speech.recognising import RecogniserEnded, Recognising
 from nondum_speech.settings import Settings
 from nondum_speech.sound import Sound
 
-VOCABULARY = Vocabulary(("follow {class}", "search for {class}"), {"class": ("me", "people")})
+VOCABULARY = Vocabulary(
+    ("follow {class}", "search for {class}", "hold still"),
+    {"class": ("me", "people")},
+    ("hold still",),
+)
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +56,47 @@ def test_sentence_is_heard_and_nothing_before_anything_was_learnt(
             await one.learn(VOCABULARY, words)
             assert one.pid not in (None, os.getpid())
             assert (await one.hear(said(espeak, "follow me"))).said == "follow me"
+
+    asyncio.run(hear())
+
+
+def test_word_that_stops_is_heard_while_the_robot_speaks_and_learns(
+    words: Lexicon,
+) -> None:
+    own, word = recorded(ROBOT), recorded("hold still")
+
+    async def hear() -> list[str]:
+        async with recognising() as one:
+            await one.says(own)
+            assert not await one.stop_in(word)
+            await one.learn(VOCABULARY, words)
+            found = []
+            for sound in (overheard(own), overheard(own, word)):
+                await one.says(own)
+                found += [await one.stop_in(piece) for piece in list(pieces(sound))[:15]]
+                await one.learn(replace(VOCABULARY, phrases=("follow me", "hold still")), words)
+                found += [await one.stop_in(piece) for piece in list(pieces(sound))[15:]]
+            return [heard for heard in found if heard]
+
+    assert asyncio.run(hear()) == ["hold still"]
+
+
+def test_process_that_was_killed_while_the_robot_speaks_hears_again_with_its_next_sentence(
+    words: Lexicon,
+) -> None:
+    own = recorded(ROBOT)
+
+    async def hear() -> None:
+        async with recognising() as one:
+            await one.learn(VOCABULARY, words)
+            await one.says(own)
+            assert one.pid is not None
+            os.kill(one.pid, signal.SIGKILL)
+            with pytest.raises(RecogniserEnded):
+                await one.stop_in(own)
+            assert await one.stop_in(own) == ""
+            await one.says(own)
+            assert await one.stop_in(own) == ""
 
     asyncio.run(hear())
 

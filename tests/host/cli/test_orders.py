@@ -117,7 +117,14 @@ def test_halting_now_halts_what_runs(daemon: RunningHost) -> None:
 
 @pytest.mark.parametrize(
     "words",
-    [["stop"], ["goal", "stop"], ["goal", "halt", "now,", "please"], ["goal", "panther,", "stop"]],
+    [
+        *(["stop"], ["goal", "stop"], ["goal", "halt", "now,", "please"]),
+        *(
+            ["goal", "panther,", "stop"],
+            ["goal", "rover,", "stop"],
+            ["goal", "--keep", "hey", "stop"],
+        ),
+    ],
 )
 def test_a_word_stops_the_robot(daemon: RunningHost, words: list[str]) -> None:
     id = daemon.run("goal", "shine", "--wait", "--json").ok().json["id"]
@@ -302,7 +309,18 @@ def test_what_is_said_is_a_goal_or_stops_or_is_refused(daemon: RunningHost) -> N
     doing = daemon.run("say", "what are you doing").ok().out
     assert doing == "I was asked to shine, and I do, with beacon.\n"
     assert daemon.run("say", "stop").ok().out.startswith("stopped: 1 goal")
+    daemon.run("say", "shine").ok()
+    assert daemon.run("say", "rover,", "please", "stop").ok().out.startswith("stopped: 1 goal")
     daemon.run("say", "sing").refused(1, "PHRASE_UNKNOWN")
+    daemon.run("say", "never", "stop").refused(1, "PHRASE_UNKNOWN")
+
+
+def test_a_phrase_that_ends_with_a_word_that_stops_is_a_goal(daemon: RunningHost) -> None:
+    for verb in ("say", "goal"):
+        daemon.run(verb, "shine", "for", "freeze").ok()
+        (given,) = [row for row in daemon.view["goals"] if row["state"] != "halted"][-1:]
+        assert given["text"] == "shine for freeze"
+        daemon.run("stop").ok()
 
 
 def test_a_robot_goes_by_its_own_name_where_there_are_no_peers(daemon: RunningHost) -> None:

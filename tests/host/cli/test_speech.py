@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from demo.robot import View
 from tests.kit.beacon import BEACON
 from tests.kit.payloads import Part
@@ -46,14 +47,15 @@ async def learn_words(ctx, vocabulary):
 async def listen(ctx):
     while not (vocabulary := await learnt.get())["phrases"]:
         pass
-    names = vocabulary["names"].get("class", [])
-    return {"words": " ".join(["learnt", *sorted(vocabulary["phrases"]), *names])}
+    names = vocabulary["names"]
+    said = [*sorted(vocabulary["phrases"]), *names.get("class", []), *names["addressee"]]
+    return {"words": " ".join(["learnt", *said])}
 """
 GUARD = """
-'''Says one word.'''
+'''Says one thing.'''
 from nondum.sdk import hookimpl
 
-said = ["Stop!"]
+said = ["SAID"]
 
 @hookimpl
 async def listen(ctx):
@@ -88,24 +90,27 @@ def test_robot_is_told_by_voice_and_answers(tmp_path: Path) -> None:
 
 
 def test_listener_learns_what_can_be_said_and_when_that_changes(tmp_path: Path) -> None:
-    with running(tmp_path) as host:
+    with running(tmp_path, name="panther") as host:
         host.plug(host.drive("pupil", Part("pupil", PUPIL)))
         host.until("the pupil is ready", lambda view: are_ready(view, 1))
         host.plug(host.drive("beacon", Part("beacon", BEACON)))
-        learnt = sorted([*STOP_PATTERNS, *ASKED, "greet {class}", "shine [for {text}]"])
-        host.until_told(f"pupil heard {' '.join(['learnt', *learnt, 'people', 'person'])!r}")
+        said = (*STOP_PATTERNS, *ASKED, "greet {class}", "shine [for {text}]")
+        learnt = sorted(f"[{{addressee}}] {pattern}" for pattern in said)
+        words = " ".join(["learnt", *learnt, "people", "person", "panther"])
+        host.until_told(f"pupil heard {words!r}")
         lamp = BEACON.replace("shine [for {words:text}]", "light up")
         host.plug(host.drive("lamp", Part("lamp", lamp)))
         host.until_told("light up")
 
 
-def test_robot_is_stopped_by_voice(tmp_path: Path) -> None:
-    with running(tmp_path) as host:
+@pytest.mark.parametrize("said", ["Stop!", "panther, stop", "Rover, stop!"])
+def test_robot_is_stopped_by_voice_whatever_name_it_is_called(tmp_path: Path, said: str) -> None:
+    with running(tmp_path, name="panther") as host:
         host.plug(host.drive("beacon", Part("beacon", BEACON)))
         host.until("the beacon is ready", lambda view: are_ready(view, 1))
         id = host.run("goal", "shine", "--wait", "--json").ok().json["id"]
-        host.plug(host.drive("guard", Part("guard", GUARD)))
-        host.until_told("guard heard 'Stop!': stopped: 1 goal and 1 behaviour halted")
+        host.plug(host.drive("guard", Part("guard", GUARD.replace("SAID", said))))
+        host.until_told(f"guard heard {said!r}: stopped: 1 goal and 1 behaviour halted")
         host.until_goal(id, "halted")
 
 

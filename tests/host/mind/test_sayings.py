@@ -68,7 +68,7 @@ def test_phrases_are_left_out_when_names_do_not_suffice() -> None:
     assert 0 < len(json.dumps(told)) <= SAYINGS_BYTES + 100
 
 
-def test_hosts_are_spoken_to_by_name_where_there_are_several() -> None:
+def test_hosts_are_spoken_to_by_name() -> None:
     told = sayings(book("find {c:class}", classes=("dog",)), ["big-mule", "rover"])
     assert told == {
         "phrases": [f"[{{addressee}}] {said}" for said in (*STOPPING, *ASKED, "find {class}")],

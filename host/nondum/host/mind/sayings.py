@@ -30,9 +30,8 @@ def sayings(book: Phrasebook, hosts: Sequence[str] = ()) -> Sayings:
     `stops`: those of the patterns that stop the robot.
 
     These come first, then what it is asked about itself. Slots are called by the
-    types of what they name. A phrase without a name for one of its slots cannot be said. Where
-    there are several hosts, each can be addressed first. What a packet has no room for is left out,
-    names first.
+    types of what they name. A phrase without a name for one of its slots cannot be said. Each of
+    the `hosts` can be addressed first. What a packet has no room for is left out, names first.
     """
     names: dict[str, list[str]] = {}
     addressee = f"[{{{ADDRESSEE}}}] " if hosts else ""

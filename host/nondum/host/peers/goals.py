@@ -20,7 +20,7 @@ from nondum.host.peers.given_away import MOST_KEPT, GivenAway, replaced, standin
 from nondum.host.peers.remote_calls import Reaches
 from nondum.host.printable import printable
 from nondum.host.rows import Row
-from nondum.host.stopping import Stopped
+from nondum.host.stopping import Stopped, is_stop_for_stranger
 from nondum.planning.addressee import addressed_to
 from nondum.planning.stop_words import STOPS, is_stop
 from nondum.sdk.errors import GoalRefused, NondumError, Problem
@@ -78,16 +78,21 @@ class Goals:
             return given_goal(given, of=f" of {peer}")
         if is_stop(rest):
             return str(self._stop())
+        if is_stop_for_stranger(rest, self._mind()):
+            return str(await self.stop_all())
         return wanted(self._mind(), rest)
 
     async def whose(self, words: str) -> tuple[str | None, str]:
-        """The peer whose goal words are, None for this host; and the words without its name.
+        """The peer whose goal words are, None for this host; and the words without its name. Words
+        that stop are never asked about.
 
         Raises `GoalRefused` (WHOSE_GOAL).
         """
         addressed, rest = addressed_to(words, (self._host, *self._peers()))
         if addressed is not None:
             return (None if addressed == self._host else addressed), rest
+        if is_stop_for_stranger(words, self._mind()):
+            return None, words
         if not self._peers() or await self._prospect(words) in ("can", "holds"):
             return None, words
         return await self._able(words), words
