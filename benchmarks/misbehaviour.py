@@ -26,9 +26,11 @@ from measuring import Spread, machine, percentile, table
 from nondum.host import heap
 from nondum.host.cgroups import Cages
 from nondum.host.events import Event, WorkerExited, WorkerLogged, WorkerStrained
-from nondum.host.workers import Limits, WorkerLauncher, Workers, WorkerSpec, base_interpreter
 from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined
+from nondum.host.workers.launcher import WorkerLauncher
+from nondum.host.workers.spec import Limits, WorkerSpec, base_interpreter
 from nondum.host.workers.worker import Worker
+from nondum.host.workers.workers import Workers
 from nondum.sdk.description import Behaviour, PluginDescription, Unit
 from nondum.sdk.errors import Problem
 

@@ -24,8 +24,9 @@ from tests.kit.workers import WorkersUnderTest
 from nondum.host.cgroups import Cages
 from nondum.host.events import WorkerLogged
 from nondum.host.inside import room
-from nondum.host.workers import Limits, WorkerLauncher
 from nondum.host.workers.confinements import Confinement
+from nondum.host.workers.launcher import WorkerLauncher
+from nondum.host.workers.spec import Limits
 from nondum.sdk.errors import WorkerFailed
 
 ESCAPE = Path(__file__).with_name("escape.py")

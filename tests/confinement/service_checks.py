@@ -29,9 +29,11 @@ from nondum.host.events import WorkerExited, WorkerLogged
 from nondum.host.helper import HelperClient
 from nondum.host.helper.worker_users import OF_SERVICE
 from nondum.host.lifecycle.folders import remove
-from nondum.host.workers import Limits, WorkerLauncher, WorkerSpec, scratch
+from nondum.host.workers import scratch
 from nondum.host.workers.confinements import Confinement
+from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.process import WorkerProcess
+from nondum.host.workers.spec import Limits, WorkerSpec
 from nondum.planning.running import RunState
 from nondum.wheelhouse.confinement import Level
 

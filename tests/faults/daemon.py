@@ -42,7 +42,8 @@ from nondum.host.lifecycle.executor import Executor
 from nondum.host.lifecycle.folders import Folders
 from nondum.host.lifecycle.installation import InstallOptions
 from nondum.host.transitions import COMPONENT_TRANSITIONS, TRANSITIONS
-from nondum.host.workers import Timing, Workers
+from nondum.host.workers.spec import Timing
+from nondum.host.workers.workers import Workers
 from nondum.sdk.errors import Problem
 
 HOST = "spot"

@@ -6,12 +6,14 @@ import json
 import os
 import pty
 import subprocess
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from demo.robot import NONDUM
+from tests.kit.fork_server import fork_server, module_of
 from tests.kit.until import PATIENCE_S
 
 
@@ -43,7 +45,27 @@ class Ran:
 
 
 def nondum(*arguments: str | Path, **environment: str) -> Ran:
-    """Run `nondum` in a process, to its end."""
+    """Run `nondum` to its end in a process of the fork server, which has imported it."""
+    own = [name for name in environment if name.startswith("PYTHON")]
+    assert not own, f"only a new interpreter reads {own}: use `in_new_interpreter`"
+    module = module_of(command(*arguments))
+    assert module is not None
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        process = fork_server().start(
+            module,
+            stdout=out.fileno(),
+            stderr=err.fileno(),
+            env=quiet_environment() | environment,
+        )
+        try:
+            code = process.wait(PATIENCE_S)
+        finally:
+            process.kill()
+        return Ran(code, _written(out), _written(err))
+
+
+def in_new_interpreter(*arguments: str | Path, **environment: str) -> Ran:
+    """Run `nondum` to its end with the whole start of Python."""
     done = subprocess.run(
         command(*arguments),
         capture_output=True,
@@ -53,6 +75,11 @@ def nondum(*arguments: str | Path, **environment: str) -> Ran:
         check=False,
     )
     return Ran(done.returncode, done.stdout, done.stderr)
+
+
+def _written(file: IO[bytes]) -> str:
+    file.seek(0)
+    return file.read().decode()
 
 
 def in_terminal(*arguments: str | Path, **environment: str) -> str:

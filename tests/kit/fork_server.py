@@ -1,4 +1,4 @@
-"""Daemons forked from a process that has imported them, in place of a start of Python for each.
+"""Programs forked from a process that has imported them, in place of a start of Python for each.
 
     process = fork_server().start(["nondum.host.cli", "host", "run", "--user"])
 
@@ -25,22 +25,25 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self
 
 from tests.kit.evidence import logged
 
+from nondum.host.cli.main import COMMANDS
+from nondum.host.heap import keep_what_is_loaded
 from nondum.host.lifecycle.fork_server import ANSWER_BYTES, answer, ask, serve
 
 ROOT = Path(__file__).parent.parent.parent
 PATIENCE_S = 90.0
 IMPORTED = (
-    *("nondum.host.app", "nondum.host.cli.main", "nondum.host.cli.host"),
+    "nondum.host.app",
     "nondum.host.peers.neighbourhood",
+    *(f"nondum.host.cli.{module}" for module, _ in COMMANDS.values()),
 )
-"""What daemons import, and the fork server before them."""
+"""What daemons and commands import, and the fork server before them."""
 
 Command = Sequence[str]
 """A module that is a program, and its arguments."""
@@ -156,8 +159,9 @@ class ForkServer:
         stdout: int | None = None,
         stderr: int | None = None,
         text: bool = False,
+        env: Mapping[str, str] | None = None,
     ) -> Forked:
-        """Start `python -m command…` in this folder with this environment.
+        """Start `python -m command…` in this folder, with this environment unless `env` is another.
 
         Each stream is a descriptor, or `subprocess.PIPE`; `text` makes pipes of text.
         """
@@ -176,13 +180,16 @@ class ForkServer:
                 ours.callback(os.close, its)
             status, of_server = os.pipe()
             ours.callback(os.close, of_server)
-            pid, descriptor = self._ask(command, [*theirs, of_server])
+            environment = dict(os.environ if env is None else env)
+            pid, descriptor = self._ask(command, [*theirs, of_server], environment)
         return Forked(pid, descriptor, status, streams)
 
-    def _ask(self, command: Command, descriptors: list[int]) -> tuple[int, int]:
+    def _ask(
+        self, command: Command, descriptors: list[int], environment: dict[str, str]
+    ) -> tuple[int, int]:
         """Have a process forked; its pid and pidfd."""
         request = json.dumps(
-            {"command": list(command), "folder": str(Path.cwd()), "environment": dict(os.environ)}
+            {"command": list(command), "folder": str(Path.cwd()), "environment": environment}
         )
         with self._one_request:
             ask(self._channel, request.encode(), descriptors)
@@ -276,6 +283,7 @@ def main() -> None:
     """Serve the client at the socket whose descriptor is given."""
     for module in IMPORTED:
         importlib.import_module(module)
+    keep_what_is_loaded()  # else each process, at its end, looks through all of it
     if request := serve(socket.socket(fileno=int(sys.argv[1]))):
         _become(**json.loads(request))
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from tests.kit.workers import HOST, WorkersUnderTest
 
-from nondum.host.workers import Call, Limits, WorkerSpec
+from nondum.host.workers.call import Call
+from nondum.host.workers.spec import Limits, WorkerSpec
 from nondum.sdk.description import Behaviour, Unit
 
 DO = Behaviour("do", "(do ?u - sensor)")

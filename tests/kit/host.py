@@ -21,7 +21,8 @@ from nondum.host.lifecycle.executor import Executor
 from nondum.host.lifecycle.folders import Folders
 from nondum.host.lifecycle.installation import InstallOptions
 from nondum.host.lifecycle.tries import STEADY_S
-from nondum.host.workers import Timing, Workers
+from nondum.host.workers.spec import Timing
+from nondum.host.workers.workers import Workers
 
 HOST = "spot"
 

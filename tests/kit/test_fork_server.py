@@ -74,6 +74,12 @@ def test_process_is_the_same_as_one_that_was_started(
     assert forked.wait(60) == 0
 
 
+def test_process_has_the_environment_that_is_given(server: ForkServer, folder: Path) -> None:
+    (folder / "program.py").write_text(SHOW, encoding="utf-8")
+    process = server.start(["program"], stderr=subprocess.PIPE, env={"ONLY": "this"})
+    assert shown(written(process))["environment"] == {"ONLY": "this"}
+
+
 def shown(text: str) -> dict[str, Any]:
     """What a program shows, with any pipe for another."""
     found: dict[str, Any] = json.loads(text)

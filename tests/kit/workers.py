@@ -18,17 +18,11 @@ from tests.kit.until import PATIENCE_S, arrived
 from nondum.host.confinement import choice
 from nondum.host.confinement.level import Standing, parse_wanted
 from nondum.host.events import BehaviourEnded, Event, WorkerExited, WorkerReady
-from nondum.host.workers import (
-    Call,
-    Limits,
-    Timing,
-    WorkerLauncher,
-    Workers,
-    WorkerSpec,
-    base_interpreter,
-)
+from nondum.host.workers.call import Call
 from nondum.host.workers.confinements import Confinement
-from nondum.host.workers.launcher import MARK
+from nondum.host.workers.launcher import MARK, WorkerLauncher
+from nondum.host.workers.spec import Limits, Timing, WorkerSpec, base_interpreter
+from nondum.host.workers.workers import Workers
 from nondum.sdk.description import Behaviour, Condition, Input, Output, PluginDescription, Unit
 from nondum.wheelhouse.confinement import Level
 

@@ -10,11 +10,13 @@ from tests.runner.result import Result
 
 INI = """
 [pytest]
+addopts = -p no:hypothesispytest
 markers =
     long(campaign): of a campaign
     short(campaign): of a campaign
 tmp_path_retention_policy = failed
 """
+"""Hypothesis is what takes longest to import, and no test here uses it."""
 TESTS = """
 import os, pytest
 

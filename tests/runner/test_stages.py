@@ -14,7 +14,8 @@ def test_options_are_not_taken_for_places(tmp_path: Path) -> None:
     project, run = tmp_path / "project", tmp_path / "run"
     for folder in (project / "named", project / "other", run):
         folder.mkdir(parents=True)
-    (project / "pytest.ini").write_text("[pytest]\ntestpaths = named\n", encoding="utf-8")
+    ini = "[pytest]\naddopts = -p no:hypothesispytest\ntestpaths = named\n"
+    (project / "pytest.ini").write_text(ini, encoding="utf-8")
     for name in ("named", "other"):
         file = project / name / f"test_{name}.py"
         file.write_text("def test_it():\n    pass\n", encoding="utf-8")

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
 from nondum.host.catalogue.records import ComponentRecord, DeviceRecord, MountPose, PeerRecord
+from nondum.host.plain import plain
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
 from nondum.wheelhouse.signatures import NOTHING, Grant
@@ -39,27 +40,6 @@ class Event:
 
 Emit: TypeAlias = Callable[[Event], None]
 """Hands an event on; never blocks, called on the loop's thread."""
-
-
-def plain(value: Any) -> Any:
-    """Values of events as JSON can carry them.
-
-    >>> plain((Path("/media/a"), frozenset({"b"})))
-    ['/media/a', ['b']]
-    """
-    if isinstance(value, Problem | PluginDescription):
-        return value.to_dict()
-    if isinstance(value, Path):
-        return str(value)
-    if isinstance(value, frozenset):
-        return sorted(plain(item) for item in value)
-    if isinstance(value, tuple | list):
-        return [plain(item) for item in value]
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
-    return value
 
 
 # Drives

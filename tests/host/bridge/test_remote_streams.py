@@ -20,7 +20,7 @@ from nondum.host.bridge.bridge import Bridge
 from nondum.host.bridge.remote_streams import RemoteStreams
 from nondum.host.bridge.shared_streams import SharedStreams
 from nondum.host.events import WorkerReady
-from nondum.host.workers import Workers
+from nondum.host.workers.workers import Workers
 from nondum.planning.running import RunState
 from nondum.sdk.description import Output, Unit
 from nondum.sdk.errors import HostUnreachable, NondumError, Problem, WorkerFailed

@@ -7,34 +7,21 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from tests.kit.command_line import command, nondum, quiet_environment
+from tests.kit.command_line import Ran, command, nondum, quiet_environment
 from tests.kit.running_host import RunningHost, running
 
 
-def host_run(*arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        command("host", "run", "--user", *arguments),
-        capture_output=True,
-        text=True,
-        env=quiet_environment() | environment,
-        timeout=60,
-        check=False,
-    )
-
-
-def refused(done: subprocess.CompletedProcess[str], *words: str, code: int = 2) -> None:
-    assert "Traceback" not in done.stderr, done.stderr
-    assert done.returncode == code, done.stderr
-    for word in words:
-        assert word in done.stderr, done.stderr
+def host_run(*arguments: str | Path) -> Ran:
+    return nondum("host", "run", "--user", *arguments)
 
 
 def test_every_mistake_of_a_configuration_is_told(tmp_path: Path) -> None:
     config = tmp_path / "host.toml"
     config.write_text('[host]\nnaem = "x"\n[workers]\ntasks = "many"\n', encoding="utf-8")
-    done = host_run("--config", config)
-    refused(done, "did you mean 'name'?", "[workers] tasks = 'many'", str(config))
-    assert done.stderr.count("error: ") == 2
+    ran = host_run("--config", config)
+    for words in ("did you mean 'name'?", "[workers] tasks = 'many'", str(config)):
+        ran.refused(2, words)
+    assert ran.err.count("error: ") == 2
 
 
 @pytest.mark.parametrize(
@@ -45,18 +32,19 @@ def test_every_mistake_of_a_configuration_is_told(tmp_path: Path) -> None:
 def test_what_is_no_configuration_is_told(tmp_path: Path, text: str, words: str) -> None:
     config = tmp_path / "host.toml"
     config.write_text(text, encoding="utf-8")
-    refused(host_run("--config", config), words)
+    host_run("--config", config).refused(2, words)
 
 
 def test_a_configuration_that_is_not_there_is_told(tmp_path: Path) -> None:
-    refused(host_run("--config", tmp_path / "none.toml"), "CONFIG_UNREADABLE", "none.toml")
-    refused(host_run("--config", tmp_path), "CONFIG_UNREADABLE")
+    ran = host_run("--config", tmp_path / "none.toml")
+    ran.refused(2, "CONFIG_UNREADABLE").refused(2, "none.toml")
+    host_run("--config", tmp_path).refused(2, "CONFIG_UNREADABLE")
 
 
 @pytest.mark.parametrize("name", ["Spot 7", "a--b", "-a", "", "spot_7"])
 def test_a_name_is_held_to_the_rules_of_the_configuration(tmp_path: Path, name: str) -> None:
     config = RunningHost(tmp_path).config
-    refused(host_run("--config", config, "--name", name), "is not a host name")
+    host_run("--config", config, "--name", name).refused(2, "is not a host name")
 
 
 def test_a_system_tree_that_is_none_is_told(tmp_path: Path) -> None:
@@ -64,13 +52,15 @@ def test_a_system_tree_that_is_none_is_told(tmp_path: Path) -> None:
     text = config.read_text(encoding="utf-8")
     tree = '[host]\nsystem_tree = "nobody.knows:it"'
     config.write_text(text.replace("[host]", tree), encoding="utf-8")
-    refused(host_run("--config", config), "CONFIG_SYSTEM_TREE", "nobody.knows:it")
+    ran = host_run("--config", config)
+    ran.refused(2, "CONFIG_SYSTEM_TREE").refused(2, "nobody.knows:it")
 
 
 def test_a_state_folder_that_cannot_be_is_told(tmp_path: Path) -> None:
     host = RunningHost(tmp_path)
     host.state.write_text("a file", encoding="utf-8")
-    refused(host_run("--config", host.config), "STATE_UNWRITABLE", str(host.state))
+    ran = host_run("--config", host.config)
+    ran.refused(2, "STATE_UNWRITABLE").refused(2, str(host.state))
 
 
 def test_every_slot_folder_that_cannot_be_is_told(tmp_path: Path) -> None:
@@ -78,17 +68,17 @@ def test_every_slot_folder_that_cannot_be_is_told(tmp_path: Path) -> None:
     for folder in (host.slots, host.devices):
         folder.rmdir()
         folder.write_text("a file", encoding="utf-8")
-    done = host_run("--config", host.config)
-    refused(done, f"CONFIG_FOLDER {host.slots}", f"CONFIG_FOLDER {host.devices}")
+    ran = host_run("--config", host.config)
+    ran.refused(2, f"CONFIG_FOLDER {host.slots}").refused(2, f"CONFIG_FOLDER {host.devices}")
 
 
 def test_two_hosts_cannot_share_state_or_socket(tmp_path: Path) -> None:
     with running(tmp_path, name="panther") as host:
-        refused(host_run("--config", host.config), "ALREADY_RUNNING")
+        host_run("--config", host.config).refused(2, "ALREADY_RUNNING")
         other = tmp_path / "other.toml"
         text = host.config.read_text(encoding="utf-8")
         other.write_text(text.replace("/state", "/state-2"), encoding="utf-8")
-        refused(host_run("--config", other), "CONTROL_IN_USE")
+        host_run("--config", other).refused(2, "CONTROL_IN_USE")
         assert host.run("status").ok().out.startswith("host panther")
 
 

@@ -9,7 +9,14 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from tests.kit.command_line import Ran, at_terminal, command, nondum, quiet_environment
+from tests.kit.command_line import (
+    Ran,
+    at_terminal,
+    command,
+    in_new_interpreter,
+    nondum,
+    quiet_environment,
+)
 from tests.kit.endless_problem import ENDLESS, endless
 from tests.kit.until import PATIENCE_S, until
 from tests.planning.differential.texts import TEXTS
@@ -206,7 +213,7 @@ def test_a_long_search_is_shown_at_a_terminal(files: Path) -> None:
 
 def test_the_same_plan_whatever_the_hash_seed(files: Path) -> None:
     plans = {
-        nondum(
+        in_new_interpreter(
             *("pddl", "plan", files / "domain.pddl", files / "problem.pddl"),
             *("--planner", "native", "--json"),
             PYTHONHASHSEED=seed,

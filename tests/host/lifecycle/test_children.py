@@ -8,6 +8,7 @@ import logging
 import os
 import select
 import signal
+import subprocess
 import sys
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -257,3 +258,17 @@ def staged_fifo(root: Path) -> dict[str, Any]:
 
 def host_facts(root: Path) -> dict[str, Any]:
     return {"store": str(root / "store"), "reserve_mb": 0, "confinement": "none", "method": "store"}
+
+
+def test_what_people_wait_for_is_done_without_what_only_daemons_need() -> None:
+    """Each child shares what its fork server has imported: time at each start, and memory."""
+    needless = ("lark", "nondum.planning", "nondum.host.events", "nondum.host.catalogue.records")
+    program = f"""
+import sys
+from nondum.host.lifecycle import child, jobs
+for job in jobs.AT_ONCE:
+    jobs.find(job)
+print([name for name in {needless} if name in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
+    assert done.stdout == b"[]\n"

@@ -19,7 +19,7 @@ from nondum.host.catalogue.records import Step
 from nondum.host.lifecycle.installing import install
 from nondum.host.lifecycle.promises import total
 from nondum.host.lifecycle.room import Needs, used_mb
-from nondum.host.workers import Timing
+from nondum.host.workers.spec import Timing
 from nondum.sdk.errors import PayloadRefused
 from nondum.wheelhouse.memory import Promised, free_memory_mb
 

@@ -18,7 +18,7 @@ from nondum.host.catalogue.records import Step
 from nondum.host.catalogue.state import HostState
 from nondum.host.events import Event
 from nondum.host.lifecycle.advance import advance
-from nondum.host.workers import Timing
+from nondum.host.workers.spec import Timing
 from nondum.sdk.errors import Problem
 from nondum.wheelhouse import build
 

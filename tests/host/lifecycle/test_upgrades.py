@@ -15,7 +15,7 @@ from nondum.host import events
 from nondum.host.catalogue.records import Step
 from nondum.host.lifecycle.going_back import go_back
 from nondum.host.lifecycle.installed import install, uninstall
-from nondum.host.workers import Timing
+from nondum.host.workers.spec import Timing
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
 

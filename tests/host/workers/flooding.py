@@ -7,7 +7,7 @@ from tests.kit.guest import do, guest_spec
 from tests.kit.workers import HOST, WorkersUnderTest, camera
 
 from nondum.host.events import WorkerLogged
-from nondum.host.workers import Limits
+from nondum.host.workers.spec import Limits
 from nondum.sdk.description import Unit
 
 FILLS = """

@@ -12,7 +12,7 @@ from tests.kit.processes import is_alive
 from tests.kit.workers import WorkersUnderTest
 
 from nondum.host.events import WorkerLogged, WorkerReady
-from nondum.host.workers import WorkerSpec
+from nondum.host.workers.spec import WorkerSpec
 from nondum.sdk.description import Label, PluginDescription
 from nondum.sdk.errors import WorkerFailed
 

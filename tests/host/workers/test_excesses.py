@@ -21,7 +21,8 @@ from tests.kit.workers import WorkersUnderTest
 
 from nondum.host.cgroups import Cages
 from nondum.host.events import WorkerExited, WorkerLogged
-from nondum.host.workers import Limits, WorkerLauncher
+from nondum.host.workers.launcher import WorkerLauncher
+from nondum.host.workers.spec import Limits
 from nondum.planning.running import RunState
 
 pytestmark = pytest.mark.anyio

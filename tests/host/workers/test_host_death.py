@@ -13,8 +13,8 @@ from tests.kit.processes import is_alive, until_gone
 from tests.kit.until import arrived, until_async
 from tests.kit.workers import WorkersUnderTest
 
-from nondum.host.workers import end_leftovers
 from nondum.host.workers.launcher import owner_mark
+from nondum.host.workers.leftovers import end_leftovers
 
 pytestmark = pytest.mark.anyio
 

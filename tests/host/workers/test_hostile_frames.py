@@ -20,8 +20,9 @@ from tests.kit.until import arrived
 from tests.kit.workers import HOST, TIMING, WorkersUnderTest
 
 from nondum.host.events import Event, WorkerLogged, WorkerReady
-from nondum.host.workers import Workers, WorkerSpec
 from nondum.host.workers.process import WorkerProcess
+from nondum.host.workers.spec import WorkerSpec
+from nondum.host.workers.workers import Workers
 from nondum.planning.running import RunState
 from nondum.sdk.errors import WorkerFailed
 from nondum.sdk.wire import PROTOCOL_VERSIONS

@@ -17,10 +17,10 @@ from tests.kit.workers import LIBRARIES, SDK, TIMING, WorkersUnderTest, level, s
 from nondum.host.cgroups import Cages
 from nondum.host.confinement import choice
 from nondum.host.events import WorkerExited, WorkerReady
-from nondum.host.workers import WorkerSpec
 from nondum.host.workers.in_flight import culprit, sent
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.process import WorkerProcess
+from nondum.host.workers.spec import WorkerSpec
 from nondum.sdk.errors import Problem, WorkerFailed
 from nondum.wheelhouse.confinement import Level
 

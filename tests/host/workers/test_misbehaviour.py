@@ -23,7 +23,8 @@ from nondum.host.events import (
     WorkerReady,
     WorkerSteady,
 )
-from nondum.host.workers import Call, Limits
+from nondum.host.workers.call import Call
+from nondum.host.workers.spec import Limits
 from nondum.host.workers.supervision import RESTARTS, WINDOW_S
 from nondum.planning.running import RunState
 from nondum.sdk.description import Condition

@@ -10,7 +10,7 @@ from tests.kit.processes import is_alive
 from tests.kit.workers import HOST, WorkersUnderTest
 
 from nondum.host.events import FactKnown, TrialFailed, WorkerExited, WorkerReady
-from nondum.host.workers import WorkerSpec
+from nondum.host.workers.spec import WorkerSpec
 from nondum.planning.running import RunState
 from nondum.sdk.description import Behaviour, Unit
 from nondum.sdk.errors import WorkerFailed

@@ -21,11 +21,11 @@ from tests.kit.workers import SDK, WorkersUnderTest
 
 from nondum.host.cgroups.cages import Cages, NoTree
 from nondum.host.inside.bootstrap import PRELOADED
-from nondum.host.workers import base_interpreter
 from nondum.host.workers.confinements import Unconfined
 from nondum.host.workers.launcher import MARK, WorkerLauncher, owner_mark
 from nondum.host.workers.leftovers import end_leftovers
 from nondum.host.workers.spare import OWNER, Spare
+from nondum.host.workers.spec import base_interpreter
 from nondum.sdk.errors import WorkerFailed
 
 pytestmark = pytest.mark.anyio

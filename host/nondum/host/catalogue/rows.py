@@ -27,7 +27,7 @@ from nondum.host.catalogue.records import (
     Step,
 )
 from nondum.host.catalogue.state import Highwater
-from nondum.host.events import plain
+from nondum.host.plain import plain
 from nondum.planning.given_names import GivenNames
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, Problem

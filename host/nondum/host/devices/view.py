@@ -15,7 +15,7 @@ from nondum.host.catalogue.records import (
     Snapshot,
 )
 from nondum.host.devices.matching import Trial, left_alone, tried
-from nondum.host.events import plain
+from nondum.host.plain import plain
 
 Row: TypeAlias = dict[str, Any]
 Held: TypeAlias = Sequence[tuple[str, DeviceClaim]]

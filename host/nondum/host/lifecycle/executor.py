@@ -34,7 +34,7 @@ from nondum.host.lifecycle.installation import Installation, InstallOptions
 from nondum.host.lifecycle.lanes import Lanes
 from nondum.host.lifecycle.quiet import Quiet
 from nondum.host.trust.payload_trust import PayloadTrust
-from nondum.host.workers import Workers
+from nondum.host.workers.workers import Workers
 from nondum.sdk.errors import DriveGone, NondumError, Problem
 from nondum.wheelhouse import disk
 

@@ -43,8 +43,10 @@ from nondum.host.lifecycle.queue import Queue
 from nondum.host.lifecycle.rebuilding import with_found, write_note
 from nondum.host.lifecycle.room import Needs
 from nondum.host.trust.payload_trust import PayloadTrust, TrustOptions
-from nondum.host.workers import Limits, Workers, base_interpreter, end_leftovers
+from nondum.host.workers.leftovers import end_leftovers
+from nondum.host.workers.spec import Limits, base_interpreter
 from nondum.host.workers.standing import Standing
+from nondum.host.workers.workers import Workers
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, WorkerFailed, problems_of
 from nondum.wheelhouse import disk

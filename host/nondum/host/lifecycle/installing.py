@@ -13,7 +13,7 @@ from typing import Any
 
 from nondum.host.drives import reader
 from nondum.host.drives.reader import Arguments, Report
-from nondum.host.events import plain
+from nondum.host.plain import plain
 from nondum.host.trust import chain
 from nondum.sdk.errors import InstallFailed, Problem
 from nondum.wheelhouse import memory, source, venvs

@@ -13,7 +13,7 @@ from nondum.host.catalogue.records import (
     DeviceClaim,
     MountPose,
 )
-from nondum.host.workers import Limits, WorkerSpec, base_interpreter
+from nondum.host.workers.spec import Limits, WorkerSpec, base_interpreter
 from nondum.planning.contribution import object_name
 from nondum.sdk.description import PluginDescription
 
