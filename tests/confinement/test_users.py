@@ -19,7 +19,9 @@ from nondum.host.helper.worker_users import OF_ROOT
 from nondum.host.lifecycle.folders import remove
 from nondum.host.workers import scratch
 from nondum.host.workers.confinements import Boxed
+from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spare import Spare
+from nondum.sdk.errors import WorkerFailed
 
 pytestmark = [
     pytest.mark.anyio,
@@ -215,6 +217,18 @@ async def test_hosts_own_mask_does_not_shut_the_worker_out(tested: WorkersUnderT
         os.umask(before)
     await tested.until(WorkerLogged, lambda event: event.message == "here")
     assert is_workers(owner(spec.scratch))
+
+
+async def test_room_that_is_not_there_in_time_is_none(
+    tested: WorkersUnderTest, tmp_path: Path
+) -> None:
+    hangs = tmp_path / "bwrap"
+    hangs.write_text("#!/bin/sh\nexec sleep 600\n")
+    hangs.chmod(0o755)
+    tested.workers.launcher = WorkerLauncher(Boxed(str(hangs), has_users=True), startup_s=0.05)
+    with pytest.raises(WorkerFailed) as failed:
+        await tested.workers.start(tested.spec("guest", NOTHING))
+    assert failed.value.code == "WORKER_HUNG"
 
 
 def test_no_descriptor_is_left_of_a_room_that_cannot_be_made() -> None:

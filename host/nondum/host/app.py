@@ -158,7 +158,7 @@ async def _run(
     confinement = choice.confinement(standing, folders.of_workers)
     if changes_user(confinement):
         await in_thread(let_pass, folders)
-    launcher = WorkerLauncher(confinement, cages, folders.scratches)
+    launcher = WorkerLauncher(confinement, cages, folders.scratches, timing.startup_s)
     workers = Workers(config.host.name, bus.emit, launcher=launcher, timing=timing)
     executor = Executor(config.host.name, folders, workers, bus.emit, _install_options(config))
     manager = ComponentManager(catalogue, executor, bus)

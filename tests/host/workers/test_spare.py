@@ -81,7 +81,17 @@ def test_one_that_ends_instead_of_asking_for_its_scratch_folder_is_no_worker() -
     try:
         spare.popen.kill()
         with pytest.raises(ConnectionResetError):
-            spare.map_scratch(user=61184)
+            spare.map_scratch(61184, PATIENCE_S)
+    finally:
+        spare.close()
+
+
+def test_one_that_does_not_come_to_ask_for_its_scratch_folder_is_waited_for_so_long_only() -> None:
+    spare = Spare(Unconfined(), Unconfined().ground(None))
+    try:
+        spare.popen.send_signal(signal.SIGSTOP)
+        with pytest.raises(TimeoutError):
+            spare.map_scratch(61184, startup_s=0.01)
     finally:
         spare.close()
 

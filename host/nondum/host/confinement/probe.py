@@ -107,7 +107,7 @@ def _look(confinement: Confinement, folder: Path) -> dict[str, Any]:
     ground = confinement.ground(spec)
     spare = Spare(confinement, ground)
     try:
-        spare.settle()
+        spare.settle(ANSWER_S)
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with ours, theirs:
             with confinement.entry(spec, ground) as entry:
@@ -115,7 +115,7 @@ def _look(confinement: Confinement, folder: Path) -> dict[str, Any]:
                     scratch.give(spec.scratch, entry.user)
                 spare.become(parameters(spec, entry, looks=True), theirs, entry.ruleset)
                 if entry.user is not None and entry.maps_scratch:
-                    spare.map_scratch(entry.user)
+                    spare.map_scratch(entry.user, ANSWER_S)
             theirs.close()
             ours.settimeout(ANSWER_S)
             seen = ours.recv(_ANSWER_BYTES)

@@ -20,8 +20,6 @@ from nondum.host.helper.worker_users import OF_ROOT, OF_SERVICE
 
 FIRST_USER, USERS = OF_ROOT.start, len(OF_ROOT)
 """Ids of users that no account has, where the daemon is root."""
-MADE_S = 10.0
-"""How long bubblewrap may take to make a user namespace."""
 _TOLD_BYTES = 4096
 
 
@@ -101,13 +99,14 @@ class NewNamespace:
         for descriptor in self.descriptors:
             os.close(descriptor)
 
-    def map_users(self) -> None:
+    def map_users(self, startup_s: float) -> None:
         """Have its users be those of workers, and the daemon's; then it is left. Call it once.
 
-        Blocks. Bubblewrap may have ended meanwhile. Raises `OSError`.
+        Blocks. Bubblewrap may have ended meanwhile. Raises `OSError`, `TimeoutError` if it has made
+        no namespace within `startup_s`.
         """
         try:
-            process = self._process()
+            process = self._process(startup_s)
             if process is not None:
                 privileged().map_users(process)
                 os.write(self._goes, b"!")
@@ -119,13 +118,13 @@ class NewNamespace:
         os.close(self._tells)
         os.close(self._goes)
 
-    def _process(self) -> int | None:
+    def _process(self, startup_s: float) -> int | None:
         """The one in the namespace, as bubblewrap tells it; None if that ended before."""
         told, poll = b"", select.poll()
         poll.register(self._tells, select.POLLIN)
         while not told.endswith(b"}\n"):  # its other end stays open as long as that process waits
-            if not poll.poll(MADE_S * 1000):
-                raise TimeoutError(f"bubblewrap has made no user namespace in {MADE_S:g} s")
+            if not poll.poll(startup_s * 1000):
+                raise TimeoutError(f"bubblewrap has made no user namespace in {startup_s:g} s")
             more = os.read(self._tells, _TOLD_BYTES)
             if not more:
                 return None

@@ -19,8 +19,9 @@ OF_ROOT = range(61184, 65520)
 OF_SERVICE = range(69632, 73968)
 """For a daemon that is not: neither systemd nor shadow gives these out (systemd.io/UIDS-GIDS), so
 that it gets no power over the processes of other services."""
-MADE_S = 5.0
-"""How long a process may take to make a user namespace: its owner may have stopped it."""
+MADE_S = 10.0
+"""How long a process may take to make a user namespace, which its owner may have stopped: less than
+whoever waits for it has (`server.DRIVE_S`)."""
 _MESSAGE_BYTES = 16
 
 

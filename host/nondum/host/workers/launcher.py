@@ -21,7 +21,7 @@ from nondum.host.workers import problems, scratch
 from nondum.host.workers.confinements import Confinement, Entry, Unconfined
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spare import ROOM, ROOM_BYTES, Spare
-from nondum.host.workers.spec import WorkerSpec
+from nondum.host.workers.spec import Timing, WorkerSpec
 from nondum.sdk.errors import Problem, WorkerFailed
 from nondum.wheelhouse.confinement import Level
 
@@ -42,7 +42,7 @@ class Launcher(Protocol):
         """Start a worker on its end of the link; the caller closes `sock`.
 
         The worker ends when the thread of the loop does. Raises
-        `WorkerFailed` (LAUNCH_FAILED, LAUNCH_CROWDED).
+        `WorkerFailed` (LAUNCH_FAILED, LAUNCH_CROWDED, WORKER_HUNG).
         """
         ...
 
@@ -63,11 +63,14 @@ class WorkerLauncher:
         confinement: Confinement | None = None,
         cages: Cages | None = None,
         scratches: Path | None = None,
+        startup_s: float = Timing().startup_s,
     ) -> None:
-        """`scratches`, where all scratch folders are, lets the next daemon find what is left."""
+        """`scratches`, where all scratch folders are, lets the next daemon find what is left;
+        `startup_s` is how long an interpreter may take until it can become a worker."""
         self._confinement = confinement or Unconfined()
         self._cages = cages
         self._owner = owner_mark(scratches) if scratches is not None else ""
+        self._startup_s = startup_s
         self._spare: Spare | None = None
         self.level = self._confinement.level
 
@@ -95,13 +98,17 @@ class WorkerLauncher:
                         spare.limit(spec.limits)
                         if spare.become(told, sock, entry.ruleset):
                             if entry.user is not None and entry.maps_scratch:
-                                await asyncio.to_thread(spare.map_scratch, entry.user)
+                                await asyncio.to_thread(
+                                    spare.map_scratch, entry.user, self._startup_s
+                                )
                             return spare.process(entry.user)
                     except OSError:
                         await spare.end()
                         raise
                     await spare.end()
                     said = spare.said
+        except TimeoutError as error:
+            raise WorkerFailed(problems.overdue(spec.component, self._startup_s)) from error
         except OSError as error:
             problem = Problem("LAUNCH_FAILED", str(error), where=spec.component)
             if error.errno == errno.ETOOMANYREFS:
@@ -124,7 +131,9 @@ class WorkerLauncher:
             await spare.end()
 
     async def _started(self, ground: Ground) -> Spare:
-        return await Spare.caged(self._confinement, ground, self._cages, self._owner)
+        return await Spare.caged(
+            self._confinement, ground, self._cages, self._owner, self._startup_s
+        )
 
     def _taken(self) -> Spare | None:
         spare, self._spare = self._spare, None

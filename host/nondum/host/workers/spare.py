@@ -35,8 +35,6 @@ ROOM_BYTES = 2048
 OWNER = "NONDUM_SPARE_OF"
 """Environment variable of interpreters that have not become a worker: whose they are."""
 SAID_BYTES = 64 * 1024
-MAPPED_S = 10.0
-"""How long one that becomes a worker may take to ask for its scratch folder."""
 _DESCRIPTOR = struct.Struct("@i")
 
 
@@ -72,15 +70,20 @@ class Spare:
 
     @classmethod
     async def caged(
-        cls, confinement: Confinement, ground: Ground, cages: Cages | None, owner: str
+        cls,
+        confinement: Confinement,
+        ground: Ground,
+        cages: Cages | None,
+        owner: str,
+        startup_s: float,
     ) -> Spare:
-        """Start one in a cage of its own, if there are cages. Raises `OSError`.
+        """Start one in a cage of its own, if there are cages, see `settle`. Raises `OSError`.
 
         The kernel takes some 20 ms to put a process into a control group: a thread waits for it.
         """
         spare = cls(confinement, ground, owner)
         if cages is not None or confinement.has_users:
-            settling = asyncio.create_task(asyncio.to_thread(spare.settle, cages))
+            settling = asyncio.create_task(asyncio.to_thread(spare.settle, startup_s, cages))
             try:
                 await until_done(settling)
                 settling.result()
@@ -89,17 +92,18 @@ class Spare:
                 raise
         return spare
 
-    def settle(self, cages: Cages | None = None) -> None:
-        """Give it a cage, and the users that its room has, if it is to have any. Blocks.
+    def settle(self, startup_s: float, cages: Cages | None = None) -> None:
+        """Give it a cage, and the users that its room has, if it is to have any: then it has been
+        started. Blocks.
 
-        Call it once. Raises `OSError`.
+        Call it once. Raises `OSError`; `TimeoutError` if it has not been after `startup_s`.
         """
         if cages is not None:
             self.cage = cages.make("worker", CageLimits())
             self.cage.add(self.popen.pid)
         if self._namespace is not None:
             namespace, self._namespace = self._namespace, None
-            namespace.map_users()
+            namespace.map_users(startup_s)
 
     def serves(self, ground: Ground) -> bool:
         """Whether it is there still, and stands on that ground."""
@@ -128,12 +132,13 @@ class Spare:
             return False
         return True
 
-    def map_scratch(self, user: int) -> None:
+    def map_scratch(self, user: int, startup_s: float) -> None:
         """Have its scratch folder, which it sends a mount of, be a user's in its room. Blocks.
 
-        Call it after `become`. Raises `OSError`; then it is still to be closed.
+        Call it after `become`. Raises `OSError`, `TimeoutError` if it does not send it within
+        `startup_s`: a slow host is still loading the interpreter. Then it is still to be closed.
         """
-        self._orders.settimeout(MAPPED_S)
+        self._orders.settimeout(startup_s)
         ancillary = socket.CMSG_SPACE(CREDENTIALS.size) + socket.CMSG_SPACE(_DESCRIPTOR.size)
         _, more, _, _ = self._orders.recvmsg(SAID_BYTES, ancillary)
         sent = [value for _, kind, value in more if kind == socket.SCM_RIGHTS]
