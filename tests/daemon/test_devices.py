@@ -13,7 +13,7 @@ import pytest
 from demo import slots
 from demo.emulators.port import Port
 from tests.daemon.plugins import gauge
-from tests.kit.running_host import RunningHost
+from tests.kit.running_host import Row, RunningHost
 
 pytestmark = pytest.mark.daemon
 
@@ -52,9 +52,9 @@ def test_device_pulled_in_the_middle_of_a_behaviour(host: RunningHost, plug_gaug
     host.until_told("gauge waits for its device gauge")
     reason = host.until_goal(goal, "suspended")["reason"]
     assert "ready spot__gauge__gauge" in reason
-    ends = [e["detail"] for e in host.journal("gauge") if e["event"] == "BehaviourEnded"]
-    assert ends[0]["outcome"] == "FAILED"
-    assert ends[0]["reason"].startswith("GAUGE_GONE")
+    (end, *_) = ends(host)
+    assert end["outcome"] == "FAILED"
+    assert end["reason"].startswith("GAUGE_GONE")
     plug_gauge("port-2")
     host.until_goal(goal, "holds")
     assert before["devices"] == {"gauge": "port-1"}
@@ -70,10 +70,15 @@ def test_behaviour_that_does_not_notice_is_halted_when_its_device_goes(
     host.until_goal(goal, "holds")
     slots.unplug(host.devices, "port-1")  # the line is still there
     host.until_goal(goal, "suspended")
-    (end,) = (e["detail"] for e in host.journal("gauge") if e["event"] == "BehaviourEnded")
+    (end,) = host.until("it has ended", lambda _: ends(host))
     assert end["outcome"] == "HALTED"
     plug_gauge()
     host.until_goal(goal, "holds")
+
+
+def ends(host: RunningHost) -> list[Row]:
+    """How the gauge's behaviour has ended, each time that it has."""
+    return [row["detail"] for row in host.journal("gauge") if row["event"] == "BehaviourEnded"]
 
 
 def test_device_that_comes_after_its_component_is_as_good(

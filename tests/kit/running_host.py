@@ -411,5 +411,5 @@ def _one(rows: Sequence[Row], key: str, value: str) -> Row | None:
 
 
 def _ageless(row: Row) -> Row:
-    """Without what is another at each look."""
-    return {key: value for key, value in row.items() if key != "age_s"}
+    """Without what is another at each look, or in each process."""
+    return {key: value for key, value in row.items() if key not in ("age_s", "since")}

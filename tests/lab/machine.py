@@ -24,6 +24,8 @@ PATIENCE_S = 400.0
 """How long a program inside may run, unless its caller says otherwise. All time-outs are those of
 an x86_64, and multiplied by the recipe's slowness."""
 POLL_S = 0.2
+END_S = 1.0
+"""From QEMU hanging up until it has ended."""
 TICKS_HZ = os.sysconf("SC_CLK_TCK")
 T = TypeVar("T")
 
@@ -83,7 +85,7 @@ class Machine:
             self._agent = self._connected(lambda: Agent(self.work / "agent"))
             self._until_up()
         except MachineSilent as error:
-            raise MachineSilent(f"{error}\n{self.last_words()}") from None
+            raise MachineSilent(f"{error}{self._status()}\n{self.last_words()}") from None
 
     def cut_power(self) -> None:
         """End it at once: what its disk was not told to keep is lost."""
@@ -258,12 +260,21 @@ class Machine:
 
     # Inside
 
+    def _status(self) -> str:
+        """How QEMU has ended, if it has: 0 when the machine has reset itself."""
+        assert self._qemu is not None
+        try:
+            return f" (status {self._qemu.wait(END_S)})"
+        except subprocess.TimeoutExpired:
+            return ""
+
     def _command(self, more: str) -> list[str | Path]:
         recipe = self.built.recipe
         serial = f"file,id=console,path={self.console},append=on"
         disks: list[str] = []
         around, card = (self.socket.around, self.socket.card) if self.socket else ((), ())
         kernel = [f"console={recipe.terminal}", "panic=-1", "quiet", "no_timer_check"]
+        kernel.append(f"earlyprintk={recipe.terminal}")  # what it says before there is a console
         if self.socket:
             kernel.append("net.ifnames=0")  # or udev renames its card under our hands
         for image in self._drives:

@@ -45,7 +45,7 @@ class OwnVoice:
     """Takes one sentence out of what is heard while it is said, and shortly after."""
 
     def __init__(self, said: Sound, canceller: EchoCanceller) -> None:
-        """`canceller` keeps what it learns of the way from the loudspeaker to the microphone."""
+        """`canceller` keeps what it learns of the way from where it is played to the microphone."""
         self._said = said.samples
         self._canceller = canceller
         self._waiting: Samples = np.zeros(0, np.int16)
@@ -81,7 +81,7 @@ class OwnVoice:
 
 
 def way_of(own: Waves, heard: Waves, longest: int) -> int | None:
-    """How many samples after it was given to the loudspeaker the own voice is heard; None: it is
+    """How many samples after it was given to be played the own voice is heard; None: it is
     not, or not yet."""
     size = 1 << (len(own) + len(heard)).bit_length()
     cross = np.fft.rfft(heard, size) * np.fft.rfft(own, size).conj()
