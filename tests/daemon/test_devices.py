@@ -70,7 +70,7 @@ def test_behaviour_that_does_not_notice_is_halted_when_its_device_goes(
     host.until_goal(goal, "holds")
     slots.unplug(host.devices, "port-1")  # the line is still there
     host.until_goal(goal, "suspended")
-    (end,) = host.until("it has ended", lambda _: ends(host))
+    (end,) = host.until("it has ended", lambda _: ends(host) or None)
     assert end["outcome"] == "HALTED"
     plug_gauge()
     host.until_goal(goal, "holds")
