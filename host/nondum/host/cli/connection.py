@@ -50,7 +50,7 @@ class Session:
 
     def short(self, shown: _Shown, *, anew: bool = False) -> _Shown:
         """Texts, or rows of them, with short names of units and streams; JSON keeps whole ones.
-        `anew` asks again which there are, if a name is shown that was not there before.
+        `anew`: ask the daemon for the names again if one is shown that is not known yet.
 
         Raises `NondumError`.
         """
