@@ -5,12 +5,13 @@ from __future__ import annotations
 import asyncio
 import os
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import zmq
 
 from nondum.sdk.errors import Problem
 from nondum.transport.peers.arrivals import Arrivals
-from nondum.transport.peers.beats import BEAT_S, QUICK_LINKS
+from nondum.transport.peers.beats import BEAT_S
 from nondum.transport.peers.drained import Drained, Sent
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.gate import entry, judge
@@ -18,6 +19,7 @@ from nondum.transport.peers.identity import Identity, Security
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.link import LINGER_MS
 from nondum.transport.peers.listener import HIGH_WATER, dialling, listening
+from nondum.transport.peers.looks import Looks
 from nondum.transport.peers.messages import MAX_MESSAGE, Ping, encode
 from nondum.transport.peers.monitor import Watch
 from nondum.transport.peers.proof import prove_enforced
@@ -31,8 +33,8 @@ from nondum.transport.peers.zap import Entry, Knock, ZapHandler
 SECOND_LOOK_S = 0.02
 """ZeroMQ tells of a broken connection a little before sending over it fails."""
 LOOK_S = 0.1
-"""Time between two looks at what came over the connections and is no whole message yet. What comes
-in between fills this process's memory. With more than `QUICK_LINKS` of them it is longer.
+"""Time between two looks at what came over connections and is no whole message yet (see `Looks`).
+What comes in between fills this process's memory.
 """
 
 
@@ -53,6 +55,7 @@ class SocketsHere:
         self._ears: Watch | None = None
         self._beating: asyncio.TimerHandle | None = None
         self._looking: asyncio.TimerHandle | None = None
+        self._looks = Looks()
 
     @property
     def pid(self) -> int:
@@ -187,13 +190,11 @@ class SocketsHere:
     def _look(self) -> None:
         """Tell of the connections over which a message comes that does not end."""
         routes: list[AcceptedRoute | DialledRoute] = [*self._accepted.values(), *self._dialled]
-        peers = sum(route.is_peers and not route.is_cut for route in routes)
-        next_s = LOOK_S * max(1.0, peers / QUICK_LINKS)
-        self._looking = self._loop.call_later(next_s, self._look)
+        self._looking = self._loop.call_later(LOOK_S, self._look)
         if self._listener is not None:
             self._listener.drain()  # what makes a connection a peer's may wait to be read
         self._arrivals.cut_overdue()
-        for route in routes:
+        for route in self._looks.due(routes, _resident_bytes()):
             if not (route.is_peers or route.is_cut) or not _is_endless(route):
                 continue
             if not route.is_cut:
@@ -212,6 +213,12 @@ def _is_endless(route: AcceptedRoute | DialledRoute) -> bool:
     # Whole messages may wait to be taken in, but no more than ZeroMQ lets wait.
     may_wait = 0 if route.drain() else HIGH_WATER * MAX_MESSAGE
     return received.ahead(read) > MOST_AHEAD + may_wait
+
+
+def _resident_bytes() -> int:
+    """Memory of this process (proc_pid_statm(5))."""
+    fields = Path("/proc/self/statm").read_text(encoding="ascii").split()
+    return int(fields[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 _PING = encode(Ping(1))

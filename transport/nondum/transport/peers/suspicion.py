@@ -29,8 +29,8 @@ class Terms:
     longest_beat_s: float = 7.0
     """However seldom a peer says that it pings: a hostile one could name any number."""
     confirm_beats: float = 2.0
-    longest_confirm_s: float = 1.9
-    """A little longer than 100 hosts' beats: so a suspected peer's own next ping may still come."""
+    longest_confirm_s: float = 1.5
+    """With 100 hosts, a suspected peer's own next ping may still come: 3.6 s after its last."""
     longest_resume_s: float = 2.5
 
     def suspect_s(self, beat_s: float) -> float:
@@ -45,7 +45,7 @@ class Terms:
         """How long a suspected peer has to answer.
 
         >>> Terms().confirm_s(0.3), Terms().confirm_s(1.8)
-        (0.6, 1.9)
+        (0.6, 1.5)
         """
         return min(self.confirm_beats * self._bounded(beat_s), self.longest_confirm_s)
 
@@ -53,7 +53,7 @@ class Terms:
         """Silence after which a peer is given up that no other peer has heard either.
 
         >>> round(Terms().limit_s(0.3), 2), round(Terms().limit_s(1.8), 2)
-        (1.35, 4.15)
+        (1.35, 3.75)
         """
         return self.suspect_s(beat_s) + self.confirm_s(beat_s)
 
