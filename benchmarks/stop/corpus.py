@@ -5,14 +5,16 @@ from __future__ import annotations
 from benchmarks.speech import FAR, NEAR, PHRASES, VOCABULARY
 
 from nondum.planning.asking import ASKED
-from nondum.planning.stop_words import STOP_PATTERNS
+from nondum.planning.stop_words import stop_patterns
 from nondum_speech.grammar import Vocabulary
 
-_TO = "[{addressee}] "
+HOST = "rover"
+_TO = "{addressee}"
+_STOPS = stop_patterns(_TO)
 KNOWN = Vocabulary(
-    tuple(_TO + said for said in (*STOP_PATTERNS, *ASKED, *VOCABULARY.phrases)),
-    {**VOCABULARY.names, "addressee": ("rover",)},
-    tuple(_TO + said for said in STOP_PATTERNS),
+    (*_STOPS, *(f"[{_TO}] {said}" for said in (*ASKED, *VOCABULARY.phrases))),
+    {**VOCABULARY.names, "addressee": (HOST,)},
+    _STOPS,
 )
 """What a host called rover with the shipped plugins tells those who listen, as `mind.sayings`
 does."""

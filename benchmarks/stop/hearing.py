@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from benchmarks.speech import VOICES
-from benchmarks.stop.corpus import KNOWN, OF_ROBOT, OTHERS
+from benchmarks.stop.corpus import HOST, KNOWN, OF_ROBOT, OTHERS
 from benchmarks.stop.results import Hearing, Spoken
 from benchmarks.stop.room import Room
 
-from nondum.planning.stop_words import STOPS, is_stop
+from nondum.planning.addressee import addressed_to
+from nondum.planning.stop_words import STOPS, host_behind_stop, is_stop
 from nondum_speech.ears import Ears
 from nondum_speech.espeak import Espeak
 from nondum_speech.settings import Settings
@@ -144,7 +145,7 @@ class Listener:
                             found.append((words, late_s + took_s, late_s))
 
         await self._ears.attend(pieces())
-        stops = [one for one in found if is_stop(one[0])]
+        stops = [one for one in found if _is_stop(one[0])]
         if not found:
             return Spoken(text, voice, None, is_stop=False)
         heard, after_s, sound_s = (stops or found)[0]
@@ -187,6 +188,11 @@ def run(voices: int, sentences: int | None, say: Says) -> list[Hearing]:
     others = OTHERS if sentences is None else OTHERS[:: max(1, len(OTHERS) // sentences)]
     with tempfile.TemporaryDirectory() as scratch:
         return asyncio.run(measured(Espeak(Path(scratch)), VOICES[:voices], others, say))
+
+
+def _is_stop(words: str) -> bool:
+    """Whether the host would stop, called by its name or not."""
+    return is_stop(addressed_to(words, [HOST])[1]) or host_behind_stop(words, [HOST]) is not None
 
 
 def _end(sound: Sound) -> int:

@@ -326,6 +326,19 @@ def test_word_that_stops_may_be_typed_for_one_host(pair: Hosts, tmp_path: Path) 
     assert mule.ask("goal", words="river, halt")["stopped"]["peers"] == ["rover"]
 
 
+def test_name_of_the_host_that_stops_may_come_last(pair: Hosts, tmp_path: Path) -> None:
+    rover, mule = pair
+    rover.bring("light", beacon(tmp_path / "log", type="pointer"))
+    until_shared(mule, "beacon@rover")
+    goal = rover.want("(lit rover)")
+    rover.until_goal(goal, "holds")
+    assert mule.ask("goal", words="halt mule")["stopped"]["peers"] == []
+    assert mule.ask("say", words="please stop rover now")["answer"] == "rover has stopped"
+    rover.until_goal(goal, "halted")
+    assert mule.ask("goal", words="stop, rover")["stopped"]["peers"] == ["rover"]
+    assert mule.ask("goal", words="stop, river")["stopped"]["peers"] == ["rover"]
+
+
 def test_goal_of_a_host_that_is_gone_is_not_known_any_more(tmp_path: Path) -> None:
     with neighbours(tmp_path, "rover", "mule") as (rover, mule):
         rover.bring("light", shining(tmp_path / "log"))

@@ -50,7 +50,7 @@ def test_spoken_goal_is_reached_and_told_aloud(
     host.until_component("speech", "ready")
     host.bring("beacon", Part("beacon", BEACON))
     (scratch,) = host.state.glob("scratch/*/speech")
-    until_logged(host, f"{2 + len(STOPS) + len(ASKED)} phrases can be heard")
+    until_logged(host, f"{2 + 2 * len(STOPS) + len(ASKED)} phrases can be heard")
     for name, text in (
         ("no phrase", "the weather is fine today"),
         ("question", "what can you do"),

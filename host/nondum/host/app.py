@@ -69,7 +69,7 @@ from nondum.host.service.telling import Telling
 from nondum.host.service.words import words
 from nondum.host.stop_button.button import StopButton
 from nondum.host.stop_button.hook import StopHook
-from nondum.host.stopping import Stopped, Stopping, is_stop_for_stranger
+from nondum.host.stopping import Stopped, Stopping, is_stop_for_stranger, said_to
 from nondum.host.trust.clock import ClockWatch
 from nondum.host.trust.orders import TrustOrders
 from nondum.host.trust.payload_trust import TrustOptions
@@ -77,7 +77,6 @@ from nondum.host.workers.confinements import changes_user
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import Limits, Timing
 from nondum.host.workers.workers import Workers
-from nondum.planning.addressee import addressed_to
 from nondum.planning.attempts import Patience
 from nondum.planning.stop_words import is_stop
 from nondum.sdk.errors import ConfigRefused, NondumError, Problem
@@ -384,7 +383,7 @@ def _take(neighbours: Neighbourhood | None, mind: Mind, stopping: Stopping) -> T
         return neighbours.goals.take
 
     async def taken(words: str) -> str:
-        _, said = addressed_to(words, [mind.beliefs.snapshot.host])
+        _, said = said_to(words, [mind.beliefs.snapshot.host], mind)
         is_for_all = is_stop(said) or is_stop_for_stranger(said, mind)
         return str(stopping.stop()) if is_for_all else wanted(mind, said)
 

@@ -43,10 +43,9 @@ from nondum.host.rows import (
     payload_row,
     unknown,
 )
-from nondum.host.stopping import Stopped, Stopping, is_stop_for_stranger
+from nondum.host.stopping import Stopped, Stopping, is_stop_for_stranger, said_to
 from nondum.host.whole_names import whole
 from nondum.host.workers.workers import Workers
-from nondum.planning.addressee import addressed_to
 from nondum.planning.goal import GoalKind
 from nondum.planning.stop_words import is_stop
 from nondum.sdk.errors import ConfigRefused, GoalRefused, InstallFailed, NondumError, Problem
@@ -160,8 +159,8 @@ class Orders:
         return f"that is kept as goal {given.id}, for {coming}"
 
     def _unaddressed(self, words: str) -> str:
-        """Words without this host's name before them."""
-        return addressed_to(words, [self.mind.beliefs.snapshot.host])[1]
+        """Words without this host's name, where they are said to it."""
+        return said_to(words, [self.mind.beliefs.snapshot.host], self.mind)[1]
 
     async def resume(self, arguments: Arguments) -> Row:
         """Take up a halted goal again, `id`. Raises `GoalRefused` (GOAL_NOT_HALTED, …)."""

@@ -5,13 +5,19 @@ It needs no planner, no payload and no peer. Software is no emergency stop: docs
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from nondum.host.mind.mind import Mind
 from nondum.host.workers.workers import Workers
-from nondum.planning.stop_words import is_stop_for_other
+from nondum.planning.addressee import addressed_to
+from nondum.planning.stop_words import (
+    STOPS,
+    host_behind_stop,
+    is_stop_before_name,
+    is_stop_for_other,
+)
 from nondum.sdk.errors import GoalRefused
 
 
@@ -74,16 +80,35 @@ def is_stop_for_stranger(words: str, mind: Mind) -> bool:
     """Whether words stop somebody whose name no host here has, and no phrase makes a goal of them.
 
     The callers look for the names of known hosts first. As no one knows who was meant, all stop.
+    Behind the word, what a phrase has no name for is no host's name either.
     """
-    if not is_stop_for_other(words):
-        return False
+    if is_stop_for_other(words):
+        return bool(_unsaid(words, mind))
+    return is_stop_before_name(words) and _unsaid(words, mind) == "PHRASE_UNKNOWN"
+
+
+def said_to(words: str, hosts: Sequence[str], mind: Mind) -> tuple[str | None, str]:
+    """The host that words are said to by its name, and the words without it; None: to nobody.
+
+    The name comes first, or behind a word that stops where no phrase says the whole sentence.
+    """
+    host, rest = addressed_to(words, hosts)
+    if host is None:
+        host = host_behind_stop(words, hosts)
+        if host is not None:
+            return (host, STOPS[0]) if _unsaid(words, mind) else (None, words)
+    return host, rest
+
+
+def _unsaid(words: str, mind: Mind) -> str:
+    """Why no phrase makes a goal of words: a code; "" where one does."""
     if mind.composition is None:
-        return True
+        return "PHRASE_UNKNOWN"
     try:
         mind.composition.book.goal(words)
-    except GoalRefused:
-        return True
-    return False
+    except GoalRefused as refused:
+        return refused.code
+    return ""
 
 
 def _counted(number: int, what: str) -> str:

@@ -24,6 +24,8 @@ _SLOT = re.compile(r"\{([\w-]+)\}")
 _OPTIONAL_SLOT = re.compile(r"\[\s*\{([\w-]+)\}\s*\]")
 _BREAKS = re.compile(r"[^\w'-]+")
 _ARTICLES = ("the", "a", "an")
+_HOST = "addressee"
+"""The slot for a host's name. No article before it: the end of "stop" would be heard as one."""
 _FREE = "free"
 
 
@@ -94,7 +96,7 @@ def jsgf(vocabulary: Vocabulary, sayable: frozenset[str]) -> str | None:
     public <said> = [please] find <thing>;
     """
     rules = {
-        slot: f"[{articles}] ({' | '.join(alternatives)})"
+        slot: f"{'' if slot == _HOST else f'[{articles}] '}({' | '.join(alternatives)})"
         for slot, names in vocabulary.names.items()
         if (alternatives := list(_sayable(names, sayable)))
         if (articles := " | ".join(word for word in _ARTICLES if word in sayable))

@@ -42,6 +42,11 @@ def test_name_that_cannot_be_pronounced_is_left_out_alone() -> None:
     ]
 
 
+def test_name_of_a_host_has_no_article() -> None:
+    vocabulary = Vocabulary(("stop {addressee}", "find {who}"), {"addressee": ("mule",)})
+    assert "<addressee> = (mule);" in rules(vocabulary)
+
+
 def test_robot_whose_name_cannot_be_pronounced_can_be_stopped() -> None:
     vocabulary = Vocabulary(("[{who}] [please] stop", "find {who}"), {"who": ("дом",)})
     assert rules(vocabulary, "дом") == ["public <said> = [please] stop;"]

@@ -100,6 +100,27 @@ def test_words_that_stop_need_less_confidence(espeak: Espeak, free: FreeHearing)
     assert heard(("[please] hold still [now]",)).said
 
 
+@pytest.mark.parametrize("text", ["rover stop", "stop rover", "please halt rover now"])
+def test_stop_is_heard_with_a_name_before_it_and_behind_and_without(
+    espeak: Espeak, free: FreeHearing, text: str
+) -> None:
+    stops = tuple(
+        pattern
+        for word in ("stop", "halt")
+        for pattern in (
+            f"[{{addressee}}] [please] {word} [now]",
+            f"[please] {word} {{addressee}} [now]",
+        )
+    )
+    vocabulary = Vocabulary((*stops, "open the gate"), {"addressee": ("rover",)}, stops)
+    words = lexicon(vocabulary.words, lambda word, voice: espeak.phonemes(word, voice=voice))
+    recogniser = Recogniser(vocabulary, words, free, Limits(1.0, -9.0))
+    sound = said(espeak, text)
+    assert recogniser.hear(sound).said == text
+    assert recogniser.stop_in(sound) == text
+    assert recogniser.stop_in(said(espeak, "stop")).startswith("stop")
+
+
 def test_word_that_is_said_in_noise_ends(espeak: Espeak) -> None:
     word = said(espeak, "halt").samples
     hiss = noise(4.0, 0.3 * float(np.std(word))).samples

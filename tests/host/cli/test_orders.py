@@ -122,6 +122,8 @@ def test_halting_now_halts_what_runs(daemon: RunningHost) -> None:
         *(
             ["goal", "panther,", "stop"],
             ["goal", "rover,", "stop"],
+            ["goal", "stop,", "panther"],
+            ["goal", "please", "halt", "rover", "now"],
             ["goal", "--keep", "hey", "stop"],
         ),
     ],

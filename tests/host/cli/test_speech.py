@@ -11,7 +11,7 @@ from tests.kit.payloads import Part
 from tests.kit.running_host import running
 
 from nondum.planning.asking import ASKED
-from nondum.planning.stop_words import STOP_PATTERNS
+from nondum.planning.stop_words import stop_patterns
 
 ECHO = """
 '''Hears what it has been told, and answers.'''
@@ -94,8 +94,9 @@ def test_listener_learns_what_can_be_said_and_when_that_changes(tmp_path: Path) 
         host.plug(host.drive("pupil", Part("pupil", PUPIL)))
         host.until("the pupil is ready", lambda view: are_ready(view, 1))
         host.plug(host.drive("beacon", Part("beacon", BEACON)))
-        said = (*STOP_PATTERNS, *ASKED, "greet {class}", "shine [for {text}]")
-        learnt = sorted(f"[{{addressee}}] {pattern}" for pattern in said)
+        said = (*ASKED, "greet {class}", "shine [for {text}]")
+        asked = (f"[{{addressee}}] {pattern}" for pattern in said)
+        learnt = sorted((*stop_patterns("{addressee}"), *asked))
         words = " ".join(["learnt", *learnt, "people", "person", "panther"])
         host.until_told(f"pupil heard {words!r}")
         lamp = BEACON.replace("shine [for {words:text}]", "light up")
@@ -103,7 +104,9 @@ def test_listener_learns_what_can_be_said_and_when_that_changes(tmp_path: Path) 
         host.until_told("light up")
 
 
-@pytest.mark.parametrize("said", ["Stop!", "panther, stop", "Rover, stop!"])
+@pytest.mark.parametrize(
+    "said", ["Stop!", "panther, stop", "Rover, stop!", "Stop, panther!", "Halt rover!"]
+)
 def test_robot_is_stopped_by_voice_whatever_name_it_is_called(tmp_path: Path, said: str) -> None:
     with running(tmp_path, name="panther") as host:
         host.plug(host.drive("beacon", Part("beacon", BEACON)))

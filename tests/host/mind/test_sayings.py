@@ -12,7 +12,13 @@ from nondum.planning.asking import ASKED
 from nondum.planning.contribution import Contribution
 from nondum.planning.merge import merge
 from nondum.planning.phrases import Phrasebook, phrasebook
-from nondum.planning.stop_words import STOP_PATTERNS, is_stop
+from nondum.planning.stop_words import (
+    STOP_PATTERNS,
+    host_behind_stop,
+    is_stop,
+    is_stop_for_other,
+    stop_patterns,
+)
 from nondum.sdk.description import Fragment, Label, Phrase, PluginDescription
 
 DOMAIN = "(define (domain d) (:predicates (seen ?c - class) (met ?t - target)))"
@@ -71,9 +77,12 @@ def test_phrases_are_left_out_when_names_do_not_suffice() -> None:
 def test_hosts_are_spoken_to_by_name() -> None:
     told = sayings(book("find {c:class}", classes=("dog",)), ["big-mule", "rover"])
     assert told == {
-        "phrases": [f"[{{addressee}}] {said}" for said in (*STOPPING, *ASKED, "find {class}")],
+        "phrases": [
+            *stop_patterns("{addressee}"),
+            *(f"[{{addressee}}] {said}" for said in (*ASKED, "find {class}")),
+        ],
         "names": {"class": ["dog"], "addressee": ["big mule", "rover"]},
-        "stops": [f"[{{addressee}}] {said}" for said in STOPPING],
+        "stops": list(stop_patterns("{addressee}")),
     }
 
 
@@ -81,3 +90,13 @@ def test_all_that_stops_the_robot_does() -> None:
     for said in STOPPING:
         assert is_stop(re.sub(r"[\[\]]", "", said))
         assert is_stop(re.sub(r"\[.*?\]", "", said))
+
+
+def test_all_that_stops_a_robot_that_is_named_does() -> None:
+    patterns = [said.replace("{addressee}", "big mule") for said in stop_patterns("{addressee}")]
+    for said in patterns:
+        plain, short = re.sub(r"[\[\]]", "", said), re.sub(r"\[.*?\]", "", said)
+        behind = [host_behind_stop(one, ["big-mule"]) == "big-mule" for one in (plain, short)]
+        before = is_stop_for_other(plain) and is_stop(short)
+        assert before or all(behind), said
+    assert len(patterns) == 2 * len(STOPPING)

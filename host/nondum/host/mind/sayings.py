@@ -14,7 +14,7 @@ from nondum.planning.asking import ASKED
 from nondum.planning.pattern import Optional, Part, Slot, Word
 from nondum.planning.phrase import KnownPhrase
 from nondum.planning.phrases import Phrasebook
-from nondum.planning.stop_words import STOP_PATTERNS
+from nondum.planning.stop_words import STOP_PATTERNS, stop_patterns
 
 SAYINGS_BYTES = 40_000
 """What a packet to a worker has room for, and some to spare."""
@@ -31,11 +31,12 @@ def sayings(book: Phrasebook, hosts: Sequence[str] = ()) -> Sayings:
 
     These come first, then what it is asked about itself. Slots are called by the
     types of what they name. A phrase without a name for one of its slots cannot be said. Each of
-    the `hosts` can be addressed first. What a packet has no room for is left out, names first.
+    the `hosts` can be addressed first, and stopped with its name behind the word, too. What a
+    packet has no room for is left out, names first.
     """
     names: dict[str, list[str]] = {}
     addressee = f"[{{{ADDRESSEE}}}] " if hosts else ""
-    stops = [f"{addressee}{said}" for said in STOP_PATTERNS]
+    stops = list(stop_patterns(f"{{{ADDRESSEE}}}") if hosts else STOP_PATTERNS)
     phrases = dict.fromkeys((*stops, *(f"{addressee}{said}" for said in ASKED)))
     for phrase in book.phrases:
         slots = {slot: _names(book, slot) for slot in phrase.binding_slots()}

@@ -1,7 +1,7 @@
 """Whose goal it is what a person said or typed: this host's, or that of the one peer that can.
 
 A compute node hears "search for people" and cannot go anywhere; the robot beside it can. Words that
-begin with a host's name are that host's, whatever others could do.
+begin with a host's name are that host's, whatever others could do; a stop may also end with it.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from nondum.host.peers.given_away import MOST_KEPT, GivenAway, replaced, standin
 from nondum.host.peers.remote_calls import Reaches
 from nondum.host.printable import printable
 from nondum.host.rows import Row
-from nondum.host.stopping import Stopped, is_stop_for_stranger
-from nondum.planning.addressee import addressed_to
+from nondum.host.stopping import Stopped, is_stop_for_stranger, said_to
 from nondum.planning.stop_words import STOPS, is_stop
 from nondum.sdk.errors import GoalRefused, NondumError, Problem
 from nondum.sdk.wire import Body
@@ -88,7 +87,7 @@ class Goals:
 
         Raises `GoalRefused` (WHOSE_GOAL).
         """
-        addressed, rest = addressed_to(words, (self._host, *self._peers()))
+        addressed, rest = said_to(words, (self._host, *self._peers()), self._mind())
         if addressed is not None:
             return (None if addressed == self._host else addressed), rest
         if is_stop_for_stranger(words, self._mind()):

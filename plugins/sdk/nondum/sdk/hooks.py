@@ -130,8 +130,8 @@ async def learn_words(ctx: Context, vocabulary: Mapping[str, Any]) -> None:
 
     `vocabulary` has `phrases`, patterns with `[optional]` parts and `{slots}`; `stops`, those of
     them that stop the robot, of which none should be missed; and `names`: slot → the words that may
-    be said there, without articles. A slot without names takes any words. A host
-    tells it anew each time that it changes.
+    be said there, without articles. The slot `addressee` is for names of hosts, which have none. A
+    slot without names takes any words. A host tells it anew each time that it changes.
     """
 
 
