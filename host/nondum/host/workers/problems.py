@@ -184,10 +184,17 @@ def foul(component: str, violation: ProtocolViolation) -> Problem:
 def located(component: str, error: NondumError) -> Iterator[Problem]:
     """A worker's own problems, with its name."""
     for problem in error.problems:
-        if problem.where in ("", component):
-            yield replace(problem, where=component)
-        else:
-            yield replace(problem, where=f"{component} ({problem.where})")
+        place = "" if problem.where == component else problem.where
+        yield replace(problem, where=placed(component, place))
+
+
+def placed(component: str, place: str) -> str:
+    """`where` of what is wrong at a place in a component's plugin.
+
+    >>> placed("gps", "gps/plugin.py:95"), placed("gps", "")
+    ('gps (gps/plugin.py:95)', 'gps')
+    """
+    return f"{component} ({place})" if place else component
 
 
 def words(error: NondumError) -> str:

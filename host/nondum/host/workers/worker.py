@@ -431,8 +431,10 @@ class Worker:
 
     def _on_condition_ended(self, condition: str, problem: Problem) -> None:
         """A condition will tell nothing any more; `tell_conditions` tells it again."""
-        place = f"{condition} of {self.spec.component}"
-        where = f"{place} ({problem.where})" if problem.where else place
+        component = self.spec.component
+        if problem.where:
+            self.faults.end(problems.placed(component, problem.where))
+        where = problems.placed(f"{condition} of {component}", problem.where)
         self.dead_conditions[condition] = replace(problem, where=where)
         self.tell_conditions()
 
