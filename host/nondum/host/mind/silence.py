@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 from nondum.host import missing_devices
 from nondum.host.catalogue.records import ComponentRecord, PeerComponent, Snapshot
 from nondum.host.mind.need import Need
+from nondum.host.placed import place_of
 from nondum.planning.cause import Cause, Lack
 from nondum.planning.contribution import object_name
 from nondum.planning.facts import parts
@@ -114,9 +115,9 @@ def _untold(snapshot: Snapshot) -> Iterator[tuple[str, Reason]]:
 def _why_silent(name: str, component: ComponentRecord | PeerComponent) -> Reason:
     if isinstance(component, ComponentRecord):
         for problem in component.problems:
-            condition, _, place = problem.where.partition(" (")
-            if problem.code == "CONDITION_RAISED" and condition == name:
-                at = f" at {place.rstrip(')')}" if place else ""
+            place = place_of(problem.where, name)
+            if problem.code == "CONDITION_RAISED" and place is not None:
+                at = f" at {place}" if place else ""
                 return Reason(f"{name} has ended{at}: {problem.message}")
         if not component.is_ready:
             return _why_not_ready(component)

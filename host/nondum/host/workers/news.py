@@ -14,8 +14,8 @@ from nondum.host.events import (
     WorkerFaulted,
     WorkerLogged,
 )
+from nondum.host.placed import placed
 from nondum.host.printable import printable, printable_text
-from nondum.host.workers.problems import placed
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import MessageInvalid, Problem, ProtocolViolation
 from nondum.sdk.messages import value_from_wire

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from nondum.host.cgroups import Usage
+from nondum.host.placed import placed
 from nondum.host.workers.process import exit_words
 from nondum.host.workers.spec import Limits
 from nondum.sdk.errors import NondumError, Problem, ProtocolViolation
@@ -186,15 +187,6 @@ def located(component: str, error: NondumError) -> Iterator[Problem]:
     for problem in error.problems:
         place = "" if problem.where == component else problem.where
         yield replace(problem, where=placed(component, place))
-
-
-def placed(component: str, place: str) -> str:
-    """`where` of what is wrong at a place in a component's plugin.
-
-    >>> placed("gps", "gps/plugin.py:95"), placed("gps", "")
-    ('gps (gps/plugin.py:95)', 'gps')
-    """
-    return f"{component} ({place})" if place else component
 
 
 def words(error: NondumError) -> str:
