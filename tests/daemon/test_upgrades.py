@@ -99,6 +99,8 @@ def test_robot_goes_on_through_upgrades_and_back(host: RunningHost) -> None:
     until_holds_with(host, "2.0", goal)
     (row,) = (row for row in host.ask("components") if row["component"] == "talker")
     assert (row["release"], row["was"]) == (2, 1)
+    rows = [row for view in host.views[seen:] for row in view["components"]]
+    assert not any(row["problem"] for row in rows), "that release 1 ended is no failure"
 
     ended = ended_behaviours(host)
     plug(host, 3, Part("talker", FALLS))

@@ -114,7 +114,7 @@ class Robot:
         self.world.forget(f"ready {unit}", "truth", self.now_s)
         for running in self.running:
             if unit in running.action.arguments[:1]:
-                self.end(running, RunState.FAILED, "its component is gone")
+                self.end(running, RunState.GONE, "its component is gone")
 
     def end(self, running: SimulatedAction, state: RunState, reason: str = "") -> None:
         """End an action; what it lasts for is undone this instant."""

@@ -274,6 +274,16 @@ def test_next_tree_halts_what_stands_in_its_way() -> None:
     assert robot.names(RunState.ESTABLISHED) == set(other)
 
 
+def test_behaviour_whose_component_went_away_has_not_failed() -> None:
+    robot, tree = following()
+    robot.lose("cam", moments=3)
+    let_pass(robot, tree, moments=1)
+    assert tree.control.past[CAMERA].state is RunState.GONE
+    assert not tree.control.attempts.troubled()
+    let_pass(robot, tree)
+    assert robot.names(RunState.ESTABLISHED) == set(FOLLOW_PLAN), "it is started again"
+
+
 def test_interruption_halts_everything() -> None:
     robot, tree = following()
     tree.stop(Status.INVALID)

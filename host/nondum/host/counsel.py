@@ -152,7 +152,7 @@ class Surroundings:
             gone = words_gone(merged, goal, self.seen)
             return gone if advice.ways else self._lacking_still(goal)
         facts = self.here.facts
-        return why_not(merged, parsed, facts, self.seen, self.failures, self.silence)
+        return why_not(merged, parsed, facts, self.seen, self.failures, self.silence).problems
 
     def _lacking_still(self, goal: str) -> tuple[Problem, ...]:
         """What a goal lacks even if all payloads were here; raises `GoalRefused` for words that
@@ -160,7 +160,7 @@ class Surroundings:
         together = self.here.beside(self.candidates)
         merged = merge(together.contributions, together.host)
         parsed = parse_goal(goal, merged)
-        return why_not(merged, parsed, together.facts | merged.init.keys(), self.seen)
+        return why_not(merged, parsed, together.facts | merged.init.keys(), self.seen).problems
 
 
 def waiting(told: Mapping[str, Any], facts: HostFacts | None) -> Iterable[Shelved | Problem]:

@@ -138,9 +138,7 @@ class Questions:
             told = [row["problem"], troubles.get(row["component"], "")]
             if why := kept_out.get(row["component"]):
                 told.append(f"kept out of planning: {why}")
-            for fault in self.workers.faults(row["component"]):
-                if fault.message not in row["problem"]:  # else it has ended a condition
-                    told.append(str(fault))
+            told += map(str, self.workers.faults(row["component"]))
             row["problem"] = "; ".join(filter(None, told))
             row["since"] = since.get(row["component"])
             row["confinement"] = str(self.workers.launcher.level) if row["pid"] else None

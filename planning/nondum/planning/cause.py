@@ -46,14 +46,15 @@ class Cause:
     goal: str = ""
     """The part of the goal that it is needed for."""
 
-    def problem(self) -> Problem:
-        """The cause in words: what is missing, which step needs it, and what that is for."""
+    def problem(self, said: str = "") -> Problem:
+        """The cause in words: what is missing, which step needs it, and what that is for; `said` is
+        what is missing where more is known of it than here."""
         needed = f", which {self.path[-1]} needs" if self.path else ""
         purpose = list(reversed(self.path[:-1]))
         if self.goal and (self.path or self.goal != self.fact):
             purpose.append(f"({self.goal})")
         serves = "".join(f", for {step}" for step in purpose)
-        return Problem(self.lack.value, f"{self.said}{needed}{serves}", fix=self._fix())
+        return Problem(self.lack.value, f"{said or self.said}{needed}{serves}", fix=self._fix())
 
     @property
     def said(self) -> str:

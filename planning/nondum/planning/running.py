@@ -20,12 +20,14 @@ class RunState(Enum):
     SUCCEEDED = "succeeded"
     FAILED = "failed"
     HALTED = "halted"
-    """Ended because it was asked to, or because its component went away."""
+    """Ended because it was asked to."""
+    GONE = "gone"
+    """Ended because its component was pulled or replaced: no failure of the action."""
 
     @property
     def has_ended(self) -> bool:
         """Whether nothing of it runs any more."""
-        return self in (RunState.SUCCEEDED, RunState.FAILED, RunState.HALTED)
+        return self not in (RunState.STARTING, RunState.ESTABLISHED)
 
 
 class RunningAction(Protocol):
@@ -38,7 +40,7 @@ class RunningAction(Protocol):
 
     @property
     def reason(self) -> str:
-        """Why it failed or was halted, in the author's words; what it answered, if it succeeded."""
+        """Why it ended, in the author's words if it failed; what it answered, if it succeeded."""
         ...
 
     @property

@@ -184,7 +184,7 @@ class TaskControl:
             self.attempts.effective(name)
         if state is RunState.SUCCEEDED and not run.step.lasting:
             self.attempts.succeeded(name, now_s)
-        else:
+        elif state is not RunState.GONE:
             self.attempts.failed(name, run.action.reason or f"it {state.value} by itself")
 
     def _uphold(self, world: World) -> Footing:

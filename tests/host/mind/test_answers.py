@@ -14,6 +14,7 @@ from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT
 from nondum.host.answering import Answering
 from nondum.host.catalogue.records import ComponentState, DeviceClaim
 from nondum.host.mind.answers import LONGEST, abilities, activity, of_the_robot
+from nondum.host.mind.need import Need
 from nondum.sdk.description import Label, PluginDescription
 
 POINTING: PluginDescription = replace(
@@ -24,12 +25,20 @@ SENSING = replace(COMPTON_CAMERA, labels=(Label("radiation-source", "the radiati
 POINT = "point at the radiation source"
 
 
-def can(words: str, now: str = "can", *lacks: str) -> dict[str, Any]:
-    return {"words": words, "goal": f"({words})", "now": now, "lacks": list(lacks)}
+def can(words: str, now: str = "can", *needs: Need) -> dict[str, Any]:
+    told = [need.to_dict() for need in needs]
+    return {"words": words, "goal": f"({words})", "now": now, "needs": told}
 
 
-def goal(text: str, state: str, reason: str = "", *, holds: bool = False) -> dict[str, Any]:
-    return {"text": text, "state": state, "reason": reason, "holds": holds}
+def goal(
+    text: str, state: str, reason: str = "", *needs: Need, holds: bool = False
+) -> dict[str, Any]:
+    told = [need.to_dict() for need in needs]
+    return {"text": text, "state": state, "reason": reason, "needs": told, "holds": holds}
+
+
+def nothing_of(*types: str, said: str = "in other words") -> Need:
+    return Need("WHY_NO_OBJECT", said, types=types)
 
 
 def step(component: str, state: str = "established") -> dict[str, Any]:
@@ -89,18 +98,17 @@ async def test_robot_says_what_it_does(robot: Robot) -> None:
 
 
 def test_what_misses_the_same_is_said_once() -> None:
-    lack = "there is no image, which eye.see needs, for (found person rover)"
-    rows = [can("look for me", "cannot", lack), can("follow me", "cannot", lack), can("sing")]
+    need = nothing_of("image")
+    rows = [can("look for me", "cannot", need), can("follow me", "cannot", need), can("sing")]
     assert abilities(rows) == "I can sing; to look for you and follow you I need an image."
 
 
 def test_what_cannot_be_said_shortly_is_not_read_out() -> None:
-    lack = "(wired a b) and (dark c) cannot both be reached, though each can"
+    need = Need("WHY_CIRCLE", "whatever makes (dark c) true needs it first", "dark c")
     assert (
-        abilities([can("sing"), can("dance", "cannot", lack)]) == "I can sing; I cannot dance now."
+        abilities([can("sing"), can("dance", "cannot", need)]) == "I can sing; I cannot dance now."
     )
-    either = "there is no (either image depth) to name"
-    told = abilities([can("look at {i}", "cannot", either)])
+    told = abilities([can("look at {i}", "cannot", nothing_of("image", "depth"))])
     assert told == "I can do nothing now: to look at something I need an image or a depth."
 
 
@@ -137,14 +145,32 @@ def test_a_goal_in_pddl_is_not_turned_into_words() -> None:
     assert told == "I was asked for (lit rover), and I do."
 
 
+def test_what_is_missing_is_told_by_data_whatever_the_sentences_say() -> None:
+    said = "(ready rover__gun__it) does not hold: gun waits for its device it"
+    image = nothing_of("image", said=said)
+    assert (
+        abilities([can("look", "cannot", image)])
+        == "I can do nothing now: to look I need an image."
+    )
+    told = activity([goal("look", "suspended", said, image)], [])
+    assert told == "I was asked to look, but for that I need an image."
+    waits = Need("WHY_NOT_SO", "no power", "ready rover__gun__it", waits=True)
+    waiting = ["gun has no power"]
+    assert abilities([can("shoot", "cannot", waits)], 0, waiting) == (
+        "I can do nothing now: gun has no power."
+    )
+
+
 @given(st.text(), st.text(), st.lists(st.text(), max_size=8))
 def test_whatever_strangers_write_an_answer_can_be_spoken(
     words: str, reason: str, names: list[str]
 ) -> None:
-    rows = [can(words, "cannot", reason), can(words, "can"), *(can(name) for name in names)]
+    needs = (nothing_of(reason), Need("WHY_NOT_SO", reason, f"ready {reason}"))
+    rows = [can(words, "cannot", *needs), can(words, "can"), *(can(name) for name in names)]
     steps = [step(name) for name in names]
     for state in ("active", "queued", "suspended"):
-        assert len(activity([goal(words, state, reason)], steps, names)) <= LONGEST
+        for told in ((), needs[:1], needs[1:]):
+            assert len(activity([goal(words, state, reason, *told)], steps, names)) <= LONGEST
     assert len(abilities(rows)) <= LONGEST
 
 

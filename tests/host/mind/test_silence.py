@@ -66,6 +66,9 @@ async def test_device_that_is_not_there_is_named(robot: Robot) -> None:
     told = await reasons(robot)
     assert told.keys() == {"WHY_NOT_SO", "WHY_NOT_TOLD"}
     assert all("gps waits for its device antenna" in message for message in told.values())
+    needs = robot.mind.queue["1"].needs
+    assert [need.code for need in needs] == [*told]
+    assert all(need.waits for need in needs)
 
 
 async def test_worker_that_is_started_again_is_named_with_why_it_ended(robot: Robot) -> None:

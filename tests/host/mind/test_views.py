@@ -54,6 +54,7 @@ async def test_goal_in_words_of_two_strangers(robot: Robot) -> None:
         "kind": "maintain",
         "now": "can",
         "lacks": [],
+        "needs": [],
         "from": ["compton-camera", "pan-tilt-unit"],
     }
     given = robot.mind.give(words="point at the radiation source")
@@ -70,6 +71,9 @@ async def test_goals_say_what_holds_and_what_is_missing(robot: Robot) -> None:
     [row] = robot.mind.views.goals()()["can"]
     assert row["now"] == "cannot"
     assert f"(ready {HEAD}) does not hold" in row["lacks"][0]
+    need = row["needs"][0]
+    assert (need["code"], need["fact"], need["waits"]) == ("WHY_NOT_SO", f"ready {HEAD}", False)
+    assert robot.mind.views.given()[0]["needs"] == row["needs"]
 
 
 async def test_phrase_without_anything_to_name_is_listed_with_what_it_lacks(robot: Robot) -> None:
@@ -78,6 +82,9 @@ async def test_phrase_without_anything_to_name_is_listed_with_what_it_lacks(robo
     [row] = view["can"]
     assert (row["words"], row["goal"]) == ("point at {t}", "(pointing self ?t)")
     assert (row["now"], row["lacks"]) == ("cannot", ["there is no target to name"])
+    assert [(need["code"], need["types"]) for need in row["needs"]] == [
+        ("WHY_NO_OBJECT", ["target"])
+    ]
     [phrase] = view["phrases"]
     assert phrase["slots"] == [{"slot": "t", "types": ["target"], "values": []}]
 

@@ -19,6 +19,7 @@ from nondum.host.events import (
     ConditionEnded,
     WorkerExited,
     WorkerFailed,
+    WorkerFaulted,
     WorkerLogged,
     WorkerReady,
     WorkerSteady,
@@ -127,6 +128,25 @@ async def test_condition_that_raises_is_told_with_its_line(tested: WorkersUnderT
     assert "ValueError" in problem.message
     assert tested.workers.dead_conditions("guest", "0" * 16) == (problem,)
     assert not tested.told(WorkerExited)
+
+
+async def test_mistake_that_ends_a_condition_is_told_as_that_end_alone(
+    tested: WorkersUnderTest,
+) -> None:
+    wrong = "ctx.know('position-known', ctx.host, value=Pose(Header(), (1.0, 2.0)))"
+    body = f"""from nondum.sdk import Header, Pose
+    try:
+        {wrong}
+    except Exception:
+        pass
+    {wrong}"""
+    await watcher(tested, body)
+    await tested.until(ConditionEnded)
+    told = [problem.where for event in tested.told(WorkerFaulted) for problem in event.problems]
+    assert told == ["guest (guest_plugin.py:8)", "guest (guest_plugin.py:11)"]
+    (ended,) = tested.workers.dead_conditions("guest", "0" * 16)
+    assert ended.where == "place of guest (guest_plugin.py:11)"
+    assert [fault.where for fault in tested.workers.faults("guest")] == told[:1]
 
 
 EARLY = """

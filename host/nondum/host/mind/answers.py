@@ -6,6 +6,8 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from nondum.planning.cause import Lack
+from nondum.planning.facts import parts
 from nondum.planning.pattern import as_said
 
 Row = Mapping[str, Any]
@@ -16,18 +18,17 @@ LONGEST = 160
 _LENGTHS = ((6, 2), (5, 1), (4, 1), (3, 1), (2, 1), (1, 1), (3, 0), (2, 0), (1, 0))
 """So many things that can be done, and that are missing, are tried to be named."""
 _NOTHING = "I can do nothing yet"
-_WAITS = " waits for its device"
 
 
 def abilities(can: Sequence[Row], coming: int = 0, waiting: Sequence[str] = ()) -> str:
     """What the robot can do, and what it lacks for more; `can` are the rows of `offers`, `coming`
     is how many payloads are being installed, `waiting` says which component waits for what.
 
-    >>> lacks = ["there is no pointer, which turret.aim needs, for (pointing rover source)"]
+    >>> pointer = {"code": "WHY_NO_OBJECT", "types": ["pointer"], "fact": "", "waits": False}
     >>> can = [
-    ...     {"words": "follow me", "goal": "a", "now": "can", "lacks": []},
-    ...     {"words": "look for me", "goal": "b", "now": "can", "lacks": []},
-    ...     {"words": "point at the source", "goal": "c", "now": "cannot", "lacks": lacks},
+    ...     {"words": "follow me", "goal": "a", "now": "can", "needs": []},
+    ...     {"words": "look for me", "goal": "b", "now": "can", "needs": []},
+    ...     {"words": "point at the source", "goal": "c", "now": "cannot", "needs": [pointer]},
     ... ]
     >>> abilities(can)
     'I can follow you and look for you; to point at the source I need a pointer.'
@@ -52,10 +53,11 @@ def activity(
     """What the robot does: `given` are the goals, `steps` those of the plan that is carried out,
     `lent` the components that run for other hosts.
 
-    >>> goal = {"text": "follow me", "state": "active", "holds": True, "reason": ""}
+    >>> goal = {"text": "follow me", "state": "active", "holds": True, "reason": "", "needs": []}
     >>> activity([goal], [{"component": "base", "state": "established"}])
     'I was asked to follow you, and I do, with base.'
-    >>> activity([{**goal, "state": "suspended", "reason": "there is no image, which …"}], [])
+    >>> image = {"code": "WHY_NO_OBJECT", "types": ["image"], "fact": "", "said": "no image"}
+    >>> activity([{**goal, "state": "suspended", "needs": [image]}], [])
     'I was asked to follow you, but for that I need an image.'
     >>> activity([], [])
     'I do nothing: nobody has asked for anything.'
@@ -105,9 +107,9 @@ def _lacking(rows: Iterable[Row]) -> list[str]:
     concrete = sorted(rows, key=lambda row: "{" in row["words"])
     wanted: dict[str, dict[str, str]] = {}
     for row in concrete:
-        if any(_WAITS in lack for lack in row["lacks"]):  # that is said of the component
+        if any(need["waits"] for need in row["needs"]):  # that is said of the component
             continue
-        need = next(filter(None, map(_need, row["lacks"])), "")
+        need = next(filter(None, map(_need, row["needs"])), "")
         wanted.setdefault(need, {}).setdefault(row["goal"], of_the_robot(as_said(row["words"])))
     return [
         f"to {_few(list(words.values()), 2)} I need {need}"
@@ -117,21 +119,20 @@ def _lacking(rows: Iterable[Row]) -> list[str]:
     ]
 
 
-def _need(lack: str) -> str:
-    """What is missing, by the words of a diagnosis; empty where they cannot be said shortly.
+def _need(need: Row) -> str:
+    """What is missing, by a row of `Need`; empty where that cannot be said shortly.
 
-    >>> _need("there is no image, which eye needs"), _need("there is no class to name")
-    ('an image', 'a class')
-    >>> _need("(ready rover__turret__head) does not hold, which turret.aim needs")
+    >>> _need({"code": "WHY_NO_OBJECT", "types": ["image", "class"], "fact": ""})
+    'an image or a class'
+    >>> _need({"code": "WHY_NOT_SO", "types": [], "fact": "ready rover__turret__head"})
     'the head to be ready'
     """
-    first = _clause(lack)
-    if found := re.fullmatch(r"there is no ([\w-]+)(?: to name)?", first):
-        return _a(found[1])
-    if found := re.fullmatch(r"there is no \(either ([\w -]+)\)(?: to name)?", first):
-        return " or ".join(map(_a, found[1].split()))
-    if found := re.fullmatch(r"\(ready ([\w-]+)\) does not hold(: .*)?", first):
-        return f"the {_short(found[1])} to be ready"
+    predicate, arguments = parts(need["fact"])
+    match need["code"]:
+        case Lack.OBJECT.value:
+            return " or ".join(map(_a, need["types"]))
+        case Lack.HOST.value if predicate == "ready" and not arguments[0].startswith("?"):
+            return f"the {_short(arguments[0])} to be ready"
     return ""
 
 
@@ -139,11 +140,12 @@ def _pursued(goal: Row, steps: Sequence[Row]) -> Iterator[str]:
     """What becomes of a goal, shorter and shorter."""
     text = goal["text"]
     head = f"I was asked for {text}" if "(" in text else f"I was asked to {of_the_robot(text)}"
-    why = _clause(str(goal["reason"]))
+    first = next(iter(goal["needs"]), None)
+    why = _in_short_names(str(first["said"] if first else goal["reason"]))
     running = [row["component"] for row in steps if row["component"]]
     names = listed(list(dict.fromkeys(name.split("@")[0] for name in running)))
     if goal["state"] == "suspended":
-        if need := _need(str(goal["reason"])):
+        if need := first and _need(first):
             yield f"{head}, but for that I need {need}"
         yield f"{head}, but I cannot now{f': {why}' if why else ''}"
         yield f"{head}, but I cannot now"
@@ -159,10 +161,8 @@ def _pursued(goal: Row, steps: Sequence[Row]) -> Iterator[str]:
         yield f"{head}, {how}"
 
 
-def _clause(text: str) -> str:
-    """What a diagnosis says first, in short names: what it is for comes after that."""
-    first = re.split(r", (?:which|for|what) |; ", text, maxsplit=1)[0]
-    return re.sub(r"[\w-]+__[\w-]+", lambda name: _short(name[0]), first)
+def _in_short_names(text: str) -> str:
+    return re.sub(r"[\w-]+__[\w-]+", lambda name: _short(name[0]), text)
 
 
 def _short(name: str) -> str:

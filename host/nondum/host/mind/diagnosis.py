@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from nondum.host.catalogue.records import FormerPayload, Snapshot
+from nondum.host.mind.need import Need
 from nondum.host.mind.silence import Silence
 from nondum.planning.claims import claims_of
 from nondum.planning.contribution import Contribution
@@ -21,8 +22,20 @@ from nondum.sdk.errors import FragmentRefused, Problem
 from nondum.sdk.planner import Answer, GroundTask
 
 NO_SILENCE = Silence()
+
 _TRIAL_S = 0.3
 """How long a part of a goal is planned for, to see whether it can be had by itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class WhyNot:
+    """Why a goal cannot be had."""
+
+    problems: tuple[Problem, ...]
+    """In words; empty: it is not known why."""
+    needs: tuple[Need, ...] = ()
+    """What is missing, as data; empty where nothing is, for example of parts of a goal that exclude
+    each other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +98,7 @@ def why_not(
     seen: Iterable[Seen],
     failures: Mapping[str, str] | None = None,
     silence: Silence = NO_SILENCE,
-) -> tuple[Problem, ...]:
+) -> WhyNot:
     """What is missing for a goal that cannot be reached, and who used to supply it.
 
     `failures` are the actions that must not be planned with, and how they failed; `silence` is what
@@ -95,17 +108,17 @@ def why_not(
         diagnosis = explain(merged, facts, goal.expr, search=_tried_out)
         in_the_way = _in_the_way(merged, goal, facts, failures or {})
     except FragmentRefused as refused:
-        return refused.problems
+        return WhyNot(refused.problems)
     if in_the_way and not diagnosis.causes:
         reasons = "; ".join(f"{name} {why}" for name, why in sorted(in_the_way.items()))
         message = f"there is no way without what failed again and again: {reasons}"
-        return (Problem("NO_OTHER_WAY", message, fix="it is tried again after a while"),)
+        fix = "it is tried again after a while"
+        return WhyNot((Problem("NO_OTHER_WAY", message, fix=fix),))
     gone = {known.contribution: known for known in seen}
     brought = [gone[contribution] for contribution in suppliers(diagnosis.causes, gone)]
-    if diagnosis.causes:
-        missing = tuple(map(silence.problem, diagnosis.causes))
-        return (*missing, *_used_to_supply(brought))
-    return (*diagnosis.problems(), *_used_to_supply(brought))
+    told = map(silence.problem, diagnosis.causes) if diagnosis.causes else diagnosis.problems()
+    needs = tuple(map(silence.need, diagnosis.causes))
+    return WhyNot((*told, *_used_to_supply(brought)), needs)
 
 
 def _in_the_way(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from nondum.host.catalogue.records import GoalRecord
+from nondum.host.mind.need import Need
 from nondum.planning.goal import GoalKind
 from nondum.sdk.errors import GoalRefused, Problem
 
@@ -55,6 +56,8 @@ class GivenGoal:
     """Why it is where it is."""
     problems: tuple[Problem, ...] = ()
     """What keeps it suspended."""
+    needs: tuple[Need, ...] = ()
+    """What it lacks, of that which keeps it suspended."""
     replaced_by: str = ""
     """The goal that has taken its place."""
 
@@ -69,6 +72,7 @@ class GivenGoal:
             "state": self.state.value,
             "reason": self.reason,
             "problems": [problem.to_dict() for problem in self.problems],
+            "needs": [need.to_dict() for need in self.needs],
             "resumable": self.is_resumable,
         }
 
@@ -156,12 +160,18 @@ class GoalQueue:
         return tuple(sorted((g for g in self if g.state not in over), key=urgency))
 
     def put(
-        self, id: str, state: GoalState, reason: str = "", problems: tuple[Problem, ...] = ()
+        self,
+        id: str,
+        state: GoalState,
+        reason: str = "",
+        problems: tuple[Problem, ...] = (),
+        needs: tuple[Need, ...] = (),
     ) -> GivenGoal:
         """Set where a goal is and why. Goals that are over stay so."""
         goal = self._goals[id]
         if not goal.state.is_final:
-            goal = self._goals[id] = replace(goal, state=state, reason=reason, problems=problems)
+            goal = replace(goal, state=state, reason=reason, problems=problems, needs=needs)
+            self._goals[id] = goal
         return goal
 
     def put_aside(self, id: str, behind: str, shared: str = "") -> GivenGoal:

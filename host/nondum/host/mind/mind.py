@@ -105,7 +105,7 @@ class Mind:
         is planned with from the next tick on."""
         gone, new = self.beliefs.see(snapshot)
         for component in gone:
-            self.runner.lose(component, "its component is gone")
+            self.runner.lose(component)
         for component in new:
             for claim in self._calls.claims(component):
                 self.on_event(claim)

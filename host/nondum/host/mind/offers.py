@@ -11,8 +11,10 @@ from collections.abc import Iterable, Iterator
 from typing import Any, TypeAlias
 
 from nondum.host.mind.composition import Composition
-from nondum.host.mind.diagnosis import Seen, why_not
+from nondum.host.mind.diagnosis import Seen, WhyNot, why_not
+from nondum.host.mind.need import Need
 from nondum.host.mind.silence import Silence
+from nondum.planning.cause import Lack
 from nondum.planning.domain import bind
 from nondum.planning.exploration import explore
 from nondum.planning.goal import Goal, goal_text
@@ -29,6 +31,7 @@ Row: TypeAlias = dict[str, Any]
 
 MOST_EXPLAINED = 50
 """So many goals that cannot be had are explained; of the rest it is only said."""
+_NOTHING = WhyNot(())
 
 
 def phrases(composition: Composition) -> list[Row]:
@@ -54,12 +57,12 @@ def offers(
     bare_facts: frozenset[str],
     seen: Iterable[Seen],
 ) -> list[Row]:
-    """Each sentence: `words`, `goal`, `kind`, `now`, `lacks`, `from` (components).
+    """Each sentence: `words`, `goal`, `kind`, `now`, `lacks`, `needs`, `from` (components).
 
     `now` is `holds`, `can` (nothing is missing, deletes ignored), `cannot` (then `lacks` says what,
-    and who used to supply it), `ambiguous` (it means something else too), or `unknown` where there
-    are too many ways to look at. Phrases with nothing to name are there as their authors wrote
-    them.
+    and who used to supply it, and `needs` has what is missing as data, see `Need`), `ambiguous` (it
+    means something else too), or `unknown` where there are too many ways to look at. Phrases with
+    nothing to name are there as their authors wrote them.
     """
     outlook = _Outlook(composition, facts, bare_facts, tuple(seen))
     readings: dict[tuple[object, ...], list[Reading]] = {}
@@ -84,14 +87,21 @@ def _row(
     same: list[Reading], outlook: _Outlook, composition: Composition, *, is_clear: bool
 ) -> Row:
     goal = same[0].goal
-    now, lacks = outlook.of(goal) if is_clear else ("ambiguous", [])
+    now, why = outlook.of(goal) if is_clear else ("ambiguous", _NOTHING)
     return {
         "words": goal.text,
         "goal": goal_text(goal.expr),
         "kind": goal.kind,
         "now": now,
-        "lacks": lacks,
+        **_why(why),
         "from": sorted({name for reading in same for name in _bringers(reading, composition)}),
+    }
+
+
+def _why(why: WhyNot) -> Row:
+    return {
+        "lacks": [problem.message for problem in why.problems],
+        "needs": [need.to_dict() for need in why.needs],
     }
 
 
@@ -107,16 +117,22 @@ def _mute(composition: Composition) -> Iterator[Row]:
     """Phrases that cannot be said: there is nothing to name in one of their slots."""
     for phrase in composition.book.phrases:
         slots = phrase.binding_slots()
-        empty = [slot for slot in slots if not composition.book.things_for(slot)]
-        if empty:
+        needs = [_to_name(slot) for slot in slots if not composition.book.things_for(slot)]
+        if needs:
             yield {
                 "words": phrase.pattern,
                 "goal": goal_text(phrase.condition),
                 "kind": phrase.kind,
                 "now": "cannot",
-                "lacks": [f"there is no {type_text(slot.types)} to name" for slot in empty],
+                "lacks": [need.said for need in needs],
+                "needs": [need.to_dict() for need in needs],
                 "from": [phrase.component],
             }
+
+
+def _to_name(slot: Slot) -> Need:
+    said = f"there is no {type_text(slot.types)} to name"
+    return Need(Lack.OBJECT.value, said, types=slot.types)
 
 
 def _slot(slot: Slot, composition: Composition) -> Row:
@@ -145,16 +161,16 @@ class _Outlook:
         with contextlib.suppress(FragmentRefused):  # too many ways
             self._reachable = explore(composition.merged, bare_facts).reachable
 
-    def of(self, goal: Goal) -> tuple[str, list[str]]:
-        """`now` and `lacks` of a goal."""
+    def of(self, goal: Goal) -> tuple[str, WhyNot]:
+        """`now` of a goal, and why it cannot be had if it cannot."""
         if self._reachable is None:
-            return "unknown", []
+            return "unknown", _NOTHING
         try:
             return self._looked_at(goal, self._reachable)
         except FragmentRefused:  # it speaks of too much
-            return "unknown", []
+            return "unknown", _NOTHING
 
-    def _looked_at(self, goal: Goal, reachable: frozenset[str]) -> tuple[str, list[str]]:
+    def _looked_at(self, goal: Goal, reachable: frozenset[str]) -> tuple[str, WhyNot]:
         expr = goal.expr
         wanted = {bind(atom, {}) for atom in expr.positive}
         if expr == Condition(positive=expr.positive):
@@ -163,16 +179,15 @@ class _Outlook:
             holds = isinstance(self._quick_answer(goal, self._facts), AlreadyTrue)
             can = not isinstance(self._quick_answer(goal, self._bare), Unsolvable)
         if holds:
-            return "holds", []
-        return ("can", []) if can else ("cannot", self._lacks(goal))
+            return "holds", _NOTHING
+        return ("can", _NOTHING) if can else ("cannot", self._why_not(goal))
 
     def _quick_answer(self, goal: Goal, facts: frozenset[str]) -> object:
         return quick_answer(ground(self._composition.merged, facts, goal.expr))
 
-    def _lacks(self, goal: Goal) -> list[str]:
+    def _why_not(self, goal: Goal) -> WhyNot:
         self._explained += 1
         if self._explained > MOST_EXPLAINED:
-            return []
+            return _NOTHING
         merged, silence = self._composition.merged, Silence.of(self._composition.snapshot)
-        problems = why_not(merged, goal, self._bare, self._seen, silence=silence)
-        return [problem.message for problem in problems]
+        return why_not(merged, goal, self._bare, self._seen, silence=silence)

@@ -386,7 +386,7 @@ class Pursuit:
             self._people.tell(f"cannot {goal.text!r} now: {words}{f' → {fixes}' if fixes else ''}")
             self._emit(PlanMissing(goal.id, found.problems))
         reason = found.problems[0].message
-        self.queue.put(goal.id, GoalState.SUSPENDED, reason, found.problems)
+        self.queue.put(goal.id, GoalState.SUSPENDED, reason, found.problems, found.needs)
 
     def _wait(self, found: Waits) -> None:
         goal = self.queue[found.situation.goal]

@@ -167,21 +167,25 @@ class BehaviourRunner:
                     run.progress = f"{fraction:.0%} {text}".strip()
                 return False
             case WorkerExited(component, reason):
-                self.lose(component, reason)
+                self._end_all(component, RunState.FAILED, reason)
                 return True
             case FactKnown() | FactForgotten():
                 self._pass_on(event.predicate)
         return False
 
-    def lose(self, component: str, reason: str) -> None:
-        """A component is gone: so is everything that it ran."""
-        for key in [key for key in self._running if key[0] == component]:
-            self._on_ended(key, RunState.FAILED, reason)
+    def lose(self, component: str) -> None:
+        """A component is gone, or another release took its place: everything that it ran is over.
+        That is no failure of the actions."""
+        self._end_all(component, RunState.GONE, "its component is gone")
 
     def halt_all(self) -> None:
         """Ask everything to end."""
         for run in self:
             run.halt()
+
+    def _end_all(self, component: str, state: RunState, reason: str) -> None:
+        for key in [key for key in self._running if key[0] == component]:
+            self._on_ended(key, state, reason)
 
     def _on_established(self, component: str, call_id: int) -> bool:
         run = self._running.get((component, call_id))

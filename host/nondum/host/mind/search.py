@@ -10,7 +10,7 @@ from functools import partial
 from typing import TypeAlias
 
 from nondum.host.mind.composition import Composition
-from nondum.host.mind.diagnosis import why_not, words_gone
+from nondum.host.mind.diagnosis import WhyNot, why_not, words_gone
 from nondum.host.mind.goals import GivenGoal
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.silence import Silence
@@ -121,10 +121,10 @@ class _Searching:
         found = await self._answered(task, fit.merged, goal, situation, deadline_s)
         if isinstance(found, Planned):
             return replace(found, left_out=fit.left_out)
-        problems = found.problems if found else ()
+        why = WhyNot(found.problems if found else ())
         if found is None and narrowed is None:
-            problems = await self._why_not(fit.merged, goal, situation)
-        return NoPlan(situation, (*problems, *too_big), fit.left_out)
+            why = await self._why_not(fit.merged, goal, situation)
+        return NoPlan(situation, (*why.problems, *too_big), fit.left_out, why.needs)
 
     def shared(self, plan: Planned, others: Iterable[Reservation]) -> dict[str, str]:
         """Goal → what its plan shares with this one, of those that cannot be beside it."""
@@ -159,9 +159,7 @@ class _Searching:
             case Unsolvable():
                 return None
 
-    async def _why_not(
-        self, merged: Merged, goal: Goal, situation: Situation
-    ) -> tuple[Problem, ...]:
+    async def _why_not(self, merged: Merged, goal: Goal, situation: Situation) -> WhyNot:
         failures = {name: self.past.failures.get(name, "") for name in situation.excluded}
         silence = Silence.of(self.composition.snapshot)
         return await asyncio.to_thread(

@@ -7,17 +7,30 @@ What planning says of such a fact, that nothing here makes it true, holds of act
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from typing import Any, TypeAlias
 
 from nondum.host import missing_devices
 from nondum.host.catalogue.records import ComponentRecord, PeerComponent, Snapshot
+from nondum.host.mind.need import Need
+from nondum.host.placed import place_of
 from nondum.planning.cause import Cause, Lack
 from nondum.planning.contribution import object_name
 from nondum.planning.facts import parts
 from nondum.sdk.errors import Problem
 
-Reasons: TypeAlias = Mapping[str, tuple[str, ...]]
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """What keeps a component from telling, or from being ready."""
+
+    said: str
+    """In one clause."""
+    waits: bool = False
+    """The component is well, and waits for its device."""
+
+
+Reasons: TypeAlias = Mapping[str, tuple[Reason, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,39 +51,60 @@ class Silence:
     def parse(cls, told: Mapping[str, Any]) -> Silence:
         """Read what `to_dict` gave. It comes from our own daemon and is trusted."""
         return cls(
-            {name: tuple(reasons) for name, reasons in told["untold"].items()},
-            {name: tuple(reasons) for name, reasons in told["unready"].items()},
+            _parsed(told["untold"]),
+            _parsed(told["unready"]),
         )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data."""
         return {
-            "untold": {name: list(reasons) for name, reasons in self.untold.items()},
-            "unready": {name: list(reasons) for name, reasons in self.unready.items()},
+            "untold": {name: [*map(asdict, reasons)] for name, reasons in self.untold.items()},
+            "unready": {name: [*map(asdict, reasons)] for name, reasons in self.unready.items()},
         }
 
     def problem(self, cause: Cause) -> Problem:
         """A cause as a problem, with the reason for the silence where there is one."""
-        found, (predicate, arguments) = cause.problem(), parts(cause.fact or "?")
-        if cause.lack is Lack.ACTION and predicate in self.untold:
-            because = " and ".join(self.untold[predicate])
-            said = f"({cause.fact}) is not known: {because}"
-            return Problem("WHY_NOT_TOLD", found.message.replace(cause.said, said, 1))
-        if cause.lack is Lack.HOST and predicate == "ready" and arguments[0] in self.unready:
-            because = " and ".join(self.unready[arguments[0]])
-            said = f"{cause.said}: {because}"
-            return replace(found, message=found.message.replace(cause.said, said, 1))
-        return found
+        said = self._said(cause)
+        found = cause.problem(said)
+        return Problem("WHY_NOT_TOLD", found.message) if said and _is_to_be_told(cause) else found
+
+    def need(self, cause: Cause) -> Need:
+        """The same as data."""
+        waits = any(reason.waits for reason in self._reasons(cause))
+        said = self._said(cause) or cause.said
+        return Need(self.problem(cause).code, said, cause.fact, cause.types, waits)
+
+    def _said(self, cause: Cause) -> str:
+        """What is missing and why, in one clause; empty: nothing is known of that here."""
+        because = " and ".join(reason.said for reason in self._reasons(cause))
+        first = f"({cause.fact}) is not known" if _is_to_be_told(cause) else cause.said
+        return because and f"{first}: {because}"
+
+    def _reasons(self, cause: Cause) -> tuple[Reason, ...]:
+        predicate, arguments = parts(cause.fact or "?")
+        if _is_to_be_told(cause):
+            return self.untold.get(predicate, ())
+        if cause.lack is Lack.HOST and predicate == "ready":
+            return self.unready.get(arguments[0], ())
+        return ()
 
 
-def _gathered(pairs: Iterator[tuple[str, str]]) -> Reasons:
-    found: dict[str, tuple[str, ...]] = {}
+def _is_to_be_told(cause: Cause) -> bool:
+    return cause.lack is Lack.ACTION
+
+
+def _parsed(told: Mapping[str, Any]) -> Reasons:
+    return {name: tuple(Reason(**reason) for reason in reasons) for name, reasons in told.items()}
+
+
+def _gathered(pairs: Iterator[tuple[str, Reason]]) -> Reasons:
+    found: dict[str, tuple[Reason, ...]] = {}
     for name, reason in pairs:
         found[name] = tuple(dict.fromkeys((*found.get(name, ()), reason)))
     return found
 
 
-def _untold(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
+def _untold(snapshot: Snapshot) -> Iterator[tuple[str, Reason]]:
     for _, component in snapshot.everyone():
         for condition in component.description.conditions:
             name = f"{condition.name} of {component.id}"
@@ -78,19 +112,19 @@ def _untold(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
             yield from ((predicate, reason) for predicate in condition.predicates)
 
 
-def _why_silent(name: str, component: ComponentRecord | PeerComponent) -> str:
+def _why_silent(name: str, component: ComponentRecord | PeerComponent) -> Reason:
     if isinstance(component, ComponentRecord):
         for problem in component.problems:
-            condition, _, place = problem.where.partition(" (")
-            if problem.code == "CONDITION_RAISED" and condition == name:
-                at = f" at {place.rstrip(')')}" if place else ""
-                return f"{name} has ended{at}: {problem.message}"
+            place = place_of(problem.where, name)
+            if problem.code == "CONDITION_RAISED" and place is not None:
+                at = f" at {place}" if place else ""
+                return Reason(f"{name} has ended{at}: {problem.message}")
         if not component.is_ready:
             return _why_not_ready(component)
-    return f"{name} has not told it"
+    return Reason(f"{name} has not told it")
 
 
-def _unready(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
+def _unready(snapshot: Snapshot) -> Iterator[tuple[str, Reason]]:
     for component in snapshot.components:
         if not component.is_ready:
             reason = _why_not_ready(component)
@@ -99,8 +133,8 @@ def _unready(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
                 yield f"?{component.description.name}.{unit.type}", reason
 
 
-def _why_not_ready(component: ComponentRecord) -> str:
+def _why_not_ready(component: ComponentRecord) -> Reason:
     if told := missing_devices.waits(component):
-        return f"{component.id} {told}"
+        return Reason(f"{component.id} {told}", waits=True)
     reason = f", {component.problems[0].message}" if component.problems else ""
-    return f"{component.id} is {component.state.value}{reason}"
+    return Reason(f"{component.id} is {component.state.value}{reason}")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from nondum.host.mind.diagnosis import Seen
+from nondum.host.mind.need import Need
 from nondum.planning.side_by_side import Reservation
 from nondum.sdk.errors import Problem
 from nondum.sdk.planner import GroundTask, Plan
@@ -82,6 +83,8 @@ class NoPlan:
     problems: tuple[Problem, ...]
     left_out: Mapping[str, Problem] = field(default_factory=dict)
     """Components that were not planned with, for they have too many ways to act."""
+    needs: tuple[Need, ...] = ()
+    """What is missing, as far as that is why."""
 
 
 @dataclass(frozen=True, slots=True)

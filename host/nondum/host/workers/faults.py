@@ -18,10 +18,17 @@ class Faults:
 
     def __init__(self) -> None:
         self._known: dict[tuple[str, str], Problem] = {}
+        self._ended: set[str] = set()
+        """Places where conditions have ended."""
 
     def __iter__(self) -> Iterator[Problem]:
-        """The newest."""
-        yield from list(self._known.values())[-SHOWN:]
+        """The newest of those that have not ended a condition: such an end is told by itself."""
+        left = [problem for (_, at), problem in self._known.items() if at not in self._ended]
+        yield from left[-SHOWN:]
+
+    def end(self, place: str) -> None:
+        """A condition has ended at a place, `where` as of faults there."""
+        self._ended.add(place)
 
     def take(self, faulted: WorkerFaulted) -> bool:
         """Take in one more. Says whether it is new and to be told."""

@@ -14,6 +14,7 @@ from nondum.host.events import (
     WorkerFaulted,
     WorkerLogged,
 )
+from nondum.host.placed import placed
 from nondum.host.printable import printable, printable_text
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import MessageInvalid, Problem, ProtocolViolation
@@ -205,7 +206,7 @@ def _fault(component: str, said: Mapping[str, Any]) -> Problem:
     need, have = (str(said.get(key) or "")[:MAX_SAID] for key in ("need", "have"))
     if not _CODE.fullmatch(code):
         raise _violation("EVENT_INVALID", "event 'fault' names no code")
-    place = f"{component} ({printable(where)})" if where else component
+    place = placed(component, printable(where))
     return Problem(
         code, printable(message), where=place, need=printable(need), have=printable(have)
     )

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from nondum.host.cgroups import Usage
+from nondum.host.placed import placed
 from nondum.host.workers.process import exit_words
 from nondum.host.workers.spec import Limits
 from nondum.sdk.errors import NondumError, Problem, ProtocolViolation
@@ -184,10 +185,8 @@ def foul(component: str, violation: ProtocolViolation) -> Problem:
 def located(component: str, error: NondumError) -> Iterator[Problem]:
     """A worker's own problems, with its name."""
     for problem in error.problems:
-        if problem.where in ("", component):
-            yield replace(problem, where=component)
-        else:
-            yield replace(problem, where=f"{component} ({problem.where})")
+        place = "" if problem.where == component else problem.where
+        yield replace(problem, where=placed(component, place))
 
 
 def words(error: NondumError) -> str:

@@ -21,6 +21,7 @@ from nondum.host.events import (
     WorkerLogged,
 )
 from nondum.host.helper.grants import reachable, withdrawn
+from nondum.host.placed import placed
 from nondum.host.printable import printable
 from nondum.host.waiting import until_done
 from nondum.host.workers import problems, scratch
@@ -431,8 +432,10 @@ class Worker:
 
     def _on_condition_ended(self, condition: str, problem: Problem) -> None:
         """A condition will tell nothing any more; `tell_conditions` tells it again."""
-        place = f"{condition} of {self.spec.component}"
-        where = f"{place} ({problem.where})" if problem.where else place
+        component = self.spec.component
+        if problem.where:
+            self.faults.end(placed(component, problem.where))
+        where = placed(f"{condition} of {component}", problem.where)
         self.dead_conditions[condition] = replace(problem, where=where)
         self.tell_conditions()
 

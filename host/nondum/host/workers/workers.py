@@ -279,7 +279,8 @@ class Workers:
         return tuple(supervisor.worker.claims)
 
     def faults(self, component: str) -> tuple[Problem, ...]:
-        """Mistakes of a component's plugin that its worker has outlived, the newest of them."""
+        """Mistakes of a component's plugin that its worker has outlived, the newest of those that
+        have not ended a condition."""
         supervisor = self._supervisors.get(component)
         worker = supervisor.worker if supervisor is not None else None
         return tuple(worker.faults) if worker is not None else ()

@@ -1,0 +1,26 @@
+"""What a goal lacks, as data: programs go by this, people read the problem that says the same."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Need:
+    """One thing that is missing for a goal."""
+
+    code: str
+    """Of the problem that tells it."""
+    said: str
+    """What is missing in one clause, without what needs it."""
+    fact: str = ""
+    """The condition that does not hold, if it is one; `?type` stands for what is not determined."""
+    types: tuple[str, ...] = ()
+    """What there is nothing of, if it is a thing: one of these types would do."""
+    waits: bool = False
+    """For the device of a component that is well: the component is said to wait for it."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {**asdict(self), "types": list(self.types)}
