@@ -243,7 +243,6 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_T}/peers/identity.py": (f"{_TT}/peers/test_identity.py",),
     f"{_T}/peers/keys.py": _PEER_KEYS,
     f"{_T}/peers/link.py": (f"{_TT}/peers/test_presence.py",),
-    f"{_T}/peers/looks.py": (f"{_TT}/peers/test_looks.py",),
     f"{_T}/peers/messages.py": (f"{_TT}/peers/test_messages.py",),
     f"{_T}/peers/node.py": (*_ADMISSION, f"{_TT}/peers/test_received.py"),
     f"{_T}/peers/pairing.py": _PAIRING,

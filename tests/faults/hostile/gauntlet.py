@@ -22,14 +22,17 @@ from tests.kit.signing import sign_payload
 from tests.kit.traces import Traces
 from tests.kit.until import until
 
+from nondum.sdk.errors import Problem
+
 HEALTHY = ("talker", "scribe")
 GOAL = "(written spot)"
 JUDGED_S = 60.0
 PRUNED_S = 20.0
 OVER = ("refused", "quarantined", "active")
+MOST_ROWS = 100
+"""Of the journal on one drive."""
 REMEDY = "→ "
 """Stands before what to do, in each problem that is told."""
-CODES = re.compile(r"\b[A-Z]+_[A-Z_]+\b")
 CONTROLS = re.compile(rb"[\x00-\x08\x0b-\x1f\x7f]")
 """What a terminal would do something with, but for line ends and tabs."""
 MORE = "[workers]\nstartup_s = 30.0\n"
@@ -101,6 +104,7 @@ class Gauntlet:
         self._healthy: list[Row] = []
         self._traces: Traces | None = None
         self._made: dict[str, str] = {}
+        self._last_row: dict[str, int] = {}
         """Drive → what it was made as."""
 
     def begin(self) -> None:
@@ -199,18 +203,24 @@ class Gauntlet:
             if any(row["state"] not in OVER for row in payloads):
                 return None
             problems = [problem for row in (*rows, *payloads) for problem in row["problems"]]
-            problems += self._told_of_trust(drive)
             active = sum(row["state"] == "active" for row in payloads)
             return (tuple(problems), active) if problems or payloads else None
 
-        return self.host.until(f"{drive.case.name} judged", found, timeout_s=JUDGED_S)
+        problems, active = self.host.until(f"{drive.case.name} judged", found, timeout_s=JUDGED_S)
+        return (*problems, *self._told_of_trust(drive)), active
 
     def _told_of_trust(self, drive: Plugged) -> list[str]:
-        """The problems of trust files that it brought: the drive and its payloads have none."""
-        begin = f"a trust file from {drive.folder.name} is not taken: "
-        said = {row["text"] for view in self.host.views for row in view["told"]}
-        texts = [text.removeprefix(begin) for text in said if text.startswith(begin)]
-        return [f"{code} {text}" for text in texts for code in CODES.findall(text)]
+        """The problems of trust files that it brought: the drive and its payloads have none.
+
+        They come before what its payloads come to. A view has the last sentences only: too few
+        where many drives are told of between two views.
+        """
+        name = drive.folder.name
+        rows = self.host.ask("journal", subject=name, limit=MOST_ROWS)
+        news = [row for row in rows if row["id"] > self._last_row.get(name, 0)]
+        self._last_row[name] = max((row["id"] for row in rows), default=0)
+        refused = [row for row in news if row["event"] == "TrustFileRefused"]
+        return [str(Problem(**problem)) for row in refused for problem in row["problems"]]
 
     def _gone(self, drive: Plugged) -> None:
         def is_gone(view: Row) -> bool:
