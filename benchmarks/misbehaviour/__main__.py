@@ -11,9 +11,9 @@ from pathlib import Path
 
 from benchmarks.measuring import Spread, machine, table
 from benchmarks.misbehaviour.rounds import Decisions, Round, misbehave
-from benchmarks.misbehaviour.scene import LIMITS, scene
+from benchmarks.misbehaviour.scene import LIMITS, Scene, scene
 from benchmarks.misbehaviour.ways import WAYS, Way
-from benchmarks.misbehaviour.windows import Window, p99
+from benchmarks.misbehaviour.windows import Window, p99, window
 
 from nondum.host import heap
 from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined
@@ -25,7 +25,10 @@ leaves a dozen calls."""
 LONG = 5
 """Ways that take seconds are done so many times less often."""
 
-Take = Callable[[Round], Window | None]
+Windows = tuple[Sequence[Window], Sequence[Window], Sequence[Window]]
+"""Before, meanwhile, and while a plain process did the same."""
+LAST_FRAME_S = 0.05
+"""A frame that was made by then has been seen."""
 CONFINEMENTS: dict[str, Callable[[], Confinement]] = {
     "sandboxed": lambda: Boxed("bwrap"),
     "restricted": Held,
@@ -89,33 +92,37 @@ def told_row(way: Way, rounds: Sequence[Round]) -> list[str]:
     ]
 
 
-def peace_row(way: Way, rounds: Sequence[Round]) -> list[str]:
+def peace_row(way: Way, windows: Windows) -> list[str]:
     """What the good ones noticed of it."""
-    calls, frames = _columns(rounds, "calls_ms"), _columns(rounds, "frames_ms")
-    meanwhile = [r.meanwhile for r in rounds]
+    calls, frames = _columns(windows, "calls_ms"), _columns(windows, "frames_ms")
+    _, meanwhile, _ = windows
     slowest = f"{max((c for w in meanwhile for c in w.calls_ms), default=0.0):.1f}"
     return [way.name, *calls[:3], slowest, *calls[3:], *frames, str(sum(w.lost for w in meanwhile))]
 
 
-def _columns(rounds: Sequence[Round], kind: str) -> list[str]:
-    """Before; meanwhile and as a part of that; the plain process and as a part of that."""
-    takes: tuple[Take, ...] = (
-        lambda one: one.before,
-        lambda one: one.meanwhile,
-        lambda one: one.plainly,
+async def _windows(made: Scene, rounds: Sequence[Round]) -> Windows:
+    """Looked at when all rounds are over: it takes the loop that the good ones' answers come to."""
+    await asyncio.sleep(LAST_FRAME_S)
+    calls, frames = tuple(made.calls), made.frames()
+    before, meanwhile, plainly = (
+        [window(calls, frames, span) for span in spans if span is not None]
+        for spans in zip(*((r.before, r.meanwhile, r.plainly) for r in rounds), strict=True)
     )
-    groups = [rounds[at::REPEATS] for at in range(REPEATS)]
-    before, *others = ([_p99(group, take, kind) for group in groups] for take in takes)
+    made.calls.clear()
+    return before, meanwhile, plainly
+
+
+def _columns(windows: Windows, kind: str) -> list[str]:
+    """Before; meanwhile and as a part of that; the plain process and as a part of that."""
+    before, *others = (
+        [p99(getattr(one, kind) for one in some[at::REPEATS]) for at in range(REPEATS)]
+        for some in windows
+    )
     columns = [_spread(before)]
     for other in others:
         parts = [a / b if a and b else None for a, b in zip(other, before, strict=True)]
         columns += [_spread(other), _spread(parts)]
     return columns
-
-
-def _p99(rounds: Sequence[Round], take: Take, kind: str) -> float | None:
-    windows = [taken for one in rounds if (taken := take(one)) is not None]
-    return p99(getattr(one, kind) for one in windows)
 
 
 def _spread(values: Sequence[float | None]) -> str:
@@ -134,7 +141,7 @@ async def main(times: int, confinement: Confinement) -> tuple[str, str]:
             often = times // LONG if way.is_long else times
             rounds = [await misbehave(made, way, decisions) for _ in range(often)]
             told.append(told_row(way, rounds))
-            peace.append(peace_row(way, rounds))
+            peace.append(peace_row(way, await _windows(made, rounds)))
             print(" | ".join((*told[-1], *peace[-1][1:])), flush=True)
         assert made.workers.pids() == pids, "the good ones are those of the beginning"
     return table(TOLD_HEAD, told), table(PEACE_HEAD, peace)

@@ -11,15 +11,13 @@ from dataclasses import dataclass
 from benchmarks.misbehaviour.plain import plain
 from benchmarks.misbehaviour.scene import HOST, Scene
 from benchmarks.misbehaviour.ways import Way
-from benchmarks.misbehaviour.windows import Window, window
+from benchmarks.misbehaviour.windows import Span
 
 from nondum.host.workers.worker import Worker
 from nondum.sdk.errors import Problem
 
 BASELINE_S = 0.6
 SETTLED_S = 0.3
-LAST_FRAME_S = 0.05
-"""A frame that was made in a window has been seen by then."""
 
 
 @dataclass(frozen=True)
@@ -31,10 +29,10 @@ class Round:
     gone_s: float
     """From there until nothing of the worker was left; 0 where it goes on."""
     code: str
-    before: Window
-    meanwhile: Window
-    plainly: Window | None
-    """While a plain process did the same."""
+    before: Span
+    meanwhile: Span
+    plainly: Span | None
+    """In which a plain process did the same."""
 
 
 class Decisions:
@@ -59,10 +57,10 @@ async def misbehave(made: Scene, way: Way, decisions: Decisions) -> Round:
     """Have it happen once."""
     await made.start("guest", way.body)
     await asyncio.sleep(SETTLED_S)
-    before = await _span(made, BASELINE_S)
+    quiet_s = time.monotonic()
+    await asyncio.sleep(BASELINE_S)
     made.events.clear()
     decisions.at_s.clear()
-    made.calls.clear()
     begun_s = time.monotonic()
     call = made.workers.behave("guest", "do", {"u": f"{HOST}__guest__it"})
     if way.signals is not None:
@@ -72,37 +70,23 @@ async def misbehave(made: Scene, way: Way, decisions: Decisions) -> Round:
         call.halt()
     at_s, code = await made.until_told(begun_s, way.codes)
     told_s = decisions.at_s[0] if decisions.at_s and way.is_ended else at_s
-    await asyncio.sleep(LAST_FRAME_S)
-    meanwhile = window(made.calls, made.frames(), begun_s, at_s)
     await made.workers.stop("guest", 0.5)
     return Round(
         told_s=told_s - begun_s,
         gone_s=at_s - told_s if way.is_ended else 0.0,
         code=code,
-        before=before,
-        meanwhile=meanwhile,
+        before=Span(quiet_s, begun_s),
+        meanwhile=Span(begun_s, at_s),
         plainly=await _plainly(made, way, at_s - begun_s) if way.has_plain else None,
     )
 
 
-async def _plainly(made: Scene, way: Way, long_s: float) -> Window:
+async def _plainly(made: Scene, way: Way, long_s: float) -> Span:
     async with plain(way, made.folder / "plain", made.cages) as process:
         await asyncio.sleep(SETTLED_S)
-        made.calls.clear()
         begun_s = time.monotonic()
         assert process.stdin is not None
         process.stdin.write(b"\n")
         process.stdin.flush()
         await asyncio.sleep(long_s)
-    over_s = time.monotonic()
-    await asyncio.sleep(LAST_FRAME_S)
-    return window(made.calls, made.frames(), begun_s, over_s)
-
-
-async def _span(made: Scene, long_s: float) -> Window:
-    made.calls.clear()
-    begun_s = time.monotonic()
-    await asyncio.sleep(long_s)
-    over_s = time.monotonic()
-    await asyncio.sleep(LAST_FRAME_S)
-    return window(made.calls, made.frames(), begun_s, over_s)
+    return Span(begun_s, time.monotonic())

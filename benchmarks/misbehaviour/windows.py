@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -11,6 +11,13 @@ from benchmarks.measuring import percentile
 
 FEW = 100
 """So many have no 99th percentile."""
+
+
+class Span(NamedTuple):
+    """From when until when."""
+
+    begun_s: float
+    over_s: float
 
 
 class Call(NamedTuple):
@@ -38,13 +45,14 @@ class Window:
     """Frames that were made and not seen."""
 
 
-def window(calls: Iterable[Call], frames: Sequence[Frame], begun_s: float, over_s: float) -> Window:
+def window(calls: Iterable[Call], frames: Iterable[Frame], span: Span) -> Window:
     """What of it lay in that span, be it in part.
 
     >>> frames = [Frame(1, 0.0, 0.1), Frame(2, 1.0, 1.5), Frame(4, 3.0, 3.25)]
-    >>> window([Call(0.0, 0.1), Call(0.9, 0.2)], frames, 1.0, 4.0)
+    >>> window([Call(0.0, 0.1), Call(0.9, 0.2)], frames, Span(1.0, 4.0))
     Window(calls_ms=(200.0,), frames_ms=(500.0, 250.0), lost=1)
     """
+    begun_s, over_s = span
     seen = [frame for frame in frames if frame.seen_s >= begun_s and frame.made_s <= over_s]
     return Window(
         tuple(
