@@ -98,7 +98,7 @@ def linked(to: str, name: str) -> Callable[[Bench], None]:
 
 def beside_a_changed_one(bench: Bench) -> None:
     """One payload is well, and another has a changed file."""
-    other = Bench(bench.drive, bench.number * 1000 + 1, bench.canary, bench.sign)
+    other = Bench(bench.drive, (bench.number + 1) * 1000 + 1, bench.canary, bench.sign)
     bench.sound()
     other.draft().write(bench.drive, bench.sign)
     with (other.folder / "index.json").open("ab") as index:
