@@ -23,7 +23,7 @@ REPEATS = 4
 """Percentiles that are compared: the rounds of a way are put together. One that is ended at once
 leaves a dozen calls."""
 LONG = 5
-"""Ways that take seconds are done so many times less often."""
+"""A way that takes seconds is measured in a fifth of the rounds."""
 
 Windows = tuple[Sequence[Window], Sequence[Window], Sequence[Window]]
 """Before, meanwhile, and while a plain process did the same."""

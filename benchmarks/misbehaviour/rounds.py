@@ -40,7 +40,7 @@ class Decisions:
 
     def __init__(self) -> None:
         self.at_s: list[float] = []
-        Worker.end = self._watched(Worker.end)  # type: ignore
+        Worker.end = self._watched(Worker.end)  # type: ignore[method-assign, assignment]
 
     def _watched(
         self, end: Callable[[Worker, Problem, float], None]

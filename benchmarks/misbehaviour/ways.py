@@ -13,7 +13,7 @@ class Way:
     name: str
     body: str
     codes: tuple[str, ...]
-    """What it is told with."""
+    """The host tells of it with one of these."""
     is_ended: bool = True
     signals: signal.Signals | None = None
     halts: bool = False

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from benchmarks.measuring import percentile
 
 FEW = 100
-"""So many have no 99th percentile."""
+"""No 99th percentile is taken of fewer measurements."""
 
 
 class Span(NamedTuple):

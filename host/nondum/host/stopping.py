@@ -88,7 +88,7 @@ def is_stop_for_stranger(words: str, mind: Mind) -> bool:
 
 
 def said_to(words: str, hosts: Sequence[str], mind: Mind) -> tuple[str | None, str]:
-    """The host that words are said to by its name, and the words without it; None: to nobody.
+    """The host whose name a sentence has, and the sentence without it; None: no host's name.
 
     The name comes first, or behind a word that stops where no phrase says the whole sentence.
     """

@@ -1,4 +1,4 @@
-"""Whom a sentence stops that names somebody, where phrases may say the same words."""
+"""Which hosts stop by a sentence with a name, where phrases may say the same words."""
 
 from __future__ import annotations
 

@@ -110,3 +110,12 @@ async def test_mistakes_without_end_are_not_all_kept() -> None:
     ]
     assert sum(told) == MOST
     assert [problem.where for problem in faults] == [f"a.py:{MOST - n}" for n in (3, 2, 1)]
+
+
+def test_a_condition_that_ends_again_and_again_ends_at_one_place() -> None:
+    faults = Faults()
+    places = ("a.py:1", "a.py:2", "a.py:3")
+    faults.take(WorkerFaulted("gps", tuple(Problem("MESSAGE_FIELD", "x", p) for p in places)))
+    for place in places:
+        faults.end("watch", place)
+    assert [problem.where for problem in faults] == ["a.py:1", "a.py:2"]

@@ -18,17 +18,19 @@ class Faults:
 
     def __init__(self) -> None:
         self._known: dict[tuple[str, str], Problem] = {}
-        self._ended: set[str] = set()
-        """Places where conditions have ended."""
+        self._ended: dict[str, str] = {}
+        """Condition → the place where it ended: a worker may say so again and again."""
 
     def __iter__(self) -> Iterator[Problem]:
-        """The newest of those that have not ended a condition: such an end is told by itself."""
-        left = [problem for (_, at), problem in self._known.items() if at not in self._ended]
+        """The newest, without those that ended a condition: the worker tells of such an end."""
+        left = [
+            problem for (_, at), problem in self._known.items() if at not in self._ended.values()
+        ]
         yield from left[-SHOWN:]
 
-    def end(self, place: str) -> None:
+    def end(self, condition: str, place: str) -> None:
         """A condition has ended at a place, `where` as of faults there."""
-        self._ended.add(place)
+        self._ended[condition] = place
 
     def take(self, faulted: WorkerFaulted) -> bool:
         """Take in one more. Says whether it is new and to be told."""

@@ -434,7 +434,7 @@ class Worker:
         """A condition will tell nothing any more; `tell_conditions` tells it again."""
         component = self.spec.component
         if problem.where:
-            self.faults.end(placed(component, problem.where))
+            self.faults.end(condition, placed(component, problem.where))
         where = placed(f"{condition} of {component}", problem.where)
         self.dead_conditions[condition] = replace(problem, where=where)
         self.tell_conditions()
