@@ -49,7 +49,7 @@ _POINTING = _AT | {"this", "that", "all"}
 
 
 def stop_patterns(name: str) -> tuple[str, ...]:
-    """Patterns for recognisers of speech, in which a `name` may come before the word or behind it.
+    """Patterns for those who listen, in which a `name` may come before the word or behind it.
 
     >>> stop_patterns("{who}")[0], stop_patterns("{who}")[-1]
     ('[{who}] [please] stop [now]', "[please] don't move {who} [now]")
