@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time
 from collections.abc import Iterator
@@ -25,11 +26,14 @@ def pss_mb(pid: int, proc: Path = PROC) -> float:
 
 
 def descendants(pid: int, proc: Path = PROC) -> Iterator[int]:
-    """All processes below one, nearest first."""
-    for task in sorted((proc / str(pid) / "task").iterdir()):
-        for child in (task / "children").read_text().split():
-            yield int(child)
-            yield from descendants(int(child), proc)
+    """All processes below one, nearest first; those that end meanwhile may be left out."""
+    children: list[int] = []
+    with contextlib.suppress(OSError):
+        for task in sorted((proc / str(pid) / "task").iterdir()):
+            children += map(int, (task / "children").read_text().split())
+    for child in children:
+        yield child
+        yield from descendants(child, proc)
 
 
 def cpu_s(pid: int, proc: Path = PROC) -> float:

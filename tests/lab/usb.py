@@ -92,10 +92,20 @@ class Usb:
         behind: tuple[str, dict[str, str]] | None,
         options: dict[str, Any],
     ) -> str:
+        port = port or self._free()
         place = {"port": port} if port is not None else {}
         self._qmp.do("device_add", driver=driver, id=name, bus=BUS, **place, **options)
         self._plugged[name] = _Plugged(port, behind)
         return name
+
+    def _free(self) -> str | None:
+        """A port of the controller, of those that are free the last one: scenarios name the first.
+
+        QEMU takes the one that has been free for longest, which may be any of them. The very first
+        is left to it: it makes a hub of its own there, for what comes when no other is free.
+        """
+        taken = {each.port for each in self._plugged.values()}
+        return next((port for port in map(str, range(PORTS, 1, -1)) if port not in taken), None)
 
     def _gone_with(self, name: str) -> list[str]:
         """What goes when something is pulled: it, and all behind its port if it is a hub."""

@@ -10,6 +10,8 @@ HEARD = ".heard"
 """Suffix of files that have been taken: a restart must not hear a goal again."""
 UNFINISHED_S = 2.0
 """A file that was written to a shorter time ago, and is no WAV file yet, may become one."""
+MARK_BYTES = 100
+"""No mark is longer."""
 
 
 class Inbox:
@@ -22,13 +24,40 @@ class Inbox:
     def waiting(self) -> Iterator[Path]:
         """The files that nobody has taken, oldest first."""
         found = [path for path in self.folder.glob("*.wav") if path.is_file()]
-        yield from sorted(found, key=lambda path: (path.stat().st_mtime_ns, path.name))
+        left = [path for path in found if not _is_marked(path)]
+        yield from sorted(left, key=lambda path: (path.stat().st_mtime_ns, path.name))
 
-    def take(self, path: Path) -> Path:
-        """Mark a file as heard *before* it is heard: it is never heard twice. Raises `OSError`."""
-        return path.rename(path.with_name(path.name + HEARD))
+    def take(self, path: Path) -> None:
+        """Mark a file as heard *before* it is heard: it is never heard twice.
+
+        It is renamed. A file that may not be, as one of another user of this machine (EOVERFLOW
+        where this folder's users are mapped), stays, and a mark lies beside it. Raises `OSError`.
+        """
+        heard = _heard(path)
+        try:
+            path.rename(heard)
+        except OSError:
+            heard.write_bytes(_mark(path))
 
 
 def may_grow(path: Path) -> bool:
     """Whether somebody may still be writing a file."""
     return time.time() - path.stat().st_mtime < UNFINISHED_S
+
+
+def _heard(path: Path) -> Path:
+    return path.with_name(path.name + HEARD)
+
+
+def _mark(path: Path) -> bytes:
+    """Which file it is; not when it was written: a copy may be given its time afterwards."""
+    status = path.stat()
+    return f"file {status.st_ino} of {status.st_size} bytes\n".encode()
+
+
+def _is_marked(path: Path) -> bool:
+    try:
+        with _heard(path).open("rb") as heard:
+            return heard.read(MARK_BYTES) == _mark(path)
+    except OSError:
+        return False

@@ -48,6 +48,16 @@ def test_sentence_that_was_said_is_heard(bench: Any, say: Say, tmp_path: Path) -
     assert [path.name for path in (tmp_path / "in").iterdir()] == ["one.wav.heard"]
 
 
+def test_file_that_cannot_be_marked_is_told_and_others_are_heard(
+    bench: Any, say: Say, tmp_path: Path
+) -> None:
+    bench.ask("learn_words", vocabulary=WORDS)
+    (tmp_path / "in" / "one.wav.heard").mkdir()
+    say("Follow quadrotors.").rename(tmp_path / "in" / "one.wav")
+    say("Follow people.").rename(tmp_path / "in" / "two.wav")
+    assert bench.ask("listen") == {"words": "follow people"}
+
+
 def test_what_is_heard_before_anything_was_learnt_waits(
     bench: Any, say: Say, tmp_path: Path
 ) -> None:

@@ -11,7 +11,7 @@ import pytest
 from tests.kit.clock import VirtualClock
 from tests.kit.guest import do, guest_spec, plugin
 from tests.kit.processes import is_alive, until_gone
-from tests.kit.until import arrived
+from tests.kit.until import arrived, until
 from tests.kit.workers import WorkersUnderTest
 
 from nondum.host.events import (
@@ -283,6 +283,28 @@ async def test_behaviour_that_does_not_halt_costs_its_worker(
     assert not is_alive(pid)
     assert (await tested.until(WorkerExited)).reason.startswith("HALT_OVERDUE")
     await tested.until_ready(2)
+
+
+async def test_behaviour_that_halted_while_the_host_stood_still_costs_nothing(
+    tested: WorkersUnderTest, clock: VirtualClock
+) -> None:
+    body = (
+        "await ctx.established()\n"
+        "try:\n"
+        "    await asyncio.sleep(60)\n"
+        "finally:\n"
+        "    answered = pathlib.Path('answered').touch\n"
+        "    asyncio.get_running_loop().call_later(0.05, answered)"
+    )
+    await guest(tested, body, "import pathlib")
+    call = do(tested)
+    await tested.until(BehaviourEstablished)
+    call.halt()
+    until("it has answered", (tested.folder / "guest/scratch/answered").exists)
+    await clock.stand_still(tested.timing.halt_s)
+    assert await call.ended() is RunState.HALTED
+    again = do(tested)
+    await tested.until(BehaviourEstablished, lambda event: event.call_id == again.id)
 
 
 async def test_stop_ends_what_ignores_everything(

@@ -199,7 +199,7 @@ class Worker:
             call.end(RunState.FAILED, problems.words(error))
             return
         self._calls[pending.id] = call
-        call.when_halted(lambda: self._halt(pending.id, call))
+        call.when_halted(lambda: self._halt(pending, call.behaviour))
         try:
             call.end(*await self._outcome(pending, call))
         finally:
@@ -367,13 +367,15 @@ class Worker:
             return RunState.HALTED if is_halted else RunState.FAILED, problems.words(error)
         return RunState.SUCCEEDED, answer
 
-    def _halt(self, call_id: int, call: Call) -> None:
-        self.link.cancel(call_id)
-        self._loop.call_later(self._timing.halt_s, self._insist, call)
+    def _halt(self, pending: Pending, behaviour: str) -> None:
+        self.link.cancel(pending.id)
+        self._loop.call_later(self._timing.halt_s, self._insist, pending, behaviour)
 
-    def _insist(self, call: Call) -> None:
-        if not call.state.has_ended:
-            problem = problems.unhalted(self.spec.component, call.behaviour, self._timing.halt_s)
+    def _insist(self, pending: Pending, behaviour: str) -> None:
+        # the answer, not the call's state, which is a turn of the loop behind: a loop that was held
+        # up reads the answer in the turn in which this timer is due
+        if not pending.outcome.done():
+            problem = problems.unhalted(self.spec.component, behaviour, self._timing.halt_s)
             self.end(problem, self._timing.term_s)
 
     def _beat(self) -> None:
