@@ -99,10 +99,10 @@ class Usb:
         return name
 
     def _free(self) -> str | None:
-        """A port of the controller, of those that are free the last one: scenarios name the first.
+        """The last free port of the controller (scenarios name the first ones); None: QEMU chooses.
 
-        QEMU takes the one that has been free for longest, which may be any of them. The very first
-        is left to it: it makes a hub of its own there, for what comes when no other is free.
+        QEMU takes the port that has been free for longest, which may be one that a scenario names
+        later. Port 1 is left to it: when no other is free, it plugs in a hub of its own there.
         """
         taken = {each.port for each in self._plugged.values()}
         return next((port for port in map(str, range(PORTS, 1, -1)) if port not in taken), None)

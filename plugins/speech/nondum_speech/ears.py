@@ -61,15 +61,14 @@ class Ears:
     async def watch(self, inbox: Inbox) -> None:
         """Hear the files that are put into a folder, for ever."""
         await self._learnt.wait()
-        told: set[Path] = set()
         while True:
             for path in inbox.waiting():
                 try:
                     await self._hear_file(inbox, path)
                 except OSError as error:  # it has gone, or cannot be marked as heard
-                    if path.exists() and path not in told:
+                    with contextlib.suppress(FileNotFoundError):
+                        inbox.give_up(path)
                         self._log.warning("%s is not heard: %s", path.name, error)
-                        told.add(path)
             await asyncio.sleep(LOOK_S)
 
     async def attend(self, pieces: AsyncIterator[bytes]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,25 +20,35 @@ class Inbox:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        self._given_up: dict[Path, bytes] = {}
+        """Files that can be neither renamed nor marked, and their marks."""
         folder.mkdir(parents=True, exist_ok=True)
 
     def waiting(self) -> Iterator[Path]:
         """The files that nobody has taken, oldest first."""
-        found = [path for path in self.folder.glob("*.wav") if path.is_file()]
-        left = [path for path in found if not _is_marked(path)]
-        yield from sorted(left, key=lambda path: (path.stat().st_mtime_ns, path.name))
+        found: list[tuple[int, Path]] = []
+        for path in self.folder.glob("*.wav"):
+            with contextlib.suppress(OSError):  # it has gone meanwhile
+                mark = _mark(path)
+                if path.is_file() and mark not in (self._given_up.get(path), _marked(path)):
+                    found.append((path.stat().st_mtime_ns, path))
+        yield from (path for _, path in sorted(found))
 
     def take(self, path: Path) -> None:
         """Mark a file as heard *before* it is heard: it is never heard twice.
 
-        It is renamed. A file that may not be, as one of another user of this machine (EOVERFLOW
-        where this folder's users are mapped), stays, and a mark lies beside it. Raises `OSError`.
+        It is renamed. One that this user may not rename, as one of root's in a mount with mapped
+        users (EOVERFLOW), stays, and a mark lies beside it. Raises `OSError`.
         """
         heard = _heard(path)
         try:
             path.rename(heard)
         except OSError:
             heard.write_bytes(_mark(path))
+
+    def give_up(self, path: Path) -> None:
+        """Never hear a file that cannot be taken. Raises `OSError` if it has gone."""
+        self._given_up[path] = _mark(path)
 
 
 def may_grow(path: Path) -> bool:
@@ -55,9 +66,10 @@ def _mark(path: Path) -> bytes:
     return f"file {status.st_ino} of {status.st_size} bytes\n".encode()
 
 
-def _is_marked(path: Path) -> bool:
+def _marked(path: Path) -> bytes | None:
+    """The mark that lies beside a file; what lies there may be another recording, too."""
     try:
         with _heard(path).open("rb") as heard:
-            return heard.read(MARK_BYTES) == _mark(path)
+            return heard.read(MARK_BYTES)
     except OSError:
-        return False
+        return None

@@ -54,3 +54,7 @@ def test_file_that_cannot_be_marked_is_not_taken(inbox: Inbox, tmp_path: Path) -
     with pytest.raises(IsADirectoryError):
         inbox.take(path)
     assert list(inbox.waiting()) == [path]
+    inbox.give_up(path)
+    assert not list(inbox.waiting())
+    path.write_bytes(b"RIFF and more")
+    assert list(inbox.waiting()) == [path]

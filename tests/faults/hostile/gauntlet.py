@@ -104,8 +104,9 @@ class Gauntlet:
         self._healthy: list[Row] = []
         self._traces: Traces | None = None
         self._made: dict[str, str] = {}
-        self._last_row: dict[str, int] = {}
         """Drive → what it was made as."""
+        self._last_row: dict[str, int] = {}
+        """Drive → the last entry of the journal that was read on it."""
 
     def begin(self) -> None:
         """Have the benign payloads at work."""
@@ -212,8 +213,8 @@ class Gauntlet:
     def _told_of_trust(self, drive: Plugged) -> list[str]:
         """The problems of trust files that it brought: the drive and its payloads have none.
 
-        They come before what its payloads come to. A view has the last sentences only: too few
-        where many drives are told of between two views.
+        They come before what its payloads come to. They are read from the journal: a view has the
+        last 50 sentences, and many drives at once make more than that before the next view.
         """
         name = drive.folder.name
         rows = self.host.ask("journal", subject=name, limit=MOST_ROWS)

@@ -228,7 +228,8 @@ class Bridge:
         except (NondumError, TimeoutError) as error:
             link.close()
             await process.end(0)
-            told = f"the bridge to other hosts does not start: {error}"
+            why = str(error) or f"no answer for {START_S:g} s"
+            told = f"the bridge to other hosts does not start: {why}"
             raise WorkerFailed(Problem("BRIDGE_START", told)) from error
         except BaseException:
             link.close()

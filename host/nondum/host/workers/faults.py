@@ -23,9 +23,8 @@ class Faults:
 
     def __iter__(self) -> Iterator[Problem]:
         """The newest, without those that ended a condition: the worker tells of such an end."""
-        left = [
-            problem for (_, at), problem in self._known.items() if at not in self._ended.values()
-        ]
+        ended = {*self._ended.values()}
+        left = [problem for (_, at), problem in self._known.items() if at not in ended]
         yield from left[-SHOWN:]
 
     def end(self, condition: str, place: str) -> None:
