@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-import pytest
+import asyncio
 
-from nondum.host.bridge.bridge import Bridge
+import pytest
+from tests.kit.clock import VirtualClock
+
+from nondum.host.bridge.bridge import START_S, Bridge
 from nondum.sdk.errors import LinkClosed, ProtocolViolation, WorkerFailed
 
 pytestmark = pytest.mark.anyio
@@ -15,6 +18,22 @@ async def test_bridge_that_cannot_listen_says_so() -> None:
     with pytest.raises(WorkerFailed, match="BRIDGE_START"):
         async with bridge.kept():
             pass
+    assert bridge.pid is None
+    await bridge.close()
+
+
+async def test_bridge_that_does_not_answer_in_time_says_so(clock: VirtualClock) -> None:
+    bridge = Bridge(("tcp://127.0.0.1:0",))
+
+    async def kept() -> None:
+        async with bridge.kept():
+            pass
+
+    starting = asyncio.ensure_future(kept())
+    await clock.advance(START_S)  # sooner than any process is there
+    with pytest.raises(WorkerFailed, match=f"{START_S:g} s") as failed:
+        await starting
+    assert [problem.code for problem in failed.value.problems] == ["BRIDGE_START"]
     assert bridge.pid is None
     await bridge.close()
 
