@@ -30,6 +30,7 @@ import zmq
 from measuring import Spread
 
 from nondum.host.bridge.bridge import Bridge
+from nondum.host.lifecycle.children import Children
 from nondum.sdk import Header, Image
 from nondum.sdk.packets import SocketPackets
 from nondum.sdk.streams import Consumer, Producer
@@ -186,7 +187,8 @@ def _out(process: subprocess.Popen[str]) -> IO[str]:
 
 @contextlib.asynccontextmanager
 async def by_bridges(run: Run) -> AsyncIterator[Send]:
-    owner, reader = Bridge(HERE), Bridge(HERE)
+    children = Children()
+    owner, reader = Bridge(children.forks, HERE), Bridge(children.forks, HERE)
     producer = Producer("image")
     try:
         ours, theirs = link_sockets()
@@ -206,6 +208,7 @@ async def by_bridges(run: Run) -> AsyncIterator[Send]:
         producer.close()
         await owner.close()
         await reader.close()
+        await children.close()
 
 
 @contextlib.asynccontextmanager

@@ -217,6 +217,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
         f"{_TH}/bridge/test_start.py",
         f"{_OWNERS[1]}::test_killed_bridge_ends_its_streams_and_a_new_one_serves",
     ),
+    f"{_H}/bridge/process.py": (f"{_TH}/bridge/test_start.py",),
     f"{_H}/bridge/inbound.py": (f"{_TH}/bridge/test_inbound.py",),
     f"{_H}/bridge/jpeg.py": (f"{_TH}/bridge/test_jpeg.py",),
     f"{_H}/bridge/remote_streams.py": _STREAMS,

@@ -9,6 +9,8 @@ from collections.abc import AsyncIterator, Callable
 import numpy as np
 
 from nondum.host.bridge.bridge import Bridge, Grant
+from nondum.host.lifecycle.children import Children
+from nondum.host.lifecycle.fork_client import ForkClient
 from nondum.sdk.errors import Problem, ProtocolViolation
 from nondum.sdk.messages import Header, Image, Message
 from nondum.sdk.packets import SocketPackets
@@ -86,8 +88,9 @@ class Over:
 class Pair:
     """The bridge of a host that has a stream, and that of one that reads it."""
 
-    def __init__(self, owner: Bridge, reader: Bridge) -> None:
-        self.owner, self.reader = owner, reader
+    def __init__(self, owner: Bridge, reader: Bridge, client: ForkClient) -> None:
+        self.owner, self.reader, self.forks = owner, reader, client
+        """The fork server is the reader's."""
         self._producers: list[Producer] = []
         self._readers: list[Reader] = []
 
@@ -117,16 +120,45 @@ class Pair:
 
 
 @contextlib.asynccontextmanager
+async def forks() -> AsyncIterator[ForkClient]:
+    """A host's fork server, ended after the block with all that it forked."""
+    children = Children()
+    try:
+        yield children.forks
+    finally:
+        await children.close()
+
+
+@contextlib.asynccontextmanager
+async def bridge_of(
+    client: ForkClient,
+    listen: tuple[str, ...] = HERE,
+    *,
+    port: int = 0,
+    idle_s: float = 10.0,
+) -> AsyncIterator[Bridge]:
+    """A bridge, ended after the block."""
+    bridge = Bridge(client, listen, port=port, idle_s=idle_s)
+    try:
+        yield bridge
+    finally:
+        await bridge.close()
+
+
+@contextlib.asynccontextmanager
 async def pair(*, idle_s: float = 10.0) -> AsyncIterator[Pair]:
     """Two bridges, ended after the block."""
-    owner, reader = Bridge(HERE, idle_s=idle_s), Bridge(HERE, idle_s=idle_s)
-    made = Pair(owner, reader)
-    try:
-        yield made
-    finally:
-        made.close()
-        await owner.close()
-        await reader.close()
+    async with (
+        forks() as owners,
+        forks() as readers,
+        bridge_of(owners, idle_s=idle_s) as owner,
+        bridge_of(readers, idle_s=idle_s) as reader,
+    ):
+        made = Pair(owner, reader, readers)
+        try:
+            yield made
+        finally:
+            made.close()
 
 
 def header(seq: int) -> Header:

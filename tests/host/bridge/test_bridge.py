@@ -20,6 +20,8 @@ from tests.host.bridge.hosts import (
     Over,
     Pair,
     Reader,
+    bridge_of,
+    forks,
     header,
     noise,
     pair,
@@ -308,28 +310,20 @@ async def test_stopped_bridge_is_noticed_by_both() -> None:
 
 
 async def test_bridge_of_a_stranger_gets_nothing() -> None:
-    stranger = Bridge(HERE)
-    async with pair() as hosts:
-        try:
-            _, grant, _ = await hosts.export("image")
-            with pytest.raises(WorkerFailed, match="STREAM_NOT_GRANTED"):
-                await stranger.import_("image", HERE, grant, Over())
-            await hosts.reader.import_("image", HERE, grant, Over())
-        finally:
-            await stranger.close()
+    async with pair() as hosts, bridge_of(hosts.forks) as stranger:
+        _, grant, _ = await hosts.export("image")
+        with pytest.raises(WorkerFailed, match="STREAM_NOT_GRANTED"):
+            await stranger.import_("image", HERE, grant, Over())
+        await hosts.reader.import_("image", HERE, grant, Over())
 
 
 async def test_bridge_with_a_grant_gets_no_other_stream() -> None:
-    other = Bridge(HERE)
-    async with pair() as hosts:
-        try:
-            _, theirs, _ = await hosts.export("image")
-            _, own, _ = await hosts.export("depth", reader=other)
-            with pytest.raises(WorkerFailed, match="STREAM_NOT_GRANTED"):
-                await other.import_("image", HERE, theirs, Over())
-            await other.import_("depth", HERE, own, Over())
-        finally:
-            await other.close()
+    async with pair() as hosts, bridge_of(hosts.forks) as other:
+        _, theirs, _ = await hosts.export("image")
+        _, own, _ = await hosts.export("depth", reader=other)
+        with pytest.raises(WorkerFailed, match="STREAM_NOT_GRANTED"):
+            await other.import_("image", HERE, theirs, Over())
+        await other.import_("depth", HERE, own, Over())
 
 
 async def test_wrong_type_is_refused() -> None:
@@ -362,8 +356,11 @@ async def test_port_may_be_given_and_is_taken_once() -> None:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    one, other = Bridge(HERE, port=port), Bridge(HERE, port=port)
-    try:
+    async with (
+        forks() as client,
+        bridge_of(client, port=port) as one,
+        bridge_of(client, port=port) as other,
+    ):
         ours, theirs = link_sockets()
         with ours, theirs:
             async with one.kept() as key:
@@ -372,9 +369,6 @@ async def test_port_may_be_given_and_is_taken_once() -> None:
             async with other.kept():
                 pass
         assert other.pid is None
-    finally:
-        await one.close()
-        await other.close()
 
 
 async def test_nothing_runs_without_streams() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import PIL.Image
 import pytest
 import zmq
-from tests.host.bridge.hosts import HERE, Over, Reader
+from tests.host.bridge.hosts import HERE, Over, Reader, bridge_of, forks
 from tests.transport.bridge.ends import PATIENCE_S
 
 from nondum.host.bridge.bridge import Bridge, Grant
@@ -66,12 +66,12 @@ class Owner:
 
 @contextlib.asynccontextmanager
 async def both() -> AsyncIterator[tuple[Owner, Bridge]]:
-    owner, bridge = Owner(), Bridge(HERE)
+    owner = Owner()
     await owner.start()
     try:
-        yield owner, bridge
+        async with forks() as client, bridge_of(client) as bridge:
+            yield owner, bridge
     finally:
-        await bridge.close()
         await owner.close()
 
 

@@ -20,6 +20,7 @@ from nondum.host.bridge.bridge import Bridge
 from nondum.host.bridge.remote_streams import RemoteStreams
 from nondum.host.bridge.shared_streams import SharedStreams
 from nondum.host.events import WorkerReady
+from nondum.host.lifecycle.children import Children
 from nondum.host.workers.workers import Workers
 from nondum.planning.running import RunState
 from nondum.sdk.description import Output, Unit
@@ -86,7 +87,11 @@ class Fleet:
 @pytest.fixture
 async def fleet(tmp_path: Path) -> AsyncIterator[Fleet]:
     rover, base = WorkersUnderTest(tmp_path / "rover"), BaseWorkers(tmp_path / "base")
-    bridges = Bridge(HERE, idle_s=0.5), Bridge(HERE, idle_s=0.5)
+    children = Children()
+    bridges = (
+        Bridge(children.forks, HERE, idle_s=0.5),
+        Bridge(children.forks, HERE, idle_s=0.5),
+    )
     shared = SharedStreams(bridges[0], rover.workers.streams)
     made = Fleet(rover, base, shared, *bridges)
     remote = RemoteStreams(
@@ -100,6 +105,7 @@ async def fleet(tmp_path: Path) -> AsyncIterator[Fleet]:
     await rover.workers.close(grace_s=1.0)
     for bridge in bridges:
         await bridge.close()
+    await children.close()
     assert not [pid for pid in pids if is_alive(pid)], "workers are left"
 
 

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import logging
 import os
+import resource
 import select
 import signal
 import subprocess
@@ -19,6 +20,7 @@ from tests.kit.clock import VirtualClock
 from tests.kit.processes import process_ended
 from tests.kit.until import until_async
 
+from nondum.host.lifecycle import allowance
 from nondum.host.lifecycle.children import (
     ASIDE_STALL_S,
     KEPT,
@@ -74,6 +76,14 @@ async def test_child_without_an_owner_ends_with_its_job(tmp_path: Path) -> None:
     async with children() as pool:
         await pool.run("look", drive(tmp_path))
         assert not pool.kept()
+
+
+async def test_child_is_held_to_what_children_may_use(tmp_path: Path) -> None:
+    async with children() as pool:
+        await pool.run("look", drive(tmp_path), owner="a")
+        limits = (resource.RLIMIT_AS, resource.RLIMIT_CORE)
+        held = [resource.prlimit(pool.kept()["a"], limit) for limit in limits]
+        assert held == [(allowance.ADDRESS_SPACE, allowance.ADDRESS_SPACE), (0, 0)]
 
 
 async def test_few_children_are_kept_however_many_drives_there_are(tmp_path: Path) -> None:

@@ -120,6 +120,19 @@ async def test_end_of_a_process_is_seen_while_the_server_has_no_time_to_tell_it(
         child.close()
 
 
+async def test_server_that_has_ended_prepares_for_nothing_and_is_started_anew() -> None:
+    async with fork_client() as client:
+        await client.expect(JOB)
+        former = server_of(client)
+        with process_ended(former) as ended:
+            os.kill(former, signal.SIGKILL)
+            await ended.wait()
+        await client.expect(JOB)
+        forked = await client.fork(JOB, START_S)
+        assert server_of(client) != former
+        forked.close()
+
+
 async def test_process_that_nobody_waits_for_any_more_is_killed() -> None:
     async with fork_client() as client:
         (await client.fork(JOB, START_S)).close()

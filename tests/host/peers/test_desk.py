@@ -10,6 +10,7 @@ from tests.host.peers.watcher import component, no_claims, snapshot
 from tests.transport.fleet.fleets import mesh_member
 
 from nondum.host.bridge.bridge import Bridge
+from nondum.host.lifecycle.children import Children
 from nondum.host.peers.desk import Desk
 from nondum.host.peers.offered import Policy
 from nondum.host.peers.peering import Peering
@@ -60,7 +61,8 @@ async def test_only_streams_that_are_offered_are_opened(stream: str | None, code
         taken=dict,
         about={},
     )
-    bridge, desk = Bridge(("tcp://127.0.0.1:0",)), Desk()
+    children, desk = Children(), Desk()
+    bridge = Bridge(children.forks, ("tcp://127.0.0.1:0",))
     streams = StreamDesk(bridge, Streams("mule"), peering, fleet, lambda: ())
     streams.serve(desk)
     answer = desk.serve(errand("stream.open", {"stream": stream, "bridge": BRIDGE}))
@@ -69,5 +71,6 @@ async def test_only_streams_that_are_offered_are_opened(stream: str | None, code
         await asyncio.ensure_future(answer)
     assert refused.value.code == code
     assert bridge.pid is None
+    assert children.server is None
     await streams.close()
     await fleet.close()

@@ -1,6 +1,6 @@
 """The daemon's end of this host's bridge: a child that carries streams to and from other hosts.
 
-It is started with the first stream and ended some time after the last. Its keys are its own, made
+It is forked for the first stream and ended some time after the last. Its keys are its own, made
 at every start; the host's secret stays with the daemon.
 """
 
@@ -9,17 +9,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import itertools
-import os
 import secrets
-import signal
 import socket
-import subprocess
-import sys
 from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from nondum.host.workers.process import WorkerProcess
+from nondum.host.lifecycle.fork_client import ForkClient, Forked
 from nondum.sdk.errors import LinkClosed, NondumError, Problem, ProtocolViolation, WorkerFailed
 from nondum.sdk.wire_fields import read_problem
 from nondum.transport import WorkerLink, link_sockets
@@ -27,8 +23,13 @@ from nondum.transport.peers.keys import PeerKey
 
 IDLE_S = 10.0
 """How long a bridge without streams is kept."""
+FORK_S = 60.0
+"""How long the fork server may take, which may have to be started first."""
 START_S = 20.0
+"""How long the child may take from then on."""
 GRACE_S = 1.0
+NAME = "bridge"
+"""What the fork server knows it by (`lifecycle/jobs.py`)."""
 OnOver = Callable[[Problem], None]
 
 
@@ -51,22 +52,23 @@ class _Export:
 
 @dataclass(frozen=True, slots=True)
 class _Running:
-    process: WorkerProcess
+    process: Forked
     link: WorkerLink
     port: int
     key: PeerKey
 
 
 class Bridge:
-    """Starts the child when it is needed. Use it on the loop; `await close()` it."""
+    """Has the child forked when it is needed. Use it on the loop; `await close()` it."""
 
     def __init__(
-        self, listen: Sequence[str] = ("tcp://*:0",), *, port: int = 0, idle_s: float = IDLE_S
+        self, forks: ForkClient, listen: Sequence[str], *, port: int = 0, idle_s: float = IDLE_S
     ) -> None:
         """Listen on the interfaces of some addresses, `tcp://INTERFACE:PORT`, but at `port`.
 
-        Port 0 has the system pick one.
+        Port 0 has the system pick one. `forks` stays the caller's to close.
         """
+        self._forks = forks
         self._port = port
         self._interfaces = tuple(dict.fromkeys(interface(address) for address in listen))
         self._idle_s = idle_s
@@ -85,6 +87,10 @@ class Bridge:
     def pid(self) -> int | None:
         """Process id of the child, while there is one."""
         return self._running.process.pid if self._running else None
+
+    async def expect(self) -> None:
+        """Prepare for streams: the first one then waits for a fork only."""
+        await self._forks.expect(NAME)
 
     @contextlib.asynccontextmanager
     async def kept(self) -> AsyncIterator[PeerKey]:
@@ -213,8 +219,14 @@ class Bridge:
             raise LinkClosed(Problem("LINK_CLOSED", "the bridge is closed"))
         body = {"interfaces": list(self._interfaces), "port": self._port}
         ours, theirs = link_sockets()
-        with theirs:
-            process = WorkerProcess(_started(theirs.fileno()))
+        try:
+            with theirs:
+                process = await self._forks.fork(NAME, FORK_S, (theirs.fileno(),))
+        except BaseException as error:
+            ours.close()
+            if isinstance(error, OSError | EOFError):  # a TimeoutError is an OSError
+                raise _not_started(str(error) or f"no process for {FORK_S:g} s") from error
+            raise
         link = WorkerLink(
             ours,
             on_event=self._on_event,
@@ -226,14 +238,11 @@ class Bridge:
                 await link.meet({})
                 answer = await link.request("listen", body)
         except (NondumError, TimeoutError) as error:
-            link.close()
-            await process.end(0)
-            why = str(error) or f"no answer for {START_S:g} s"
-            told = f"the bridge to other hosts does not start: {why}"
-            raise WorkerFailed(Problem("BRIDGE_START", told)) from error
+            await _ended(link, process, 0)
+            raise _not_started(str(error) or f"no answer for {START_S:g} s") from error
         except BaseException:
             link.close()
-            process.signal(signal.SIGKILL)
+            _killed(process)
             raise
         return _Running(process, link, answer["port"], PeerKey(answer["key"]))
 
@@ -250,7 +259,8 @@ class Bridge:
         """End the child; whoever needs one from now on starts another."""
         running, self._running = self._running, None
         if running is not None:
-            task = asyncio.get_running_loop().create_task(_ended(running))
+            ending = _ended(running.link, running.process, GRACE_S)
+            task = asyncio.get_running_loop().create_task(ending)
             self._endings.add(task)
             task.add_done_callback(self._endings.discard)
 
@@ -275,7 +285,7 @@ class Bridge:
         if running is None or running.link is not link:
             return
         self._running = None
-        running.process.signal(signal.SIGKILL)
+        _killed(running.process)
         ended = [*(one.on_over for one in self._exports.values()), *self._imports.values()]
         self._exports.clear()
         self._imports.clear()
@@ -283,10 +293,28 @@ class Bridge:
             on_over(Problem("BRIDGE_DIED", "the bridge to other hosts has ended"))
 
 
-async def _ended(running: _Running) -> None:
-    running.link.close()
-    if not await running.process.wait(GRACE_S):
-        await running.process.end(0)
+async def _ended(link: WorkerLink, process: Forked, grace_s: float) -> None:
+    link.close()
+    if not await _is_over(process, grace_s):
+        process.kill()
+        await _is_over(process, GRACE_S)
+    process.close()
+
+
+async def _is_over(process: Forked, timeout_s: float) -> bool:
+    with contextlib.suppress(TimeoutError):
+        await asyncio.wait_for(process.over(), timeout_s)
+    return process.is_over
+
+
+def _killed(process: Forked) -> None:
+    process.kill()
+    process.close()
+
+
+def _not_started(why: str) -> WorkerFailed:
+    told = f"the bridge to other hosts does not start: {why}"
+    return WorkerFailed(Problem("BRIDGE_START", told))
 
 
 def interface(address: str) -> str:
@@ -305,14 +333,3 @@ def with_port(address: str, port: int) -> str:
     'tcp://10.0.0.7:40001'
     """
     return f"tcp://{interface(address)}:{port}"
-
-
-def _started(link: int) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-I", "-m", "nondum.host.bridge", str(link), str(os.getpid())]
-    return subprocess.Popen(
-        command,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        pass_fds=(link,),
-        start_new_session=True,
-    )

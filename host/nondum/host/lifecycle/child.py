@@ -1,7 +1,8 @@
 """The other end of `children.py`: a process that does jobs, one after the other.
 
-Run as a program, this is the fork server that such processes come from. They die with it, and it
-with the daemon; what they may use is bounded: what they read was written by strangers.
+Run as a program, this is the fork server that such processes come from, and those that run a
+service (`jobs.SERVICES`). They die with it, and it with the daemon; what they may use is bounded:
+what they read was written by strangers.
 """
 
 from __future__ import annotations
@@ -39,11 +40,16 @@ def main(daemon: int, channel: int) -> None:
     What this process gives up, its children have not, either.
     """
     own_children.settle(daemon, keeps=("mounts",))  # drives are mounted by them
-    confine_process()
     server = os.getpid()
-    if fork_server.serve(socket.socket(fileno=channel), prepare=_prepare, ahead=_ahead()):
-        kernel.end_with(server)
-        os.setsid()
+    name = fork_server.serve(socket.socket(fileno=channel), prepare=_prepare, ahead=_ahead())
+    if name is None:
+        return
+    kernel.end_with(server)
+    os.setsid()
+    if (service := name.decode()) in jobs.SERVICES:
+        jobs.find_service(service)(server)
+    else:
+        confine_process()
         work()
 
 
@@ -57,9 +63,9 @@ def work() -> None:
             _say(answers, _do(request["job"], request["arguments"], answers))
 
 
-def _prepare(job: bytes) -> None:
+def _prepare(name: bytes) -> None:
     """Import what a child is to do, once for all that will do it."""
-    _import(job.decode())
+    _import(name.decode())
     gc.freeze()  # a collection in a child would make pages its own that are shared
 
 
@@ -72,9 +78,10 @@ def _ahead() -> Iterator[None]:
     preflight.probe(Path.cwd(), reserve_mb=0, confinement=Level.NONE)
 
 
-def _import(job: str) -> None:
+def _import(name: str) -> None:
+    find = jobs.find_service if name in jobs.SERVICES else jobs.find
     with contextlib.suppress(Exception):  # it will be the child's, which tells of it
-        jobs.find(job)
+        find(name)
 
 
 def _do(job: str, arguments: dict[str, Any], answers: TextIO) -> dict[str, Any]:

@@ -55,7 +55,8 @@ class Children:
     ) -> None:
         """`on_crowded`: see `ForkClient`."""
         self._quiet_s = quiet_s
-        self._forks = ForkClient("nondum.host.lifecycle.child", on_crowded)
+        self.forks = ForkClient("nondum.host.lifecycle.child", on_crowded)
+        """What they are forked by, and services of the host beside them (`jobs.SERVICES`)."""
         self._kept: dict[str, Forked] = {}
         """Owner → the child that worked for it, and for nobody else; the last ones last."""
         self._busy: set[Forked] = set()
@@ -128,7 +129,7 @@ class Children:
     @property
     def server(self) -> int | None:
         """The process that they are forked from, while there is one."""
-        return self._forks.pid
+        return self.forks.pid
 
     def kept(self) -> dict[str, int]:
         """Owner → the process of the child that waits for more of its work."""
@@ -144,7 +145,7 @@ class Children:
         self._kept.clear()
         for child in self._left_behind:
             child.close()
-        await self._forks.close()
+        await self.forks.close()
 
     async def _take(self, owner: str, job: str) -> Forked:
         """A child that nobody else's bytes have touched."""
@@ -156,7 +157,7 @@ class Children:
         Raises `InstallFailed` (NO_RESOURCES, IO_ERROR, CHILD_DIED, CHILD_STALLED).
         """
         try:
-            return await self._forks.fork(job, START_S)
+            return await self.forks.fork(job, START_S)
         except TimeoutError as error:
             raise _stalled(job, START_S) from error
         except OSError as error:

@@ -11,7 +11,7 @@ import signal
 import socket
 import sys
 from asyncio.subprocess import DEVNULL, Process
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 from nondum.host.lifecycle import fork_server
 from nondum.sdk.packets import CROWDED_S, CROWDED_TRIES
@@ -124,13 +124,15 @@ class ForkClient:
         """The server's process, while there is one."""
         return self._server.pid if self._server is not None else None
 
-    async def fork(self, message: str, patience_s: float) -> Forked:
-        """A new process.
+    async def fork(
+        self, message: str, patience_s: float, descriptors: Sequence[int] = ()
+    ) -> Forked:
+        """A new process. It has copies of these descriptors as its 1, 2 …
 
         Raises `OSError` when none can be started, `EOFError` when the server ends as soon as it is
         started, `TimeoutError` when it does not answer for so long: then all that it forked ends.
         """
-        forking = asyncio.ensure_future(self._in_turn(message, patience_s))
+        forking = asyncio.ensure_future(self._in_turn(message, patience_s, descriptors))
         try:
             return await asyncio.shield(forking)
         except asyncio.CancelledError:  # the answer is read, or the next one would be taken for it
@@ -140,29 +142,40 @@ class ForkClient:
                 unwanted.close()
             raise
 
+    async def expect(self, message: str) -> None:
+        """Have the server prepare for such a process, so that one is there at once when it is
+        wanted. Nothing comes of it where that fails: `fork` would tell why."""
+        async with self._turn:
+            try:
+                if self._channel is None:
+                    self._channel = await self._start()
+                fork_server.ask(self._channel, message.encode(), ())
+            except OSError as error:
+                log.warning("the fork server cannot prepare for %s: %s", message, error)
+
     async def close(self) -> None:
         """End the server, and all that it forked."""
         async with self._turn:
             await self._end()
 
-    async def _in_turn(self, message: str, patience_s: float) -> Forked:
+    async def _in_turn(self, message: str, patience_s: float, descriptors: Sequence[int]) -> Forked:
         async with self._turn:
             try:
                 async with asyncio.timeout(patience_s):
-                    return await self._from_a_server(message)
+                    return await self._from_a_server(message, descriptors)
             except BaseException as error:
                 if not isinstance(error, OSError) or isinstance(error, TimeoutError):
                     await self._end()
                 raise
 
-    async def _from_a_server(self, message: str) -> Forked:
+    async def _from_a_server(self, message: str, descriptors: Sequence[int]) -> Forked:
         if self._channel is not None:
             with contextlib.suppress(EOFError):
-                return await self._fork(self._channel, message)
+                return await self._fork(self._channel, message, descriptors)
             log.warning("the fork server has ended; another one is started")
             await self._end()
         self._channel = await self._start()
-        return await self._fork(self._channel, message)
+        return await self._fork(self._channel, message, descriptors)
 
     async def _start(self) -> socket.socket:
         channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -183,24 +196,29 @@ class ForkClient:
                 raise
         return channel
 
-    async def _fork(self, channel: socket.socket, message: str) -> Forked:
+    async def _fork(
+        self, channel: socket.socket, message: str, descriptors: Sequence[int]
+    ) -> Forked:
         for _ in range(CROWDED_TRIES):
             try:
-                return await self._forked(channel, message)
+                return await self._forked(channel, message, descriptors)
             except OSError as error:
                 if error.errno != errno.ETOOMANYREFS:
                     raise
             self._on_crowded()
             await asyncio.sleep(CROWDED_S)
-        return await self._forked(channel, message)
+        return await self._forked(channel, message, descriptors)
 
-    async def _forked(self, channel: socket.socket, message: str) -> Forked:
+    async def _forked(
+        self, channel: socket.socket, message: str, descriptors: Sequence[int]
+    ) -> Forked:
         ours, theirs = socket.socketpair()
         reader, writer = await asyncio.open_unix_connection(sock=ours, limit=LINE_LIMIT)
         status, of_server = os.pipe()
         try:
             with theirs, _closed(of_server):
-                fork_server.ask(channel, message.encode(), (theirs.fileno(), of_server))
+                given = (theirs.fileno(), *descriptors, of_server)
+                fork_server.ask(channel, message.encode(), given)
             pid, descriptor = await _answer(channel)
         except BaseException as error:
             writer.close()

@@ -32,7 +32,8 @@ def ask(channel: socket.socket, message: bytes, descriptors: Sequence[int]) -> N
 
     It has these descriptors as its 0, 1 … in place of the server's, and no others but the server's
     standard ones. The last one is not for it: to this pipe the server writes the return code once
-    the process has ended, in decimal, negative for a signal.
+    the process has ended, in decimal, negative for a signal. Without descriptors, no process is
+    wanted yet, and nothing is answered: the server prepares for one when it has time.
     """
     socket.send_fds(channel, [message], list(descriptors))
 
@@ -65,10 +66,13 @@ def serve(
     was to be done for a while.
     """
     children = _Children(channel)
+    wanted: list[bytes] = []
     steps, is_ready = iter(ahead), False
     while True:
-        found = children.events(None if is_ready else IDLE_S)
-        if not found:
+        found = children.events(None if is_ready and not wanted else IDLE_S)
+        if not found and wanted:
+            prepare(wanted.pop(0))
+        elif not found:
             is_ready = next(steps, _NO_STEP) is _NO_STEP
         for descriptor in found:
             if descriptor != channel.fileno():
@@ -78,6 +82,9 @@ def serve(
             if request is None:
                 children.kill()
                 return None
+            if not request.descriptors:
+                wanted.append(request.message)
+                continue
             prepare(request.message)
             if children.fork(request.descriptors) == 0:
                 return request.message

@@ -34,12 +34,25 @@ JOBS: Mapping[str, str] = {
 }
 """`module:function`."""
 
+SERVICES: Mapping[str, str] = {"bridge": "nondum.host.bridge.process:main"}
+"""What a child runs for as long as it lives; it is told the process of the fork server."""
+
 AT_ONCE = ("look", "copy", "verify", "install")
 """What people wait for: a child that has time imports these before it is asked."""
 
 
 def find(name: str) -> Job:
     """The function that does a job. Raises `KeyError`."""
-    module, _, function = JOBS[name].partition(":")
-    job: Job = getattr(import_module(module), function)
+    job: Job = _imported(JOBS[name])
     return job
+
+
+def find_service(name: str) -> Callable[[int], None]:
+    """The function that runs a service. Raises `KeyError`."""
+    service: Callable[[int], None] = _imported(SERVICES[name])
+    return service
+
+
+def _imported(name: str) -> Any:
+    module, _, function = name.partition(":")
+    return getattr(import_module(module), function)

@@ -47,6 +47,7 @@ from nondum.transport.peers import (
     LinksFailed,
     PeerLost,
     PeerRefused,
+    PeerUp,
     Refusal,
     Security,
     Trust,
@@ -70,6 +71,7 @@ class Neighbourhood:
         stop: Callable[[], Stopped],
         answer: Reply,
         placement: Placement,
+        bridge: Bridge,
     ) -> None:
         """Use `open`. `mind` is asked for once the host runs; `stop` stops this host, `answer`
         answers what is asked about it."""
@@ -123,7 +125,6 @@ class Neighbourhood:
             refusals=self.fleet.refusals,
             links_pid=lambda: self.fleet.links_pid if isinstance(self.fleet, Mesh) else None,
         )
-        bridge = Bridge(self._listens, port=config.peers.stream_port)
         self._streams = StreamDesk(bridge, workers.streams, self.peering, self.fleet, self._hints)
         self._streams.serve(self.desk)
         self.trust = TrustOrders(
@@ -196,7 +197,11 @@ class Neighbourhood:
             judged_by=judged_by,
             known=lambda: made.view.known().values(),
         )
-        made = cls(config, keeper, workers, catalogue, emit, compute, mind, stop, answer, placement)
+        bridge = Bridge(children.forks, listens(config.peers), port=config.peers.stream_port)
+        made = cls(
+            *(config, keeper, workers, catalogue, emit, compute),
+            *(mind, stop, answer, placement, bridge),
+        )
         return made
 
     @property
@@ -269,8 +274,11 @@ class Neighbourhood:
                 log.warning("%s", problem)
                 self._mind().people.tell(str(problem))
         self.peering.on_fleet(event)
-        if isinstance(event, PeerLost):
-            self._streams.lose(event.key)
+        match event:
+            case PeerUp():
+                self._aside(self._streams.expect())
+            case PeerLost():
+                self._streams.lose(event.key)
 
     async def _look_at(self, event: CertificatesBrought) -> None:
         """Take this host's certificate, if a drive brought it, and is of use."""

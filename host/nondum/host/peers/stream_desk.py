@@ -44,6 +44,10 @@ class StreamDesk:
         desk.add("stream.open", self._open)
         desk.add("stream.close", self._close)
 
+    async def expect(self) -> None:
+        """A peer is here: streams may cross soon."""
+        await self._bridge.expect()
+
     def lose(self, peer: PeerKey) -> None:
         """A peer is gone: it reads nothing from now on."""
         task = asyncio.get_running_loop().create_task(self._shared.caller_lost(peer))

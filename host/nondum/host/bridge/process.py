@@ -1,12 +1,9 @@
-"""The bridge's process: `python -I -m nondum.host.bridge LINK DAEMON`.
-
-`LINK` is the descriptor of the link to the daemon, `DAEMON` its process id. It ends with either.
-"""
+"""The bridge's process, forked from the daemon's fork server (`lifecycle/jobs.py`)."""
 
 from __future__ import annotations
 
 import asyncio
-import fcntl
+import os
 import resource
 import socket
 import sys
@@ -14,23 +11,21 @@ import sys
 from nondum.host.bridge.service import Service
 from nondum.host.confinement import own_children
 
+LINK = 1
+"""The descriptor of the link to the daemon, with which the process ends."""
 MEMORY_BYTES = 2 * 1024**3
 """What strangers send is bounded piece by piece, and all together here (setrlimit(2))."""
 
 
-def main(link: int, daemon: int) -> int:
-    """Serve until the daemon is gone, or needs it no more."""
-    own_children.settle(daemon)
+def main(server: int) -> None:
+    """Serve until the daemon needs it no more, or the fork server ends."""
+    own_children.settle(server)
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_BYTES, MEMORY_BYTES))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    fcntl.fcntl(link, fcntl.F_SETFD, fcntl.FD_CLOEXEC)
+    link = os.dup(LINK)
+    os.dup2(sys.stderr.fileno(), LINK)  # whatever prints does not take part in the conversation
     asyncio.run(_serve(link))
-    return 0
 
 
 async def _serve(link: int) -> None:
     await Service(socket.socket(fileno=link)).run()
-
-
-if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]), int(sys.argv[2])))
