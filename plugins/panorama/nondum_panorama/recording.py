@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 Frame = npt.NDArray[np.uint8]
+Tell = Callable[[float], None]
+"""Is told how much has been done, 0 to 1, after each frame. What it raises ends the work."""
+
+
+def not_told(_done: float) -> None:
+    """A `Tell` for whoever does not care."""
+
 
 _JPEG_QUALITY = 95
 
@@ -26,13 +33,13 @@ class Recording:
         self._frames = frames
 
     @classmethod
-    def open(cls, video: Path, first: int, last: int) -> Recording:
+    def open(cls, video: Path, first: int, last: int, tell: Tell = not_told) -> Recording:
         """Read the stretch. Raises `OSError` when the video does not hold it."""
-        frames = {
-            number: _packed(frame)
-            for number, frame in enumerate(frames_of(video, stop=last + 1))
-            if number >= first
-        }
+        frames = {}
+        for number, frame in enumerate(frames_of(video, stop=last + 1)):
+            if number >= first:
+                frames[number] = _packed(frame)
+            tell((number + 1) / (last + 1))
         if len(frames) != last - first + 1:
             raise OSError(f"{video}: frames {first} to {last} are wanted, {len(frames)} are there")
         return cls(frames)

@@ -8,19 +8,23 @@ import math
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
 
 from nondum.sdk import BehaviourFailed, CameraModel, Context, Header, Image, Problem
 from nondum_panorama.capture import Capture
 from nondum_panorama.clip import Clip
 from nondum_panorama.heading import BodyHeading
 from nondum_panorama.playing import Score
-from nondum_panorama.recording import Frame, Recording
+from nondum_panorama.recording import Frame, Recording, Tell, not_told
 from nondum_panorama.settings import CameraSettings
 from nondum_panorama.view import Lens, View
 
+STEPS = 20
+"""How often reading a recording is told of, in all."""
 FrameSource = Callable[[int], Frame]
 """Gives the full frame of a number: colour, or whatever a camera makes of it."""
 
+_T = TypeVar("_T")
 _ENCODINGS = {2: "mono8", 3: "bgr8"}
 
 
@@ -79,10 +83,40 @@ def camera_model(view: View) -> CameraModel:
     return CameraModel(view.width, view.height, view.focal_px, view.focal_px, cx, cy)
 
 
-def open_recording(clip: Clip) -> Recording:
+async def opened(progress: Callable[[float, str], None], opening: Callable[[Tell], _T]) -> _T:
+    """Have `opening` read a recording in a thread, and return what it gives.
+
+    `progress` is called on the loop: a small computer may need longer than a behaviour may take
+    without a sign of progress. If this is cancelled, the thread ends with the next frame.
+    """
+    loop, told, is_over = asyncio.get_running_loop(), 0, False
+
+    def say(done: float) -> None:
+        if not is_over:
+            progress(done, "reads the recording")
+
+    def tell(done: float) -> None:
+        nonlocal told
+        if is_over:
+            raise _Halted
+        if int(done * STEPS) > told:
+            told = int(done * STEPS)
+            loop.call_soon_threadsafe(say, done)
+
+    try:
+        return await asyncio.to_thread(opening, tell)
+    finally:
+        is_over = True
+
+
+class _Halted(Exception):
+    """Ends a thread whose result is no longer wanted."""
+
+
+def open_recording(clip: Clip, tell: Tell = not_told) -> Recording:
     """Read a clip's stretch. Fails with RECORDING_UNREADABLE."""
     try:
-        return Recording.open(clip.video, clip.first, clip.last)
+        return Recording.open(clip.video, clip.first, clip.last, tell)
     except OSError as error:
         raise BehaviourFailed(Problem("RECORDING_UNREADABLE", str(error))) from error
 

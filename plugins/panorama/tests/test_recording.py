@@ -31,6 +31,14 @@ def test_stretch_beyond_the_end_is_refused() -> None:
         Recording.open(packaged_clip().video, 140, 160)
 
 
+def test_reading_tells_how_far_it_is_and_ends_where_that_raises() -> None:
+    told: list[float] = []
+    Recording.open(packaged_clip().video, 3, 4, told.append)
+    assert told == [0.2, 0.4, 0.6, 0.8, 1.0]
+    with pytest.raises(ZeroDivisionError):
+        Recording.open(packaged_clip().video, 3, 4, lambda done: 1 // 0)
+
+
 def test_file_that_is_no_video_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.avi"
     path.write_bytes(b"no video")

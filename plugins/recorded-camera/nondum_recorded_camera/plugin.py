@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
+from functools import partial
 
 from nondum.sdk import Context, DeviceNeed, Fragment, Input, Output, Unit, behaviour, hookimpl
 from nondum.sdk.settings import parse_settings
 from nondum_panorama.settings import CameraSettings
-from nondum_panorama.streaming import open_recording, play, relay
+from nondum_panorama.streaming import open_recording, opened, play, relay
 
 DEVICE = "camera"
 
@@ -58,5 +58,5 @@ async def stream(ctx: Context, u: str, o: str, h: str) -> None:
         await relay(ctx, o, settings, device.node)
     else:
         clip = settings.read_clip()
-        recording = await asyncio.to_thread(open_recording, clip)
+        recording = await opened(ctx.progress, partial(open_recording, clip))
         await play(ctx, o, settings, clip, recording.frame)

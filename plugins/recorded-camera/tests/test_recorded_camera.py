@@ -37,6 +37,13 @@ def test_images_carry_stamp_frame_and_model(worker: Any) -> None:
     assert call.halt().state == "halted"
 
 
+def test_reading_the_recording_is_told_as_progress(worker: Any) -> None:
+    bench = worker(PLUGIN)
+    call = stream(bench).wait_established()
+    done = [fraction for fraction, _ in call.progress]
+    assert done and done == sorted(done)
+
+
 def test_first_frame_stands_still_then_the_clip_runs(worker: Any) -> None:
     bench = worker(PLUGIN, settings={"hold_s": 0.3, "pace": "every-frame"})
     stream(bench)

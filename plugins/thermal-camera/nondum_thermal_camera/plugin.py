@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
+from functools import partial
 
 from nondum.sdk import Context, DeviceNeed, Fragment, Input, Output, Unit, behaviour, hookimpl
 from nondum.sdk.settings import parse_settings
 from nondum_panorama.settings import CameraSettings
-from nondum_panorama.streaming import play, relay
+from nondum_panorama.streaming import opened, play, relay
 from nondum_thermal_camera.simulation import open_simulation
 
 DEVICE = "camera"
@@ -64,5 +64,5 @@ async def stream(ctx: Context, u: str, o: str, h: str) -> None:
         await relay(ctx, o, settings, device.node)
     else:
         clip = settings.read_clip()
-        simulation = await asyncio.to_thread(open_simulation, clip)
+        simulation = await opened(ctx.progress, partial(open_simulation, clip))
         await play(ctx, o, settings, clip, simulation.frame)

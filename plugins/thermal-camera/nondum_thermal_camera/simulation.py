@@ -16,7 +16,6 @@ Grey levels are white-hot, 8 bits; they are not degrees.
 from __future__ import annotations
 
 import functools
-import itertools
 from collections.abc import Iterable
 from typing import Any
 
@@ -25,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nondum_panorama.clip import Clip
-from nondum_panorama.recording import Frame, Recording, frames_of
+from nondum_panorama.recording import Frame, Recording, Tell, frames_of, not_told
 from nondum_panorama.streaming import open_recording
 
 AMBIENT = 60.0
@@ -50,7 +49,8 @@ class ThermalModel:
     @classmethod
     def of(cls, frames: Iterable[Frame]) -> ThermalModel:
         """Take the background from frames that are spread over a recording."""
-        return cls(np.median(np.stack(list(frames)), axis=0).astype(np.uint8))
+        stacked = np.stack(list(frames))
+        return cls(np.median(stacked, axis=0, overwrite_input=True).astype(np.uint8))
 
     def warmth(self, frame: Frame, seed: int) -> Frame:
         """The simulated thermal image of a colour frame; the same seed gives the same noise."""
@@ -87,8 +87,12 @@ class Simulation:
         return self._model.warmth(self._recording.frame(number), seed=number)
 
 
-def open_simulation(clip: Clip) -> Simulation:
+def open_simulation(clip: Clip, tell: Tell = not_told) -> Simulation:
     """Read a clip and learn its background. Fails with RECORDING_UNREADABLE."""
-    recording = open_recording(clip)
-    spread = itertools.islice(frames_of(clip.video), 0, None, BACKGROUND_EVERY)
+    recording = open_recording(clip, lambda done: tell(done / 2))
+    spread = []
+    for number, frame in enumerate(frames_of(clip.video)):
+        if number % BACKGROUND_EVERY == 0:
+            spread.append(frame)
+        tell(1 - 0.5 / (1 + number / BACKGROUND_EVERY))  # how many there are is not known before
     return Simulation(recording, ThermalModel.of(spread))

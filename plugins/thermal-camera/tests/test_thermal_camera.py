@@ -21,6 +21,13 @@ def test_simulated_images_are_grey(worker: Any) -> None:
     assert call.halt().state == "halted"
 
 
+def test_reading_the_recording_is_told_as_progress(worker: Any) -> None:
+    bench = worker(PLUGIN)
+    call = bench.behave("stream", u="thermal-eye", o="warmth", h=bench.host).wait_established()
+    done = [fraction for fraction, _ in call.progress]
+    assert done and done == sorted(done)
+
+
 def test_device_that_is_no_camera_fails_the_behaviour(worker: Any) -> None:
     bench = worker(PLUGIN, devices={"camera": "/dev/null"})
     call = bench.behave("stream", u="thermal-eye", o="warmth", h=bench.host)
