@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from demo.robot import nondum
 from tests.daemon.plugins import arm, compass, scribe, talker
+from tests.kit.descendants import descendants
 from tests.kit.running_host import Row, RunningHost, steps
-from tests.kit.traces import descendants
 
 pytestmark = pytest.mark.daemon
 

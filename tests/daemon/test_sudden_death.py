@@ -7,8 +7,9 @@ import signal
 
 import pytest
 from tests.daemon.plugins import scribe, talker
+from tests.kit.descendants import descendants
 from tests.kit.running_host import Row, RunningHost, until_ended
-from tests.kit.traces import Traces, descendants, former_payloads
+from tests.kit.traces import Traces, former_payloads
 
 pytestmark = pytest.mark.daemon
 

@@ -12,9 +12,9 @@ from pathlib import Path
 
 from tests.faults.hostile.case import Bench
 from tests.faults.hostile.folders import litter
+from tests.kit.descendants import descendants
 from tests.kit.payloads import Part, make_payload
 from tests.kit.running_host import Row, RunningHost
-from tests.kit.traces import descendants
 
 SOUND = '''"""Does nothing, well."""
 from nondum.sdk import Unit, hookimpl

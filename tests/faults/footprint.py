@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.kit.traces import descendants, pids
+from tests.kit.descendants import descendants, pids
 
 from nondum.host.drives.mounts import mounted_below
 

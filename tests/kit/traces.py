@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.kit.descendants import pids
+
 from nondum.host.drives.mounts import mounted_below
 
 FOLDERS = ("staging", "payloads", "venvs", "scratch", "mounts")
@@ -70,24 +72,6 @@ def until_unmounted(folder: Path, timeout_s: float = 60.0) -> None:
                 raise TimeoutError(f"still mounted: {mounted_below(folder)}")
             changes.seek(0)
             changes.read()
-
-
-def descendants(pid: int) -> set[int]:
-    """Processes that one has started, and that those have started; zombies are none."""
-    parents: dict[int, int] = {}
-    for other in pids():
-        with contextlib.suppress(OSError):
-            fields = Path(f"/proc/{other}/stat").read_text().rpartition(")")[2].split()
-            parents[other] = 0 if fields[0] == "Z" else int(fields[1])
-    below = {pid}
-    while more := {child for child, parent in parents.items() if parent in below} - below:
-        below |= more
-    return below - {pid}
-
-
-def pids() -> Iterator[int]:
-    """All processes."""
-    return (int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit())
 
 
 def _open(folder: Path) -> Iterator[str]:

@@ -8,6 +8,7 @@ test that failed, or null.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import importlib
 import json
 import os
@@ -19,6 +20,7 @@ from typing import Any
 
 import pytest
 from hypothesis import is_hypothesis_test, settings
+from tests.kit.descendants import descendants
 
 WARM = ("anyio", "cryptography.hazmat.primitives.asymmetric.ed25519", "packaging.pylock", "msgpack")
 """What most tests load, too."""
@@ -35,6 +37,8 @@ OPTIONS = (
     *("--hypothesis-profile=mutation", "--timeout=60"),
 )
 SEEDS = (1, 2, 3)
+PR_SET_CHILD_SUBREAPER = 36
+"""prctl(2)."""
 
 
 class _Listener:
@@ -92,6 +96,8 @@ def _is_property(item: Any) -> bool:
 
 def main() -> None:
     """Answer until there are no more questions."""
+    if ctypes.CDLL(None, use_errno=True).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0):
+        raise OSError(ctypes.get_errno(), "PR_SET_CHILD_SUBREAPER")
     settings.register_profile("mutation", derandomize=False, database=None, deadline=None)
     for name in WARM:
         with contextlib.suppress(ImportError):
@@ -120,12 +126,24 @@ def _in_child(tests: list[str]) -> str | None:
     os.waitpid(child, 0)
     late.cancel()
     late.join()
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(child, signal.SIGKILL)
+    end_what_is_left()
     heard = os.read(receiver, 65536)
     os.close(receiver)
     answer: str | None = json.loads(heard) if heard else STARTED.read_text()
     return answer
+
+
+def end_what_is_left() -> None:
+    """End all that the tests have started: what was removed may be what would have ended it."""
+    own = os.getpid()
+    children = Path(f"/proc/{own}/task/{own}/children")
+    while children.read_text(encoding="ascii"):  # orphans become this process's own
+        for sent in (signal.SIGSTOP, signal.SIGKILL):  # or one would fork while another is killed
+            for pid in descendants(own):
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, sent)
+        with contextlib.suppress(ChildProcessError):
+            os.waitpid(-1, 0)
 
 
 if __name__ == "__main__":
