@@ -12,11 +12,12 @@ import numpy.typing as npt
 
 Frame = npt.NDArray[np.uint8]
 Tell = Callable[[float], None]
-"""Is told how much has been done, 0 to 1, after each frame. What it raises ends the work."""
+"""A callback for progress: called after each frame with the fraction that is done, 0 to 1. An
+exception that it raises ends the reading."""
 
 
 def not_told(_done: float) -> None:
-    """A `Tell` for whoever does not care."""
+    """The `Tell` that does nothing."""
 
 
 _JPEG_QUALITY = 95

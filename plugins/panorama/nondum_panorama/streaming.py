@@ -20,7 +20,7 @@ from nondum_panorama.settings import CameraSettings
 from nondum_panorama.view import Lens, View
 
 STEPS = 20
-"""How often reading a recording is told of, in all."""
+"""Number of progress reports while a recording is read."""
 FrameSource = Callable[[int], Frame]
 """Gives the full frame of a number: colour, or whatever a camera makes of it."""
 

@@ -81,6 +81,20 @@ async def test_bridge_that_is_expected_is_imported_by_the_fork_server() -> None:
         assert forked_by(client) == [bridge.pid]
 
 
+async def test_bridge_that_is_expected_is_imported_by_the_next_fork_server_too() -> None:
+    async with forks() as client, bridge_of(client) as bridge:
+        await bridge.expect()
+        former = client.pid
+        assert former is not None
+        with process_ended(former) as ended:
+            os.kill(former, signal.SIGKILL)
+            await ended.wait()
+        (await client.fork("listing", FORK_S)).close()
+        assert client.pid != former
+        await until_async("the bridge's code", lambda: has_mapped(client, "zmq"))
+        assert bridge.pid is None
+
+
 @pytest.mark.skipif(not refusals.has_filters(), reason="knows no filters")
 async def test_bridge_has_its_memory_bounded_and_more_calls_filtered_than_other_children() -> None:
     async with forks() as client, bridge_of(client) as bridge, bridge.kept():

@@ -127,7 +127,7 @@ async def test_server_that_has_ended_prepares_for_nothing_and_is_started_anew() 
         with process_ended(former) as ended:
             os.kill(former, signal.SIGKILL)
             await ended.wait()
-        await client.expect(JOB)
+        await client.expect("sweep")
         forked = await client.fork(JOB, START_S)
         assert server_of(client) != former
         forked.close()

@@ -117,6 +117,7 @@ class ForkClient:
         self._module, self._on_crowded = module, on_crowded
         self._server: Process | None = None
         self._channel: socket.socket | None = None
+        self._expected: list[str] = []
         self._turn = asyncio.Lock()
 
     @property
@@ -143,13 +144,17 @@ class ForkClient:
             raise
 
     async def expect(self, message: str) -> None:
-        """Have the server prepare for such a process, so that one is there at once when it is
-        wanted. Nothing comes of it where that fails: `fork` would tell why."""
+        """Have the server, and each one that follows it, import what such a process needs, so that
+        the first one is forked at once. A failure is logged only: `fork` raises it."""
         async with self._turn:
+            if message in self._expected:
+                return
+            self._expected.append(message)
             try:
                 if self._channel is None:
                     self._channel = await self._start()
-                fork_server.ask(self._channel, message.encode(), ())
+                else:
+                    fork_server.ask(self._channel, message.encode(), ())
             except OSError as error:
                 log.warning("the fork server cannot prepare for %s: %s", message, error)
 
@@ -191,6 +196,8 @@ class ForkClient:
                     start_new_session=True,
                     cwd="/",
                 )
+                for message in self._expected:
+                    fork_server.ask(channel, message.encode(), ())
             except BaseException:
                 channel.close()
                 raise

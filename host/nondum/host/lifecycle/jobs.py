@@ -35,7 +35,8 @@ JOBS: Mapping[str, str] = {
 """`module:function`."""
 
 SERVICES: Mapping[str, str] = {"bridge": "nondum.host.bridge.process:main"}
-"""What a child runs for as long as it lives; it is told the process of the fork server."""
+"""Service → `module:function`. The function runs until the process ends; its argument is the pid of
+the fork server."""
 
 AT_ONCE = ("look", "copy", "verify", "install")
 """What people wait for: a child that has time imports these before it is asked."""
