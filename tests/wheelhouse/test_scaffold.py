@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from tests.kit.payloads import SDK
@@ -13,7 +15,7 @@ from tests.kit.payloads import SDK
 from nondum.sdk.errors import ConfigRefused
 from nondum.wheelhouse import build, manifest, preflight
 from nondum.wheelhouse.confinement import Level
-from nondum.wheelhouse.scaffold import NewPackage, new_package
+from nondum.wheelhouse.scaffold import NewPackage, build_command, new_package
 from nondum.wheelhouse.signatures import UnsignedAllowed
 from nondum.wheelhouse.target import Target
 from nondum.wheelhouse.verification import verify
@@ -124,3 +126,17 @@ def _sdk_is_installed() -> bool:
         [sys.executable, "-m", "pip", "show", "-q", "nondum-sdk"], capture_output=True, check=False
     )
     return done.returncode == 0
+
+
+def test_build_is_told_where_the_sources_of_the_sdk_are() -> None:
+    folder = SimpleNamespace(editable=True)
+    url = "file:///home/me/my%20nondum/plugins/sdk"
+    *_, option, library = shlex.split(build_command(SimpleNamespace(url=url, dir_info=folder)))
+    assert (option, library) == ("--library", "/home/me/my nondum/plugins/sdk")
+
+
+@pytest.mark.parametrize(
+    "sdk", [None, SimpleNamespace(url="https://example.org/a.whl", archive_info=SimpleNamespace())]
+)
+def test_build_finds_an_sdk_that_is_a_wheel_by_itself(sdk: object) -> None:
+    assert "--library" not in build_command(sdk)

@@ -499,6 +499,7 @@ async def test_component_with_too_many_bindings_is_kept_out_alone(robot: Robot) 
     robot.unplug("knobs")
     await robot.until_holding()
     assert robot.mind.views.kept_out() == []
+    assert all(said.is_over for said in robot.mind.people if said.about == "kept out knobs")
 
 
 async def test_goal_that_only_a_component_kept_out_serves_says_so(robot: Robot) -> None:

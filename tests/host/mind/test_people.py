@@ -8,7 +8,8 @@ from tests.host.lifecycle.states import component
 
 from nondum.host.catalogue.records import Snapshot
 from nondum.host.mind.composition import compose
-from nondum.host.mind.people import MAX_CHARACTERS, MAX_SENTENCES, People, recomposed
+from nondum.host.mind.people import MAX_CHARACTERS, MAX_SENTENCES, People, kept_out, recomposed
+from nondum.sdk.errors import Problem
 
 
 def test_sentences_are_numbered_and_the_last_ones_kept() -> None:
@@ -42,3 +43,14 @@ def test_component_that_waits_for_its_device_is_not_said_to_be_able_to_do_anythi
     assert recomposed(None, before) == ["eye waits for its device port"]
     assert recomposed(before, after) == ["eye is ready"]
     assert recomposed(after, before) == ["eye waits for its device port"]
+
+
+def test_what_was_told_of_a_component_that_is_kept_out_is_over_when_it_is_not_any_more() -> None:
+    people, wrong, worse = People(lambda: 5.0), Problem("E-UNDECL", "a"), Problem("E-UNDECL", "b")
+    kept_out(people, {}, {"eye": (wrong,), "ear": (wrong,)})
+    kept_out(people, {"eye": (wrong,), "ear": (wrong,)}, {"eye": (worse,), "ear": (wrong,)})
+    assert [told.about for told in people if not told.is_over] == ["kept out ear", "kept out eye"]
+    kept_out(people, {"eye": (worse,), "ear": (wrong,)}, {"eye": (worse,)})
+    assert [told.about for told in people if not told.is_over] == ["kept out eye"]
+    kept_out(people, {"eye": (worse,)}, {})
+    assert all(told.is_over for told in people)

@@ -6,12 +6,16 @@ The files are those of `template/`, with `$name` and its like put in their place
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path, PurePosixPath
 from string import Template
+from typing import Any
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 from nondum.sdk.errors import ConfigRefused, Problem
 from nondum.wheelhouse import names
@@ -56,6 +60,18 @@ def new_package(name: str, folder: Path, *, payload_id: str | None = None) -> Ne
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(text.substitute(words), encoding="utf-8")
     return NewPackage(folder, tuple(sorted(Path(path) for path in files)))
+
+
+def build_command(sdk: Any) -> str:
+    """How to put a new package onto a drive, where the SDK was installed from `sdk`.
+
+    `sdk` is the origin of that distribution (PEP 610), or None. An SDK that was installed from its
+    source folder is in no index: the wheel of it is made from that folder.
+    """
+    command = "nondum payload build . -o DRIVE"
+    if sdk is None or not hasattr(sdk, "dir_info"):
+        return command
+    return f"{command} --library {shlex.quote(url2pathname(urlsplit(sdk.url).path))}"
 
 
 def _problems(name: str, payload_id: str, folder: Path) -> Iterator[Problem]:

@@ -44,6 +44,8 @@ def new(session: Session, name: str, output: Path | None, payload_id: str | None
 
     Example: nondum payload new window-opener && cd window-opener && pytest
     """
+    from importlib_metadata import distributions
+
     from nondum.wheelhouse import scaffold
 
     made = scaffold.new_package(name, output or Path(name), payload_id=payload_id)
@@ -52,7 +54,9 @@ def new(session: Session, name: str, output: Path | None, payload_id: str | None
         return
     for path in made.files:
         click.echo(f"{made.folder / path}")
-    click.echo(f"next: cd {shlex.quote(str(made.folder))}; pytest; nondum payload build . -o DRIVE")
+    sdk = next((found.origin for found in distributions(name="nondum-sdk")), None)
+    build = scaffold.build_command(sdk)
+    click.echo(f"next: cd {shlex.quote(str(made.folder))}; pytest; {build}")
 
 
 @payload.command()

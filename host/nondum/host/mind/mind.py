@@ -21,7 +21,7 @@ from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition, compose
 from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState
 from nondum.host.mind.halts import Halts
-from nondum.host.mind.people import People, recomposed
+from nondum.host.mind.people import People, kept_out, recomposed
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.pursuit import Pursuit
 from nondum.host.mind.runner import BehaviourRunner, Calls
@@ -310,6 +310,7 @@ class Mind:
         self.pursuit.adopt(composition)
         for sentence in recomposed(old, composition):
             self.people.tell(sentence)
+        kept_out(self.people, old.merged.quarantined if old else {}, composition.merged.quarantined)
 
     def _believe(self) -> str:
         for problem in self.beliefs.new_conflicts():

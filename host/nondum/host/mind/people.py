@@ -6,7 +6,7 @@ What a sentence is about may be gone since; then it is over.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
@@ -14,6 +14,7 @@ from nondum.host import missing_devices
 from nondum.host.catalogue.records import ComponentRecord, PeerComponent
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.frames import mount_warnings
+from nondum.sdk.errors import Problem
 
 MAX_SENTENCES = 1000
 MAX_CHARACTERS = 4096
@@ -91,7 +92,7 @@ def recomposed(old: Composition | None, new: Composition) -> list[str]:
             sentences.append(f"{id} {_arrives(component)}")
         elif earlier.is_ready != component.is_ready:
             sentences.append(f"{id} {_health(component)}")
-    return sentences + _contested(old, new) + _doubts(old, new) + _kept_out(old, new)
+    return sentences + _contested(old, new) + _doubts(old, new)
 
 
 def _contested(old: Composition | None, new: Composition) -> list[str]:
@@ -111,15 +112,17 @@ def _doubts(old: Composition | None, new: Composition) -> list[str]:
     return list(mount_warnings(mount for mount in new.snapshot.mounts if mount not in known))
 
 
-def _kept_out(old: Composition | None, new: Composition) -> list[str]:
-    known = old.merged.quarantined if old else {}
-    present = {c.component for c in new.contributions}
-    return [
-        f"{key} is kept out of planning: {problem}"
-        for key, problems in new.merged.quarantined.items()
-        if key in present and known.get(key) != problems
-        for problem in problems
-    ]
+def kept_out(
+    people: People, before: Mapping[str, Sequence[Problem]], now: Mapping[str, Sequence[Problem]]
+) -> None:
+    """Tell which components are not planned with, and why; what was told is over with its cause."""
+    for component in {**before, **now}:
+        if before.get(component) == now.get(component):
+            continue
+        about = f"kept out {component}"
+        people.end(about)
+        for problem in now.get(component, ()):
+            people.tell(f"{component} is kept out of planning: {problem}", about)
 
 
 def _offers(component: _Component) -> str:

@@ -19,7 +19,7 @@ from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.diagnosis import Seen, seen_in
 from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState, is_replaced, urgency
-from nondum.host.mind.people import People
+from nondum.host.mind.people import People, kept_out
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.pursued import Pursued, conflicts
 from nondum.host.mind.runner import BehaviourRunner
@@ -163,7 +163,7 @@ class Pursuit:
         """Go on with the plan in a new composition if it still works there."""
         before = self._composition.contributions if self._composition else ()
         if not set(before) <= set(composition.contributions):  # what is left may be small enough
-            self._left_out.clear()
+            self._note_left_out({})
         if self._composition is None or _parts(self._composition) != _parts(composition):
             self._excluded_until_s.clear()  # what it failed for may be another now
             self.setbacks.clear()
@@ -355,9 +355,11 @@ class Pursuit:
             del self._tried[number]  # the world has moved on; `step` searches again
 
     def _note_left_out(self, left_out: Mapping[str, Problem]) -> None:
-        for component, problem in left_out.items():
-            if component not in self._left_out:
-                self._people.tell(f"{component} is kept out of planning: {problem}")
+        known = {component: (problem,) for component, problem in self._left_out.items()}
+        now = {
+            component: known.get(component, (problem,)) for component, problem in left_out.items()
+        }
+        kept_out(self._people, known, now)
         self._left_out = dict(left_out)
 
     def _outcome(self, search: asyncio.Task[Outcome], asked: Situation) -> Outcome:
