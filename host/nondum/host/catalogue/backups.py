@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from nondum.host.catalogue.database import CACHE
 from nondum.wheelhouse import disk
 
 FOLDER = "backups"
@@ -92,6 +93,7 @@ async def keep(
 def _reading(path: Path, how: str) -> Iterator[sqlite3.Connection]:
     connection = sqlite3.connect(f"{path.resolve().as_uri()}?{how}", uri=True)
     with contextlib.closing(connection):
+        connection.execute(CACHE)
         yield connection
 
 
@@ -101,6 +103,7 @@ def _writing(path: Path) -> Iterator[sqlite3.Connection]:
     os.close(descriptor)
     connection = sqlite3.connect(path)
     with contextlib.closing(connection):
+        connection.execute(CACHE)
         connection.execute("PRAGMA synchronous = OFF")  # it is synced once, when it is whole
         yield connection
 

@@ -74,7 +74,10 @@ _UPGRADES = {
 }
 """Schema → what makes the next one of it."""
 
+CACHE = "PRAGMA cache_size = -512"
+"""What a connection keeps of the file: 512 KiB, not SQLite's 2 MB. The kernel has all of it."""
 _PRAGMAS = (
+    CACHE,
     "PRAGMA journal_mode = WAL",
     "PRAGMA synchronous = FULL",
     "PRAGMA foreign_keys = ON",
