@@ -26,6 +26,8 @@ TICKS_AWAKE = 1.5
 """Of the time between two looks, so many ticks count: if more has passed, the loop stood still."""
 SOONEST_S = 0.001
 """Between two looks at one link."""
+HEARD_AGAIN_S = 0.01
+"""What comes so soon after something else is no news of who is there: it is not noted."""
 FIRST_PROBE = 2**40 * ANSWERED
 """Pings that ask for an answer have numbers of their own, all of which every host answers."""
 
@@ -74,7 +76,9 @@ class Presence:
 
     def heard(self, link: Link) -> None:
         """Something came over a link."""
-        now_s = self.awake_s()
+        now_s, before = self.awake_s(), link.watched
+        if now_s - before.heard_s < HEARD_AGAIN_S and not before.is_suspected:
+            return
         link.watched = Watched(now_s)
         link.calm_until_s = now_s + self.terms.suspect_s(link.beat_s) - self.terms.tick_s
 

@@ -38,7 +38,8 @@ class Received:
 
     def delivered(self, parts: Iterable[zmq.Frame]) -> None:
         """A message came whole: all its parts, as they came over the connection."""
-        self._delivered += sum(on_wire(len(part) + self._seal) for part in parts)
+        for part in parts:
+            self._delivered += on_wire(len(part) + self._seal)
 
     def read(self) -> int:
         """Bytes that were read from the connection until now."""
