@@ -175,6 +175,8 @@ name = "lamp"
 xyz = [0.1, 0, 0.2]
 rpy = [0, 0, 1.57]
 """
+MARKERS = (b"extra ", b"extras", b"os_name", b"~=", b"===", b" not in ", b" or ", b"(")
+"""Of environment markers (PEP 508)."""
 TOML = (b"[[", b"]]", b'"""', b"'''", b"1e999", b"inf", b"2026-01-01", b"a.b.c", b"\\u0000", b"= {")
 
 
@@ -431,7 +433,10 @@ TARGETS = (
         "manifest", of_text(lambda t: manifest.parse(t, WHERE)), lambda: [MANIFEST], tokens=TOML
     ),
     Target(
-        "lock", of_text(_read_lock), _locks, tokens=(*TOML, b"hashes", b"vcs", b"archive", b"url")
+        "lock",
+        of_text(_read_lock),
+        _locks,
+        tokens=(*TOML, *MARKERS, b"hashes", b"vcs", b"archive", b"url"),
     ),
     Target(
         "wheel",

@@ -94,6 +94,23 @@ def test_two_entries_for_one_host_are_refused() -> None:
     assert found.value.code == "WHEEL_INCOMPATIBLE"
 
 
+@pytest.mark.parametrize(
+    "marker",
+    [
+        "python_full_version ~= '6.9inf'",
+        "platform_machine ~= '1.0'",
+        "extras == 'a'",
+        "extra == 'a'",
+    ],
+)
+def test_marker_that_cannot_be_judged_is_refused(marker: str) -> None:
+    text = HEAD + package("a", "1.0", wheel(A), more=f'marker = "{marker}"\n')
+    with pytest.raises(PayloadRefused) as found:
+        lock.select(lock.parse(text, "pylock.a.toml"), *host((3, 11), "x86_64"))
+    assert found.value.code == "LOCK_INVALID"
+    assert found.value.problems[0].where == "pylock.a.toml"
+
+
 A = "a-1.0-py3-none-any.whl"
 DIGITS = "9" * 5_000
 """More than Python makes a number of."""

@@ -12,7 +12,18 @@ from hypothesis import strategies as st
 
 from nondum.host.cgroups.cage import NAME
 from nondum.host.helper import requests
-from nondum.host.helper.requests import MAX_BYTES, Request, encode, parse
+from nondum.host.helper.requests import (
+    MAX_BYTES,
+    FillCage,
+    LimitCage,
+    MapUsers,
+    Mount,
+    PutNode,
+    Request,
+    Unmount,
+    encode,
+    parse,
+)
 from nondum.sdk.errors import NondumError
 
 NUMBERS = st.integers(0, 2**63 - 1)
@@ -73,35 +84,50 @@ def test_no_field_takes_another_kind_of_value(request: Request, data: st.DataObj
         assert value not in (".", "..")
 
 
+MOUNT = Mount("sdb1", 1, "vfat", "read")
+UNMOUNT = Unmount("sdb1-1", "read")
+NODE = PutNode("a", "x", 1, 1, None)
+FILL = FillCage("a.1", 1)
+LIMIT = LimitCage("a.1", 1, 1, 1, 0.0)
+
+
 @pytest.mark.parametrize(
-    "body",
+    ("whole", "but"),
     [
-        {},
-        {"verb": "mount"},
-        {"verb": "Request"},
-        {"verb": "Mount", "device": "../sda", "diskseq": 1, "filesystem": "vfat", "use": "read"},
-        {"verb": "Mount", "device": "sdb1", "diskseq": True, "filesystem": "", "use": "read"},
-        {"verb": "Mount", "device": "sdb1", "diskseq": 1, "filesystem": "vfat", "use": "boot"},
-        {"verb": "Mount", "device": "sdb1", "diskseq": 1, "filesystem": "vfat"},
-        {"verb": "Unmount", "drive": "..", "use": "read"},
-        {"verb": "Unmount", "drive": "sdb1-1", "use": "read", "path": "/"},
-        {"verb": "PutNode", "component": "a/b", "need": "x", "major": 1, "minor": 1},
-        {"verb": "PutNode", "component": "a", "need": "..", "major": 1, "minor": 1},
-        {"verb": "PutNode", "component": "a", "need": "x", "major": -1, "minor": 1},
-        {"verb": "FillCage", "cage": "../x.1", "pid": 1},
-        {"verb": "FillCage", "cage": "a.1", "pid": 1.0},
-        {"verb": "FillCage", "cage": "a.1", "pid": 2**31},
-        {"verb": "MapUsers", "pid": 2**31},
-        {"verb": "LimitCage", "cage": "a.1", "memory_mb": 0, "tasks": 1, "cpu_weight": 1,
-         "processors": 0.0},
-        {"verb": "LimitCage", "cage": "a.1", "memory_mb": 1, "tasks": 1, "cpu_weight": 1,
-         "processors": float("nan")},
-        pytest.param({"verb": "LimitCage", "cage": "a.1", "memory_mb": 1, "tasks": 1,
-         "cpu_weight": 1, "processors": 10**400}, id="more than a float holds"),
+        (MOUNT, {"verb": "mount"}),
+        (MOUNT, {"verb": "Request"}),
+        (MOUNT, {"device": "../sda"}),
+        (MOUNT, {"diskseq": True}),
+        (MOUNT, {"use": "boot"}),
+        (UNMOUNT, {"drive": ".."}),
+        (UNMOUNT, {"path": "/"}),
+        (NODE, {"component": "a/b"}),
+        (NODE, {"need": ".."}),
+        (NODE, {"major": -1}),
+        (NODE, {"user": "0"}),
+        (FILL, {"cage": "../x.1"}),
+        (FILL, {"pid": 1.0}),
+        (FILL, {"pid": 2**31}),
+        (MapUsers(1), {"pid": 2**31}),
+        (LIMIT, {"memory_mb": 0}),
+        (LIMIT, {"processors": float("nan")}),
+        pytest.param(LIMIT, {"processors": 10**400}, id="more than a float holds"),
     ],
     ids=str,
-)  # fmt: skip
-def test_what_is_nearly_a_request_is_refused(body: dict[str, Any]) -> None:
+)
+def test_what_is_nearly_a_request_is_refused(whole: Request, but: dict[str, Any]) -> None:
+    assert parse(encode(whole)) == whole
+    assert_refused({**json.loads(encode(whole)), **but})
+
+
+@pytest.mark.parametrize("field", [field.name for field in fields(Mount)])
+def test_request_without_one_of_its_fields_is_refused(field: str) -> None:
+    body = json.loads(encode(MOUNT))
+    del body[field]
+    assert_refused(body)
+
+
+def assert_refused(body: dict[str, Any]) -> None:
     with pytest.raises(NondumError) as refused:
         parse(json.dumps(body).encode())
     assert refused.value.code == "HELPER_REFUSED"

@@ -244,7 +244,6 @@ def test_one_descriptor_comes_with_a_folder_and_none_with_anything_else(root: Se
     read, write = os.pipe()
     cases: list[tuple[Request, int]] = [
         (requests.MapFolder(WORKER), 0),
-        (requests.MapFolder(WORKER), 2),
         (requests.ListCages(), 1),
         (requests.MapUsers(os.getpid()), 1),
     ]
@@ -256,6 +255,22 @@ def test_one_descriptor_comes_with_a_folder_and_none_with_anything_else(root: Se
     os.close(write)
     assert os.read(read, 1) == b"", "no copy is kept"
     os.close(read)
+
+
+def test_folder_that_comes_with_another_descriptor_is_not_mapped(
+    root: Service, folder: Path
+) -> None:
+    mount = kernel.copy_mount(str(folder))
+    request = requests.encode(requests.MapFolder(WORKER))
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with ours, theirs:
+        socket.send_fds(ours, [request], [mount, mount])
+        assert answer(theirs, root)["problems"][0]["code"] == "HELPER_REFUSED"
+        assert Path(f"/proc/self/fd/{mount}").stat().st_uid == SERVED.pw_uid
+        socket.send_fds(ours, [request], [mount])
+        assert "problems" not in answer(theirs, root)
+        assert Path(f"/proc/self/fd/{mount}").stat().st_uid == WORKER
+    os.close(mount)
 
 
 def test_node_is_the_workers_whose_it_is_to_be(tmp_path: Path) -> None:

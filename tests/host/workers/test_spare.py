@@ -40,6 +40,8 @@ FORKING = (
     "while not os.path.exists('child') or not open('child').read(): time.sleep(0.01)\n"
 )
 
+TELLS_PATH = "import sys; open('path', 'w').write('\\n'.join(sys.path))\n"
+
 
 def spare_of(tested: WorkersUnderTest) -> int:
     launcher = tested.workers.launcher
@@ -74,6 +76,21 @@ async def test_the_spare_becomes_the_next_worker(tested: WorkersUnderTest) -> No
     assert spare in ancestors(tested.workers.pids()["cam"])
     await tested.start("cam-2", QUIET)
     assert spare not in ancestors(tested.workers.pids()["cam-2"])
+
+
+async def test_only_the_standard_library_and_its_own_packages_are_to_be_found(
+    tmp_path: Path,
+) -> None:
+    tested = WorkersUnderTest(tmp_path, confinement=Unconfined())
+    try:
+        spec = await tested.start("cam", TELLS_PATH)
+    finally:
+        await tested.workers.close()
+    bare = "import sys; print(*sys.path, sep='\\n')"
+    command = [spec.python, "-I", "-S", "-c", bare]
+    standard = await asyncio.to_thread(subprocess.check_output, command, text=True)
+    told = (spec.scratch / "path").read_text(encoding="utf-8")
+    assert told.splitlines() == [*standard.splitlines(), *map(str, spec.site_packages)]
 
 
 def test_one_that_ends_instead_of_asking_for_its_scratch_folder_is_no_worker() -> None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import NoReturn
 
+from packaging.markers import UndefinedEnvironmentName
 from packaging.pylock import Package, Pylock, PylockSelectError, PylockValidationError
 from packaging.tags import Tag
 from packaging.utils import InvalidWheelFilename, canonicalize_name, parse_wheel_filename
@@ -100,7 +101,8 @@ def parse(text: str, where: str) -> Lock:
 def select(lock: Lock, environment: Environment, tags: Sequence[Tag]) -> tuple[LockedWheel, ...]:
     """The wheels for one host: one per distribution, the best first of `tags`.
 
-    Raises `PayloadRefused` (WHEEL_INCOMPATIBLE) that says what is there and what would be needed.
+    Raises `PayloadRefused`: WHEEL_INCOMPATIBLE says what is there and what would be needed,
+    LOCK_INVALID which marker cannot be judged.
     """
     try:
         chosen = list(lock.parsed.select(environment=environment, tags=tags))  # type: ignore[arg-type]  # a Mapping of markers is what it reads
@@ -115,6 +117,9 @@ def select(lock: Lock, environment: Environment, tags: Sequence[Tag]) -> tuple[L
                 fix="build the payload for this architecture and Python",
             )
         )
+    except (ValueError, RecursionError, UndefinedEnvironmentName) as error:
+        text = f"a marker cannot be judged: {str(error)[:200]}"
+        _refuse(Problem("LOCK_INVALID", text, where=lock.where, fix="build the payload again"))
     paths = {wheel.path: wheel for wheel in lock.wheels}
     return tuple(paths[str(wheel.path)] for _, wheel in chosen if hasattr(wheel, "path"))
 
