@@ -108,6 +108,7 @@ def test_software_for_a_device_without_is_named(daemon: RunningHost, tmp_path: P
     finally:
         slots.unplug(daemon.devices, "second")
     assert "second: nothing here drives Gauge; org.example.meter 1.0 (" in said
+    daemon.until("the second one is gone", lambda _: len(rows(daemon)) == 4)
     gone = daemon.run("devices", "--all").ok().out
     assert "at second" in gone
 

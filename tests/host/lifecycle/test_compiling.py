@@ -31,6 +31,13 @@ TELLING = (
 """Says where it was loaded from, each time that it is."""
 
 
+@pytest.fixture(autouse=True)
+def ordinary_priority(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine that is always busy gives a child nothing that is SCHED_IDLE, which
+    `test_children.py` sees to."""
+    monkeypatch.setattr(os, "sched_setscheduler", lambda *_: None)
+
+
 def lamp(drive: Path, *, id: str = "lamp", payload_id: str = LAMP_ID, **files: str) -> None:
     make_payload(drive, Part(id, LAMP + TELLING, files=files), payload_id=payload_id)
 
