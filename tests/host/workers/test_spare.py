@@ -87,8 +87,8 @@ async def test_only_the_standard_library_and_its_own_packages_are_to_be_found(
     finally:
         await tested.workers.close()
     bare = "import sys; print(*sys.path, sep='\\n')"
-    command = [spec.python, "-I", "-S", "-c", bare]
-    standard = await asyncio.to_thread(subprocess.check_output, command, text=True)
+    command = [str(spec.python), "-I", "-S", "-c", bare]
+    standard = await asyncio.to_thread(lambda: subprocess.check_output(command, text=True))
     told = (spec.scratch / "path").read_text(encoding="utf-8")
     assert told.splitlines() == [*standard.splitlines(), *map(str, spec.site_packages)]
 
