@@ -33,8 +33,8 @@ TELLING = (
 
 @pytest.fixture(autouse=True)
 def ordinary_priority(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A machine that is always busy gives a child nothing that is SCHED_IDLE, which
-    `test_children.py` sees to."""
+    """The child that compiles is SCHED_IDLE (`test_children.py` asserts that): on a machine that is
+    always busy it would get no processor time."""
     monkeypatch.setattr(os, "sched_setscheduler", lambda *_: None)
 
 
