@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,7 +12,7 @@ from packaging.utils import canonicalize_name
 from packaging.version import Version
 from tests.wheelhouse.locks import HEAD, SHA, host, package, wheel
 
-from nondum.sdk.errors import PayloadRefused
+from nondum.sdk.errors import PayloadRefused, Problem
 from nondum.wheelhouse import lock
 
 PLAIN = HEAD + package("a", "1.0", wheel("a-1.0-py3-none-any.whl"))
@@ -103,12 +105,26 @@ def test_two_entries_for_one_host_are_refused() -> None:
         "extra == 'a'",
     ],
 )
-def test_marker_that_cannot_be_judged_is_refused(marker: str) -> None:
+def test_marker_that_cannot_be_evaluated_is_refused(marker: str) -> None:
     text = HEAD + package("a", "1.0", wheel(A), more=f'marker = "{marker}"\n')
+    (problem,) = not_selected(text)
+    assert (problem.code, problem.where) == ("LOCK_INVALID", "pylock.a.toml a")
+    assert marker.split("'")[1] in problem.message
+
+
+def test_all_markers_that_cannot_be_evaluated_are_told() -> None:
+    text = HEAD + "environments = [\"extra == 'x'\"]\n"
+    for name in ("a", "b"):
+        more = "marker = \"extra == 'a'\"\n"
+        text += package(name, "1.0", wheel(f"{name}-1.0-py3-none-any.whl"), more=more)
+    told = [problem.where for problem in not_selected(text)]
+    assert told == [f"pylock.a.toml {place}" for place in ("environments", "a", "b")]
+
+
+def not_selected(text: str) -> Sequence[Problem]:
     with pytest.raises(PayloadRefused) as found:
         lock.select(lock.parse(text, "pylock.a.toml"), *host((3, 11), "x86_64"))
-    assert found.value.code == "LOCK_INVALID"
-    assert found.value.problems[0].where == "pylock.a.toml"
+    return found.value.problems
 
 
 A = "a-1.0-py3-none-any.whl"

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import NoReturn
 
-from packaging.markers import UndefinedEnvironmentName
+from packaging.markers import EvaluateContext, Marker, UndefinedEnvironmentName
 from packaging.pylock import Package, Pylock, PylockSelectError, PylockValidationError
 from packaging.tags import Tag
 from packaging.utils import InvalidWheelFilename, canonicalize_name, parse_wheel_filename
@@ -102,8 +102,10 @@ def select(lock: Lock, environment: Environment, tags: Sequence[Tag]) -> tuple[L
     """The wheels for one host: one per distribution, the best first of `tags`.
 
     Raises `PayloadRefused`: WHEEL_INCOMPATIBLE says what is there and what would be needed,
-    LOCK_INVALID which marker cannot be judged.
+    LOCK_INVALID which markers cannot be evaluated.
     """
+    if problems := list(_not_evaluated(lock.parsed, environment, lock.where)):
+        raise PayloadRefused(*problems)
     try:
         chosen = list(lock.parsed.select(environment=environment, tags=tags))  # type: ignore[arg-type]  # a Mapping of markers is what it reads
     except PylockSelectError as error:
@@ -117,11 +119,23 @@ def select(lock: Lock, environment: Environment, tags: Sequence[Tag]) -> tuple[L
                 fix="build the payload for this architecture and Python",
             )
         )
-    except (ValueError, RecursionError, UndefinedEnvironmentName) as error:
-        text = f"a marker cannot be judged: {str(error)[:200]}"
-        _refuse(Problem("LOCK_INVALID", text, where=lock.where, fix="build the payload again"))
     paths = {wheel.path: wheel for wheel in lock.wheels}
     return tuple(paths[str(wheel.path)] for _, wheel in chosen if hasattr(wheel, "path"))
+
+
+def _not_evaluated(parsed: Pylock, environment: Environment, where: str) -> Iterator[Problem]:
+    """What is wrong with the markers that cannot be evaluated on a host."""
+    marked: list[tuple[str, Marker | None, EvaluateContext]] = [
+        *(("environments", marker, "requirement") for marker in parsed.environments or ()),
+        *((str(package.name), package.marker, "lock_file") for package in parsed.packages),
+    ]
+    for place, marker, context in marked:
+        try:
+            if marker is not None:
+                marker.evaluate(environment, context)
+        except (ValueError, RecursionError, UndefinedEnvironmentName):
+            text = f"the marker {str(marker)[:200]!r} cannot be evaluated"
+            yield _flaw("LOCK_INVALID", text, f"{where} {place}")
 
 
 def flaws(package: Package, where: str) -> Iterator[Problem]:
