@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
 LONGEST = 8 * 1024
 Read = Callable[[bytes], object]
+ENDLESS_NUMBER = b"9" * 5_000
+"""Python makes an `int` of 4,300 digits at most, and raises `ValueError` on more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,3 +29,25 @@ class Target:
     """How many inputs the long run makes."""
     longest: int = LONGEST
     """Bytes of the longest input."""
+
+
+def of_text(read: Callable[[str], object]) -> Callable[[bytes], object]:
+    """A reader of text, which is not asked about bytes that are none."""
+
+    def read_bytes(data: bytes) -> object:
+        try:
+            text = data.decode()
+        except UnicodeDecodeError:
+            return None
+        return read(text)
+
+    return read_bytes
+
+
+def with_endless_numbers(seeds: list[bytes]) -> list[bytes]:
+    """Each seed with one of its numbers after the other made longer than Python reads them."""
+    return [
+        seed[: number.start()] + ENDLESS_NUMBER + seed[number.end() :]
+        for seed in seeds
+        for number in re.finditer(rb"[0-9]+", seed)
+    ]

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.fuzz.mutation import mutated
-from tests.fuzz.target import Target
-from tests.fuzz.targets import TARGETS, with_endless_numbers
+from tests.fuzz.target import Target, with_endless_numbers
+from tests.fuzz.targets import TARGETS
 from tests.fuzz.trial import tried
 
 each = pytest.mark.parametrize("target", TARGETS, ids=[target.name for target in TARGETS])
