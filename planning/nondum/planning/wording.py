@@ -78,7 +78,36 @@ class Wording:
             part = all_of([*besides, part])
         elif besides:
             part = f"(or {' '.join(f'(not {one})' for one in besides)} {part})"
+        elif _constant(formula.part) is (formula.quantifier == "exists"):
+            part = _bound(variables, formula.quantifier)
         return f"({formula.quantifier} ({declared}) {part})" if variables else part
+
+
+def _constant(formula: Formula) -> bool | None:
+    """What a condition is by its form alone; None where it needs an object or a fact."""
+    match formula:
+        case And(parts) | Or(parts):
+            deciding = isinstance(formula, Or)
+            values = [_constant(part) for part in parts]
+            if deciding in values:
+                return deciding
+            return None if None in values else not deciding
+        case Quantified(quantifier, variables, part):
+            value = _constant(part)
+            return value if not variables or value is (quantifier == "forall") else None
+        case _:
+            return None
+
+
+def _bound(variables: Sequence[TypedName], quantifier: str) -> str:
+    """What is true of all objects (`exists`) or false of all (`forall`), and names each variable.
+
+    Fast Downward takes `(exists (?x - t) (and))` for true, also where nothing is of that type.
+    """
+    same = [f"(= {variable.name} {variable.name})" for variable in variables]
+    if quantifier == "exists":
+        return all_of(same)
+    return f"(or {' '.join(f'(not {one})' for one in same)})"
 
 
 def apart(

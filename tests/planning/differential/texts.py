@@ -245,5 +245,27 @@ TEXTS = (
         """(:objects a b) (:init (p a)) (:goal (and (p a) (p b) (seen a) (not (seen b))))""",
         2,
     ),
+    text(
+        "some-of-none",
+        """(:types ghost - object)
+           (:predicates (seen) (bare))
+           (:action undress :parameters () :precondition () :effect (bare))
+           (:action look :parameters ()
+             :precondition (exists (?g ?h - ghost) (or (bare) (forall (?i - ghost) (and))))
+             :effect (seen))""",
+        """(:init) (:goal (and (bare) (seen)))""",
+        None,
+    ),
+    text(
+        "all-of-none",
+        """(:types ghost - object)
+           (:predicates (calm) (bare))
+           (:action undress :parameters () :precondition () :effect (bare))
+           (:action rest :parameters ()
+             :precondition (forall (?g - ghost) (or (exists (?h - ghost) (or))))
+             :effect (calm))""",
+        """(:init) (:goal (and (bare) (calm) (forall (?g ?h - ghost) (or))))""",
+        2,
+    ),
 )
 """Every feature that is read."""
