@@ -106,12 +106,10 @@ def boundaries(times: int) -> Iterator[Point]:
     """Before and after the commit of each row of both tables, so many times."""
     for nth in range(times):
         for when in ("BEFORE", "AFTER"):
-            for step, event in TRANSITIONS:
-                at = [when, step.name, event.__name__]
-                yield Point("boundary", f"{' '.join(at)} {nth}", {"at": at, "of": "payload"})
-            for state, event in COMPONENT_TRANSITIONS:
-                at = [when, state.name, event.__name__]
-                yield Point("boundary", f"{' '.join(at)} {nth}", {"at": at, "of": "component"})
+            for of, rows in (("payload", TRANSITIONS), ("component", COMPONENT_TRANSITIONS)):
+                for state, event in rows:
+                    at = [when, state.name, event.__name__]
+                    yield Point("boundary", f"{' '.join((of, *at))} {nth}", {"at": at, "of": of})
 
 
 def moments(count: int, seed: int = 20) -> Iterator[Point]:
@@ -241,5 +239,6 @@ def out_of_place(ended: Ended) -> list[str]:
 
 def clean(folder: Path) -> None:
     """Leave nothing of an experiment, whatever was mounted."""
-    subprocess.run(["umount", "-q", "--lazy", str(folder / "state")], check=False)
+    state = folder / "state"  # mostly no mount, which umount would tell for each point
+    subprocess.run(["umount", "--lazy", str(state)], check=False, stderr=subprocess.DEVNULL)
     shutil.rmtree(folder, ignore_errors=True)
