@@ -1,10 +1,10 @@
-"""Points are counted by their names, so that each needs one of its own."""
+"""The campaign counts each fault point by its name: two points with one name would count as one."""
 
 from __future__ import annotations
 
 from tests.faults.points import boundaries
 
 
-def test_rows_of_both_tables_have_names_of_their_own() -> None:
+def test_no_two_points_have_the_same_name() -> None:
     names = [point.name for point in boundaries(times=2)]
     assert sorted(set(names)) == sorted(names)

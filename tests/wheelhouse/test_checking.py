@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import hashlib
-from collections.abc import Callable
+import os
+import resource
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -12,6 +16,18 @@ from nondum.wheelhouse import checking
 from nondum.wheelhouse.unpacking import StoredFile
 
 DATA = b"d" * 300_000
+
+
+@contextlib.contextmanager
+def no_descriptor_left() -> Iterator[None]:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    lowest = os.dup(0)
+    os.close(lowest)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (lowest, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
 def stored(folder: Path, name: str, data: bytes) -> StoredFile:
@@ -49,3 +65,23 @@ def test_one_other_byte_is_found(tmp_path: Path, data: bytes) -> None:
     file = stored(tmp_path, "a", data)
     (tmp_path / "a").write_bytes(data[:-1] + b"y")
     assert checking.damaged(tmp_path, (file,)) == (file,)
+
+
+@pytest.mark.parametrize("size", [300_000, 600_000], ids=["two pieces", "three pieces"])
+def test_progress_that_cannot_be_reported_is_no_damage(tmp_path: Path, size: int) -> None:
+    """A job's daemon may be killed while the job reads: the pipe to it is broken then."""
+    files = [stored(tmp_path, name, b"d" * size) for name in ("a", "b")]
+
+    def broken() -> None:
+        raise BrokenPipeError
+
+    with pytest.raises(BrokenPipeError):
+        checking.damaged(tmp_path, files, broken)
+
+
+@pytest.mark.parametrize("data", [b"x", DATA], ids=["small", "large"])
+def test_want_of_descriptors_is_no_damage(tmp_path: Path, data: bytes) -> None:
+    file = stored(tmp_path, "a", data)
+    with no_descriptor_left(), pytest.raises(OSError) as raised:
+        checking.damaged(tmp_path, (file,))
+    assert raised.value.errno == errno.EMFILE

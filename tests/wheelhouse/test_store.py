@@ -85,6 +85,19 @@ def test_several_wheels_come_in_together(store: Store, tmp_path: Path) -> None:
     assert not any(store.verify(wheel.sha256) for wheel in stored)
 
 
+def test_wheel_stays_where_progress_cannot_be_reported(store: Store, tmp_path: Path) -> None:
+    """As when the daemon is killed while its job reads the store."""
+    path = make_wheel(tmp_path, "large", "1.0", {"large/data.bin": "d" * 600_000})
+    stored = added(store, path)
+
+    def broken() -> None:
+        raise BrokenPipeError
+
+    with pytest.raises(BrokenPipeError):
+        store.add_all([(path, stored.sha256)], alive=broken)
+    assert store.get(stored.sha256) == stored
+
+
 def test_one_bad_wheel_keeps_out_all_new_ones(store: Store, tmp_path: Path) -> None:
     good, bad = plain(tmp_path / "w"), plain(tmp_path / "w", "bad")
     known = added(store, plain(tmp_path / "w", "known"))

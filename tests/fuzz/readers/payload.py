@@ -99,7 +99,7 @@ def _read_wheel(data: bytes) -> object:
         try:
             for _ in archive.unpack(view, file.member):
                 pass
-        except ValueError as error:  # how a damaged member is told to `wheel`
+        except ValueError as error:  # `archive.unpack` raises it for a damaged member
             raise PayloadRefused(wheel.damaged(file, NAME, str(error))) from error
     return layout.needs.requirements
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from nondum.wheelhouse import disk
 from nondum.wheelhouse.unpacking import THREADS, StoredFile
 
 _LARGE = 256 * 1024
@@ -19,7 +20,8 @@ def damaged(
 ) -> tuple[StoredFile, ...]:
     """Those of the files under `root` that are not as they were, or not there.
 
-    `alive` is called, from any thread, whenever a piece of a large one has been read.
+    `alive` is called, from any thread, whenever a piece of a large one has been read. Raises what
+    it raises, and `OSError` where this process has no descriptor or no memory left.
     """
     large = [file for file in files if file.size >= _LARGE]
     small = [file for file in files if file.size < _LARGE]
@@ -31,26 +33,34 @@ def damaged(
         return (*(file for file, is_whole in pairs if not is_whole), *found)
 
 
+class _DamagedError(Exception):
+    """The file is not there, has another size, or cannot be read."""
+
+
 def _is_whole(path: str, file: StoredFile, alive: Callable[[], None]) -> bool:
+    digest = hashlib.sha256()
+    try:
+        for piece in _read(path, file.size):
+            digest.update(piece)
+            if file.size > _LARGE:
+                alive()  # what it raises says nothing about the file
+    except _DamagedError:
+        return False
+    return digest.hexdigest() == file.sha256
+
+
+def _read(path: str, size: int) -> Iterator[memoryview]:
+    buffer = memoryview(bytearray(min(size, _LARGE)))
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
-    except OSError:
-        return False
-    try:
-        if os.fstat(descriptor).st_size != file.size:
-            return False
-        return _digest(descriptor, file.size, alive) == file.sha256
-    except OSError:
-        return False
-    finally:
-        os.close(descriptor)
-
-
-def _digest(descriptor: int, size: int, alive: Callable[[], None]) -> str:
-    digest = hashlib.sha256()
-    buffer = memoryview(bytearray(min(size, _LARGE)))
-    while count := os.readv(descriptor, [buffer]):
-        digest.update(buffer[:count])
-        if size > _LARGE:
-            alive()
-    return digest.hexdigest()
+        try:
+            if os.fstat(descriptor).st_size != size:
+                raise _DamagedError
+            while count := os.readv(descriptor, [buffer]):
+                yield buffer[:count]
+        finally:
+            os.close(descriptor)
+    except OSError as error:
+        if disk.is_shortage(error):
+            raise
+        raise _DamagedError from error

@@ -91,6 +91,11 @@ def problem_of(error: OSError, what: str, where: Path) -> Problem:
     return Problem("IO_ERROR", f"{what}: {reason}", where=str(where), fix=fix)
 
 
+def is_shortage(error: OSError) -> bool:
+    """Whether this process or host has no descriptor or no memory left."""
+    return error.errno in _SHORT
+
+
 def is_short_of_memory(error: Exception) -> bool:
     """Whether Python had no memory; for a thread that there is none for it has no error class."""
     return isinstance(error, MemoryError) or "can't start new thread" in str(error)

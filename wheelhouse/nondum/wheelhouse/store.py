@@ -100,7 +100,7 @@ class Store:
         """A stored wheel whose files have been hashed again, if they are as they were.
 
         Compiled files are dropped if any of them is not. `alive` is called, from any thread, while
-        large ones are read. Raises `InstallFailed`.
+        large ones are read. Raises `InstallFailed`, and what `checking.damaged` raises.
         """
         stored = self.get(sha256)
         if stored is None:
