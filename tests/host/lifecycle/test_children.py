@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import logging
 import os
 import resource
 import select
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import AsyncIterator
@@ -70,6 +72,17 @@ async def test_child_works_again_for_the_same_drive_only(tmp_path: Path) -> None
         assert pool.kept() == {"a": first}
         await pool.run("look", drive(tmp_path), owner="b")
         assert pool.kept()["b"] != first
+
+
+def test_child_whose_daemon_was_killed_ends_in_silence(tmp_path: Path) -> None:
+    program = [sys.executable, "-c", "from nondum.host.lifecycle import child; child.work()"]
+    daemon, requests = socket.socketpair()
+    with requests, daemon:
+        request = {"job": "look", "arguments": drive(tmp_path)}
+        daemon.sendall(json.dumps(request).encode() + b"\n")
+        daemon.close()
+        ended = subprocess.run(program, stdin=requests, capture_output=True, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, b"", b"")
 
 
 async def test_child_without_an_owner_ends_with_its_job(tmp_path: Path) -> None:

@@ -53,9 +53,13 @@ def test_payload_is_tried_once_and_is_well_if_the_daemon_lives() -> None:
 
 
 def test_payload_that_kills_its_trial_is_left_to_people() -> None:
-    tried = on(left_alone(), DUE)
+    before = left_alone()
+    tried = on(before, DUE)
     state = on(died(tried), drive(), events.DriveRead("a", ("k1",)))
     assert state.payloads["k1"].step is Step.QUARANTINED
+    (foretold,), (untried,) = before.payloads["k1"].problems, state.payloads["k1"].problems
+    assert (foretold.code, untried.code) == ("QUARANTINED", "QUARANTINED")
+    assert foretold.fix != untried.fix, "a trial is foretold that will not be"
     assert on(state, DUE).payloads["k1"].step is Step.QUARANTINED
     asked = on(state, RetryAsked("k1"))
     assert asked.payloads["k1"].step is Step.STORED

@@ -55,7 +55,11 @@ def main(daemon: int, channel: int) -> None:
 
 def work() -> None:
     """Do the jobs that come over descriptor 0, a socket, until it ends."""
-    with os.fdopen(os.dup(0)) as requests, os.fdopen(os.dup(0), "w", buffering=1) as answers:
+    with (
+        contextlib.suppress(ConnectionError),  # nobody waits for the answer any more
+        os.fdopen(os.dup(0)) as requests,
+        os.fdopen(os.dup(0), "w", buffering=1) as answers,
+    ):
         os.dup2(1, 0)  # what it starts does not take part in the conversation,
         os.dup2(2, 1)  # nor does whatever prints
         for line in requests:

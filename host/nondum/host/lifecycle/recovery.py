@@ -88,7 +88,7 @@ def _why_not(state: HostState, payload: PayloadRecord, *, is_missing: bool) -> P
         return _lost(payload)
     if _is_kept_out(state, payload):
         return safe_mode.problem(state.safety, payload.payload_id)
-    return tries.left_alone(payload.payload_id)
+    return tries.left_alone(state, payload.key, payload.payload_id)
 
 
 def _lost(payload: PayloadRecord) -> Problem:

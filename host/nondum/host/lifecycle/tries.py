@@ -85,25 +85,32 @@ def counts(snapshot: Snapshot) -> Iterator[str]:
             yield f"{died} died at {names[subject]}; after {ATTEMPTS} it is left alone"
 
 
-def left_alone(where: str) -> Problem:
-    """What is told of it."""
+def left_alone(state: HostState, subject: str, where: str) -> Problem:
+    """What is told of what too many daemons died at."""
+    fix = (
+        "pull it and plug it in again, or ask for another try with `nondum retry` or "
+        "`nondum host resume --all`"
+    )
+    if state.tries[subject] < ON_TRIAL:
+        fix += "; a daemon that has lived for an hour tries it once by itself"
     return Problem(
         "QUARANTINED",
         f"{ATTEMPTS} daemons in a row ended while they were at it, so it is left alone",
         where=where,
-        fix="pull it and plug it in again, or ask for another try with `nondum retry` or "
-        "`nondum host resume --all`",
+        fix=fix,
     )
 
 
 def drive_problems(state: HostState, drive: DriveRecord) -> tuple[Problem, ...]:
     """What there is against looking at a drive."""
-    return (left_alone(drive.id),) if is_left_alone(state, subject_of(drive)) else ()
+    subject = subject_of(drive)
+    return (left_alone(state, subject, drive.id),) if is_left_alone(state, subject) else ()
 
 
 def payload_problems(state: HostState, found: PayloadFound) -> tuple[Problem, ...]:
     """What there is against taking in a payload."""
-    return (left_alone(found.payload_id),) if is_left_alone(state, found.payload) else ()
+    subject = found.payload
+    return (left_alone(state, subject, found.payload_id),) if is_left_alone(state, subject) else ()
 
 
 def on_event(turn: Turn, event: Event) -> None:

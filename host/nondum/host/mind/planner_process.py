@@ -90,6 +90,7 @@ class PlannerProcess:
         async with self._lock:
             await self._kill()
         await asyncio.gather(*self._endings, return_exceptions=True)
+        await asyncio.to_thread(self._folder.remove)  # of a start that was cancelled
 
     def _refusal(self, request: wire.Request) -> str:
         """Why the planner is not one for a task; empty if it is."""

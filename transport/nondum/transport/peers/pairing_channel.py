@@ -393,11 +393,18 @@ class PairingHost:
             return
         is_slow = self._loop.time() - self._try.begun_s > ANSWER_S
         if self._try.link.send(encode(Beat())) is Sent.GONE:
-            self._give_up(pairing_problems.VANISHED, None)
+            self._vanished(self._try)
         elif is_slow and not self._try.pairing.has_told_nonce:
             self._give_up(pairing_problems.VANISHED, Ending.BROKEN)
         elif _sent_too_much(self._try):
             self._give_up(pairing_problems.BROKEN, Ending.BROKEN)
+
+    def _vanished(self, current: Try) -> None:
+        """The connection is gone. Why may wait to be read: the last words."""
+        assert self._door is not None
+        self._door.drain()
+        if self._try is current:
+            self._give_up(pairing_problems.VANISHED, None)
 
     def _waiting(self, problem: Problem | None) -> Waiting:
         return Waiting(TRIES - self._window.tries, problem)
