@@ -81,7 +81,7 @@ def test_child_whose_daemon_was_killed_ends_in_silence(tmp_path: Path) -> None:
         request = {"job": "look", "arguments": drive(tmp_path)}
         daemon.sendall(json.dumps(request).encode() + b"\n")
         daemon.close()
-        ended = subprocess.run(program, stdin=requests, capture_output=True, check=False)
+        ended = subprocess.run(program, stdin=requests.fileno(), capture_output=True, check=False)
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, b"", b"")
 
 

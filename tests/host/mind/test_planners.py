@@ -190,6 +190,20 @@ async def test_what_a_planner_had_written_goes_when_it_is_killed(
     assert not folder.exists()
 
 
+async def test_start_that_is_cancelled_leaves_nothing(planner: Make, tmp_path: Path) -> None:
+    def has_a_folder() -> bool:
+        return (tmp_path / "planning/native").is_dir()
+
+    process = planner("native")
+    starting = asyncio.create_task(process.warm())
+    while not has_a_folder():  # noqa: ASYNC110  # its process, which is made next, is not there yet
+        await asyncio.sleep(0)
+    starting.cancel()
+    await asyncio.wait([starting])
+    await process.close()
+    assert not has_a_folder()
+
+
 async def test_what_the_planner_of_a_killed_daemon_had_written_goes(
     planner: Make, tmp_path: Path
 ) -> None:

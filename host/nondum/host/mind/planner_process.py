@@ -9,8 +9,9 @@ import signal
 import sys
 import time
 from asyncio.subprocess import DEVNULL, PIPE, Process
-from collections.abc import Mapping
+from collections.abc import Coroutine, Mapping
 from pathlib import Path
+from typing import Any, TypeVar
 
 from nondum.host.mind import planner_wire as wire
 from nondum.host.mind.planner_folder import PlannerFolder
@@ -24,6 +25,8 @@ GRACE_S = 0.5
 AT_ONCE = 2_000
 """Ground actions that are written for the wire in a time that the loop can spare."""
 _LANGUAGES = ("ground", "pddl")
+
+_T = TypeVar("_T")
 
 
 class PlannerProcess:
@@ -48,7 +51,8 @@ class PlannerProcess:
         self._environment = {**os.environ, "PYTHONHASHSEED": "0", **(environment or {})}
         self._process: Process | None = None
         self._is_ready = False
-        self._endings: set[asyncio.Future[tuple[bytes, bytes]]] = set()
+        self._going: set[asyncio.Future[Any]] = set()
+        """What goes on though nobody may wait for it any more but `close`."""
         self._language = ""
         self._handles: frozenset[str] = frozenset()
         self._lock = asyncio.Lock()
@@ -89,7 +93,7 @@ class PlannerProcess:
             _end(self._process)
         async with self._lock:
             await self._kill()
-        await asyncio.gather(*self._endings, return_exceptions=True)
+        await asyncio.gather(*self._going, return_exceptions=True)
         await asyncio.to_thread(self._folder.remove)  # of a start that was cancelled
 
     def _refusal(self, request: wire.Request) -> str:
@@ -121,7 +125,7 @@ class PlannerProcess:
         if self._process is not None and self._process.returncode is None and self._is_ready:
             return self._process
         await self._kill()
-        folder = await asyncio.to_thread(self._folder.make)
+        folder = await self._to_its_end(asyncio.to_thread(self._folder.make))
         module = "nondum.host.mind.planner_child"
         self._process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-P", "-m", module, self._reference),
@@ -163,13 +167,15 @@ class PlannerProcess:
         if process is None:
             return
         _end(process)
-        # Also takes both pipes off the loop; shielded, since the caller may be being cancelled,
-        # even again while it waits here: then `close` waits.
-        ending = asyncio.ensure_future(process.communicate())
-        self._endings.add(ending)
-        ending.add_done_callback(self._endings.discard)
-        await asyncio.shield(ending)
-        await asyncio.to_thread(self._folder.remove)
+        await self._to_its_end(process.communicate())  # also takes both pipes off the loop
+        await self._to_its_end(asyncio.to_thread(self._folder.remove))
+
+    async def _to_its_end(self, awaited: Coroutine[Any, Any, _T]) -> _T:
+        """Wait for what comes to its end though the caller is cancelled, even again."""
+        going = asyncio.ensure_future(awaited)
+        self._going.add(going)
+        going.add_done_callback(self._going.discard)
+        return await asyncio.shield(going)
 
     def _failure(self, code: str, message: str) -> PlannerFailed:
         return PlannerFailed(Problem(code, message, where=f"planner {self.name}"))
