@@ -1,4 +1,4 @@
-"""Hosts that meet and read each other: `python benchmarks/fleet.py`.
+"""Hosts that meet and read each other: `python -m benchmarks.fleet`.
 
 Every host is a process of its own, all on this machine over loopback: by mesh (CURVE, every host
 linked to every other) and by way of a Zenoh router (a process more, no encryption). All start, and
@@ -32,9 +32,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import measuring
 import zmq
-from measuring import Spread
+from benchmarks import measuring
+from benchmarks.measuring import Spread
 
 from nondum.transport.fleet import Fleet, FleetEvent, Mesh, PeerChanged
 from nondum.transport.fleet.zenoh import ZenohFleet
@@ -225,7 +225,7 @@ def children(kinds: list[tuple[str, Any]]) -> Iterator[list[Child]]:
     with contextlib.ExitStack() as stack:
         started = []
         for kind, config in kinds:
-            command = [sys.executable, __file__, "--be", kind, json.dumps(config)]
+            command = [sys.executable, "-m", "benchmarks.fleet", "--be", kind, json.dumps(config)]
             process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
             )
@@ -404,7 +404,7 @@ def page(found: dict[tuple[str, int], list[Figures]], repeats: int) -> str:
         rows.append([str(hosts), named[kind], *spreads])
     return f"""# Hosts that meet: mesh against a Zenoh router
 
-`python benchmarks/fleet.py` wrote this page. Every host is a process of its own, all on this one
+`python -m benchmarks.fleet` wrote this page. Every host is a process of its own, all on this one
 machine over loopback, so that {max(hosts for _, hosts in found)} hosts share what each of them
 would have alone. All have started when they are told of each other at one moment; converged means
 that every one has every other's catalogue (10 kB, ten entries). Bytes are those that TCP carried,

@@ -1,4 +1,4 @@
-"""Calls over a worker link against calls over zmq.asyncio: `python benchmarks/link.py`.
+"""Calls over a worker link against calls over zmq.asyncio: `python -m benchmarks.link`.
 
 Both in one run, repeat by repeat in turn: a 200-byte request and a 100-byte reply, packed with
 msgpack at both ends, ids matched to callers, between two processes. Writes docs/benchmarks/link.md.
@@ -17,11 +17,10 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
-import measuring
 import zmq
 import zmq.asyncio
-import zmq_calls
-from measuring import IN_FLIGHT, REPLY, REQUEST, CallFigures, LoopCalling
+from benchmarks import measuring, zmq_calls
+from benchmarks.measuring import IN_FLIGHT, REPLY, REQUEST, CallFigures, LoopCalling
 
 from nondum.sdk.link import Link
 
@@ -53,7 +52,7 @@ async def serve_zmq(address: str) -> None:
 
 @contextlib.contextmanager
 def server(kind: str, where: str, *, descriptors: tuple[int, ...] = ()) -> Any:
-    command = [sys.executable, __file__, "--serve", kind, where]
+    command = [sys.executable, "-m", "benchmarks.link", "--serve", kind, where]
     with subprocess.Popen(command, pass_fds=descriptors) as process:
         try:
             yield process.pid
@@ -97,7 +96,7 @@ def page(found: dict[str, list[CallFigures]], repeats: int, calls: int) -> str:
     calls_table = measuring.call_table(found, {"link ÷ zmq": (OURS, ZMQ)})
     return f"""# Calls: worker link against zmq.asyncio
 
-`python benchmarks/link.py` wrote this page. A 200-byte request and a 100-byte reply between two
+`python -m benchmarks.link` wrote this page. A 200-byte request and a 100-byte reply between two
 processes, msgpack at both ends; the link also checks every packet against its limits and runs each
 request as a task that can be cancelled. {repeats} repeats in turn of {calls:,} calls one by one and
 {4 * calls:,} with 64 in flight; medians of the repeats (lowest-highest). CPU counts both processes.

@@ -1,4 +1,4 @@
-"""Camera frames between hosts, against ZeroMQ PUB/SUB: `python benchmarks/remote_streams.py`.
+"""Camera frames between hosts, against ZeroMQ PUB/SUB: `python -m benchmarks.remote_streams`.
 
 Frames of 921,600 bytes (640×480, bgr8) at 30 Hz from one process to another one over TCP on
 loopback, all designs in one run, repeat by repeat in turn: first as fast as loopback is, then over
@@ -20,14 +20,13 @@ import sys
 import time
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import IO, Any
 
-import measuring
 import msgpack
 import numpy as np
 import zmq
-from measuring import Spread
+from benchmarks import measuring
+from benchmarks.measuring import Spread
 
 from nondum.host.bridge.bridge import Bridge
 from nondum.host.lifecycle.children import Children
@@ -147,12 +146,12 @@ class Run:
         """The port at which the link of this run leads to a port."""
         if math.isinf(self._bytes_s):
             return port
-        script = str(Path(__file__).with_name("slow_link.py"))
-        link = self._start([sys.executable, script, str(port), str(self._bytes_s)])
+        module = "benchmarks.slow_link"
+        link = self._start([sys.executable, "-m", module, str(port), str(self._bytes_s)])
         return int(_out(link).readline())
 
     def start_reader(self, kind: str, where: str, *descriptors: int) -> None:
-        command = [sys.executable, __file__, "--read", kind, where]
+        command = [sys.executable, "-m", "benchmarks.remote_streams", "--read", kind, where]
         self.reader = self._start(command, *descriptors)
         self.pids.append(self.reader.pid)
         assert _out(self.reader).readline() == "ready\n"
@@ -330,7 +329,7 @@ def page(found: Found, repeats: int, seconds: float) -> str:
     sections = "\n".join(section(found, link) for link in LINKS)
     return f"""# Frames between hosts: bridges against ZeroMQ PUB/SUB
 
-`python benchmarks/remote_streams.py` wrote this page. Frames of {WIDTH * HEIGHT * 3:,} bytes at
+`python -m benchmarks.remote_streams` wrote this page. Frames of {WIDTH * HEIGHT * 3:,} bytes at
 {RATE_HZ} Hz over TCP on loopback, whole or through a process that lets only so much pass. The age
 runs from the frame's stamp, set just before it is sent, to the moment the reader has an `Image` and
 has read all its pixels once. CPU is that of all processes that take part, the link's apart: four

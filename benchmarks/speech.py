@@ -231,7 +231,7 @@ def page(results: Sequence[Result]) -> str:
     ]
     parts = [
         "# Spoken goals: heard, mistaken, refused\n",
-        "`benchmarks/speech.py` wrote this page. " + METHOD,
+        "`python -m benchmarks.speech` wrote this page. " + METHOD,
         "\n## What strictness costs\n",
         measuring.table(heads, rows),
         f"\nShipped: {shipped:g}. *None*: the nearest sentence is always taken.\n",

@@ -1,4 +1,4 @@
-"""Camera frames between processes, against ZeroMQ ipc: `python benchmarks/streams.py`.
+"""Camera frames between processes, against ZeroMQ ipc: `python -m benchmarks.streams`.
 
 Frames of 921,600 bytes (640×480, bgr8) to one and to three readers, all designs in one run, repeat
 by repeat in turn: paced at 30 Hz for latency and CPU, and as fast as the slowest reader takes them
@@ -23,11 +23,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-import measuring
 import msgpack
 import numpy as np  # before anything is measured: reading the pixels imports it
 import zmq
-from measuring import Spread
+from benchmarks import measuring
+from benchmarks.measuring import Spread
 
 from nondum.sdk import Header, Image
 from nondum.sdk.packets import SocketPackets
@@ -126,7 +126,7 @@ class Readers:
 
     def start(self, kind: str, where: str, *descriptors: int) -> None:
         reading, writing = os.pipe()
-        command = [sys.executable, __file__, "--read", kind, where, str(writing)]
+        command = [sys.executable, "-m", "benchmarks.streams", "--read", kind, where, str(writing)]
         process = self._stack.enter_context(
             subprocess.Popen(
                 command, pass_fds=(*descriptors, writing), stdout=subprocess.PIPE, text=True
@@ -301,7 +301,7 @@ def page(found: Found, repeats: int, frames: int) -> str:
     sections = "\n".join(section(found, count) for count in READERS)
     return f"""# Frames on one host: shared slots against ZeroMQ ipc
 
-`python benchmarks/streams.py` wrote this page. Frames of {WIDTH * HEIGHT * 3:,} bytes from one
+`python -m benchmarks.streams` wrote this page. Frames of {WIDTH * HEIGHT * 3:,} bytes from one
 process to others. Latency runs from the frame's stamp, set just before it is sent, to the moment
 the reader has an `Image` and has read all its pixels once. {repeats} repeats in turn of {frames}
 frames at {RATE_HZ} Hz and {10 * frames} at most {WINDOW} ahead of the slowest reader; medians of

@@ -7,6 +7,7 @@ import gc
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NoReturn, TypeVar
 
 from benchmarks.composition import peer
@@ -114,7 +115,7 @@ def composed(
     The steps of a plan that is `running` are tried out in the new task; without one, it searches.
     """
     for contribution in present:
-        claims = watch.take("parse and check", lambda c=contribution: claims_of(c))
+        claims = watch.take("parse and check", partial(claims_of, contribution))
         assert not claims.problems, claims.problems
     merged = watch.take("merge", lambda: merge(present, HOST))
     watch.take("phrases", lambda: phrasebook(present, merged))

@@ -47,14 +47,7 @@ async def plain(way: Way, folder: Path, cages: Cages) -> AsyncIterator[subproces
     """A process that misbehaves as soon as it reads a line; ended with all its children."""
     await asyncio.to_thread(folder.mkdir)
     cage = cages.make("plain", LIMITS.of_cage())
-    process = await asyncio.to_thread(
-        subprocess.Popen,
-        [base_interpreter(), "-c", SOURCE.replace("{body}", way.body.replace("\n", "\n    "))],
-        cwd=folder,
-        env={"PYTHONPATH": os.pathsep.join(map(str, LIBRARIES))},
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-    )
+    process = await asyncio.to_thread(_started, way, folder)
     try:
         await asyncio.to_thread(cage.add, process.pid)
         limit = LIMITS.descriptors
@@ -66,3 +59,13 @@ async def plain(way: Way, folder: Path, cages: Cages) -> AsyncIterator[subproces
         await asyncio.to_thread(cage.end)
         await asyncio.to_thread(process.communicate)
         await asyncio.to_thread(shutil.rmtree, folder)
+
+
+def _started(way: Way, folder: Path) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [base_interpreter(), "-c", SOURCE.replace("{body}", way.body.replace("\n", "\n    "))],
+        cwd=folder,
+        env={"PYTHONPATH": os.pathsep.join(map(str, LIBRARIES))},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
