@@ -8,7 +8,6 @@ import errno
 import socket
 from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TypeVar
 
 import pytest
@@ -17,8 +16,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.kit.clock import VirtualClock
 from tests.kit.examples import a_share
-from tests.kit.until import until, until_async
+from tests.kit.until import until_async
 from tests.transport.peers.bad_ends import bad_router
+from tests.transport.peers.connections import until_none_is_left
 from tests.transport.peers.held_back import held_back
 from tests.transport.peers.hosts import PATIENCE_S, identity
 
@@ -59,7 +59,6 @@ from nondum.transport.peers.pairing_state import (
 
 pytestmark = pytest.mark.anyio
 
-ESTABLISHED, CLOSE_WAIT = "01", "08"
 S = TypeVar("S", bound=PairingState)
 
 
@@ -153,16 +152,6 @@ async def refuses_connections(port: int) -> None:
             return late.connect_ex(("127.0.0.1", port)) == errno.ECONNREFUSED
 
     await until_async(f"port {port} is closed", is_refused)
-
-
-def connections(port: int) -> list[str]:
-    """Those that this machine's listener at a port has accepted: proc_net_tcp(5)."""
-    rows = [row.split() for row in Path("/proc/net/tcp").read_text().splitlines()[1:]]
-    return [
-        there
-        for _, here, there, state, *_ in rows
-        if int(here.rpartition(":")[2], 16) == port and state in (ESTABLISHED, CLOSE_WAIT)
-    ]
 
 
 async def compared(rover: End, base: End) -> tuple[Comparing, Comparing]:
@@ -261,7 +250,7 @@ async def test_no_counts_that_waits_to_be_read_when_its_connection_is_found_gone
 
         def refuse_while_nothing_is_read() -> None:
             rover.host.refuse()
-            until("ZeroMQ has closed the connection", lambda: not connections(base.port))
+            until_none_is_left(base.port)
 
         clock.call_later(channel.BEAT_S / 100, refuse_while_nothing_is_read)
         clock.skip(channel.BEAT_S)  # so that base's sign of life comes next, before it reads

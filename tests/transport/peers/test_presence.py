@@ -12,14 +12,16 @@ import pytest
 import zmq
 from tests.kit.clock import VirtualClock
 from tests.kit.until import until_async
+from tests.transport.peers.bad_ends import bad_dealer, hello_of
+from tests.transport.peers.connections import until_none_is_left
 from tests.transport.peers.hosts import PATIENCE_S, Host, host, identity, trusting, two_hosts, up
 
-from nondum.transport.peers import DialFailed, HostKeys, Loss, PeerLost, Reason, roster
+from nondum.transport.peers import DialFailed, HostKeys, Loss, PeerLost, PeerUp, Reason, roster
 from nondum.transport.peers.accepted import AWAITED_S
 from nondum.transport.peers.dial import ANSWER_S, GREETING_S
 from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.link import Link
-from nondum.transport.peers.messages import Ask, Ping, Pong, encode
+from nondum.transport.peers.messages import Ask, Bye, Ping, Pong, encode
 from nondum.transport.peers.presence import Presence
 from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.session import Session
@@ -85,6 +87,26 @@ async def test_host_that_stands_still_as_it_greets_doubts_the_link(clock: Virtua
     assert link.is_doubtful(clock.time())
 
 
+async def test_goodbye_counts_that_waits_to_be_read_when_its_connection_is_found_gone(
+    clock: VirtualClock,
+) -> None:
+    rover, base = identity("rover"), identity("base")
+    async with host(base, trusting(rover)) as there:
+        with bad_dealer(there.address, rover, there) as leaving:
+            leaving.send(hello_of(rover))
+            await there.told(PeerUp)
+
+            def leave_while_nothing_is_read() -> None:
+                leaving.send(encode(Bye("closed")))
+                leaving.close(linger=int(PATIENCE_S) * 1000)
+                until_none_is_left(int(there.address.rpartition(":")[2]))
+
+            clock.call_later(0.99 * BEAT_S, leave_while_nothing_is_read)
+            clock.skip(BEAT_S)  # so that base's ping comes next, before it reads
+            lost = await clock.advance_until(there.told(PeerLost))
+            assert lost.reason is Loss.DEPARTED
+
+
 def _ping(link: Link, number: int, pings: list[int]) -> None:
     pings.append(number)
     link.tell(Ping(1))
@@ -98,6 +120,9 @@ class Wire:
     def send(self, data: bytes) -> Sent:
         """Send without waiting."""
         return Sent.SENT
+
+    def drain(self) -> None:
+        """Take in what has come."""
 
     def cut(self, linger_ms: int = 0) -> None:
         """End the connection."""

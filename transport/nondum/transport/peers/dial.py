@@ -51,6 +51,10 @@ class Attempt:
         """Send without waiting."""
         return self.route.send(data)
 
+    def drain(self) -> object:
+        """Take in what has come."""
+        return self.route.drain()
+
     def cut(self, linger_ms: int = 0) -> None:
         """End it, and have the dial try again."""
         self.route.cut(linger_ms)

@@ -28,7 +28,10 @@ class Route(Protocol):
         """The other end."""
 
     def send(self, data: bytes) -> Sent:
-        """Send without waiting."""
+        """Send without waiting. When it is `GONE`, what came before may wait for `drain`."""
+
+    def drain(self) -> object:
+        """Take in what has come, if only just before the end."""
 
     def cut(self, linger_ms: int = 0) -> None:
         """End the connection."""

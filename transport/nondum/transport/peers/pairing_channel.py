@@ -400,9 +400,8 @@ class PairingHost:
             self._give_up(pairing_problems.BROKEN, Ending.BROKEN)
 
     def _vanished(self, current: Try) -> None:
-        """The connection is gone. Why may wait to be read: the last words."""
-        assert self._door is not None
-        self._door.drain()
+        """The connection is gone. Why may wait to be read."""
+        current.link.route.drain()
         if self._try is current:
             self._give_up(pairing_problems.VANISHED, None)
 

@@ -91,10 +91,6 @@ class Door:
         """Cut those that say nothing, or send too much."""
         self._arrivals.cut_overdue()
 
-    def drain(self) -> None:
-        """Take in what was said, if only just before its connection ended."""
-        self._listener.drain()
-
     def close(self, linger_ms: int) -> None:
         """Listen no more; what was said may leave for `linger_ms`."""
         self._ears.close()

@@ -248,6 +248,7 @@ class Roster:
     def _send_ping(self, link: Link, number: int, ping: bytes) -> None:
         now_s = self._loop.time()
         if not link.is_over and link.ping(number, ping, now_s) is Sent.GONE:
+            link.route.drain()  # a goodbye may wait to be read
             self.break_link(link, Loss.DISCONNECTED)
             return
         self._presence.pinged(link, now_s, self._beat_s)

@@ -211,6 +211,7 @@ class _Served:
             self._waiting.popleft()
             self._taken += 1
             if sent is Sent.GONE:
+                self.route.drain()  # what was said last comes before the end
                 self.route.cut()
                 self.over(None)
                 return

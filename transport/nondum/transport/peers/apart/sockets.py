@@ -308,6 +308,9 @@ class _FarRoute:
         self._tell("data", data)
         return Sent.SENT
 
+    def drain(self) -> None:
+        """Nothing waits here: what comes is told in its order, the end last."""
+
     def cut(self, linger_ms: int = 0) -> None:
         """End the connection."""
         self._tell("cut", linger_ms)
