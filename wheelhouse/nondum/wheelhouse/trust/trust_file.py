@@ -39,7 +39,7 @@ from datetime import UTC, datetime
 from nondum.sdk.errors import PayloadRefused, Problem, TrustRefused
 from nondum.wheelhouse import names, tables
 from nondum.wheelhouse.manifest import GRANTABLE
-from nondum.wheelhouse.tables import Form, Report, Table
+from nondum.wheelhouse.tables import Form, Table
 from nondum.wheelhouse.trust.public_key import FINGERPRINT, PublicKey, parse_line
 from nondum.wheelhouse.trust.trust import (
     ANY,
@@ -116,8 +116,8 @@ def _parse(text: str, where: str) -> Trust:
         bounds=tuple(_bounds(table) for table in root.tables("release")),
     )
     root.close()
-    for kind, message, fix in _contradictions(trust):
-        report.add(kind, message, _line(report, message), fix)
+    for kind, name, message, fix in _contradictions(trust):
+        report.add(kind, message, _last_line(report.text, name), fix)
     report.raise_if_any()
     return trust
 
@@ -232,14 +232,16 @@ def _is_prefix(text: str) -> bool:
     return text == ANY or (len(text) <= names.MAX_PATH and bool(_PREFIX.fullmatch(text)))
 
 
-def _contradictions(trust: Trust) -> Iterator[tuple[str, str, str]]:
-    """Kind, message and remedy of what the parts of a file say against one another."""
+def _contradictions(trust: Trust) -> Iterator[tuple[str, str, str, str]]:
+    """Kind, name, message and remedy of what the parts of a file say against one another. The name
+    is a text of the file."""
     for what, known in (("root", trust.roots.keys), ("key", trust.keys)):
         yield from _twice(what, (one.name for one in known))
         points = {one.key.point.hex(): one.name for one in known}
         for again in _repeated(one.key.point.hex() for one in known if one.name):
             fix = "a person with two names would count twice: keep one of them"
-            yield "TWICE", f"the key of {points[again]!r} stands twice", fix
+            name = points[again]
+            yield "TWICE", name, f"the key of {name!r} stands twice", fix
     yield from _twice("role", (role.name for role in trust.roles))
     yield from _twice("bound for releases of", (bounds.payload for bounds in trust.bounds))
     yield from _twice("revocation of", (gone.fingerprint for gone in trust.revoked))
@@ -247,28 +249,26 @@ def _contradictions(trust: Trust) -> Iterator[tuple[str, str, str]]:
     for role in trust.roles:
         for unknown in sorted({*role.keys} - named):
             fix = f"known: {', '.join(sorted(named)) or 'none'}"
-            yield "VALUE", f"role {role.name!r} names a key {unknown!r} that is not there", fix
+            message = f"role {role.name!r} names a key {unknown!r} that is not there"
+            yield "VALUE", unknown, message, fix
         yield from _twice(f"key of role {role.name!r}:", role.keys)
     gone = {revocation.fingerprint for revocation in trust.revoked}
     for root in trust.roots.keys:
         if root.key.point and root.key.fingerprint in gone:
             fix = "take it out of [[roots.key]], or out of [[revoked]]"
-            yield "VALUE", f"the root {root.name!r} is revoked", fix
+            yield "VALUE", root.name, f"the root {root.name!r} is revoked", fix
 
 
-def _twice(what: str, known: Iterable[str]) -> Iterator[tuple[str, str, str]]:
+def _twice(what: str, known: Iterable[str]) -> Iterator[tuple[str, str, str, str]]:
     for again in _repeated(known):
-        yield "TWICE", f"{what} {again!r} stands twice", "keep one of them"
+        yield "TWICE", again, f"{what} {again!r} stands twice", "keep one of them"
 
 
 def _repeated(known: Iterable[str]) -> list[str]:
     return [one for one, count in Counter(known).items() if one and count > 1]
 
 
-def _line(report: Report, message: str) -> int | None:
-    """The last line of the file with what a message quotes."""
-    quoted = re.search(r"'([^']+)'(?!.*')", message)
-    if quoted is None:
-        return None
-    numbered = enumerate(report.text.splitlines(), start=1)
-    return next((n for n, line in reversed(list(numbered)) if quoted[1] in line), None)
+def _last_line(text: str, name: str) -> int | None:
+    """The number of the last line that has a name in it."""
+    numbered = enumerate(text.splitlines(), start=1)
+    return next((n for n, line in reversed(list(numbered)) if name in line), None)
