@@ -59,7 +59,7 @@ def test_payload_that_kills_its_trial_is_left_to_people() -> None:
     assert state.payloads["k1"].step is Step.QUARANTINED
     (foretold,), (untried,) = before.payloads["k1"].problems, state.payloads["k1"].problems
     assert (foretold.code, untried.code) == ("QUARANTINED", "QUARANTINED")
-    assert foretold.fix != untried.fix, "a trial is foretold that will not be"
+    assert len(foretold.fix) > len(untried.fix), "it is foretold, then no more"
     assert on(state, DUE).payloads["k1"].step is Step.QUARANTINED
     asked = on(state, RetryAsked("k1"))
     assert asked.payloads["k1"].step is Step.STORED

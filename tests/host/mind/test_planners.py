@@ -191,17 +191,41 @@ async def test_what_a_planner_had_written_goes_when_it_is_killed(
 
 
 async def test_start_that_is_cancelled_leaves_nothing(planner: Make, tmp_path: Path) -> None:
-    def has_a_folder() -> bool:
-        return (tmp_path / "planning/native").is_dir()
-
     process = planner("native")
+    await cancelled_in_the_midst_of_making_its_folder(process, tmp_path / "planning/native")
+    await process.close()
+    assert not (await asyncio.to_thread(list, (tmp_path / "planning").iterdir()))
+
+
+async def test_start_after_one_that_was_cancelled_has_its_folder(
+    planner: Make, tmp_path: Path
+) -> None:
+    process, folder = planner("writer"), tmp_path / "planning/writer"
+    await cancelled_in_the_midst_of_making_its_folder(process, folder)
+    await process.warm()
+    assert await asyncio.to_thread(folder.is_dir)
+    assert not await asyncio.to_thread(list, folder.glob("left-*"))
+
+
+async def cancelled_in_the_midst_of_making_its_folder(
+    process: PlannerProcess, folder: Path
+) -> None:
+    """Cancel a start while it removes what a planner before has left."""
+
+    def leave_much() -> None:
+        folder.mkdir(parents=True)
+        for number in range(2_000):
+            (folder / f"left-{number}").touch()
+
+    def is_untouched() -> bool:
+        return sum(1 for _ in folder.iterdir()) == 2_000
+
+    await asyncio.to_thread(leave_much)
     starting = asyncio.create_task(process.warm())
-    while not has_a_folder():  # noqa: ASYNC110  # its process, which is made next, is not there yet
+    while is_untouched():  # noqa: ASYNC110  # nothing tells of it
         await asyncio.sleep(0)
     starting.cancel()
     await asyncio.wait([starting])
-    await process.close()
-    assert not has_a_folder()
 
 
 async def test_what_the_planner_of_a_killed_daemon_had_written_goes(

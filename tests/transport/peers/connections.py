@@ -6,28 +6,36 @@ from pathlib import Path
 
 from tests.kit.until import until
 
+_TABLES = (Path("/proc/net/tcp"), Path("/proc/net/tcp6"))
 _ESTABLISHED, _CLOSE_WAIT = "01", "08"
 
 
-def until_none_is_left(port: int) -> None:
-    """Wait until ZeroMQ's own thread has closed them all; nothing else runs meanwhile.
+class Accepted:
+    """Those to one port; there is at least one."""
 
-    Two looks, since a socket that is sent over hears of it a few milliseconds later.
-    """
-    looks: list[bool] = []
+    def __init__(self, port: int) -> None:
+        self._port = port
+        assert self._others(), f"no connection to port {port}"
 
-    def are_closed() -> bool:
-        looks.append(not _accepted(port))
-        return looks[-2:] == [True, True]
+    def until_closed(self) -> None:
+        """Wait until ZeroMQ's own thread has closed them all; nothing else runs meanwhile.
 
-    until(f"the connections to port {port} are closed", are_closed)
+        Two looks, since a socket that is sent over hears of it a few milliseconds later.
+        """
+        looks: list[bool] = []
 
+        def are_closed() -> bool:
+            looks.append(not self._others())
+            return looks[-2:] == [True, True]
 
-def _accepted(port: int) -> list[str]:
-    """Their other ends: proc_net_tcp(5)."""
-    rows = [row.split() for row in Path("/proc/net/tcp").read_text().splitlines()[1:]]
-    return [
-        there
-        for _, here, there, state, *_ in rows
-        if int(here.rpartition(":")[2], 16) == port and state in (_ESTABLISHED, _CLOSE_WAIT)
-    ]
+        until(f"the connections to port {self._port} are closed", are_closed)
+
+    def _others(self) -> list[str]:
+        """Their other ends: proc_net_tcp(5)."""
+        lines = (line for table in _TABLES for line in table.read_text().splitlines()[1:])
+        return [
+            there
+            for _, here, there, state, *_ in map(str.split, lines)
+            if int(here.rpartition(":")[2], 16) == self._port
+            and state in (_ESTABLISHED, _CLOSE_WAIT)
+        ]

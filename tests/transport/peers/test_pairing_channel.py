@@ -18,7 +18,7 @@ from tests.kit.clock import VirtualClock
 from tests.kit.examples import a_share
 from tests.kit.until import until_async
 from tests.transport.peers.bad_ends import bad_router
-from tests.transport.peers.connections import until_none_is_left
+from tests.transport.peers.connections import Accepted
 from tests.transport.peers.held_back import held_back
 from tests.transport.peers.hosts import PATIENCE_S, identity
 
@@ -247,10 +247,11 @@ async def test_no_counts_that_waits_to_be_read_when_its_connection_is_found_gone
 ) -> None:
     async with end("rover") as rover, end("base") as base:
         await compared(rover, base)
+        connections = Accepted(base.port)
 
         def refuse_while_nothing_is_read() -> None:
             rover.host.refuse()
-            until_none_is_left(base.port)
+            connections.until_closed()
 
         clock.call_later(channel.BEAT_S / 100, refuse_while_nothing_is_read)
         clock.skip(channel.BEAT_S)  # so that base's sign of life comes next, before it reads

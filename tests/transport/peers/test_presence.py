@@ -13,7 +13,7 @@ import zmq
 from tests.kit.clock import VirtualClock
 from tests.kit.until import until_async
 from tests.transport.peers.bad_ends import bad_dealer, hello_of
-from tests.transport.peers.connections import until_none_is_left
+from tests.transport.peers.connections import Accepted
 from tests.transport.peers.hosts import PATIENCE_S, Host, host, identity, trusting, two_hosts, up
 
 from nondum.transport.peers import DialFailed, HostKeys, Loss, PeerLost, PeerUp, Reason, roster
@@ -87,24 +87,35 @@ async def test_host_that_stands_still_as_it_greets_doubts_the_link(clock: Virtua
     assert link.is_doubtful(clock.time())
 
 
+@pytest.mark.parametrize(
+    ("before", "stall_s"),
+    [(0, 0.0), (0, 2.0), (200, 0.0), (200, 2.0)],
+    ids=["alone", "after a stall", "behind others", "behind others after a stall"],
+)
 async def test_goodbye_counts_that_waits_to_be_read_when_its_connection_is_found_gone(
-    clock: VirtualClock,
+    clock: VirtualClock, before: int, stall_s: float
 ) -> None:
+    faults: list[object] = []
+    clock.set_exception_handler(lambda _, context: faults.append(context))
     rover, base = identity("rover"), identity("base")
     async with host(base, trusting(rover)) as there:
         with bad_dealer(there.address, rover, there) as leaving:
             leaving.send(hello_of(rover))
             await there.told(PeerUp)
+            connections = Accepted(int(there.address.rpartition(":")[2]))
 
             def leave_while_nothing_is_read() -> None:
+                for _ in range(before):
+                    leaving.send(encode(Ping(9)))
                 leaving.send(encode(Bye("closed")))
                 leaving.close(linger=int(PATIENCE_S) * 1000)
-                until_none_is_left(int(there.address.rpartition(":")[2]))
+                connections.until_closed()
 
             clock.call_later(0.99 * BEAT_S, leave_while_nothing_is_read)
-            clock.skip(BEAT_S)  # so that base's ping comes next, before it reads
+            clock.skip(BEAT_S + stall_s)  # so that base's ping comes next, before it reads
             lost = await clock.advance_until(there.told(PeerLost))
             assert lost.reason is Loss.DEPARTED
+            assert not faults
 
 
 def _ping(link: Link, number: int, pings: list[int]) -> None:
@@ -121,8 +132,9 @@ class Wire:
         """Send without waiting."""
         return Sent.SENT
 
-    def drain(self) -> None:
-        """Take in what has come."""
+    def drain(self) -> bool:
+        """Nothing ever comes."""
+        return True
 
     def cut(self, linger_ms: int = 0) -> None:
         """End the connection."""

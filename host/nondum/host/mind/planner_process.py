@@ -52,7 +52,7 @@ class PlannerProcess:
         self._process: Process | None = None
         self._is_ready = False
         self._going: set[asyncio.Future[Any]] = set()
-        """What goes on though nobody may wait for it any more but `close`."""
+        """Tasks that outlive a cancelled caller; `close` waits for them."""
         self._language = ""
         self._handles: frozenset[str] = frozenset()
         self._lock = asyncio.Lock()
@@ -93,8 +93,8 @@ class PlannerProcess:
             _end(self._process)
         async with self._lock:
             await self._kill()
-        await asyncio.gather(*self._going, return_exceptions=True)
-        await asyncio.to_thread(self._folder.remove)  # of a start that was cancelled
+            # Behind whatever outlives a cancelled caller: a start may just have made the folder.
+            await self._to_its_end(asyncio.to_thread(self._folder.remove))
 
     def _refusal(self, request: wire.Request) -> str:
         """Why the planner is not one for a task; empty if it is."""
@@ -171,14 +171,20 @@ class PlannerProcess:
         await self._to_its_end(asyncio.to_thread(self._folder.remove))
 
     async def _to_its_end(self, awaited: Coroutine[Any, Any, _T]) -> _T:
-        """Wait for what comes to its end though the caller is cancelled, even again."""
-        going = asyncio.ensure_future(awaited)
+        """Do this to its end even if the caller is cancelled, one after the other."""
+        going = asyncio.ensure_future(_after(frozenset(self._going), awaited))
         self._going.add(going)
         going.add_done_callback(self._going.discard)
         return await asyncio.shield(going)
 
     def _failure(self, code: str, message: str) -> PlannerFailed:
         return PlannerFailed(Problem(code, message, where=f"planner {self.name}"))
+
+
+async def _after(others: frozenset[asyncio.Future[Any]], awaited: Coroutine[Any, Any, _T]) -> _T:
+    if others:
+        await asyncio.wait(others)
+    return await awaited
 
 
 def _end(process: Process) -> None:

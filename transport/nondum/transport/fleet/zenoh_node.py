@@ -70,8 +70,9 @@ class _Route:
         """Send without waiting."""
         return self._line.send(self._place, self._number, data)
 
-    def drain(self) -> None:
-        """Nothing waits: messages are taken in as they come."""
+    def drain(self) -> bool:
+        """Nothing can wait: sending is `GONE` only while there is no line to a router."""
+        return True
 
     def cut(self, linger_ms: int = 0) -> None:
         """End it: there is no connection that would, so the other end is told."""

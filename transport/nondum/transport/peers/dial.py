@@ -51,8 +51,8 @@ class Attempt:
         """Send without waiting."""
         return self.route.send(data)
 
-    def drain(self) -> object:
-        """Take in what has come."""
+    def drain(self) -> bool:
+        """Take in what has come; whether nothing is left that waits."""
         return self.route.drain()
 
     def cut(self, linger_ms: int = 0) -> None:

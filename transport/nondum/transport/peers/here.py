@@ -183,7 +183,7 @@ class SocketsHere:
         # Routes that were cut keep their ids until their connections are gone: what was read of
         # them before must not make a new one.
         for routing_id, route in list(self._accepted.items()):
-            if route.is_cut and route.send(_PING) is Sent.GONE:
+            if route.is_cut and route.send(_PING) is Sent.GONE and route.drain():
                 del self._accepted[routing_id]
                 route.receiver.over(None)
 

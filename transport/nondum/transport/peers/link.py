@@ -30,8 +30,9 @@ class Route(Protocol):
     def send(self, data: bytes) -> Sent:
         """Send without waiting. When it is `GONE`, what came before may wait for `drain`."""
 
-    def drain(self) -> object:
-        """Take in what has come, if only just before the end."""
+    def drain(self) -> bool:
+        """Take in what has come, of other connections to the same socket, too; whether nothing is
+        left that waits. Handlers run before it returns, so it is not called from one."""
 
     def cut(self, linger_ms: int = 0) -> None:
         """End the connection."""

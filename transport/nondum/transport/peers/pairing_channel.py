@@ -400,9 +400,8 @@ class PairingHost:
             self._give_up(pairing_problems.BROKEN, Ending.BROKEN)
 
     def _vanished(self, current: Try) -> None:
-        """The connection is gone. Why may wait to be read."""
-        current.link.route.drain()
-        if self._try is current:
+        """The connection is gone. Why may wait to be read, if need be until the next beat."""
+        if current.link.route.drain() and self._try is current:
             self._give_up(pairing_problems.VANISHED, None)
 
     def _waiting(self, problem: Problem | None) -> Waiting:

@@ -39,6 +39,8 @@ ACQUAINTANCES = 1024
 """Peers that are remembered while they are away."""
 
 _TERMS = Terms()
+UNREAD_S = 0.02
+"""Until it is looked again whether all is read that came over a connection that is gone."""
 
 
 class Roster:
@@ -248,10 +250,18 @@ class Roster:
     def _send_ping(self, link: Link, number: int, ping: bytes) -> None:
         now_s = self._loop.time()
         if not link.is_over and link.ping(number, ping, now_s) is Sent.GONE:
-            link.route.drain()  # a goodbye may wait to be read
-            self.break_link(link, Loss.DISCONNECTED)
+            self._loop.call_soon(self._end_gone, link)  # this may be in the midst of draining
             return
         self._presence.pinged(link, now_s, self._beat_s)
+
+    def _end_gone(self, link: Link) -> None:
+        """The connection is gone. What came over it is read first: a goodbye, say."""
+        if link.is_over:
+            return
+        if link.route.drain():
+            self.break_link(link, Loss.DISCONNECTED)
+        else:
+            self._loop.call_later(UNREAD_S, self._end_gone, link)
 
     def _on_dead(self, link: Link) -> None:
         self.break_link(link, Loss.SILENT)

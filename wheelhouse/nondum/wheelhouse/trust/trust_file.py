@@ -269,6 +269,6 @@ def _repeated(known: Iterable[str]) -> list[str]:
 
 
 def _last_line(text: str, name: str) -> int | None:
-    """The number of the last line that has a name in it."""
+    """The number of the last line that has a name in it. None for a name that was refused."""
     numbered = enumerate(text.splitlines(), start=1)
-    return next((n for n, line in reversed(list(numbered)) if name in line), None)
+    return next((n for n, line in reversed(list(numbered)) if name and name in line), None)

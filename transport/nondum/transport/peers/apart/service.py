@@ -205,13 +205,13 @@ class _Served:
         """Hand on what waits."""
         while self._waiting and not self._is_over:
             sent = self.route.send(self._waiting[0])
-            if sent is Sent.FULL:
+            is_unread = sent is Sent.GONE and not self.route.drain()
+            if sent is Sent.FULL or is_unread:  # what was said last is told before the end
                 self._service.retry_soon()
                 break
             self._waiting.popleft()
             self._taken += 1
             if sent is Sent.GONE:
-                self.route.drain()  # what was said last comes before the end
                 self.route.cut()
                 self.over(None)
                 return

@@ -308,8 +308,9 @@ class _FarRoute:
         self._tell("data", data)
         return Sent.SENT
 
-    def drain(self) -> None:
+    def drain(self) -> bool:
         """Nothing waits here: what comes is told in its order, the end last."""
+        return True
 
     def cut(self, linger_ms: int = 0) -> None:
         """End the connection."""
