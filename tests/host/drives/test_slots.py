@@ -5,15 +5,17 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import resource
 import shutil
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 
 import pytest
+from tests.kit.clock import VirtualClock
 from tests.kit.until import until_async
 
-from nondum.host.drives.slots import SlotSource
+from nondum.host.drives.slots import AGAIN_S, SlotSource
 from nondum.host.events import DriveInserted, DriveRemoved, DrivesScanned, Event
 from nondum.wheelhouse import disk
 
@@ -58,6 +60,35 @@ async def test_links_and_folders_come_and_go(tmp_path: Path) -> None:
         assert await told.get() == DriveRemoved("b")
         (slots / "a").unlink()
         assert await told.get() == DriveRemoved("a")
+
+
+async def test_drives_of_a_folder_that_cannot_be_read_for_a_moment_stay(
+    tmp_path: Path, clock: VirtualClock
+) -> None:
+    slots = tmp_path / "slots"
+    (slots / "a").mkdir(parents=True)
+    async with watched(slots) as told:
+        assert await told.get() == DriveInserted("a", slots / "a", "slot")
+        assert await told.get() == DrivesScanned("slot", ("a",))
+        (slots / "b").mkdir()
+        with no_descriptor_left():
+            await clock.settle()
+            await clock.advance(AGAIN_S)
+        assert told.empty()
+        await clock.advance(AGAIN_S)
+        assert await told.get() == DriveInserted("b", slots / "b", "slot")
+        assert told.empty()
+
+
+@contextlib.contextmanager
+def no_descriptor_left() -> Iterator[None]:
+    """This process may open no more files (EMFILE)."""
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (0, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
 
 
 async def test_swapped_drive_is_another_drive(tmp_path: Path) -> None:

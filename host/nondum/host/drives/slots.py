@@ -8,6 +8,7 @@ are not read.
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import logging
 import os
@@ -26,6 +27,9 @@ _Identity = tuple[Path, int, str]
 _Slot = tuple[str, _Identity | None]
 """A drive; or the path of a link that leads nowhere yet, without an identity."""
 
+AGAIN_S = 1.0
+"""Until a slot folder that could not be read is read again."""
+
 log = logging.getLogger(__name__)
 
 
@@ -37,6 +41,8 @@ class SlotSource:
     def __init__(self, folders: Sequence[Path]) -> None:
         self._folders = tuple(folders)
         self._seen: dict[str, _Identity] = {}
+        self._is_unread = False
+        """Whether a folder could not be read the last time."""
         self.problems: tuple[Problem, ...] = ()
         """Of links that lead nowhere yet."""
 
@@ -51,7 +57,9 @@ class SlotSource:
             emit(DrivesScanned(self.kind, tuple(self._seen)))
             while True:
                 rewritten.look(self._places())
-                await changed.wait()
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(AGAIN_S if self._is_unread else None):
+                        await changed.wait()
                 changed.clear()
                 compare()
 
@@ -74,6 +82,7 @@ class SlotSource:
 
     def _compare(self, emit: Emit) -> None:
         """Tell the difference to what was seen last."""
+        self._is_unread = False
         present = dict(self._entries())
         for drive, identity in list(self._seen.items()):
             if present.get(drive) != identity:
@@ -92,7 +101,14 @@ class SlotSource:
 
     def _entries(self) -> Iterator[tuple[str, _Identity]]:
         for folder in self._folders:
-            for entry in _scanned(folder):
+            try:
+                entries = _scanned(folder)
+            except OSError as error:  # its drives may be in still
+                log.warning("the slot folder %s cannot be read: %s", folder, error)
+                self._is_unread = True
+                yield from self._seen_in(folder)
+                continue
+            for entry in entries:
                 try:
                     identity = _identity(entry)
                 except OSError as error:  # it has just gone, or is a link that leads in circles
@@ -102,12 +118,15 @@ class SlotSource:
                     name = _shown(entry.name)
                     yield name if len(self._folders) == 1 else f"{folder.name}/{name}", identity
 
+    def _seen_in(self, folder: Path) -> Iterator[tuple[str, _Identity]]:
+        return ((d, seen) for d, seen in self._seen.items() if seen[0].parent == folder)
+
 
 def _scanned(folder: Path) -> list[os.DirEntry[str]]:
-    """What is in a slot folder, by name; one that was taken away is empty."""
+    """What is in a slot folder, by name; one that was taken away is empty. Raises `OSError`."""
     try:
         return sorted(os.scandir(folder), key=lambda entry: entry.name)
-    except OSError as error:
+    except (FileNotFoundError, NotADirectoryError) as error:
         log.warning("the slot folder %s cannot be read: %s", folder, error)
         return []
 
