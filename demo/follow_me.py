@@ -171,10 +171,13 @@ class FollowMe:
         stage.faults += [f"{id} got another worker" for id in others if now.get(id) != pids[id]]
         if not any(chosen.component in s and "not ready" in s for s in stage.told()):
             stage.faults.append(f"nobody was told that {chosen.component} is not ready")
-        if (taken := self._choice()).component == chosen.component:
+        # Not `_choice`: the plan has no alternative while the killed worker is being restarted.
+        running = {step["component"] for step in self.robot.view["plan"]["steps"]}
+        taken = sorted(running & set(chosen.others))
+        if chosen.component in running or not taken:
             stage.faults.append(f"{chosen.component} was taken again, though another worked")
         measure = (
-            f"{taken.component} took over {_ms(stage.phases_s['in plan'])} after the worker of "
+            f"{', '.join(taken)} took over {_ms(stage.phases_s['in plan'])} after the worker of "
             f"{chosen.component} was killed; {_told(share)}"
         )
         return stage.result(reached=share >= WANTED_FRACTION, measure=measure)
