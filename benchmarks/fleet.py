@@ -1,6 +1,6 @@
 """Hosts that meet and read each other: `python -m benchmarks.fleet`.
 
-Every host is a process of its own, all on this machine over loopback: by mesh (CURVE, every host
+Every host is a separate process, all on this machine over loopback: by mesh (CURVE, every host
 linked to every other) and by way of a Zenoh router (a process more, no encryption). All start, and
 wait; then they are told of each other at one moment. Measured until every one of them has every
 other's catalogue of 10 kB; then for some seconds of quiet, and one change that all must hear of.
@@ -404,7 +404,7 @@ def page(found: dict[tuple[str, int], list[Figures]], repeats: int) -> str:
         rows.append([str(hosts), named[kind], *spreads])
     return f"""# Hosts that meet: mesh against a Zenoh router
 
-`python -m benchmarks.fleet` wrote this page. Every host is a process of its own, all on this one
+`python -m benchmarks.fleet` wrote this page. Every host is a separate process, all on this one
 machine over loopback, so that {max(hosts for _, hosts in found)} hosts share what each of them
 would have alone. All have started when they are told of each other at one moment; converged means
 that every one has every other's catalogue (10 kB, ten entries). Bytes are those that TCP carried,

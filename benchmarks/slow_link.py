@@ -1,6 +1,6 @@
 """A link between two hosts that carries only so much, or nothing for a while.
 
-`python -m benchmarks.slow_link PORT BYTES_S` is one in a process of its own: it prints the port at
+`python -m benchmarks.slow_link PORT BYTES_S` runs one in a separate process: it prints the port at
 which it takes connections to `PORT`, and lasts until it is killed.
 """
 

@@ -56,7 +56,7 @@ def main(daemon: int, channel: int) -> None:
 def work() -> None:
     """Do the jobs that come over descriptor 0, a socket, until it ends."""
     with (
-        contextlib.suppress(ConnectionError),  # nobody waits for the answer any more
+        contextlib.suppress(ConnectionError),  # the daemon is gone and reads no answer
         os.fdopen(os.dup(0)) as requests,
         os.fdopen(os.dup(0), "w", buffering=1) as answers,
     ):
