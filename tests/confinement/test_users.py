@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -11,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from tests.confinement.guests import open_folder, owner, status
+from tests.kit.descriptors import descriptors_left, open_descriptors
 from tests.kit.workers import WorkersUnderTest
 
 from nondum.host.confinement.users import FIRST_USER, Users, is_workers
@@ -234,27 +234,15 @@ async def test_room_that_is_not_there_in_time_is_none(
 def test_no_descriptor_is_left_of_a_room_that_cannot_be_made() -> None:
     boxed = Boxed(BWRAP, has_users=True)
     before = open_descriptors()
-    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
-    free = [number for number in range(64) if number not in before]
     failures = 0
-    try:
-        for more in range(16):
-            resource.setrlimit(resource.RLIMIT_NOFILE, (free[more], limits[1]))
+    for left in range(16):
+        with descriptors_left(left):
             try:
                 Spare(boxed, boxed.ground(None)).close()
             except OSError:
                 failures += 1
-            resource.setrlimit(resource.RLIMIT_NOFILE, limits)
-            assert open_descriptors() == before, more
-    finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+        assert open_descriptors() == before, left
     assert failures >= 6, "two for orders, four for the namespace"
-
-
-def open_descriptors() -> set[int]:
-    with os.scandir("/proc/self/fd") as entries:
-        found = {int(entry.name) for entry in entries}
-    return {number for number in found if Path(f"/proc/self/fd/{number}").exists()}
 
 
 async def test_worker_inherits_nothing_of_how_it_got_its_user(tested: WorkersUnderTest) -> None:

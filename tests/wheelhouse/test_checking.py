@@ -2,32 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import hashlib
-import os
-import resource
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from tests.kit.descriptors import descriptors_left
 
 from nondum.wheelhouse import checking
 from nondum.wheelhouse.unpacking import StoredFile
 
 DATA = b"d" * 300_000
-
-
-@contextlib.contextmanager
-def no_descriptor_left() -> Iterator[None]:
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    lowest = os.dup(0)
-    os.close(lowest)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (lowest, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
 def stored(folder: Path, name: str, data: bytes) -> StoredFile:
@@ -82,6 +68,6 @@ def test_progress_that_cannot_be_reported_is_no_damage(tmp_path: Path, size: int
 @pytest.mark.parametrize("data", [b"x", DATA], ids=["small", "large"])
 def test_want_of_descriptors_is_no_damage(tmp_path: Path, data: bytes) -> None:
     file = stored(tmp_path, "a", data)
-    with no_descriptor_left(), pytest.raises(OSError) as raised:
+    with descriptors_left(0), pytest.raises(OSError) as raised:
         checking.damaged(tmp_path, (file,))
     assert raised.value.errno == errno.EMFILE

@@ -41,6 +41,7 @@ from nondum.transport.peers import (
     PeerUp,
     Trust,
 )
+from nondum.transport.peers.allowance import USUAL, Allowance
 from nondum.transport.peers.certificate import FleetKey
 
 KEYS = 20
@@ -48,6 +49,8 @@ KEYS = 20
 LONG = 30_000
 """Bytes of the longest entry: a few of them make a catalogue of several messages."""
 DEADLINE_S = 4.0
+ALLOWANCE = Allowance(USUAL.per_s / 10, USUAL.burst / 4)
+"""A slow computer, and a busy one, can send so much more that it is a flood."""
 ENDINGS = {"work.stop": Lease.STOP, "work.finish": Lease.FINISH, "work.hold": Lease.HOLD}
 """What becomes of a piece of work whose caller is lost."""
 
@@ -245,6 +248,7 @@ class Member:
             listen=[f"tcp://*:{config['port']}"],
             find=lambda mesh: PeerFinder(mesh, section),
             clock=lambda: datetime.now(UTC) + self._skew,
+            allowance=ALLOWANCE,
         )
         self._works.open(Path(config["log"], f"{self.mesh.name}-{self.mesh.epoch}"))
         self._changes, self._asks = Changes(self.mesh, chance), Asks(self.mesh, chance)

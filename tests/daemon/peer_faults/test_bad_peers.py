@@ -209,8 +209,10 @@ def bad_peer(hosts: Crew, kind: str, victim: Member) -> Iterator[None]:
         words.append(hosts.fleet_secret.hex())
     process = started(machine, "tests.daemon.peer_faults.bad_peers", *words, stdout=subprocess.PIPE)
     assert process.stdout is not None
-    assert process.stdout.readline() == b"in\n"
-    yield
-    assert process.poll() is None, "it has given up"
-    process.kill()
+    try:
+        assert process.stdout.readline() == b"in\n"
+        yield
+        assert process.poll() is None, "it has given up"
+    finally:
+        process.kill()
     victim.ask("miss", peer="bad")

@@ -10,11 +10,14 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.kit.clock import VirtualClock
+from tests.kit.descriptors import descriptors_left
 
 from nondum.host.catalogue.records import DeviceNode
 from nondum.host.devices import DeviceSlotSource
 from nondum.host.devices.slots import parse_slot
 from nondum.host.events import DeviceAppeared, DeviceRemoved, Event
+from nondum.host.slot_folders import AGAIN_S
 from nondum.sdk.errors import ConfigRefused
 
 CAMERA = '[device]\nnode = "/dev/video0"\n[device.properties]\nID_BUS = "usb"\n'
@@ -116,6 +119,48 @@ async def test_files_that_stand_for_no_device_are_problems_until_they_are_mended
         (slots / ".next").symlink_to(file)
         (slots / ".next").rename(slots / "eye.toml")
         assert isinstance(await heard(told), DeviceAppeared)
+        assert source.problems == ()
+
+
+@pytest.mark.anyio
+async def test_devices_of_a_folder_that_cannot_be_read_for_a_moment_stay(
+    tmp_path: Path, clock: VirtualClock
+) -> None:
+    (tmp_path / "a.toml").write_text(CAMERA)
+    source = DeviceSlotSource([tmp_path])
+    async with telling(source) as told:
+        assert isinstance(await told.get(), DeviceAppeared)
+        (tmp_path / ".b").write_text(CAMERA)
+        with descriptors_left(0):
+            (tmp_path / ".b").rename(tmp_path / "b.toml")
+            await clock.settle()
+            await clock.advance(AGAIN_S)
+        (problem,) = source.problems
+        assert (problem.code, problem.where) == ("SLOT_UNREADABLE", str(tmp_path))
+        assert told.empty()
+        await clock.advance(AGAIN_S)
+        event = await told.get()
+        assert isinstance(event, DeviceAppeared)
+        assert event.device == "b"
+        assert source.problems == ()
+
+
+@pytest.mark.anyio
+async def test_device_whose_file_cannot_be_read_stays(tmp_path: Path, clock: VirtualClock) -> None:
+    file = tmp_path / "a.toml"
+    file.write_text(CAMERA)
+    source = DeviceSlotSource([tmp_path])
+    async with telling(source) as told:
+        assert isinstance(await told.get(), DeviceAppeared)
+        (tmp_path / ".next").symlink_to("/proc/self/mem")  # reading its first byte is an EIO
+        (tmp_path / ".next").rename(file)
+        await clock.settle()
+        (problem,) = source.problems
+        assert (problem.code, problem.where) == ("SLOT_UNREADABLE", str(file))
+        assert told.empty()
+        file.unlink()
+        await clock.advance(AGAIN_S)
+        assert isinstance(await told.get(), DeviceRemoved)
         assert source.problems == ()
 
 

@@ -5,18 +5,19 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import resource
 import shutil
 import time
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
 from tests.kit.clock import VirtualClock
+from tests.kit.descriptors import descriptors_left
 from tests.kit.until import until_async
 
-from nondum.host.drives.slots import AGAIN_S, SlotSource
+from nondum.host.drives.slots import SlotSource
 from nondum.host.events import DriveInserted, DriveRemoved, DrivesScanned, Event
+from nondum.host.slot_folders import AGAIN_S
 from nondum.wheelhouse import disk
 
 pytestmark = pytest.mark.anyio
@@ -63,32 +64,27 @@ async def test_links_and_folders_come_and_go(tmp_path: Path) -> None:
 
 
 async def test_drives_of_a_folder_that_cannot_be_read_for_a_moment_stay(
-    tmp_path: Path, clock: VirtualClock
+    tmp_path: Path, clock: VirtualClock, caplog: pytest.LogCaptureFixture
 ) -> None:
     slots = tmp_path / "slots"
     (slots / "a").mkdir(parents=True)
-    async with watched(slots) as told:
+    source = SlotSource([slots])
+    async with telling(source) as told:
         assert await told.get() == DriveInserted("a", slots / "a", "slot")
         assert await told.get() == DrivesScanned("slot", ("a",))
         (slots / "b").mkdir()
-        with no_descriptor_left():
+        with descriptors_left(0):
             await clock.settle()
             await clock.advance(AGAIN_S)
+        assert [(problem.code, problem.where) for problem in source.problems] == [
+            ("SLOT_UNREADABLE", str(slots))
+        ]
+        assert len(caplog.records) == 1
         assert told.empty()
         await clock.advance(AGAIN_S)
         assert await told.get() == DriveInserted("b", slots / "b", "slot")
         assert told.empty()
-
-
-@contextlib.contextmanager
-def no_descriptor_left() -> Iterator[None]:
-    """This process may open no more files (EMFILE)."""
-    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (0, limits[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+        assert source.problems == ()
 
 
 async def test_swapped_drive_is_another_drive(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from tests.kit.clock import VirtualClock
+from tests.kit.descriptors import descriptors_left, open_descriptors
 from tests.kit.processes import process_ended
 from tests.kit.until import until_async
 
@@ -185,6 +186,19 @@ async def test_server_that_may_not_send_yet_is_asked_again(
         forked.kill()
         assert await forked.wait() == -signal.SIGKILL
         forked.close()
+
+
+@pytest.mark.parametrize("left", range(4))
+async def test_process_for_which_descriptors_are_missing_leaves_none_open(left: int) -> None:
+    """It takes two for the conversation, and two for the return code."""
+    async with fork_client() as client:
+        await client.expect(JOB)
+        before = open_descriptors()
+        with descriptors_left(left), pytest.raises(OSError) as failed:
+            await client.fork(JOB, START_S)
+        assert failed.value.errno == errno.EMFILE
+        await asyncio.sleep(0)  # what a transport closes, it closes on the loop's next turn
+        assert open_descriptors() == before
 
 
 async def test_server_that_ends_as_it_starts_is_told(with_python: WithPython) -> None:

@@ -14,6 +14,7 @@ device is pulled. Files whose names begin with a dot, or end in anything but `.t
 from __future__ import annotations
 
 import contextlib
+import errno
 import logging
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,14 +22,15 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.catalogue.records import DeviceNode, DeviceRecord
-from nondum.host.dead_links import leads_nowhere
 from nondum.host.devices.hardware import described
 from nondum.host.devices.source import Sightings
 from nondum.host.events import Emit
 from nondum.host.inotify import folders_watched
+from nondum.host.slot_folders import changed_or_due, leads_nowhere, unreadable
 from nondum.sdk.errors import ConfigRefused, Problem
 
 MAX_BYTES = 64 * 1024
+_NO_FILE = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP)
 
 log = logging.getLogger(__name__)
 
@@ -39,11 +41,14 @@ class DeviceSlotSource:
     def __init__(self, folders: Sequence[Path]) -> None:
         self._folders = tuple(folders)
         self._refused: dict[Path, Problem] = {}
+        self._unread: dict[Path, Problem] = {}
+        """Folders and files that could not be read the last time."""
+        self._seen: dict[Path, tuple[str, DeviceRecord]] = {}
 
     @property
     def problems(self) -> tuple[Problem, ...]:
-        """Of the files that stand for no device."""
-        return tuple(self._refused.values())
+        """Of the files that stand for no device, and of what cannot be read."""
+        return (*self._refused.values(), *self._unread.values())
 
     async def watch(self, emit: Emit) -> None:
         """Tell what is there, then what comes and goes (see `DeviceSource`)."""
@@ -51,31 +56,56 @@ class DeviceSlotSource:
         with folders_watched(self._folders) as changed:
             while True:
                 changed.clear()
-                sightings.see_all(dict(self._present()))
-                await changed.wait()
+                self._seen = dict(self._present())
+                sightings.see_all(dict(self._seen.values()))
+                await changed_or_due(changed, is_unread=bool(self._unread))
 
-    def _present(self) -> Iterator[tuple[str, DeviceRecord]]:
+    def _present(self) -> Iterator[tuple[Path, tuple[str, DeviceRecord]]]:
         refused: dict[Path, Problem] = {}
+        unread: dict[Path, Problem] = {}
         for folder in self._folders:
-            for path in sorted(folder.glob("[!.]*.toml")):
+            try:
+                paths = _scanned(folder)
+            except OSError as error:  # its devices may be in still
+                unread[folder] = unreadable(folder, error)
+                yield from ((p, seen) for p, seen in self._seen.items() if p.parent == folder)
+                continue
+            for path in paths:
                 name = path.stem if len(self._folders) == 1 else f"{folder.name}/{path.stem}"
                 try:
-                    found = device_of(name, parse_slot(_read(path), str(path)))
+                    yield path, (name, device_of(name, parse_slot(_read(path), str(path))))
                 except ConfigRefused as wrong:
                     refused[path] = wrong.problems[0]
-                except OSError:
+                except OSError as error:
+                    if error.errno not in _NO_FILE:
+                        unread[path] = unreadable(path, error)
+                        if path in self._seen:
+                            yield path, self._seen[path]
+                        continue
                     with contextlib.suppress(OSError):  # it has just gone
                         refused[path] = leads_nowhere(path)
-                else:
-                    yield name, found
-        self._refuse(refused)
+        self._refused = _logged(self._refused, refused)
+        self._unread = _logged(self._unread, unread)
 
-    def _refuse(self, refused: dict[Path, Problem]) -> None:
-        """Say it once: a file that is being written is looked at several times."""
-        for path, problem in refused.items():
-            if self._refused.get(path) != problem:
-                log.warning("%s", problem)
-        self._refused = refused
+
+def _scanned(folder: Path) -> list[Path]:
+    """The slot files in a folder, by name; one that was taken away has none. Raises `OSError`."""
+    try:
+        return sorted(
+            path
+            for path in folder.iterdir()
+            if path.suffix == ".toml" and not path.name.startswith(".")
+        )
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+
+
+def _logged(before: dict[Path, Problem], now: dict[Path, Problem]) -> dict[Path, Problem]:
+    """Say it once: a file that is being written is looked at several times."""
+    for path, problem in now.items():
+        if before.get(path) != problem:
+            log.warning("%s", problem)
+    return now
 
 
 def device_of(name: str, nodes: Sequence[DeviceNode]) -> DeviceRecord:

@@ -8,7 +8,6 @@ are not read.
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import logging
 import os
@@ -16,19 +15,16 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-from nondum.host.dead_links import dead_links, leads_nowhere
 from nondum.host.drives.rewritten import Rewritten
 from nondum.host.events import DriveInserted, DriveRemoved, DrivesScanned, Emit
 from nondum.host.inotify import folders_watched
+from nondum.host.slot_folders import changed_or_due, dead_links, leads_nowhere, unreadable
 from nondum.sdk.errors import Problem
 
 _Identity = tuple[Path, int, str]
 """Path, inode and symlink target: an entry that is replaced is another drive."""
 _Slot = tuple[str, _Identity | None]
 """A drive; or the path of a link that leads nowhere yet, without an identity."""
-
-AGAIN_S = 1.0
-"""Until a slot folder that could not be read is read again."""
 
 log = logging.getLogger(__name__)
 
@@ -41,10 +37,14 @@ class SlotSource:
     def __init__(self, folders: Sequence[Path]) -> None:
         self._folders = tuple(folders)
         self._seen: dict[str, _Identity] = {}
-        self._is_unread = False
-        """Whether a folder could not be read the last time."""
-        self.problems: tuple[Problem, ...] = ()
-        """Of links that lead nowhere yet."""
+        self._unread: dict[Path, Problem] = {}
+        """Folders that could not be read the last time."""
+        self._dangling: tuple[Problem, ...] = ()
+
+    @property
+    def problems(self) -> tuple[Problem, ...]:
+        """Of folders that cannot be read, and of links that lead nowhere yet."""
+        return (*self._unread.values(), *self._dangling)
 
     async def watch(self, emit: Emit) -> None:
         """Tell what is there, then what comes and goes, until cancelled."""
@@ -57,9 +57,7 @@ class SlotSource:
             emit(DrivesScanned(self.kind, tuple(self._seen)))
             while True:
                 rewritten.look(self._places())
-                with contextlib.suppress(TimeoutError):
-                    async with asyncio.timeout(AGAIN_S if self._is_unread else None):
-                        await changed.wait()
+                await changed_or_due(changed, is_unread=bool(self._unread))
                 changed.clear()
                 compare()
 
@@ -70,7 +68,7 @@ class SlotSource:
         }
         links = [link for folder in self._folders for link in _dead_links(folder)]
         places |= {(str(link), None): link for link in links}
-        self.problems = tuple(_problems(links))
+        self._dangling = tuple(_problems(links))
         return places
 
     def _again(self, emit: Emit, slot: _Slot) -> None:
@@ -82,7 +80,6 @@ class SlotSource:
 
     def _compare(self, emit: Emit) -> None:
         """Tell the difference to what was seen last."""
-        self._is_unread = False
         present = dict(self._entries())
         for drive, identity in list(self._seen.items()):
             if present.get(drive) != identity:
@@ -104,10 +101,12 @@ class SlotSource:
             try:
                 entries = _scanned(folder)
             except OSError as error:  # its drives may be in still
-                log.warning("the slot folder %s cannot be read: %s", folder, error)
-                self._is_unread = True
+                if folder not in self._unread:
+                    log.warning("the slot folder %s cannot be read: %s", folder, error)
+                self._unread[folder] = unreadable(folder, error)
                 yield from self._seen_in(folder)
                 continue
+            self._unread.pop(folder, None)
             for entry in entries:
                 try:
                     identity = _identity(entry)

@@ -219,20 +219,22 @@ class ForkClient:
     async def _forked(
         self, channel: socket.socket, message: str, descriptors: Sequence[int]
     ) -> Forked:
-        ours, theirs = socket.socketpair()
-        reader, writer = await asyncio.open_unix_connection(sock=ours, limit=LINE_LIMIT)
-        status, of_server = os.pipe()
-        try:
-            with theirs, _closed(of_server):
-                given = (theirs.fileno(), *descriptors, of_server)
-                fork_server.ask(channel, message.encode(), given)
-            pid, descriptor = await _answer(channel)
-        except BaseException as error:
-            writer.close()
-            os.close(status)
-            if isinstance(error, ConnectionError):  # it ended before it had read the request
+        with contextlib.ExitStack() as failed:
+            ours, theirs = socket.socketpair()
+            failed.callback(theirs.close)
+            failed.callback(ours.close)
+            reader, writer = await asyncio.open_unix_connection(sock=ours, limit=LINE_LIMIT)
+            failed.callback(writer.close)
+            status, of_server = os.pipe()
+            failed.callback(os.close, status)
+            try:
+                with theirs, _closed(of_server):
+                    given = (theirs.fileno(), *descriptors, of_server)
+                    fork_server.ask(channel, message.encode(), given)
+                pid, descriptor = await _answer(channel)
+            except ConnectionError as error:  # it ended before it had read the request
                 raise EOFError("the fork server has ended") from error
-            raise
+            failed.pop_all()
         return Forked(pid, descriptor, status, reader, writer)
 
     async def _end(self) -> None:

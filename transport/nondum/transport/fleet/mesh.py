@@ -10,6 +10,7 @@ from nondum.sdk.wire import Body
 from nondum.transport.fleet.catalogues import Catalogues
 from nondum.transport.fleet.meeting import Meeting
 from nondum.transport.fleet.seam import FleetEvent, Peer
+from nondum.transport.peers.allowance import USUAL, Allowance
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.errands import Handler
 from nondum.transport.peers.events import DialFailed, PeerEvent, PeerLost, PeerUp
@@ -50,12 +51,13 @@ class Mesh:
         listen: Sequence[str] = ("tcp://*:0",),
         find: Find | None = None,
         clock: Callable[[], datetime] = lambda: datetime.now(UTC),
+        allowance: Allowance = USUAL,
         sockets: MakeSockets = SocketsHere,
     ) -> None:
         """Made on the running loop. Without `find`, hosts meet by `meet` only.
 
-        `clock` tells the time of day, which only certificates need; `sockets` makes what its links
-        go over.
+        `clock` tells the time of day, which only certificates need; `allowance` is what each peer
+        may send; `sockets` makes what its links go over.
         """
         self.epoch = fresh_epoch()
         self.addresses: tuple[str, ...] = ()
@@ -70,6 +72,7 @@ class Mesh:
             pulse=Pulse(self._catalogues.state, self._catalogues.heard),
             epoch=self.epoch,
             clock=clock,
+            allowance=allowance,
             sockets=sockets,
         )
         self._meeting = Meeting(identity.key, self._node, self.is_welcome)

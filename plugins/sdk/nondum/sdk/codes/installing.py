@@ -112,6 +112,12 @@ CODES = (
         causes="a path in a link counts from the link's folder, not from where `ln` was typed",
     ),
     Code(
+        "SLOT_UNREADABLE",
+        "A slot folder or a file in it cannot be read; what was plugged in by it stays plugged in.",
+        "find out why the host cannot read it; it is read again every second",
+        causes="a disk that fails, rights that are missing, or a host that has no descriptors left",
+    ),
+    Code(
         "STORE_DAMAGED",
         "A stored file is not what was stored.",
         "nothing: it is unpacked again from the payload; if it happens again, the disk is failing",

@@ -1,12 +1,18 @@
-"""Symbolic links in slot folders that lead nowhere: nothing is plugged in by them."""
+"""What can be wrong in slot folders: links that lead nowhere, by which nothing is plugged in, and
+what cannot be read, which is read again."""
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import os
 from collections.abc import Iterator
 from pathlib import Path
 
 from nondum.sdk.errors import Problem
+
+AGAIN_S = 1.0
+"""Until what could not be read is read again."""
 
 
 def dead_links(folder: Path) -> Iterator[Path]:
@@ -27,3 +33,20 @@ def leads_nowhere(link: Path) -> Problem:
         told = f"it is a link to {target}, which means {link.parent / target}; nothing is there"
     fix = f"link to the whole path: ln -sfn /…/{target.name} {link}"
     return Problem("SLOT_DANGLING", told, where=str(link), fix=fix)
+
+
+def unreadable(path: Path, error: OSError) -> Problem:
+    """What people are told of a folder, or a file in it, that cannot be read."""
+    return Problem(
+        "SLOT_UNREADABLE",
+        f"cannot be read: {error.strerror}; what was plugged in by it counts as plugged in still",
+        where=str(path),
+        fix="find out why the host cannot read it; it is read again every second",
+    )
+
+
+async def changed_or_due(changed: asyncio.Event, *, is_unread: bool) -> None:
+    """Wait until something has changed, or until what could not be read is due again."""
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(AGAIN_S if is_unread else None):
+            await changed.wait()
