@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tests.kit.descriptors import descriptors_left
 
 from nondum.host.catalogue import database, journal
 from nondum.host.catalogue.catalogue import Catalogue
@@ -349,6 +350,36 @@ async def test_file_that_is_damaged_under_a_daemon_is_written_anew(tmp_path: Pat
         assert catalogue.loss.instead is Instead.MEMORY
     async with opened(tmp_path) as catalogue:
         assert catalogue.state == later
+
+
+@pytest.mark.anyio
+async def test_connection_that_is_of_no_use_is_made_anew_as_soon_as_that_works(
+    tmp_path: Path,
+) -> None:
+    async with opened(tmp_path) as catalogue:
+        await catalogue.commit(FULL, ())
+        await catalogue._run(catalogue._connection.close)
+        with descriptors_left(0), pytest.raises((sqlite3.Error, OSError)):
+            await catalogue.commit(replace(FULL, revision=6), (entry(),))
+        assert catalogue.state == FULL
+        later = replace(FULL, revision=7)
+        await catalogue.commit(later, (entry(),))
+        assert catalogue.loss is None
+    async with opened(tmp_path) as catalogue:
+        assert catalogue.state == later
+        assert len(await catalogue.journal()) == 1
+
+
+@pytest.mark.parametrize(
+    ("code", "is_unusable"),
+    [(sqlite3.SQLITE_PROTOCOL, True), (sqlite3.SQLITE_BUSY, False), (sqlite3.SQLITE_FULL, False)],
+)
+def test_lock_that_is_never_let_go_of_takes_another_connection(
+    code: int, is_unusable: bool
+) -> None:
+    error = sqlite3.OperationalError("locking protocol")
+    error.sqlite_errorcode = code
+    assert database.is_unusable(error) == is_unusable
 
 
 @pytest.mark.anyio

@@ -156,6 +156,10 @@ class Catalogue:
                 self._replace(after, entries)
             elif database.is_out_of_room(error) and self._reserve.release():
                 self._write_once(self._written, after, entries)
+            elif database.is_unusable(error):
+                self._connection.close()
+                self._connection = database.connect(self._path)
+                self._write_once(self._written, after, entries)
             else:
                 raise
         else:

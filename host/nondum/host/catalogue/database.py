@@ -115,12 +115,24 @@ def connect(path: Path) -> sqlite3.Connection:
 
 def is_damaged(error: sqlite3.DatabaseError) -> bool:
     """Whether the file itself is broken, not only out of reach or out of room."""
-    return error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+    return _code(error) in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 
 
 def is_out_of_room(error: sqlite3.DatabaseError) -> bool:
     """Whether a full disk may be what is wrong: SQLite tells of some as errors of the disk."""
-    return error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
+    return _code(error) in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
+
+
+def is_unusable(error: sqlite3.DatabaseError) -> bool:
+    """Whether another connection is needed: this one is closed, or a lock of the write-ahead log
+    could not be let go of, which it holds until all of the process's connections are closed."""
+    is_closed = isinstance(error, sqlite3.ProgrammingError)
+    return is_closed or _code(error) == sqlite3.SQLITE_PROTOCOL
+
+
+def _code(error: sqlite3.DatabaseError) -> int:
+    """SQLite's primary result code; 0 for an error of the module's own."""
+    return getattr(error, "sqlite_errorcode", 0) & 0xFF
 
 
 def _damaged(verdict: str) -> sqlite3.DatabaseError:
