@@ -41,6 +41,7 @@ from nondum.host.lifecycle.component_manager import ComponentManager
 from nondum.host.lifecycle.executor import Executor
 from nondum.host.lifecycle.folders import Folders
 from nondum.host.lifecycle.installation import InstallOptions
+from nondum.host.service.stop_signals import told_to_stop
 from nondum.host.transitions import COMPONENT_TRANSITIONS, TRANSITIONS
 from nondum.host.workers.spec import Timing
 from nondum.host.workers.workers import Workers
@@ -215,11 +216,11 @@ class Script:
 
 
 async def main(orders: dict[str, Any]) -> None:
-    with watched_without_threads():
-        await _main(orders)
+    with told_to_stop() as stop, watched_without_threads():
+        await _main(orders, stop)
 
 
-async def _main(orders: dict[str, Any]) -> None:
+async def _main(orders: dict[str, Any], stop: asyncio.Event) -> None:
     root = Path(orders["root"])
     os.environ[MARK] = str(root)
     told = os.open(root / "told", os.O_CREAT | os.O_APPEND | os.O_WRONLY | os.O_CLOEXEC)
@@ -235,9 +236,7 @@ async def _main(orders: dict[str, Any]) -> None:
     manager = ComponentManager(catalogue, executor, bus)
     manager.add_source(SlotSource([root / "slots"]))
     running = asyncio.create_task(manager.run())
-    ended = asyncio.Event()
-    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
-    waited: list[asyncio.Task[Any]] = [running, asyncio.create_task(ended.wait())]
+    waited: list[asyncio.Task[Any]] = [running, asyncio.create_task(stop.wait())]
     if "script" in orders:
         script = Script(catalogue, root / "slots")
         waited.append(asyncio.create_task(script.run(orders["script"])))

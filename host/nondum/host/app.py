@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import signal
 from collections.abc import Awaitable, Callable, Coroutine, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -65,6 +64,7 @@ from nondum.host.questions import Questions
 from nondum.host.service import journal
 from nondum.host.service.notify import Notifier
 from nondum.host.service.service import Part, Service
+from nondum.host.service.stop_signals import told_to_stop
 from nondum.host.service.telling import Telling
 from nondum.host.service.words import words
 from nondum.host.stop_button.button import StopButton
@@ -99,8 +99,7 @@ async def run_host(
 
     Raises `ConfigRefused` (ALREADY_RUNNING, STATE_BUSY, SYSTEM_TREE, …) before anything has begun.
     """
-    stop = _told_to_stop()
-    with watched_without_threads():
+    with told_to_stop() as stop, watched_without_threads():
         async with Service(notifier or Notifier()) as service:
             await _run_as(service, config, more_drives, safety, stop)
 
@@ -512,14 +511,6 @@ def _warnings(catalogue: Catalogue, why_safe: str) -> Iterator[str]:
         yield str(opening.problem_of(catalogue.loss, ()))
     if catalogue.unwritten is not None:
         yield str(catalogue.unwritten)
-
-
-def _told_to_stop() -> asyncio.Event:
-    """Set by a signal that asks to stop, from now on: also while the host is still starting."""
-    stop = asyncio.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        asyncio.get_running_loop().add_signal_handler(number, stop.set)
-    return stop
 
 
 async def _when(event: asyncio.Event, function: Callable[[], None]) -> None:
