@@ -81,7 +81,7 @@ def test_payload_that_was_rebuilt_is_told_as_such_without_a_version() -> None:
     snapshot = Snapshot("spot", revision=1, payloads=(LAMP, rebuilt))
     gone = events.PayloadWithdrawn(KEY, "it was built again in its place", rebuilt.key)
     assert announced(gone, snapshot) == (
-        "org.example.lamp was rebuilt on its drive, and is judged again"
+        "org.example.lamp has changed on its drive, and is judged again"
     )
 
 

@@ -77,7 +77,7 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
         case PayloadWithdrawn(rebuilt_as=new) if new:
             payload = _record(new, snapshot)
             name = payload.payload_id if payload else f"payload {new}"
-            return f"{name} was rebuilt on its drive, and is judged again"
+            return f"{name} has changed on its drive, and is judged again"
         case PayloadWithdrawn():
             stays = _stays(event.payload, snapshot)  # it was refused, or waited
             return f"{_name(event.payload, snapshot)} is withdrawn: {event.reason}{stays}"

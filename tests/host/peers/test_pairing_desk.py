@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pytest
+import zmq
 from tests.host.peers.hints import Hinted, Network
 from tests.kit.clock import VirtualClock
 
 from nondum.host.peers.pairing_desk import LOOK_S, PairingDesk
 from nondum.host.peers.trust_keeper import TRUST_NAME, TrustKeeper
 from nondum.transport.peers import HostKeys, PeerKey, PeerRefused, fingerprint
+from nondum.transport.peers.pairing import Ask, Commit, Nonce
+from nondum.transport.peers.pairing_messages import Beat, Said, decode, encode
 
 pytestmark = pytest.mark.anyio
 
@@ -111,6 +114,63 @@ async def test_code_is_told_once_whoever_is_heard_of_meanwhile(
         await clock.advance(2 * LOOK_S)
         for one in (rover, base):
             assert [row["step"] for row in one.rows].count("comparing") == 1
+
+
+async def test_try_goes_on_when_the_other_host_is_heard_of_at_one_more_address(
+    tmp_path: Path, clock: VirtualClock
+) -> None:
+    network, at = Network(), ("tcp://127.0.0.1:7410",)
+    async with host(tmp_path, network, "rover") as rover:
+        with hand_played(after=rover.keeper.key) as base:
+            network.hints[base.keys.public] = Hinted(base.keys.public, "base", at, base.port)
+            rover.begins()
+            assert isinstance(await base.hears(), Ask)
+            more = (*at, "tcp://127.0.0.2:7410")
+            network.hints[base.keys.public] = Hinted(base.keys.public, "base", more, base.port)
+            await clock.advance(2 * LOOK_S)
+            base.says(Commit(base.keys.public, "base", b"c" * 32))
+            assert isinstance(await base.hears(), Nonce)
+
+
+class HandPlayed:
+    """A host that is asked, and says what it is made to."""
+
+    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], keys: HostKeys) -> None:
+        self.keys = keys
+        self._socket = context.socket(zmq.ROUTER)
+        self._socket.linger = 0
+        self._socket.curve_server = True
+        self._socket.curve_secretkey = keys.secret.encode("ascii")
+        self._asker = b""
+        self.port = self._socket.bind_to_random_port("tcp://127.0.0.1")
+
+    async def hears(self) -> Said:
+        """The next message that is not there for the connection's sake only."""
+        said: Said = Beat()
+        while isinstance(said, Beat):
+            is_there = await asyncio.to_thread(self._socket.poll, int(PATIENCE_S) * 1000)
+            assert is_there, "nothing was said"
+            self._asker, data = self._socket.recv_multipart()
+            said = decode(data)
+        return said
+
+    def says(self, message: Said) -> None:
+        self._socket.send_multipart([self._asker, encode(message)])
+
+    def close(self) -> None:
+        self._socket.close(0)
+
+
+@contextlib.contextmanager
+def hand_played(*, after: PeerKey) -> Iterator[HandPlayed]:
+    """One that is asked by the host with a key: its own comes after that."""
+    keys = HostKeys.generate()
+    while keys.public < after:
+        keys = HostKeys.generate()
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    with contextlib.closing(HandPlayed(context, keys)) as one:
+        yield one
+    context.term()
 
 
 async def test_window_is_announced_while_it_is_open(tmp_path: Path) -> None:

@@ -188,9 +188,10 @@ class _Window:
 
     def look(self, hints: Iterable[Hint]) -> None:
         """See who could be paired. Of two hosts the one with the lesser key asks, if there is just
-        one that it could ask."""
+        one that it could ask; where else that one may be counts once a try has come to nothing."""
         self._found = _candidates(hint for hint in hints if self._is_wanted(hint.key, hint.name))
-        if not isinstance(self.host.state, Waiting) or len(self._found) != 1:
+        is_free = isinstance(self.host.state, Waiting) and not self.host.is_trying
+        if not is_free or len(self._found) != 1:
             return
         (candidate,) = self._found.values()
         if self._keeper.key < candidate.key and candidate != self._asked:

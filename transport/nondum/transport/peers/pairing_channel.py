@@ -111,6 +111,11 @@ class PairingHost:
         ends_s = self._window.opened_s + pairing.WINDOW_S
         return 0.0 if self._is_over else max(0.0, ends_s - self._loop.time())
 
+    @property
+    def is_trying(self) -> bool:
+        """Whether another host has been met, and it is not settled yet what comes of it."""
+        return self._try is not None
+
     def open(self, address: str = "tcp://*:*") -> int:
         """Open the window, once; the port at which this host can be asked from now on.
 
