@@ -352,13 +352,18 @@ async def test_file_that_is_damaged_under_a_daemon_is_written_anew(tmp_path: Pat
         assert catalogue.state == later
 
 
+@contextlib.asynccontextmanager
+async def disconnected(folder: Path) -> AsyncIterator[Catalogue]:
+    """One that has to connect again, as after an error of SQLite's locks."""
+    async with opened(folder) as catalogue:
+        await catalogue.commit(FULL, (entry(),))
+        await catalogue._run(catalogue._disconnect)
+        yield catalogue
+
+
 @pytest.mark.anyio
-async def test_connection_that_is_of_no_use_is_made_anew_as_soon_as_that_works(
-    tmp_path: Path,
-) -> None:
-    async with opened(tmp_path) as catalogue:
-        await catalogue.commit(FULL, ())
-        await catalogue._run(catalogue._connection.close)
+async def test_connection_is_made_again_as_soon_as_that_works(tmp_path: Path) -> None:
+    async with disconnected(tmp_path) as catalogue:
         with descriptors_left(0), pytest.raises((sqlite3.Error, OSError)):
             await catalogue.commit(replace(FULL, revision=6), (entry(),))
         assert catalogue.state == FULL
@@ -367,19 +372,74 @@ async def test_connection_that_is_of_no_use_is_made_anew_as_soon_as_that_works(
         assert catalogue.loss is None
     async with opened(tmp_path) as catalogue:
         assert catalogue.state == later
-        assert len(await catalogue.journal()) == 1
+        assert len(await catalogue.journal()) == 2
+
+
+@pytest.mark.anyio
+async def test_journal_is_read_whether_connected_or_not(tmp_path: Path) -> None:
+    async with disconnected(tmp_path) as catalogue:
+        reading = catalogue.journal()
+        await catalogue.commit(replace(FULL, revision=6), (entry(),))
+        assert len(await reading) == 2
+        await catalogue._run(catalogue._disconnect)
+        assert len(await catalogue.journal()) == 2
+
+
+@pytest.mark.anyio
+@pytest.mark.parametrize("harm", [damaged, gone, cut, unreadable])
+async def test_file_that_is_lost_before_it_is_connected_to_again_is_written_whole(
+    tmp_path: Path, harm: Harm
+) -> None:
+    file = tmp_path / "catalogue.sqlite"
+    async with disconnected(tmp_path) as catalogue:
+        harm(file)
+        with descriptors_left(0), pytest.raises((sqlite3.Error, OSError)):
+            await catalogue.commit(replace(FULL, revision=6), (entry(),))
+        later = replace(FULL, revision=7)
+        await catalogue.commit(later, (entry(),))
+        assert catalogue.loss is not None
+        assert (catalogue.loss.instead, catalogue.loss.revision) == (Instead.MEMORY, 7)
+        assert (catalogue.loss.aside is None) == (harm is gone)
+    async with opened(tmp_path) as catalogue:
+        assert catalogue.state == later
+
+
+@pytest.mark.anyio
+async def test_file_that_cannot_be_begun_anew_at_once_is_written_whole_later(
+    tmp_path: Path,
+) -> None:
+    async with opened(tmp_path) as catalogue:
+        await catalogue.commit(FULL, (entry(),))
+        await catalogue._run(catalogue._set_aside)  # and then there was no room for a new one
+        later = replace(FULL, revision=6)
+        await catalogue.commit(later, (entry(),))
+        assert catalogue.loss is not None
+        assert catalogue.loss.aside is not None
+    async with opened(tmp_path) as catalogue:
+        assert catalogue.state == later
+
+
+@pytest.mark.anyio
+async def test_older_file_that_was_put_back_is_brought_up_to_date(tmp_path: Path) -> None:
+    file = tmp_path / "catalogue.sqlite"
+    async with opened(tmp_path / "other") as other:
+        await other.commit(replace(FULL, goals={}, revision=2), ())
+    async with disconnected(tmp_path) as catalogue:
+        file.write_bytes((tmp_path / "other/catalogue.sqlite").read_bytes())
+        later = replace(FULL, revision=7)
+        await catalogue.commit(later, (entry(),))
+    async with opened(tmp_path) as catalogue:
+        assert catalogue.state == later
 
 
 @pytest.mark.parametrize(
-    ("code", "is_unusable"),
+    ("code", "is_locked"),
     [(sqlite3.SQLITE_PROTOCOL, True), (sqlite3.SQLITE_BUSY, False), (sqlite3.SQLITE_FULL, False)],
 )
-def test_lock_that_is_never_let_go_of_takes_another_connection(
-    code: int, is_unusable: bool
-) -> None:
+def test_lock_that_is_never_let_go_of_takes_another_connection(code: int, is_locked: bool) -> None:
     error = sqlite3.OperationalError("locking protocol")
     error.sqlite_errorcode = code
-    assert database.is_unusable(error) == is_unusable
+    assert database.is_locked_for_good(error) == is_locked
 
 
 @pytest.mark.anyio

@@ -24,7 +24,7 @@ from nondum.host.catalogue.records import JournalEntry, Moment, Snapshot
 from nondum.host.catalogue.reserve import Reserve
 from nondum.host.catalogue.state import HostState
 from nondum.host.waiting import until_done
-from nondum.sdk.errors import Problem
+from nondum.sdk.errors import ConfigRefused, Problem
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -40,8 +40,11 @@ class Catalogue:
         self, path: Path, opened: Opened, thread: ThreadPoolExecutor, keep: int = journal.KEEP
     ) -> None:
         self._path = path
-        self._connection = opened.connection
-        self._state = self._written = opened.state
+        self._connection: sqlite3.Connection | None = opened.connection
+        """None: the next work on the file makes one. As `_held`, it is the thread's."""
+        self._held = opened.state
+        """What the file holds."""
+        self._state = opened.state
         self._owed: deque[JournalEntry] = deque(maxlen=OWED_LIMIT)
         # What the last daemon left is for recovery only: nobody else sees it.
         self._snapshot = Snapshot(opened.state.host, opened.state.revision)
@@ -53,6 +56,9 @@ class Catalogue:
         """Names this run of the daemon in the journal."""
         self.loss = opened.loss
         """What became of a file that could not be used, if there was one."""
+        self._is_begun_anew = False
+        self._aside: Path | None = None
+        """Whether the next file is a new one, and where the last one was moved."""
         self.commits = 0
         """Rises whenever there is more in the journal."""
         self._next = asyncio.Event()
@@ -121,7 +127,7 @@ class Catalogue:
     ) -> tuple[JournalEntry, ...]:
         """The last entries, oldest first: about one subject, with ids above `after`, not older than
         `since`."""
-        return await self._run(journal.read, self._connection, subject, after, since, limit)
+        return await self._run(self._read_journal, subject, after, since, limit)
 
     async def changed(self, since: int) -> int:
         """Wait until `commits` is not `since`, and give it."""
@@ -131,7 +137,7 @@ class Catalogue:
 
     async def close(self) -> None:
         """Finish what was asked for and close the file."""
-        await self._run(self._connection.close)
+        await self._run(self._disconnect)
         self._thread.shutdown()
 
     def _wrote(self, after: HostState) -> None:
@@ -139,7 +145,6 @@ class Catalogue:
         self.commits += 1
         self._next.set()
         self._next = asyncio.Event()
-        self._written = after
         self.unwritten = None
         self._take(after)
 
@@ -147,37 +152,62 @@ class Catalogue:
         self._state = after
         self._snapshot = after.snapshot()
 
+    # On the catalogue's thread
+
     def _write(self, after: HostState, entries: Sequence[JournalEntry]) -> None:
-        """On the catalogue's thread."""
-        try:
-            self._write_once(self._written, after, entries)
-        except sqlite3.DatabaseError as error:
-            if database.is_damaged(error):
-                self._replace(after, entries)
-            elif database.is_out_of_room(error) and self._reserve.release():
-                self._write_once(self._written, after, entries)
-            elif database.is_unusable(error):
-                self._connection.close()
-                self._connection = database.connect(self._path)
-                self._write_once(self._written, after, entries)
-            else:
-                raise
-        else:
-            if not self._reserve.is_taken:
-                self._reserve.take()
+        """Each cure of what is wrong is tried once."""
+        tried: set[Callable[[], bool]] = set()
+        while True:
+            try:
+                database.write(self._connected(), self._held, after, entries, self._keep)
+                break
+            except (sqlite3.DatabaseError, OSError) as error:
+                cure = self._cure_of(error)
+                if cure is None or cure in tried or not cure():
+                    raise
+                tried.add(cure)
+        self._held = after
+        if self._is_begun_anew:
+            self.loss = Loss(self._aside, Instead.MEMORY, after.revision)
+            self._is_begun_anew, self._aside = False, None
+        if self._reserve.release not in tried:
+            self._reserve.take()
 
-    def _replace(self, after: HostState, entries: Sequence[JournalEntry]) -> None:
-        """Begin a new file with all that is known: the one there is damaged."""
-        self._connection.close()
-        aside = opening.set_aside(self._path)
-        self._connection = database.connect(self._path)
-        self._write_once(HostState(after.host), after, entries)
-        self.loss = Loss(aside, Instead.MEMORY, after.revision)
+    def _cure_of(self, error: sqlite3.DatabaseError | OSError) -> Callable[[], bool] | None:
+        """What may help; it says whether it has done something."""
+        if database.is_damaged(error):
+            return self._set_aside
+        if database.is_out_of_room(error):
+            return self._reserve.release
+        return self._disconnect if database.is_locked_for_good(error) else None
 
-    def _write_once(
-        self, before: HostState, after: HostState, entries: Sequence[JournalEntry]
-    ) -> None:
-        database.write(self._connection, before, after, entries, self._keep)
+    def _set_aside(self) -> bool:
+        """Have a new file be begun with all that is known."""
+        self._disconnect()
+        self._aside = opening.set_aside(self._path) or self._aside
+        return True
+
+    def _disconnect(self) -> bool:
+        if self._connection is not None:
+            self._connection.close()
+            self._connection = None
+        return True
+
+    def _connected(self) -> sqlite3.Connection:
+        """The connection. One that is new goes by what it finds: the file may be gone or another
+        one. Raises `sqlite3.DatabaseError`, `OSError`."""
+        if self._connection is None:
+            self._is_begun_anew = self._is_begun_anew or not self._path.exists()
+            try:
+                self._connection, self._held = database.opened(self._path, self._state.host)
+            except ConfigRefused as error:  # another nondum's has been put there
+                raise database.damaged(str(error)) from error
+        return self._connection
+
+    def _read_journal(
+        self, subject: str | None, after: int, since: Since | None, limit: int
+    ) -> tuple[JournalEntry, ...]:
+        return journal.read(self._connected(), subject, after, since, limit)
 
     async def _run(self, function: Callable[_P, _R], *args: _P.args, **kwargs: _P.kwargs) -> _R:
         def call() -> _R:

@@ -6,6 +6,7 @@ WAL and FULL synchronous: what was committed survives power loss (sqlite.org/wal
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import sqlite3
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -16,7 +17,7 @@ from typing import Any
 from nondum.host.catalogue import journal, rows
 from nondum.host.catalogue.records import ComponentRecord, JournalEntry, Rollback
 from nondum.host.catalogue.state import HostState
-from nondum.sdk.errors import ConfigRefused, Problem
+from nondum.sdk.errors import ConfigRefused, NondumError, Problem
 
 SCHEMA = 8
 
@@ -86,6 +87,9 @@ _PRAGMAS = (
 )
 
 
+_UNREADABLE = (sqlite3.DatabaseError, NondumError, LookupError, TypeError, ValueError)
+"""What reading a file raises that says what nobody can read."""
+
 MODE = 0o600
 """Of the file: it holds the journal, goals and serial numbers, for no other user to read."""
 
@@ -105,7 +109,7 @@ def connect(path: Path) -> sqlite3.Connection:
             connection.execute(pragma)
         (verdict,) = connection.execute("PRAGMA quick_check(1)").fetchone()
         if verdict != "ok":
-            raise _damaged(verdict)
+            raise damaged(verdict)
         _prepare(connection)
     except BaseException:
         connection.close()
@@ -113,29 +117,48 @@ def connect(path: Path) -> sqlite3.Connection:
     return connection
 
 
-def is_damaged(error: sqlite3.DatabaseError) -> bool:
+def opened(path: Path, host: str) -> tuple[sqlite3.Connection, HostState]:
+    """Open the file and read all of it but the journal.
+
+    Raises `sqlite3.DatabaseError`, which is that of a damaged file also where it says what nobody
+    can read, and `ConfigRefused` (CATALOGUE_VERSION).
+    """
+    connection = connect(path)
+    try:
+        return connection, load(connection, host)
+    except BaseException as error:
+        connection.close()
+        if isinstance(error, sqlite3.OperationalError) or is_damaged(error):
+            raise
+        if isinstance(error, _UNREADABLE):
+            raise damaged(str(error)) from error
+        raise
+
+
+def is_damaged(error: BaseException) -> bool:
     """Whether the file itself is broken, not only out of reach or out of room."""
     return _code(error) in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 
 
-def is_out_of_room(error: sqlite3.DatabaseError) -> bool:
+def is_out_of_room(error: Exception) -> bool:
     """Whether a full disk may be what is wrong: SQLite tells of some as errors of the disk."""
-    return _code(error) in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
+    is_full = isinstance(error, OSError) and error.errno == errno.ENOSPC
+    return is_full or _code(error) in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
 
 
-def is_unusable(error: sqlite3.DatabaseError) -> bool:
-    """Whether another connection is needed: this one is closed, or a lock of the write-ahead log
-    could not be let go of, which it holds until all of the process's connections are closed."""
-    is_closed = isinstance(error, sqlite3.ProgrammingError)
-    return is_closed or _code(error) == sqlite3.SQLITE_PROTOCOL
+def is_locked_for_good(error: Exception) -> bool:
+    """Whether a lock of the write-ahead log could not be let go of: it is held until all of the
+    process's connections are closed."""
+    return _code(error) == sqlite3.SQLITE_PROTOCOL
 
 
-def _code(error: sqlite3.DatabaseError) -> int:
-    """SQLite's primary result code; 0 for an error of the module's own."""
+def _code(error: BaseException) -> int:
+    """SQLite's primary result code; 0 where there is none."""
     return getattr(error, "sqlite_errorcode", 0) & 0xFF
 
 
-def _damaged(verdict: str) -> sqlite3.DatabaseError:
+def damaged(verdict: str) -> sqlite3.DatabaseError:
+    """The error of a file that is broken."""
     error = sqlite3.DatabaseError(verdict)
     error.sqlite_errorcode = sqlite3.SQLITE_CORRUPT
     return error

@@ -12,7 +12,7 @@ from pathlib import Path
 from nondum.host.catalogue import database
 from nondum.host.catalogue.backups import Backups
 from nondum.host.catalogue.state import HostState
-from nondum.sdk.errors import ConfigRefused, NondumError, Problem
+from nondum.sdk.errors import ConfigRefused, Problem
 from nondum.wheelhouse import disk
 
 TRACES = ("store", "installed")
@@ -89,16 +89,9 @@ def _was_there(path: Path, backups: Backups) -> bool:
 def _opened(path: Path, host: str) -> Opened | None:
     """The file as it is; None: it is damaged, or says what nobody can read."""
     try:
-        connection = database.connect(path)
+        return Opened(*database.opened(path, host))
     except sqlite3.DatabaseError as error:
         if not database.is_damaged(error):
-            raise
-        return None
-    try:
-        return Opened(connection, database.load(connection, host))
-    except (sqlite3.DatabaseError, NondumError, LookupError, TypeError, ValueError) as error:
-        connection.close()
-        if isinstance(error, sqlite3.OperationalError) and not database.is_damaged(error):
             raise
         return None
 
