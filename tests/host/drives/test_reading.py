@@ -17,10 +17,11 @@ from tests.kit.payloads import Part, make_payload
 
 from nondum.host.catalogue import payload_key
 from nondum.host.catalogue.records import Step
-from nondum.host.drives import steady
+from nondum.host.drives import reading, steady
 from nondum.host.drives.blocks import BlockSource
 from nondum.host.drives.source import DriveSource
 from nondum.host.drives.steady import Steady
+from nondum.host.effects import ReadDrive, ReleaseDrive
 from nondum.host.events import (
     DriveFlapping,
     DriveInserted,
@@ -28,7 +29,11 @@ from nondum.host.events import (
     PayloadFound,
     WheelsStored,
 )
+from nondum.host.helper.client import HelperClient
+from nondum.host.lifecycle.children import Children
 from nondum.host.lifecycle.folders import Folders
+from nondum.host.trust.payload_trust import PayloadTrust, TrustOptions
+from nondum.sdk.errors import NondumError
 
 pytestmark = pytest.mark.anyio
 
@@ -140,3 +145,21 @@ async def test_bad_cable_is_told_and_read_once_it_holds(
             (told,) = (event for event in host.heard if isinstance(event, DriveFlapping))
             assert [problem.code for problem in told.problems] == ["DRIVE_FLAPPING"]
             assert len(heard(host, DriveInserted)) <= steady.FREE_FLAPS + 1
+
+
+async def test_drive_that_could_not_be_unmounted_is_not_let_go_unasked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reading, "privileged", lambda: HelperClient(tmp_path / "no helper"))
+    children, folders = Children(), Folders(tmp_path)
+    try:
+        trust = PayloadTrust("rover", folders, children, TrustOptions(), allow_unsigned=True)
+        await trust.open()
+        drives = reading.DriveReading(children, lambda event: None, trust)
+        node = tmp_path / "no node"
+        with pytest.raises(NondumError):
+            await drives.read(ReadDrive("sda1-3", "block", Path("/"), node, "ext4"))
+        for _ in range(2):
+            assert await drives.release(ReleaseDrive("sda1-3")) == ()
+    finally:
+        await children.close()

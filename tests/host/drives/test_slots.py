@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from tests.kit.clock import VirtualClock
-from tests.kit.descriptors import descriptors_left
+from tests.kit.descriptors import descriptors_left, open_descriptors
 from tests.kit.until import until_async
 
 from nondum.host.drives.slots import SlotSource
@@ -85,6 +85,25 @@ async def test_drives_of_a_folder_that_cannot_be_read_for_a_moment_stay(
         assert await told.get() == DriveInserted("b", slots / "b", "slot")
         assert told.empty()
         assert source.problems == ()
+
+
+async def test_drive_goes_though_watches_cannot_be_made_anew(
+    tmp_path: Path, clock: VirtualClock
+) -> None:
+    slots = tmp_path / "slots"
+    (slots / "a").mkdir(parents=True)
+    async with watched(slots) as told:
+        assert await told.get() == DriveInserted("a", slots / "a", "slot")
+        assert await told.get() == DrivesScanned("slot", ("a",))
+        await clock.settle()
+        (slots / "a").rmdir()
+        with descriptors_left(1):  # for reading the folder
+            assert await told.get() == DriveRemoved("a")
+            await clock.settle()
+        before = open_descriptors()
+        (slots / "b").mkdir()
+        assert await told.get() == DriveInserted("b", slots / "b", "slot")
+        assert before <= open_descriptors()
 
 
 async def test_swapped_drive_is_another_drive(tmp_path: Path) -> None:

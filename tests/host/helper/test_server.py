@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
+from tests.kit.descriptors import descriptors_left
 from tests.kit.disk_images import make_ext4
 from tests.kit.loop_devices import attached
 from tests.kit.until import until
@@ -489,6 +490,15 @@ def test_missing_helper_is_told(tmp_path: Path) -> None:
         HelperClient(tmp_path / "none").ask(requests.ListCages())
     assert silent.value.code == "HELPER_SILENT"
     assert "systemctl" in silent.value.problems[0].fix
+
+
+def test_helper_that_cannot_be_asked_for_want_of_a_descriptor_is_told(tmp_path: Path) -> None:
+    client = HelperClient(tmp_path / "none")
+    with descriptors_left(0):
+        with pytest.raises(NondumError) as silent:
+            client.ask(requests.ListCages())
+        client.unmount(tmp_path, "sda1-3", "read")
+    assert silent.value.code == "HELPER_SILENT"
 
 
 def test_helper_that_hangs_up_is_told(tmp_path: Path) -> None:

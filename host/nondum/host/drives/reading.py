@@ -134,11 +134,12 @@ class DriveReading:
 
     async def release(self, effect: ReleaseDrive) -> tuple[Event, ...]:
         """Unmount a drive that was mounted for reading; tell once it is not mounted any more."""
-        if (root := self._mounted.pop(effect.drive, None)) is not None:
+        if (root := self._mounted.get(effect.drive)) is not None:
             await in_thread(privileged().unmount, root, effect.drive, "read")
             if await in_thread(os.path.ismount, root):
                 log.warning("drive %s is still mounted at %s", effect.drive, root)
                 return ()
+            self._mounted.pop(effect.drive, None)
         return (DriveReleased(effect.drive),)
 
     async def close(self) -> None:

@@ -66,8 +66,7 @@ class Rewritten(Generic[_Slot]):
             for slot in gone:
                 del self._since_ns[slot]
                 self._marks.pop(slot, None)
-            self._watches.close()  # and so all watches of what has gone
-            self._watches = Watches(self._changed)
+            self._watch_anew()
         if slots:
             self._is_looking = True
             loop, watches = asyncio.get_running_loop(), self._watches
@@ -82,6 +81,16 @@ class Rewritten(Generic[_Slot]):
             except RuntimeError as error:  # no memory for it; the next change asks again
                 log.warning("slots are not looked at for what was built into them: %s", error)
                 self._is_looking = False
+
+    def _watch_anew(self) -> None:
+        """Let go of all watches: some are of what has gone."""
+        try:
+            fresh = Watches(self._changed)
+        except OSError as error:  # they cost a look too many at worst
+            log.warning("what has gone from the slots is watched on: %s", error)
+            return
+        self._watches.close()
+        self._watches = fresh
 
     def close(self) -> None:
         """Watch no more. A look that hangs is left behind."""

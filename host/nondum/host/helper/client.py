@@ -98,7 +98,7 @@ class HelperClient:
 
     def stop_key(self, device: Path, code: int) -> PressesOfHelper:
         """Listen to the key that the helper's own configuration names."""
-        asked = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        asked = _opened()
         try:
             asked.settimeout(WAIT_S)
             said = self._asked(asked, requests.ListenToStopKey())
@@ -120,7 +120,7 @@ class HelperClient:
             log.warning("%s", error)
 
     def _ask(self, request: Request, *descriptors: int) -> dict[str, Any]:
-        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as asked:
+        with _opened() as asked:
             asked.settimeout(WAIT_S)
             return self._asked(asked, request, *descriptors)
 
@@ -231,6 +231,14 @@ def _as_os_error() -> Iterator[None]:
         yield
     except NondumError as error:
         raise OSError(str(error)) from error
+
+
+def _opened() -> socket.socket:
+    """A socket to ask with. Raises `InstallFailed` (HELPER_SILENT)."""
+    try:
+        return socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    except OSError as error:
+        raise _silent(str(error)) from error
 
 
 def _connect(asked: socket.socket, path: Path) -> None:
