@@ -62,7 +62,8 @@ class Player:
             os.kill(pid, signal.SIGTERM)
             with contextlib.suppress(Stuck):
                 self._until(pid, "SIGTERM", lambda: False)
-            # The write(2) by which a signal wakes the loop may have been made to fail.
+            # The write(2) by which a signal wakes the loop may have failed, or the daemon
+            # has stopped and waits for a thread that could not start.
             os.kill(pid, signal.SIGTERM)
             self._until(pid, "a second SIGTERM", lambda: False)
         except ProcessLookupError:

@@ -5,14 +5,19 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
+import logging
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from nondum.sdk.errors import Problem
 
 AGAIN_S = 1.0
 """Until what could not be read is read again."""
+_GONE = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP)
+
+log = logging.getLogger(__name__)
 
 
 def dead_links(folder: Path) -> Iterator[Path]:
@@ -21,8 +26,9 @@ def dead_links(folder: Path) -> Iterator[Path]:
         if entry.is_symlink() and not entry.name.startswith("."):
             try:
                 entry.stat()
-            except OSError:
-                yield Path(entry.path)
+            except OSError as error:
+                if is_gone(error):
+                    yield Path(entry.path)
 
 
 def leads_nowhere(link: Path) -> Problem:
@@ -35,14 +41,28 @@ def leads_nowhere(link: Path) -> Problem:
     return Problem("SLOT_DANGLING", told, where=str(link), fix=fix)
 
 
-def unreadable(path: Path, error: OSError) -> Problem:
-    """What people are told of a folder, or a file in it, that cannot be read."""
+def is_gone(error: OSError) -> bool:
+    """Whether nothing is there, rather than something that cannot be read now."""
+    return error.errno in _GONE
+
+
+def unreadable(path: Path, error: OSError, *, is_plugged_in: bool) -> Problem:
+    """What people are told of a folder, or an entry of it, that cannot be read."""
+    stays = "; what was plugged in by it stays plugged in" if is_plugged_in else ""
     return Problem(
         "SLOT_UNREADABLE",
-        f"cannot be read: {error.strerror}; what was plugged in by it counts as plugged in still",
+        f"cannot be read: {error.strerror}{stays}",
         where=str(path),
         fix="find out why the host cannot read it; it is read again every second",
     )
+
+
+def logged(before: Mapping[Path, Problem], now: dict[Path, Problem]) -> dict[Path, Problem]:
+    """Log what was not a problem before; give those of now."""
+    for path, problem in now.items():
+        if before.get(path) != problem:
+            log.warning("%s", problem)
+    return now
 
 
 async def changed_or_due(changed: asyncio.Event, *, is_unread: bool) -> None:

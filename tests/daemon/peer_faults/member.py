@@ -50,7 +50,7 @@ LONG = 30_000
 """Bytes of the longest entry: a few of them make a catalogue of several messages."""
 DEADLINE_S = 4.0
 ALLOWANCE = Allowance(USUAL.per_s / 10, USUAL.burst / 4)
-"""A slow computer, and a busy one, can send so much more that it is a flood."""
+"""Lower than usual, so that a slow machine, too, can exceed it."""
 ENDINGS = {"work.stop": Lease.STOP, "work.finish": Lease.FINISH, "work.hold": Lease.HOLD}
 """What becomes of a piece of work whose caller is lost."""
 

@@ -473,7 +473,7 @@ async def test_what_cannot_be_written_is_owed(tmp_path: Path) -> None:
     """Somebody else holds the file: as a disk that fails for a while."""
     async with opened(tmp_path) as catalogue:
         await catalogue.commit(FULL, (entry("one"),))
-        await catalogue._run(catalogue._connection.execute, "PRAGMA busy_timeout = 0")
+        await catalogue._run(lambda: catalogue._connected().execute("PRAGMA busy_timeout = 0"))
         other = sqlite3.connect(tmp_path / "catalogue.sqlite", isolation_level=None)
         other.execute("BEGIN IMMEDIATE")
         two, three = replace(FULL, revision=6), replace(FULL, revision=7, goals={})

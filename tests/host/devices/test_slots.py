@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -104,6 +105,7 @@ async def test_files_that_stand_for_no_device_are_problems_until_they_are_mended
     slots.mkdir()
     file.write_text(CAMERA)
     (slots / "a.toml").write_text("[device\n")
+    os.mkfifo(slots / "pipe.toml")
     (slots / "eye.toml").symlink_to("files/eye.toml")  # that is slots/files/eye.toml
     (slots / "front.toml").write_text(CAMERA)
     source = DeviceSlotSource([slots])
@@ -112,10 +114,12 @@ async def test_files_that_stand_for_no_device_are_problems_until_they_are_mended
         found = {Path(problem.where).name: problem for problem in source.problems}
         assert {name: problem.code for name, problem in found.items()} == {
             "a.toml": "DEVICE_SLOT",
+            "pipe.toml": "DEVICE_SLOT",
             "eye.toml": "SLOT_DANGLING",
         }
         assert str(slots / "files/eye.toml") in found["eye.toml"].message
         (slots / "a.toml").unlink()
+        (slots / "pipe.toml").unlink()
         (slots / ".next").symlink_to(file)
         (slots / ".next").rename(slots / "eye.toml")
         assert isinstance(await heard(told), DeviceAppeared)
@@ -143,6 +147,29 @@ async def test_devices_of_a_folder_that_cannot_be_read_for_a_moment_stay(
         assert isinstance(event, DeviceAppeared)
         assert event.device == "b"
         assert source.problems == ()
+
+
+@pytest.mark.anyio
+async def test_devices_of_other_folders_go_while_one_cannot_be_read(tmp_path: Path) -> None:
+    left, right = tmp_path / "left", tmp_path / "right"
+    for folder in (left, right):
+        folder.mkdir()
+        (folder / "eye.toml").write_text(CAMERA)
+    (left / "bad.toml").write_text("[device\n")
+    source = DeviceSlotSource([left, right])
+    async with telling(source) as told:
+        for _ in range(2):
+            await heard(told)
+        left.rename(tmp_path / "away")
+        left.symlink_to("x" * 300)  # ENAMETOOLONG: not to be followed, nor said to lead nowhere
+        (right / "eye.toml").unlink()
+        event = await heard(told)
+        assert isinstance(event, DeviceRemoved)
+        assert event.device == "right/eye"
+        assert {problem.code: problem.where for problem in source.problems} == {
+            "DEVICE_SLOT": str(left / "bad.toml"),
+            "SLOT_UNREADABLE": str(left),
+        }
 
 
 @pytest.mark.anyio

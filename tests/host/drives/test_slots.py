@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import os
 import shutil
+import threading
 import time
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -21,6 +22,10 @@ from nondum.host.slot_folders import AGAIN_S
 from nondum.wheelhouse import disk
 
 pytestmark = pytest.mark.anyio
+
+
+TOO_LONG = "x" * 300
+"""A link to it can be neither followed nor said to lead nowhere (ENAMETOOLONG)."""
 
 
 @contextlib.asynccontextmanager
@@ -72,6 +77,7 @@ async def test_drives_of_a_folder_that_cannot_be_read_for_a_moment_stay(
     async with telling(source) as told:
         assert await told.get() == DriveInserted("a", slots / "a", "slot")
         assert await told.get() == DrivesScanned("slot", ("a",))
+        await until_async("the drive was looked at", lambda: not looking())
         (slots / "b").mkdir()
         with descriptors_left(0):
             await clock.settle()
@@ -85,6 +91,50 @@ async def test_drives_of_a_folder_that_cannot_be_read_for_a_moment_stay(
         assert await told.get() == DriveInserted("b", slots / "b", "slot")
         assert told.empty()
         assert source.problems == ()
+
+
+def looking() -> list[str]:
+    """The threads that look into slots."""
+    return [thread.name for thread in threading.enumerate() if thread.name == "slots"]
+
+
+async def test_drives_of_other_folders_go_while_one_cannot_be_read(tmp_path: Path) -> None:
+    left, right = tmp_path / "left", tmp_path / "right"
+    for drive in (left / "a", right / "b"):
+        drive.mkdir(parents=True)
+    source = SlotSource([left, right])
+    async with telling(source) as told:
+        assert [(await told.get()) for _ in range(3)][-1] == DrivesScanned(
+            "slot", ("left/a", "right/b")
+        )
+        left.rename(tmp_path / "away")
+        left.symlink_to(TOO_LONG)
+        (right / "b").rmdir()
+        assert await told.get() == DriveRemoved("right/b")
+        assert [problem.where for problem in source.problems] == [str(left)]
+        left.unlink()
+        (right / "c").mkdir()
+        assert await told.get() == DriveRemoved("left/a")
+
+
+async def test_drive_whose_entry_cannot_be_read_stays(tmp_path: Path) -> None:
+    slots = tmp_path / "slots"
+    (slots / "a").mkdir(parents=True)
+    (slots / "dangling").symlink_to(tmp_path / "nothing")
+    source = SlotSource([slots])
+    async with telling(source) as told:
+        assert await told.get() == DriveInserted("a", slots / "a", "slot")
+        assert await told.get() == DrivesScanned("slot", ("a",))
+        (slots / "a").rmdir()
+        (slots / "a").symlink_to(TOO_LONG)
+        (slots / "b").mkdir()
+        assert await told.get() == DriveInserted("b", slots / "b", "slot")
+        assert {problem.code: problem.where for problem in source.problems} == {
+            "SLOT_UNREADABLE": str(slots / "a"),
+            "SLOT_DANGLING": str(slots / "dangling"),
+        }
+        (slots / "a").unlink()
+        assert await told.get() == DriveRemoved("a")
 
 
 async def test_drive_goes_though_watches_cannot_be_made_anew(

@@ -168,9 +168,9 @@ def hand_played(*, after: PeerKey) -> Iterator[HandPlayed]:
     while keys.public < after:
         keys = HostKeys.generate()
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-    with contextlib.closing(HandPlayed(context, keys)) as one:
-        yield one
-    context.term()
+    with contextlib.ExitStack() as ended:
+        ended.callback(context.term)
+        yield ended.enter_context(contextlib.closing(HandPlayed(context, keys)))
 
 
 async def test_window_is_announced_while_it_is_open(tmp_path: Path) -> None:

@@ -12,16 +12,17 @@ from tests.kit.until import PATIENCE_S
 from nondum.host.service.stop_signals import STOP
 
 DAEMON = """
-import asyncio, os, sys
+import asyncio, os, sys, threading, time
 from nondum.host.service.stop_signals import told_to_stop
 
 async def main(number):
     with told_to_stop() as stop:
         os.kill(os.getpid(), number)
         await stop.wait()
-    print("stopped", flush=True)
-    os.kill(os.getpid(), number)
-    await asyncio.Event().wait()
+    loop = asyncio.get_running_loop()
+    loop.run_in_executor(None, time.sleep, 600)  # asyncio.run waits for it
+    again = lambda: (print("stopped", flush=True), os.kill(os.getpid(), number))
+    threading.Thread(target=again, daemon=True).start()
 
 asyncio.run(main(int(sys.argv[1])))
 """

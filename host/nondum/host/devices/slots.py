@@ -14,8 +14,7 @@ device is pulled. Files whose names begin with a dot, or end in anything but `.t
 from __future__ import annotations
 
 import contextlib
-import errno
-import logging
+import os
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -26,13 +25,10 @@ from nondum.host.devices.hardware import described
 from nondum.host.devices.source import Sightings
 from nondum.host.events import Emit
 from nondum.host.inotify import folders_watched
-from nondum.host.slot_folders import changed_or_due, leads_nowhere, unreadable
+from nondum.host.slot_folders import changed_or_due, is_gone, leads_nowhere, logged, unreadable
 from nondum.sdk.errors import ConfigRefused, Problem
 
 MAX_BYTES = 64 * 1024
-_NO_FILE = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP)
-
-log = logging.getLogger(__name__)
 
 
 class DeviceSlotSource:
@@ -67,8 +63,10 @@ class DeviceSlotSource:
             try:
                 paths = _scanned(folder)
             except OSError as error:  # its devices may be in still
-                unread[folder] = unreadable(folder, error)
-                yield from ((p, seen) for p, seen in self._seen.items() if p.parent == folder)
+                kept = {path: one for path, one in self._seen.items() if path.parent == folder}
+                unread[folder] = unreadable(folder, error, is_plugged_in=bool(kept))
+                refused |= {p: told for p, told in self._refused.items() if p.parent == folder}
+                yield from kept.items()
                 continue
             for path in paths:
                 name = path.stem if len(self._folders) == 1 else f"{folder.name}/{path.stem}"
@@ -77,15 +75,16 @@ class DeviceSlotSource:
                 except ConfigRefused as wrong:
                     refused[path] = wrong.problems[0]
                 except OSError as error:
-                    if error.errno not in _NO_FILE:
-                        unread[path] = unreadable(path, error)
-                        if path in self._seen:
+                    if not is_gone(error):
+                        is_known = path in self._seen
+                        unread[path] = unreadable(path, error, is_plugged_in=is_known)
+                        if is_known:
                             yield path, self._seen[path]
                         continue
                     with contextlib.suppress(OSError):  # it has just gone
                         refused[path] = leads_nowhere(path)
-        self._refused = _logged(self._refused, refused)
-        self._unread = _logged(self._unread, unread)
+        self._refused = logged(self._refused, refused)
+        self._unread = logged(self._unread, unread)
 
 
 def _scanned(folder: Path) -> list[Path]:
@@ -98,14 +97,6 @@ def _scanned(folder: Path) -> list[Path]:
         )
     except (FileNotFoundError, NotADirectoryError):
         return []
-
-
-def _logged(before: dict[Path, Problem], now: dict[Path, Problem]) -> dict[Path, Problem]:
-    """Say it once: a file that is being written is looked at several times."""
-    for path, problem in now.items():
-        if before.get(path) != problem:
-            log.warning("%s", problem)
-    return now
 
 
 def device_of(name: str, nodes: Sequence[DeviceNode]) -> DeviceRecord:
@@ -153,8 +144,12 @@ def _properties(said: Any, where: str) -> dict[str, str]:
 
 
 def _read(path: Path) -> str:
-    with path.open("rb") as file:
+    with open(path, "rb", opener=_without_waiting) as file:
         return file.read(MAX_BYTES).decode("utf-8", "replace")
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK)  # it may be a pipe
 
 
 def _refused(where: str, message: str) -> ConfigRefused:

@@ -35,16 +35,12 @@ log = logging.getLogger(__name__)
 class Rewritten(Generic[_Slot]):
     """Looks at what is plugged in, and says what is not as it was. Close it."""
 
-    def __init__(
-        self,
-        changed: asyncio.Event,
-        on_watched: Callable[[], None],
-        on_rewritten: Callable[[_Slot], None],
-    ) -> None:
-        """`changed` is set when it is worth looking again; `on_watched` is called when more is
-        watched than before, so that nothing that changed meanwhile is missed. Raises `OSError`."""
+    def __init__(self, changed: asyncio.Event, on_rewritten: Callable[[_Slot], None]) -> None:
+        """`changed` is set when it is worth looking again: something has changed, more is watched
+        than before, so that nothing that changed meanwhile is missed, or `on_rewritten` was called.
+        Raises `OSError`."""
         self._changed = changed
-        self._on_watched, self._on_rewritten = on_watched, on_rewritten
+        self._on_rewritten = on_rewritten
         self._watches = Watches(changed)
         self._marks: dict[_Slot, Mark] = {}
         self._since_ns: dict[_Slot, int] = {}
@@ -110,7 +106,7 @@ class Rewritten(Generic[_Slot]):
         before = {slot: self._marks.get(slot) for slot in looked}
         self._marks |= {slot: mark for slot, (mark, _) in looked.items()}
         if None in before.values():
-            self._on_watched()
+            self._changed.set()
         for slot, (mark, latest_ns) in looked.items():
             if before[slot] is None:
                 is_rewritten = latest_ns > self._since_ns[slot]
@@ -118,6 +114,7 @@ class Rewritten(Generic[_Slot]):
                 is_rewritten = before[slot] != mark
             if is_rewritten:
                 self._on_rewritten(slot)
+                self._changed.set()
 
 
 def _looked(watches: Watches, slot: Path) -> Looked | None:

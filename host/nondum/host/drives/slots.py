@@ -11,14 +11,20 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-from collections.abc import Iterable, Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from nondum.host.drives.rewritten import Rewritten
 from nondum.host.events import DriveInserted, DriveRemoved, DrivesScanned, Emit
 from nondum.host.inotify import folders_watched
-from nondum.host.slot_folders import changed_or_due, dead_links, leads_nowhere, unreadable
+from nondum.host.slot_folders import (
+    changed_or_due,
+    dead_links,
+    is_gone,
+    leads_nowhere,
+    logged,
+    unreadable,
+)
 from nondum.sdk.errors import Problem
 
 _Identity = tuple[Path, int, str]
@@ -38,45 +44,45 @@ class SlotSource:
         self._folders = tuple(folders)
         self._seen: dict[str, _Identity] = {}
         self._unread: dict[Path, Problem] = {}
-        """Folders that could not be read the last time."""
-        self._dangling: tuple[Problem, ...] = ()
+        """Folders and entries that could not be read the last time."""
+        self._dangling: dict[Path, Problem] = {}
+        """Links that lead nowhere yet."""
+        self._rewritten: list[_Slot] = []
+        """What is to be told as written again."""
 
     @property
     def problems(self) -> tuple[Problem, ...]:
         """Of folders that cannot be read, and of links that lead nowhere yet."""
-        return (*self._unread.values(), *self._dangling)
+        return (*self._unread.values(), *self._dangling.values())
 
     async def watch(self, emit: Emit) -> None:
         """Tell what is there, then what comes and goes, until cancelled."""
-        compare, again = partial(self._compare, emit), partial(self._again, emit)
         with (
             folders_watched(self._folders) as changed,
-            contextlib.closing(Rewritten(changed, compare, again)) as rewritten,
+            contextlib.closing(Rewritten(changed, self._rewritten.append)) as rewritten,
         ):
-            compare()
+            self._compare(emit)
             emit(DrivesScanned(self.kind, tuple(self._seen)))
             while True:
                 rewritten.look(self._places())
                 await changed_or_due(changed, is_unread=bool(self._unread))
                 changed.clear()
-                compare()
+                self._compare(emit)
+                self._tell_rewritten(emit)
 
     def _places(self) -> dict[_Slot, Path]:
         """What is worth being watched: drives, and links that lead nowhere yet."""
         places: dict[_Slot, Path] = {
             (drive, identity): identity[0] for drive, identity in self._seen.items()
         }
-        links = [link for folder in self._folders for link in _dead_links(folder)]
-        places |= {(str(link), None): link for link in links}
-        self._dangling = tuple(_problems(links))
-        return places
+        return places | {(str(link), None): link for link in self._dangling}
 
-    def _again(self, emit: Emit, slot: _Slot) -> None:
-        """Tell of a drive that was written anew, if it is the one that is in still."""
-        self._compare(emit)
-        drive, identity = slot
-        if identity is not None and self._seen.get(drive) == identity:
-            emit(self._inserted(drive, identity[0]))
+    def _tell_rewritten(self, emit: Emit) -> None:
+        """Tell of drives that were written again, if they are those that are in still."""
+        for drive, identity in self._rewritten:
+            if identity is not None and self._seen.get(drive) == identity:
+                emit(self._inserted(drive, identity[0]))
+        self._rewritten.clear()
 
     def _compare(self, emit: Emit) -> None:
         """Tell the difference to what was seen last."""
@@ -97,28 +103,34 @@ class SlotSource:
         return DriveInserted(drive, path.parent / drive, self.kind, problems=(_unnameable(drive),))
 
     def _entries(self) -> Iterator[tuple[str, _Identity]]:
+        unread: dict[Path, Problem] = {}
+        dangling: dict[Path, Problem] = {}
         for folder in self._folders:
             try:
                 entries = _scanned(folder)
+                dangling |= _dangling(folder)
             except OSError as error:  # its drives may be in still
-                if folder not in self._unread:
-                    log.warning("the slot folder %s cannot be read: %s", folder, error)
-                self._unread[folder] = unreadable(folder, error)
-                yield from self._seen_in(folder)
+                kept = {d: seen for d, seen in self._seen.items() if seen[0].parent == folder}
+                unread[folder] = unreadable(folder, error, is_plugged_in=bool(kept))
+                dangling |= {at: told for at, told in self._dangling.items() if at.parent == folder}
+                yield from kept.items()
                 continue
-            self._unread.pop(folder, None)
             for entry in entries:
+                name = _shown(entry.name)
+                drive = name if len(self._folders) == 1 else f"{folder.name}/{name}"
                 try:
                     identity = _identity(entry)
-                except OSError as error:  # it has just gone, or is a link that leads in circles
-                    log.debug("%s is no drive: %s", entry.path, error)
-                    continue
+                except OSError as error:
+                    if is_gone(error):  # it has just gone, or is a link that leads in circles
+                        log.debug("%s is no drive: %s", entry.path, error)
+                        continue
+                    identity, path = self._seen.get(drive), Path(entry.path)
+                    is_known = identity is not None
+                    unread[path] = unreadable(path, error, is_plugged_in=is_known)
                 if identity is not None:
-                    name = _shown(entry.name)
-                    yield name if len(self._folders) == 1 else f"{folder.name}/{name}", identity
-
-    def _seen_in(self, folder: Path) -> Iterator[tuple[str, _Identity]]:
-        return ((d, seen) for d, seen in self._seen.items() if seen[0].parent == folder)
+                    yield drive, identity
+        self._unread = logged(self._unread, unread)
+        self._dangling = dangling
 
 
 def _scanned(folder: Path) -> list[os.DirEntry[str]]:
@@ -130,17 +142,13 @@ def _scanned(folder: Path) -> list[os.DirEntry[str]]:
         return []
 
 
-def _dead_links(folder: Path) -> list[Path]:
-    """Links to what is not there; those to what is are drives, or files."""
-    with contextlib.suppress(OSError):  # it was told when its entries were read
-        return list(dead_links(folder))
-    return []
-
-
-def _problems(links: Iterable[Path]) -> Iterator[Problem]:
-    for link in links:
+def _dangling(folder: Path) -> dict[Path, Problem]:
+    """Links to what is not there; those to what is are drives, or files. Raises `OSError`."""
+    found: dict[Path, Problem] = {}
+    for link in dead_links(folder) if folder.is_dir() else ():
         with contextlib.suppress(OSError):  # it has just gone
-            yield leads_nowhere(link)
+            found[link] = leads_nowhere(link)
+    return found
 
 
 def _identity(entry: os.DirEntry[str]) -> _Identity | None:

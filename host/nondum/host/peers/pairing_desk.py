@@ -188,7 +188,7 @@ class _Window:
 
     def look(self, hints: Iterable[Hint]) -> None:
         """See who could be paired. Of two hosts the one with the lesser key asks, if there is just
-        one that it could ask; where else that one may be counts once a try has come to nothing."""
+        one that it could ask. Its new addresses are used when the attempt under way has failed."""
         self._found = _candidates(hint for hint in hints if self._is_wanted(hint.key, hint.name))
         is_free = isinstance(self.host.state, Waiting) and not self.host.is_trying
         if not is_free or len(self._found) != 1:

@@ -15,8 +15,8 @@ def told_to_stop() -> Iterator[asyncio.Event]:
     """An event that such a signal sets, on the running loop, from the start of the daemon to its
     end.
 
-    Afterwards such a signal ends the process: what is left of it may hang. (A thread that has no
-    memory to begin with is waited for by `asyncio.run`, for ever.)
+    Afterwards such a signal ends the process: `asyncio.run` may wait for ever for a thread, such as
+    one that could not start for want of memory.
     """
     loop, stop = asyncio.get_running_loop(), asyncio.Event()
     for number in STOP:
@@ -26,3 +26,4 @@ def told_to_stop() -> Iterator[asyncio.Event]:
     finally:
         for number in STOP:
             loop.remove_signal_handler(number)
+            signal.signal(number, signal.SIG_DFL)  # not KeyboardInterrupt, which ends no thread

@@ -115,7 +115,7 @@ CODES = (
         "SLOT_UNREADABLE",
         "A slot folder or a file in it cannot be read; what was plugged in by it stays plugged in.",
         "find out why the host cannot read it; it is read again every second",
-        causes="a disk that fails, rights that are missing, or a host that has no descriptors left",
+        causes="a failing disk, missing permissions, or no file descriptors left",
     ),
     Code(
         "STORE_DAMAGED",
