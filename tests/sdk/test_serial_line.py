@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import fcntl
 import os
 import pty
@@ -12,6 +13,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+from tests.kit.until import PATIENCE_S
 
 from nondum.sdk.errors import BehaviourFailed
 from nondum.sdk.serial_line import FAILED, SerialLine
@@ -87,3 +89,24 @@ async def test_a_device_pulled_while_it_is_waited_for(device: Device) -> None:
         with pytest.raises(BehaviourFailed) as failed:
             await line.receive()
         assert failed.value.code == FAILED
+
+
+@pytest.mark.anyio
+async def test_closed_while_it_is_waited_for_it_leaves_its_descriptor_to_the_next(
+    device: Device,
+) -> None:
+    loop, ready = asyncio.get_running_loop(), asyncio.Event()
+    reading, writing = os.pipe()
+    with SerialLine(device.node, BAUD) as line:
+        number = line._port.fileno()
+        waiting = asyncio.create_task(line.receive())
+        await asyncio.sleep(0)
+    os.dup2(reading, number)
+    waiting.cancel()
+    await asyncio.wait({waiting})
+    loop.add_reader(number, ready.set)
+    os.write(writing, b"x")
+    await asyncio.wait_for(ready.wait(), PATIENCE_S)
+    loop.remove_reader(number)
+    for one in (reading, writing, number):
+        os.close(one)

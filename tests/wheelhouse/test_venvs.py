@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 from tests.kit.payloads import installed_wheel, make_wheel, sha256
+from tests.kit.processes import is_alive
+from tests.kit.until import until
 from tests.wheelhouse.file_systems import file_system, needs_mount
 
 from nondum.sdk.errors import InstallFailed
@@ -222,6 +224,27 @@ def test_pip_makes_one_too(folder: Path, tmp_path: Path) -> None:
     assert (site / "one.py").read_text() == "X = 1"
     assert (site / "one-1.dist-info/RECORD").exists()
     assert not (tmp_path / "venv/requirements.txt").exists()
+
+
+INSTALLER = """
+import sys
+from pathlib import Path
+from nondum.wheelhouse import venvs
+from nondum.wheelhouse.lock import LockedWheel
+venv, python, folder = map(Path, sys.argv[1:])
+wheel = LockedWheel("one", "1", "wheels/one-1-py3-none-any.whl", "0" * 64, 1)
+venvs.make_with_pip(venv, python, folder, [wheel])
+"""
+
+
+def test_pip_ends_with_the_process_that_runs_it(folder: Path, tmp_path: Path) -> None:
+    os.mkfifo(folder / "wheels/one-1-py3-none-any.whl")  # pip reads until somebody has written
+    command = [sys.executable, "-c", INSTALLER, str(tmp_path / "venv"), str(PYTHON), str(folder)]
+    with subprocess.Popen(command) as installer:
+        children = Path(f"/proc/{installer.pid}/task/{installer.pid}/children")
+        pip = int(until("pip runs", lambda: children.read_text().split())[0])
+        installer.kill()
+    until("pip has ended", lambda: not is_alive(pip))
 
 
 def test_pip_refuses_another_wheel(folder: Path, tmp_path: Path) -> None:

@@ -81,7 +81,8 @@ def make_with_pip(
         encoding="utf-8",
     )
     command = [
-        *(sys.executable, "-I", "-m", "pip", "--isolated", "install", "--no-index", "--no-deps"),
+        *(sys.executable, "-I", "-c", _PIP, str(os.getpid())),
+        *("--isolated", "install", "--no-index", "--no-deps"),
         *("--only-binary", ":all:", "--require-hashes", "--no-cache-dir", "--no-compile"),
         *("--no-input", "--disable-pip-version-check", "--quiet", "--no-warn-script-location"),
         *("--target", str(site_packages(unfinished).absolute())),
@@ -93,6 +94,16 @@ def make_with_pip(
         raise InstallFailed(Problem("PIP_FAILED", failure, where=str(folder)))
     requirements.unlink()
     unfinished.rename(venv)
+
+
+_PIP = """
+import ctypes, os, runpy, signal, sys
+ctypes.CDLL(None).prctl(1, signal.SIGKILL)
+if os.getppid() == int(sys.argv.pop(1)):
+    runpy.run_module("pip", run_name="__main__", alter_sys=True)
+"""
+"""pip, killed with the thread that waits for it (prctl(2), PR_SET_PDEATHSIG): it would write on where
+the next one does."""
 
 
 def _run_pip(command: Sequence[str], alive: Callable[[], None]) -> str | None:

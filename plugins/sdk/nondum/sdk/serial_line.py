@@ -28,6 +28,8 @@ class SerialLine:
 
     def __init__(self, node: str, baud: int) -> None:
         self._node = node
+        self._waits: asyncio.AbstractEventLoop | None = None
+        """The loop on which bytes are waited for."""
         with self._translated():
             self._port = serial.Serial(
                 node, baud, timeout=0, write_timeout=_WRITE_TIMEOUT_S, exclusive=True
@@ -40,13 +42,13 @@ class SerialLine:
 
     async def receive(self) -> bytes:
         """The bytes that have come, after waiting for the first of them."""
-        loop, ready = asyncio.get_running_loop(), asyncio.Event()
+        self._waits, ready = asyncio.get_running_loop(), asyncio.Event()
         # Only while somebody waits: unread bytes would keep the loop busy otherwise.
-        loop.add_reader(self._port.fileno(), ready.set)
+        self._waits.add_reader(self._port.fileno(), ready.set)
         try:
             await ready.wait()
         finally:
-            loop.remove_reader(self._port.fileno())
+            self._wait_no_more()
         with self._translated():
             return bytes(self._port.read(max(1, self._port.in_waiting)))
 
@@ -59,7 +61,13 @@ class SerialLine:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        self._wait_no_more()  # what is opened next may have the descriptor's number
         self._port.close()
+
+    def _wait_no_more(self) -> None:
+        if self._waits is not None:
+            self._waits.remove_reader(self._port.fileno())
+            self._waits = None
 
     @contextmanager
     def _translated(self) -> Iterator[None]:
