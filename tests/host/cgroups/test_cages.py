@@ -3,6 +3,7 @@ on trees of files that look like other machines', what is found and written ther
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -11,9 +12,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from tests.kit.descriptors import descriptors_left
 
 from nondum.host.cgroups import CageLimits, Cages
-from nondum.host.cgroups.cages import NoTree, known, problems_of, tree
+from nondum.host.cgroups.cages import Cage, NoTree, known, problems_of, tree
 from nondum.host.cgroups.legacy import Legacy
 from nondum.host.cgroups.mounts import Mounted, mounted
 from nondum.host.cgroups.unified import Unified
@@ -185,6 +187,47 @@ def test_version_1_is_taken_controller_by_controller(tmp_path: Path) -> None:
     assert read == str(1 << 20)
     assert (tmp_path / "cpu,cpuacct/nondum-x/lamp.1/cpu.shares").read_text() == "2048"
     assert made.usage("gone.1").tasks == 0
+
+
+def test_cage_that_cannot_be_limited_is_not_left(tmp_path: Path) -> None:
+    cages = Cages(found := Unified(tmp_path, frozenset({"memory"})))
+    with descriptors_left(0), pytest.raises(OSError) as failed:
+        cages.make("lamp", CageLimits())
+    assert failed.value.errno == errno.EMFILE
+    assert found.names() == ()
+
+
+class Unkillable(NoTree):
+    """Has no descriptor left to kill by; `is_empty` tells whether that matters."""
+
+    def __init__(self, *, is_empty: bool) -> None:
+        self._is_empty = is_empty
+
+    def kill(self, name: str) -> None:
+        """Fail."""
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    def remove(self, name: str) -> bool:
+        """Only an empty one can be removed."""
+        return self._is_empty
+
+
+def test_empty_cage_is_removed_though_nobody_can_be_killed() -> None:
+    assert Cage(Unkillable(is_empty=True), "lamp.1").end()
+
+
+def test_cage_in_which_nobody_can_be_killed_says_why_it_is_left() -> None:
+    with pytest.raises(OSError) as failed:
+        Cage(Unkillable(is_empty=False), "lamp.1").end()
+    assert failed.value.errno == errno.EMFILE
+
+
+def test_cage_of_version_1_that_is_made_in_part_is_not_left(tmp_path: Path) -> None:
+    found = Legacy({"memory": tmp_path / "memory", "pids": tmp_path / "pids"})
+    (tmp_path / "memory").mkdir()
+    with pytest.raises(FileNotFoundError, match="pids"):
+        Cages(found).make("lamp", CageLimits())
+    assert found.names() == ()
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import errno
 import logging
 import os
 import signal
+import socket
 import sys
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
@@ -16,8 +17,10 @@ import pytest
 from tests.kit.clock import VirtualClock
 from tests.kit.descriptors import descriptors_left, open_descriptors
 from tests.kit.processes import process_ended
-from tests.kit.until import until_async
+from tests.kit.until import arrived, until_async
+from tests.kit.watches import watches_left
 
+from nondum.host.lifecycle import fork_server
 from nondum.host.lifecycle.children import START_S, Children
 from nondum.host.lifecycle.fork_client import ForkClient
 from nondum.sdk.errors import InstallFailed
@@ -199,6 +202,62 @@ async def test_process_for_which_descriptors_are_missing_leaves_none_open(left: 
         assert failed.value.errno == errno.EMFILE
         await asyncio.sleep(0)  # what a transport closes, it closes on the loop's next turn
         assert open_descriptors() == before
+
+
+@pytest.mark.parametrize(
+    "watched",
+    [
+        pytest.param(0, id="the answer"),
+        pytest.param(1, id="its end"),
+        pytest.param(2, id="its return code"),
+    ],
+)
+async def test_process_that_cannot_be_watched_is_none(watched: int) -> None:
+    """Nothing is left of it, and the next one's answer is that one's own."""
+    async with fork_client() as client:
+        other = await client.fork(JOB, START_S)
+        server, before = server_of(client), open_descriptors()
+        with watches_left(watched), pytest.raises(OSError) as failed:
+            await client.fork(JOB, START_S)
+        assert failed.value.errno == errno.ENOSPC
+        await asyncio.sleep(0)  # what a transport closes, it closes on the loop's next turn
+        assert open_descriptors() == before
+        wanted = await client.fork(JOB, START_S)
+        both = [other.pid, wanted.pid]
+        await until_async("both", lambda: forked_by(server_of(client)) == both)
+        wanted.kill()
+        assert await arrived("its own end", wanted.wait()) == -signal.SIGKILL
+        assert server_of(client) == server
+        other.close()
+        wanted.close()
+
+
+async def test_process_for_whose_pidfd_no_descriptor_is_left_costs_no_other_one() -> None:
+    async with fork_client() as client:
+        other = await client.fork(JOB, START_S)
+        server, before = server_of(client), open_descriptors()
+        os.kill(server, signal.SIGSTOP)
+        forking = asyncio.create_task(client.fork(JOB, START_S))
+        for _ in range(10):  # turns of the loop, after which it waits for the answer
+            await asyncio.sleep(0)
+        with descriptors_left(0), pytest.raises(OSError) as failed:
+            os.kill(server, signal.SIGCONT)
+            await forking
+        assert failed.value.errno == errno.EMFILE
+        await asyncio.sleep(0)
+        assert open_descriptors() == before
+        await until_async("the other one", lambda: forked_by(server) == [other.pid])
+        assert server_of(client) == server
+        other.close()
+
+
+def test_answer_whose_pidfd_finds_no_room_says_so() -> None:
+    channel, of_server = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with channel, of_server:
+        socket.send_fds(of_server, [b"7"], [of_server.fileno()])
+        with descriptors_left(0), pytest.raises(OSError) as failed:
+            fork_server.answer(channel)
+    assert failed.value.errno == errno.EMFILE
 
 
 async def test_server_that_ends_as_it_starts_is_told(with_python: WithPython) -> None:

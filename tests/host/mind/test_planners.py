@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from tests.kit.clock import VirtualClock
+from tests.kit.descriptors import descriptors_left
 from tests.kit.until import arrived, until_async
 from tests.planning.tasks import FOLLOW_PLAN, follow_task, gripper_task, plan_of
 
@@ -242,6 +243,23 @@ async def test_planner_works_where_no_folder_can_be_made(
 ) -> None:
     (tmp_path / "planning").write_text("a file")
     assert isinstance((await Planners([planner("native")]).plan(task, 5.0)).answer, Plan)
+
+
+async def test_planner_for_which_no_descriptor_is_left_leaves_the_search_to_others(
+    planner: Make, task: GroundTask, tmp_path: Path
+) -> None:
+    others, late = planner("native"), planner("pyperplan")
+    await others.warm()
+    with descriptors_left(2):  # its pipes take more
+        await Planners([late]).warm()
+        alone = await Planners([late]).plan(task, 5.0)
+        found = await Planners([others, late]).plan(task, 5.0)
+    assert isinstance(alone.answer, GaveUp)
+    assert "PLANNER_START planner pyperplan: it does not start" in alone.answer.why
+    assert isinstance(found.answer, Plan)
+    assert found.planner == "native"
+    assert not (tmp_path / "planning/pyperplan").exists()
+    assert isinstance(await late.plan(Request(task), 5.0), Plan)
 
 
 async def test_first_valid_plan_wins(planner: Make, task: GroundTask) -> None:

@@ -7,11 +7,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tests.host.workers.trees import CountedTree
 from tests.kit.clock import VirtualClock
+from tests.kit.descriptors import descriptors_left, open_descriptors
 from tests.kit.processes import is_alive
+from tests.kit.watches import watches_left
 from tests.kit.workers import WorkersUnderTest
 
+from nondum.host.cgroups.cages import Cages
 from nondum.host.events import WorkerLogged, WorkerReady
+from nondum.host.workers.confinements import Unconfined
+from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import WorkerSpec
 from nondum.sdk.description import Label, PluginDescription
 from nondum.sdk.errors import WorkerFailed
@@ -198,3 +204,43 @@ async def test_second_worker_of_a_component_is_a_mistake(tested: WorkersUnderTes
     spec = await tested.start("guest", "")
     with pytest.raises(ValueError, match="has a worker already"):
         await tested.workers.start(spec)
+
+
+@pytest.mark.parametrize(
+    "watched",
+    [
+        pytest.param(0, id="its end"),
+        pytest.param(1, id="its standard output"),
+        pytest.param(2, id="its standard error"),
+        pytest.param(3, id="its link"),
+    ],
+)
+async def test_worker_that_cannot_be_watched_leaves_nothing(
+    tested: WorkersUnderTest, watched: int
+) -> None:
+    tree = CountedTree()
+    launcher = WorkerLauncher(Unconfined(), Cages(tree))
+    tested.workers.launcher = launcher
+    await tested.workers.keep_spare()
+    spare = launcher.spare_pid
+    assert spare is not None
+    assert tree.names()
+    spec, before = tested.spec("guest", ""), open_descriptors()
+    with watches_left(watched), pytest.raises(WorkerFailed) as failed:
+        await tested.workers.start(spec)
+    assert failed.value.code == "LAUNCH_FAILED"
+    assert "No space left" in str(failed.value)
+    assert not is_alive(spare)
+    assert not tree.names()
+    assert not open_descriptors() - before
+    assert not tested.workers.pids()
+
+
+async def test_worker_for_which_no_link_can_be_made_fails_to_start(
+    tested: WorkersUnderTest,
+) -> None:
+    spec = tested.spec("guest", "")
+    with descriptors_left(0), pytest.raises(WorkerFailed) as failed:
+        await tested.workers.start(spec)
+    assert failed.value.code == "LAUNCH_FAILED"
+    assert "Too many open files" in str(failed.value)

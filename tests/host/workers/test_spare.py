@@ -15,17 +15,19 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
+from tests.host.workers.trees import CountedTree
 from tests.kit.processes import is_alive, until_gone
 from tests.kit.until import PATIENCE_S
 from tests.kit.workers import SDK, WorkersUnderTest
 
 from nondum.host.cgroups.cages import Cages, NoTree
+from nondum.host.confinement.bubblewrap import Ground
 from nondum.host.inside.bootstrap import PRELOADED
-from nondum.host.workers.confinements import Unconfined
+from nondum.host.workers.confinements import Entry, Unconfined
 from nondum.host.workers.launcher import MARK, WorkerLauncher, owner_mark
 from nondum.host.workers.leftovers import end_leftovers
 from nondum.host.workers.spare import OWNER, Spare
-from nondum.host.workers.spec import base_interpreter
+from nondum.host.workers.spec import WorkerSpec, base_interpreter
 from nondum.sdk.errors import WorkerFailed
 
 pytestmark = pytest.mark.anyio
@@ -241,6 +243,50 @@ async def test_start_that_is_not_wanted_any_more_leaves_no_process(
     for process in processes:
         await until_gone(process)
     assert launcher.spare_pid is None
+
+
+class ShownScratch(Entry):
+    """Its scratch folder is to be shown as another user's."""
+
+    @property
+    def maps_scratch(self) -> bool:
+        """It is, without a room for that."""
+        return True
+
+
+class Showing(Unconfined):
+    """Waits for a mount of the scratch folder."""
+
+    @contextmanager
+    def entry(self, spec: WorkerSpec, ground: Ground) -> Iterator[Entry]:
+        """The same worker."""
+        with super().entry(spec, ground) as entry:
+            yield ShownScratch(entry.walls, user=os.geteuid())
+
+
+async def test_launch_that_is_not_wanted_any_more_while_it_waits_for_a_mount_leaves_nothing(
+    tested: WorkersUnderTest,
+) -> None:
+    tree = CountedTree()
+    launcher = WorkerLauncher(Showing(), Cages(tree), startup_s=PATIENCE_S)
+    await launcher.warm()
+    spare = launcher.spare_pid
+    assert spare is not None
+    os.kill(spare, signal.SIGSTOP)  # it will not say anything
+    tree.is_limited.clear()
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        launching = asyncio.create_task(launcher.launch(tested.spec("cam", QUIET), theirs))
+        await asyncio.to_thread(tree.is_limited.wait, PATIENCE_S)
+        launching.cancel()
+        await asyncio.wait([launching])
+    try:
+        assert launching.cancelled()
+        assert not is_alive(spare)
+        assert not tree.names()
+    finally:
+        if is_alive(spare):
+            os.kill(spare, signal.SIGKILL)
 
 
 def spares(scratches: Path) -> list[int]:

@@ -102,7 +102,7 @@ ctypes.CDLL(None).prctl(1, signal.SIGKILL)
 if os.getppid() == int(sys.argv.pop(1)):
     runpy.run_module("pip", run_name="__main__", alter_sys=True)
 """
-"""pip, killed with the thread that waits for it (prctl(2), PR_SET_PDEATHSIG): it would write on where
+"""pip, killed with the thread that waits for it (PR_SET_PDEATHSIG): it would write on where
 the next one does."""
 
 

@@ -71,16 +71,26 @@ class Cage:
 
     def end(self) -> bool:
         """Kill all that is in it and remove it; answer whether it is gone. Blocks up to a second:
-        not for the loop.
+        not for the loop. Raises `OSError`.
         """
         until_s = time.monotonic() + EMPTY_S
         while True:
-            self.kill()
+            failure = self._kill()
             if self.remove():
                 return True
             if time.monotonic() >= until_s:
+                if failure is not None:
+                    raise failure
                 return False
             time.sleep(PAUSE_S)
+
+    def _kill(self) -> OSError | None:
+        """`kill`; why that cannot be done now: it may be empty all the same."""
+        try:
+            self.kill()
+        except OSError as error:  # no descriptor is left, say
+            return error
+        return None
 
 
 class Cages:
@@ -109,10 +119,15 @@ class Cages:
         return self._tree.controllers
 
     def make(self, component: str, limits: CageLimits) -> Cage:
-        """Make a cage for a new worker of a component. Raises `OSError`."""
+        """Make a cage for a new worker of a component. Raises `OSError`; then there is none."""
         cage = Cage(self._tree, f"{component}.{next(self._numbers)}")
-        self._tree.make(cage.name)
-        cage.limit(limits)
+        try:
+            self._tree.make(cage.name)  # of version 1 it may be made in part
+            cage.limit(limits)
+        except OSError:
+            with contextlib.suppress(OSError):  # what failed first is told
+                cage.remove()
+            raise
         return cage
 
     def sweep(self, keep: Collection[str] = ()) -> int:

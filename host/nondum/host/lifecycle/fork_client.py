@@ -36,7 +36,10 @@ class Forked:
         reader: asyncio.StreamReader,
         writer: asyncio.StreamWriter,
     ) -> None:
-        """`descriptor` is its pidfd; its return code can be read from `status`."""
+        """`descriptor` is its pidfd; its return code can be read from `status`. It closes both.
+
+        Raises `OSError` when they cannot be watched: then they are still the caller's.
+        """
         self.pid = pid
         self._reader, self._writer = reader, writer
         self.returncode: int | None = None
@@ -45,7 +48,11 @@ class Forked:
         self._over, self._ended = asyncio.Event(), asyncio.Event()
         loop = asyncio.get_running_loop()
         loop.add_reader(descriptor, self._see_over)
-        loop.add_reader(status, self._see_end)
+        try:
+            loop.add_reader(status, self._see_end)
+        except OSError:
+            loop.remove_reader(descriptor)
+            raise
 
     async def say(self, line: bytes) -> None:
         """Write a line to it; one that has ended does not hear it."""
@@ -63,8 +70,7 @@ class Forked:
     def kill(self) -> None:
         """SIGKILL it, if it runs."""
         if self._status >= 0:
-            with contextlib.suppress(ProcessLookupError):
-                signal.pidfd_send_signal(self._descriptor, signal.SIGKILL)
+            _kill(self._descriptor)
 
     @property
     def is_over(self) -> bool:
@@ -219,7 +225,8 @@ class ForkClient:
     async def _forked(
         self, channel: socket.socket, message: str, descriptors: Sequence[int]
     ) -> Forked:
-        with contextlib.ExitStack() as failed:
+        # Before it is asked: an answer that nobody waits for would be taken for the next one.
+        with _readable(channel) as is_answered, contextlib.ExitStack() as failed:
             ours, theirs = socket.socketpair()
             failed.callback(theirs.close)
             failed.callback(ours.close)
@@ -231,11 +238,15 @@ class ForkClient:
                 with theirs, _closed(of_server):
                     given = (theirs.fileno(), *descriptors, of_server)
                     fork_server.ask(channel, message.encode(), given)
-                pid, descriptor = await _answer(channel)
+                await is_answered.wait()
+                pid, descriptor = fork_server.answer(channel)
             except ConnectionError as error:  # it ended before it had read the request
                 raise EOFError("the fork server has ended") from error
+            failed.callback(os.close, descriptor)
+            failed.callback(_kill, descriptor)
+            forked = Forked(pid, descriptor, status, reader, writer)
             failed.pop_all()
-        return Forked(pid, descriptor, status, reader, writer)
+            return forked
 
     async def _end(self) -> None:
         if self._channel is not None:
@@ -253,15 +264,15 @@ class ForkClient:
             log.warning("the fork server %d cannot be ended, and is left behind", server.pid)
 
 
-async def _answer(channel: socket.socket) -> tuple[int, int]:
-    """See `fork_server.answer`."""
+@contextlib.contextmanager
+def _readable(channel: socket.socket) -> Iterator[asyncio.Event]:
+    """Set when there is something to be read."""
     loop, is_there = asyncio.get_running_loop(), asyncio.Event()
     loop.add_reader(channel, is_there.set)
     try:
-        await is_there.wait()
+        yield is_there
     finally:
         loop.remove_reader(channel)
-    return fork_server.answer(channel)
 
 
 @contextlib.contextmanager
@@ -270,3 +281,8 @@ def _closed(descriptor: int) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
+
+
+def _kill(pidfd: int) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        signal.pidfd_send_signal(pidfd, signal.SIGKILL)

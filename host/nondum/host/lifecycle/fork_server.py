@@ -41,13 +41,16 @@ def ask(channel: socket.socket, message: bytes, descriptors: Sequence[int]) -> N
 def answer(channel: socket.socket) -> tuple[int, int]:
     """The new process's pid and pidfd.
 
-    Raises `EOFError` when the server has ended, `OSError` when it could not fork.
+    Raises `EOFError` when the server has ended, `OSError` when it could not fork, or this process
+    has no descriptor left for the pidfd: that process ends by the end of its conversation.
     """
     said, descriptors, _, _ = socket.recv_fds(channel, ANSWER_BYTES, 1)
     if not said:
         raise EOFError("the fork server has ended")
     if (number := int(said)) < 0:
         raise OSError(-number, os.strerror(-number))
+    if not descriptors:
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
     (descriptor,) = descriptors
     fcntl.fcntl(descriptor, fcntl.F_SETFD, fcntl.FD_CLOEXEC)
     return number, descriptor

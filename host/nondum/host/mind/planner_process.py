@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import os
 import signal
 import sys
@@ -25,6 +26,8 @@ GRACE_S = 0.5
 AT_ONCE = 2_000
 """Ground actions that are written for the wire in a time that the loop can spare."""
 _LANGUAGES = ("ground", "pddl")
+
+log = logging.getLogger(__name__)
 
 _T = TypeVar("_T")
 
@@ -126,17 +129,7 @@ class PlannerProcess:
             return self._process
         await self._kill()
         folder = await self._to_its_end(asyncio.to_thread(self._folder.make))
-        module = "nondum.host.mind.planner_child"
-        self._process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-P", "-m", module, self._reference),
-            *(str(self._memory_mb), str(os.getpid())),
-            stdin=PIPE,
-            stdout=PIPE,
-            stderr=DEVNULL,
-            env={**self._environment, **folder},
-            start_new_session=True,
-            cwd="/",
-        )
+        self._process = await self._started(folder)
         try:
             async with asyncio.timeout(START_S):
                 hello = await self._read(self._process)
@@ -151,6 +144,25 @@ class PlannerProcess:
                 raise self._failure("PLANNER_START", f"it speaks no language of this host: {hello}")
         self._is_ready = True
         return self._process
+
+    async def _started(self, folder: Mapping[str, str]) -> Process:
+        """The child. Where this host has no process or descriptor left, others may plan."""
+        module = "nondum.host.mind.planner_child"
+        try:
+            return await asyncio.create_subprocess_exec(
+                *(sys.executable, "-P", "-m", module, self._reference),
+                *(str(self._memory_mb), str(os.getpid())),
+                stdin=PIPE,
+                stdout=PIPE,
+                stderr=DEVNULL,
+                env={**self._environment, **folder},
+                start_new_session=True,
+                cwd="/",
+            )
+        except OSError as error:
+            log.warning("planner %s cannot be started: %s", self.name, error)
+            await self._to_its_end(asyncio.to_thread(self._folder.remove))
+            raise self._failure("PLANNER_START", "it does not start") from error
 
     async def _read(self, process: Process) -> object:
         assert process.stdout is not None  # started with pipes

@@ -92,8 +92,8 @@ class Keeper:
         return OpenFiles(answer["descriptors"], answer["deleted_bytes"])
 
     def take_pidfd(self) -> int | None:
-        """The keeper's own process, for the caller to wait for and close; None if it is gone, or
-        never said who it is. It ends last: everything in its room has ended before."""
+        """The keeper's own process, for the caller to wait for and close; None if it is gone, never
+        said who it is, or cannot be watched. It ends last: all in its room has ended before."""
         taken, self._pidfd = self._pidfd, None
         return taken
 
@@ -131,7 +131,9 @@ class Keeper:
     def _hear(self, said: dict[str, Any], more: list[tuple[int, int, bytes]]) -> None:
         match said["is"]:
             case "keeper":
-                with contextlib.suppress(ProcessLookupError):  # it has ended meanwhile
+                # It has ended meanwhile, or no descriptor is left. It is not tried again later: by
+                # then its id may be somebody else's, whose end would be waited for.
+                with contextlib.suppress(OSError):
                     self._pidfd = os.pidfd_open(_sender(more))
             case "worker":
                 self._worker = _sender(more)

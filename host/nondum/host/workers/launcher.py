@@ -98,11 +98,9 @@ class WorkerLauncher:
                         spare.limit(spec.limits)
                         if spare.become(told, sock, entry.ruleset):
                             if entry.user is not None and entry.maps_scratch:
-                                await asyncio.to_thread(
-                                    spare.map_scratch, entry.user, self._startup_s
-                                )
+                                await spare.scratch_mapped(entry.user, self._startup_s)
                             return spare.process(entry.user)
-                    except OSError:
+                    except BaseException:
                         await spare.end()
                         raise
                     await spare.end()

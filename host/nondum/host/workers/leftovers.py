@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from nondum.host.workers.launcher import MARK, owner_mark
@@ -33,6 +33,13 @@ def end_leftovers(folder: Path) -> int:
         if not found:
             break
     return len(ended)
+
+
+def clear_away(*steps: Callable[[], object]) -> None:
+    """Take all these steps in their order, whichever of them fails; the last failure is raised."""
+    with contextlib.ExitStack() as left:
+        for step in reversed(steps):
+            left.callback(step)
 
 
 def marked(folder: Path) -> Iterator[int]:

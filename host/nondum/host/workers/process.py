@@ -28,7 +28,10 @@ class WorkerProcess:
         keeper: Keeper | None = None,
         user: int | None = None,
     ) -> None:
-        """`keeper`, which it takes over, is that of a worker in a room of its own."""
+        """`keeper`, which it takes over, is that of a worker in a room of its own.
+
+        Raises `OSError` when its end cannot be watched; the keeper is still the caller's then.
+        """
         self.user = user
         """The user of the machine that it is, if not the host's."""
         self._popen = popen
@@ -38,7 +41,11 @@ class WorkerProcess:
         self.exited: asyncio.Future[int] = asyncio.get_running_loop().create_future()
         """Its exit status, negative for the signal that ended it."""
         self._pidfd = os.pidfd_open(popen.pid)
-        asyncio.get_running_loop().add_reader(self._pidfd, self._on_exit)
+        try:
+            asyncio.get_running_loop().add_reader(self._pidfd, self._on_exit)
+        except OSError:
+            os.close(self._pidfd)
+            raise
 
     @property
     def pid(self) -> int:
@@ -112,10 +119,12 @@ class WorkerProcess:
         self._keeper.close()
         if room_ended is None:
             self.exited.set_result(status)
-        else:  # what made the room may be gone before what is in it
-            asyncio.get_running_loop().add_reader(
-                room_ended, self._on_room_ended, room_ended, status
-            )
+            return
+        loop = asyncio.get_running_loop()
+        try:  # what made the room may be gone before what is in it
+            loop.add_reader(room_ended, self._on_room_ended, room_ended, status)
+        except OSError:  # as where it never said who it is
+            self._on_room_ended(room_ended, status)
 
     def _on_room_ended(self, pidfd: int, status: int) -> None:
         asyncio.get_running_loop().remove_reader(pidfd)

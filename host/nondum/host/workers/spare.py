@@ -151,6 +151,24 @@ class Spare:
             os.close(mount)
         self._orders.send(b"mapped")
 
+    async def scratch_mapped(self, user: int, startup_s: float) -> None:
+        """`map_scratch` without holding up the loop.
+
+        Cancelled, it kills the process and is over when nobody hears it any more: then it may be
+        closed, as it is to be after all that is raised.
+        """
+        mapping = asyncio.create_task(asyncio.to_thread(self.map_scratch, user, startup_s))
+        try:
+            await asyncio.wait([mapping])
+        except asyncio.CancelledError:
+            self._kill()  # or a slow one would be waited for
+            try:
+                await until_done(mapping)
+            finally:
+                mapping.exception()  # nobody wants to know
+            raise
+        mapping.result()
+
     def process(self, user: int | None = None) -> WorkerProcess:
         """The worker that it has become, as that user if not as the host's.
 
@@ -175,15 +193,19 @@ class Spare:
         self._orders.close()
         if self._namespace is not None:
             self._namespace.close()
-        with contextlib.suppress(ProcessLookupError):  # its room may not be finished: all of it
-            os.killpg(self.popen.pid, signal.SIGKILL)
+        self._kill()
         self.popen.wait()
-        if self.cage is not None:
-            self.cage.end()
         self.said = _last_line(self.popen.stderr) or self.said
         for pipe in (self.popen.stdout, self.popen.stderr):
             if pipe is not None:
                 pipe.close()
+        if self.cage is not None:
+            self.cage.end()
+
+    def _kill(self) -> None:
+        """SIGKILL all of it: its room may not be finished."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.popen.pid, signal.SIGKILL)
 
     def _begin(self, confinement: Confinement, orders: int, owner: str) -> subprocess.Popen[bytes]:
         namespace = self._namespace

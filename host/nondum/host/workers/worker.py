@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -31,7 +33,7 @@ from nondum.host.workers.faults import Faults
 from nondum.host.workers.gauge import Gauge
 from nondum.host.workers.index import mismatches
 from nondum.host.workers.launcher import Launcher
-from nondum.host.workers.leftovers import end_leftovers
+from nondum.host.workers.leftovers import clear_away, end_leftovers
 from nondum.host.workers.lending import Lending
 from nondum.host.workers.news import (
     Claims,
@@ -84,6 +86,7 @@ class Worker:
     ) -> None:
         """Take over its process, and the host's end of its link.
 
+        Raises `OSError` when they cannot be read: then they are still the caller's.
         `on_crowded` is called with how often descriptors could not be sent to it, or by it.
         """
         self._on_crowded = on_crowded
@@ -119,17 +122,19 @@ class Worker:
         self._watch = Watch(spec.component, spec.limits, timing.spin_s)
         self._process = process
         self._gauge = Gauge(lambda: self.pid, self._process.cage)
-        self._outputs = [
-            Output(source, pipe, self._on_line)
-            for source, pipe in zip(("stdout", "stderr"), self._process.outputs, strict=True)
-        ]
-        self.link = WorkerLink(
-            link,
-            on_event=self._on_event,
-            on_closed=self._on_hang_up,
-            on_violation=self._on_foul,
-            on_crowded=lambda: on_crowded(1),
-        )
+        self._outputs: list[Output] = []
+        with contextlib.ExitStack() as failed:
+            failed.callback(self._close_outputs)
+            for source, pipe in zip(("stdout", "stderr"), self._process.outputs, strict=True):
+                self._outputs.append(Output(source, pipe, self._on_line))
+            self.link = WorkerLink(
+                link,
+                on_event=self._on_event,
+                on_closed=self._on_hang_up,
+                on_violation=self._on_foul,
+                on_crowded=lambda: on_crowded(1),
+            )
+            failed.pop_all()
         self._process.exited.add_done_callback(lambda _: self._on_hang_up())
 
     @property
@@ -262,14 +267,12 @@ class Worker:
             self.gone.set_result(problem)
 
     def _clear_away(self, problem: Problem) -> None:
-        """End what the process has started. Blocks."""
-        if self._process.cage is not None:
-            self._process.cage.end()
-        end_leftovers(self.spec.scratch)
-        for name in tuple(self._reached):
-            self._withdraw(name)
+        """End what the process has started. Blocks. Raises `OSError`."""
+        steps = _ends_of_all(self._process, self.spec)
+        steps += [partial(self._withdraw, name) for name in tuple(self._reached)]
         if problem.code == problems.SCRATCH_FULL:  # the next worker is to have room, and the host
-            scratch.empty(self.spec.scratch)
+            steps.append(partial(scratch.empty, self.spec.scratch))
+        clear_away(*steps)
 
     async def _end_by_itself(self) -> None:
         """Its link or process has ended: the other one will, or is ended."""
@@ -319,8 +322,9 @@ class Worker:
 
     def _withdraw(self, name: str) -> None:
         """Undo that. Blocks."""
-        self._lending.take_back(name)
-        withdrawn(self.spec.component, name)
+        clear_away(
+            partial(self._lending.take_back, name), partial(withdrawn, self.spec.component, name)
+        )
 
     async def _reading(self) -> Reading:
         is_flowing = any(isinstance(claim, StreamFlowing) for claim in self.claims)
@@ -515,14 +519,37 @@ async def _launched(
 
     Raises `WorkerFailed` (LAUNCH_FAILED, LAUNCH_CROWDED).
     """
-    ours, theirs = link_sockets()
     try:
-        with theirs:
-            process = await _process(spec, launcher, theirs, on_crowded)
-    except BaseException:
-        ours.close()
-        raise
-    return Worker(spec, process, ours, timing, emit, on_crowded)
+        with contextlib.ExitStack() as failed:
+            ours, theirs = link_sockets()
+            failed.callback(ours.close)
+            with theirs:
+                process = await _process(spec, launcher, theirs, on_crowded)
+            try:
+                worker = Worker(spec, process, ours, timing, emit, on_crowded)
+            except BaseException:
+                await until_done(asyncio.create_task(_end_unread(process, spec)))
+                raise
+            failed.pop_all()
+            return worker
+    except OSError as error:
+        problem = Problem("LAUNCH_FAILED", str(error), where=spec.component)
+        raise WorkerFailed(problem) from error
+
+
+async def _end_unread(process: WorkerProcess, spec: WorkerSpec) -> None:
+    """End one that no `Worker` could be made of, and whatever it has started."""
+    await process.end(0.0)
+    for pipe in process.outputs:
+        pipe.close()
+    with contextlib.suppress(OSError):  # what is left is the next sweep's
+        await asyncio.to_thread(clear_away, *_ends_of_all(process, spec))
+
+
+def _ends_of_all(process: WorkerProcess, spec: WorkerSpec) -> list[Callable[[], object]]:
+    """What ends all that a process has started; each may block, and raise `OSError`."""
+    by_cage = [] if process.cage is None else [process.cage.end]
+    return [*by_cage, partial(end_leftovers, spec.scratch)]
 
 
 async def _process(
