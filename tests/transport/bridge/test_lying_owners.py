@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Sequence
 
 import pytest
 import zmq
+from tests.kit.descriptors import descriptors_left
+from tests.kit.until import arrived
 from tests.transport.bridge.ends import LyingOwner, Reading, owner, stalling, within
 
 from nondum.transport.bridge import Coding, Frame, Place, incoming, packets
@@ -77,6 +80,20 @@ async def test_frame_whose_end_is_held_back_ends_the_stream(
             await within(reading.opened)
             granted.send(bytes(1_000_000))
             assert (await within(reading.over)).code == "BRIDGE_PACKET"
+
+
+@pytest.mark.parametrize("left", range(3))
+async def test_stream_without_descriptors_cannot_be_reached_and_leaves_nothing_open(
+    left: int,
+) -> None:
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    place = Place(("tcp://127.0.0.1:9", "tcp://127.0.0.1:10"), READER.public, "token")
+    with context.socket(zmq.PAIR):  # the threads of the context run already
+        with descriptors_left(left):
+            reading = Reading(context, READER, place)
+        assert (await within(reading.over)).code == "STREAM_UNREACHABLE"
+    reading.incoming.close()
+    await arrived("no socket is left", asyncio.to_thread(context.term))
 
 
 async def test_address_that_is_none_is_told() -> None:

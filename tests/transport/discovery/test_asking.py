@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import socket
+import threading
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import pytest
+from tests.kit.clock import VirtualClock
 from tests.kit.until import until_async
 from tests.transport.discovery.hosts import PATIENCE_S, Seeker, free_port, here, seeking
 
@@ -117,6 +121,30 @@ async def test_a_name_that_nobody_has_is_told() -> None:
     async with seeking(here("rover"), multicast=False, static=["nobody.invalid"]) as rover:
         told = await row(rover, code="STATIC_UNKNOWN")
         assert told.problem is not None and "peers.static" in told.problem.fix
+
+
+@contextlib.contextmanager
+def no_new_threads() -> Iterator[None]:
+    """The system has no memory for the stack of one more."""
+    before = threading.stack_size(1 << 46)
+    try:
+        yield
+    finally:
+        threading.stack_size(before)
+
+
+async def test_a_name_is_resolved_once_there_are_threads_again(clock: VirtualClock) -> None:
+    base = here("base")
+    static = [f"localhost:{base.port}"]
+    async with seeking(base, multicast=False) as there, contextlib.AsyncExitStack() as stack:
+        with no_new_threads():
+            rover = await stack.enter_async_context(
+                seeking(here("rover"), multicast=False, static=static)
+            )
+            await clock.settle()
+        (asked,) = rover.discovery.status().static
+        assert asked.problem is not None and asked.problem.code == "STATIC_UNKNOWN"
+        await clock.advance_until(rover.found(there))
 
 
 async def test_a_host_that_was_given_itself_finds_nobody() -> None:

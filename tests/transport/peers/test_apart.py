@@ -14,8 +14,10 @@ from typing import Any
 import pytest
 import zmq
 from tests.kit.clock import VirtualClock
+from tests.kit.descriptors import descriptors_left
 from tests.kit.processes import is_alive, until_gone
 from tests.kit.until import arrived, until, until_async
+from tests.kit.watches import watches_left
 from tests.transport.peers import hosts
 from tests.transport.peers.bad_ends import bad_dealer, hello_of
 from tests.transport.peers.hosts import (
@@ -50,7 +52,7 @@ from nondum.transport.peers.accepted import AWAITED_S
 from nondum.transport.peers.apart import sockets
 from nondum.transport.peers.apart.pipe import WINDOW
 from nondum.transport.peers.apart.service import MOST_WAITING
-from nondum.transport.peers.apart.sockets import SocketsApart
+from nondum.transport.peers.apart.sockets import LONGEST_WAIT_S, SocketsApart
 from nondum.transport.peers.beats import BEAT_S
 from nondum.transport.peers.here import SECOND_LOOK_S
 from nondum.transport.peers.listener import HIGH_WATER
@@ -85,6 +87,18 @@ async def test_links_of_a_host_come_back_after_their_process_was_killed(whose: i
         assert not (*one.node.accepted, *one.node.dialled)
         await until_async("it has another", lambda: one.node.links_pid not in (None, pid))
         await answers(*both)
+
+
+async def test_process_is_started_again_once_there_are_descriptors(clock: VirtualClock) -> None:
+    async with host(identity("base")) as there:
+        await asyncio.to_thread(os.getpid)  # or the clock would have to open files for its pauses
+        os.kill(pid := pid_of(there), signal.SIGKILL)
+        with descriptors_left(0):
+            await clock.advance_until(there.told(LinksFailed))
+            await clock.advance(LONGEST_WAIT_S)  # in which it is tried more than once
+            assert there.node.links_pid is None
+        started = until_async("it has another", lambda: there.node.links_pid not in (None, pid))
+        await clock.advance_until(started)
 
 
 async def test_links_that_come_back_at_once_lose_nobody_and_no_call() -> None:
@@ -255,6 +269,17 @@ async def test_strangers_have_time_only_while_the_loop_of_the_daemon_runs(
             assert told[:2] == ["refused", "silent"]
 
 
+async def test_connection_without_descriptors_is_over_and_may_be_cut(clock: VirtualClock) -> None:
+    async with serving() as daemon:
+        with descriptors_left(0):
+            daemon.say("dial", 1, KEY, ADDRESS)
+            what, number, problem = await daemon.hears()
+        assert (what, number, problem["code"]) == ("over", 1, "PEER_DOWN")
+        daemon.say("cut", 1, 0)
+        daemon.say("tick")
+        assert await daemon.hears() == ["tock", 0]
+
+
 async def test_daemon_is_told_at_once_what_cannot_be_sent_to(clock: VirtualClock) -> None:
     """No time passes in which the process would look for what is over."""
     async with serving() as daemon:
@@ -309,6 +334,24 @@ async def test_process_that_does_not_start_is_told(
         with pytest.raises(PeerRefused, match="LINKS_START"):
             async with host(identity("base")):
                 pass
+
+
+async def test_process_whose_pipe_cannot_be_watched_is_told_and_ended(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    started: list[int] = []
+
+    def start(pipe: socket.socket) -> LinksProcess:
+        process = LinksProcess(pipe)
+        started.append(process.pid)
+        return process
+
+    monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketsApart, start=start))
+    with watches_left(1), pytest.raises(PeerRefused, match="LINKS_START"):  # for its end alone
+        async with host(identity("base")):
+            pass
+    (pid,) = started
+    assert not is_alive(pid)
 
 
 STRANGE: Mapping[str, list[Any]] = {

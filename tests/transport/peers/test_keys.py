@@ -5,7 +5,9 @@ from __future__ import annotations
 import base64
 import json
 import os
+import resource
 import stat
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -99,6 +101,28 @@ def test_new_file_never_replaces_one(tmp_path: Path) -> None:
         private_file.create(path, "second")
     assert path.read_text(encoding="utf-8") == "first"
     assert [found.name for found in tmp_path.iterdir()] == ["secret"]
+
+
+@pytest.mark.parametrize("write", [private_file.create, private_file.replace])
+def test_file_that_cannot_be_written_leaves_nothing_behind(
+    tmp_path: Path, write: Callable[[Path, str], None]
+) -> None:
+    """As on a full disk: a file may have no more than some bytes."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10, hard))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            write(tmp_path / "trust", "x" * 100)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert not list(tmp_path.iterdir())
+
+
+def test_file_that_cannot_take_its_place_leaves_nothing_behind(tmp_path: Path) -> None:
+    (tmp_path / "trust").mkdir()
+    with pytest.raises(IsADirectoryError):
+        private_file.replace(tmp_path / "trust", "text")
+    assert [found.name for found in tmp_path.iterdir()] == ["trust"]
 
 
 @given(st.text(max_size=60))

@@ -15,6 +15,7 @@ import zmq
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.kit.clock import VirtualClock
+from tests.kit.descriptors import descriptors_left
 from tests.kit.examples import a_share
 from tests.kit.until import until_async
 from tests.transport.peers.bad_ends import bad_router
@@ -654,6 +655,14 @@ async def test_host_without_keys_cannot_ask() -> None:
 async def test_host_without_keys_has_nothing_to_pair_with() -> None:
     with pytest.raises(PeerRefused, match="PAIRING_DEVELOPMENT"):
         PairingHost(Identity("rover", None), lambda state: None)
+
+
+async def test_host_asks_again_once_there_are_descriptors() -> None:
+    async with end("base") as base, end("rover") as rover:
+        with descriptors_left(0):
+            rover.asks(base)
+        await rover.gives_up("PEER_DOWN")
+        await rover.sees(Comparing)
 
 
 async def test_window_that_was_never_opened_closes() -> None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import zmq
 
@@ -14,7 +16,9 @@ from nondum.transport.bridge import packets, sockets
 from nondum.transport.bridge.clocks import Clocks
 from nondum.transport.bridge.packets import Claim, Frame, Handled, Opened, Over, Ping, Pong
 from nondum.transport.bridge.window import Window
+from nondum.transport.peers import descriptors
 from nondum.transport.peers.drained import Drained
+from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import HostKeys, PeerKey
 from nondum.transport.peers.monitor import SocketEvent, Watch
 from nondum.transport.token_bucket import TokenBucket
@@ -79,7 +83,7 @@ class Incoming:
         self._attempts: list[_Attempt] = []
         self._beating = self._loop.call_later(BEAT_S, self._beat)
         for address in place.addresses:
-            self._dial(sockets.dialling(context, keys, place.owner), address)
+            self._dial(partial(sockets.dialling, context, keys, place.owner), address)
         if not self._attempts:
             self._loop.call_soon(self._lose, self._problem)
 
@@ -96,11 +100,11 @@ class Incoming:
             for attempt in self._attempts:
                 attempt.close()
 
-    def _dial(self, socket: zmq.Socket[bytes], address: str) -> None:
+    def _dial(self, make: Callable[[], zmq.Socket[bytes]], address: str) -> None:
         try:
-            self._attempts.append(_Attempt(self, socket, address))
-        except zmq.ZMQError as error:
-            self._problem = Problem("ADDRESS_MALFORMED", str(error), where=address)
+            self._attempts.append(_Attempt(self, make, address))
+        except PeerRefused as refused:
+            self._problem = refused.problems[0]
 
     def connected(self, attempt: _Attempt) -> None:
         """A connection stands, and both ends have proved their keys: the first one is kept."""
@@ -184,20 +188,35 @@ class Incoming:
 
 
 class _Attempt:
-    """One connection to one address. Raises `zmq.ZMQError` for an address that is none."""
+    """One connection to one address. `close` it."""
 
-    def __init__(self, incoming: Incoming, socket: zmq.Socket[bytes], address: str) -> None:
+    def __init__(
+        self, incoming: Incoming, make: Callable[[], zmq.Socket[bytes]], address: str
+    ) -> None:
+        """`make` its socket. Raises `PeerRefused`: ADDRESS_MALFORMED, or STREAM_UNREACHABLE where
+        there are no descriptors for it."""
         self._incoming = incoming
         self._address = address
         self.descriptor: int | None = None
         """Of the connection, once there is one."""
-        self._ears = Watch(socket, self._on_event)
-        self._socket = Drained(socket, incoming.receive)
-        try:
-            socket.connect(address)
-        except zmq.ZMQError:
-            self.close()
-            raise
+        with contextlib.ExitStack() as taken:
+            try:
+                socket = make()
+                taken.callback(socket.close, 0)
+                self._socket = Drained(socket, incoming.receive)
+                taken.callback(self._socket.close)
+                self._ears = Watch(socket, self._on_event)
+                taken.callback(self._ears.close)
+            except (OSError, zmq.ZMQError) as error:
+                told = f"nothing can be dialled now: {error.strerror}"
+                problem = Problem("STREAM_UNREACHABLE", told, fix=descriptors.remedy(error))
+                raise PeerRefused(problem) from error
+            try:
+                socket.connect(address)
+            except zmq.ZMQError as error:
+                problem = Problem("ADDRESS_MALFORMED", str(error), where=address)
+                raise PeerRefused(problem) from error
+            taken.pop_all()
 
     def send(self, data: bytes) -> None:
         self._socket.send([data])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import ipaddress
 import socket
 import threading
@@ -20,7 +21,7 @@ MAX_FOUND = 8
 async def resolve(host: str, port: int) -> tuple[str, ...]:
     """The IP addresses of a host; those of one link have their scope.
 
-    Raises `OSError` when there is none.
+    Raises `OSError` when there is none, or no thread to look them up in.
     """
     with contextlib.suppress(ValueError):
         ipaddress.ip_address(host)
@@ -40,7 +41,10 @@ async def resolve(host: str, port: int) -> tuple[str, ...]:
         with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits any more
             loop.call_soon_threadsafe(what)
 
-    threading.Thread(target=look_up, name=f"resolve {host}", daemon=True).start()
+    try:
+        threading.Thread(target=look_up, name=f"resolve {host}", daemon=True).start()
+    except RuntimeError as error:  # as Python says that the system gives no thread
+        raise OSError(errno.EAGAIN, str(error)) from error
     return await found
 
 

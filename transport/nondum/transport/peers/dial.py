@@ -32,7 +32,8 @@ GREETING_S = 12.0
 """… and so much more to be greeted: the other end's loop has let it in, so it is only slow."""
 
 Connect: TypeAlias = Callable[[PeerKey, str, Receiver], Route]
-"""Begins one connection to an address. Raises `PeerRefused` (ADDRESS_MALFORMED)."""
+"""Begins one connection to an address. Raises `PeerRefused` (ADDRESS_MALFORMED,
+PEER_DOWN)."""
 
 
 class Attempt:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import zmq
 
 from nondum.sdk.errors import Problem
+from nondum.transport.peers import descriptors
 from nondum.transport.peers.arrivals import Arrivals
 from nondum.transport.peers.beats import BEAT_S
 from nondum.transport.peers.drained import Drained, Sent
@@ -18,7 +21,7 @@ from nondum.transport.peers.gate import entry, judge
 from nondum.transport.peers.identity import Identity, Security
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.link import LINGER_MS
-from nondum.transport.peers.listener import HIGH_WATER, dialling, listening
+from nondum.transport.peers.listener import HIGH_WATER, Context, dialling, listening
 from nondum.transport.peers.looks import Looks
 from nondum.transport.peers.messages import MAX_MESSAGE, Ping, encode
 from nondum.transport.peers.monitor import Watch
@@ -45,7 +48,7 @@ class SocketsHere:
         """See `MakeSockets`."""
         self._me, self._trust, self._owner = me, trust, owner
         self._arrivals = Arrivals(owner.on_refusal, self._on_closed, owner.awake_s)
-        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._context: Context | None = None
         self._loop = asyncio.get_running_loop()
         self._accepted: dict[bytes, AcceptedRoute] = {}
         self._dialled: list[DialledRoute] = []
@@ -69,27 +72,19 @@ class SocketsHere:
 
     async def listen(self, addresses: Sequence[str]) -> tuple[str, ...]:
         """Listen (see `Sockets`)."""
-        if self._zap is None:
-            self._zap = ZapHandler(self._context, self._judge)
-        socket = listening(self._context, self._me.keys)
         try:
-            await prove_enforced(socket, self._me.keys, self._zap.expect_probe)
-            self._ears = Watch(socket, self._arrivals.on_event)
-            bound = tuple(_bind(socket, address) for address in addresses)
-        except BaseException:
-            if self._ears is not None:
-                self._ears.close()
-            socket.close(0)
-            self._ears = None
-            raise
-        self._listener = Drained(socket, self._on_frames)
+            bound = await self._listen(addresses)
+        except (OSError, zmq.ZMQError) as error:
+            told = f"peers cannot be listened for there: {error.strerror}"
+            where, fix = ", ".join(addresses), descriptors.remedy(error)
+            raise PeerRefused(Problem("ADDRESS_UNUSABLE", told, where=where, fix=fix)) from error
         self._beating = self._loop.call_later(BEAT_S, self._beat)
         self._looking = self._loop.call_later(LOOK_S, self._look)
         return bound
 
     def dial(self, key: PeerKey, address: str, receiver: Receiver) -> DialledRoute:
         """Begin one connection (see `Sockets`)."""
-        route = DialledRoute(dialling(self._context, self._me.keys, key), address, receiver)
+        route = DialledRoute(partial(self._dialling, key), address, receiver)
         self._dialled = [*(one for one in self._dialled if not one.is_cut), route]
         if self._is_held:
             route.hold()
@@ -124,7 +119,37 @@ class SocketsHere:
             self._listener.close(LINGER_MS)
         if self._zap is not None:
             self._zap.close()
-        await asyncio.to_thread(self._context.term)
+        if self._context is not None:
+            await asyncio.to_thread(self._context.term)
+
+    async def _listen(self, addresses: Sequence[str]) -> tuple[str, ...]:
+        """Raises `PeerRefused`, `zmq.ZMQError` and `OSError`, with no socket left open but that of
+        the handler."""
+        descriptors.see_that_there_are()
+        context = self._opened()
+        if self._zap is None:
+            self._zap = ZapHandler(context, self._judge)
+        with contextlib.ExitStack() as taken:
+            socket = listening(context, self._me.keys)
+            taken.callback(socket.close, 0)
+            await prove_enforced(socket, self._me.keys, self._zap.expect_probe)
+            ears = Watch(socket, self._arrivals.on_event)
+            taken.callback(ears.close)
+            bound = tuple(_bind(socket, address) for address in addresses)
+            self._listener = Drained(socket, self._on_frames)
+            self._ears = ears
+            taken.pop_all()
+        return bound
+
+    def _dialling(self, key: PeerKey) -> zmq.Socket[bytes]:
+        return dialling(self._opened(), self._me.keys, key)
+
+    def _opened(self) -> Context:
+        """The context of all sockets. Raises `OSError` and `zmq.ZMQError`."""
+        if self._context is None:
+            descriptors.see_that_there_are()
+            self._context = zmq.Context()
+        return self._context
 
     def _read(self) -> Iterator[Drained | DialledRoute]:
         """All that is read from."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import struct
 from collections.abc import Callable
@@ -48,15 +49,20 @@ class Watch:
     """Tells of a socket's connections. `close` it before the socket."""
 
     def __init__(self, socket: zmq.Socket[bytes], on_event: Callable[[SocketEvent], None]) -> None:
+        """Raises `zmq.ZMQError` and `OSError` where there are no descriptors for it."""
         self._socket, self._on_event = socket, on_event
         # Not pyzmq's own name, made of the descriptor: descriptors come back, names linger.
         address = f"inproc://nondum.monitor.{next(_numbers)}"
-        socket.monitor(address, WATCHED)
-        ears = socket.context.socket(zmq.PAIR)
-        ears.linger = 0
-        ears.rcvhwm = 0  # or ZeroMQ's own thread waits, while this host hangs, for news to be read
-        ears.connect(address)
-        self._ears = Drained(ears, self._on_frames)
+        with contextlib.ExitStack() as taken:  # in the order in which `close` lets go of it
+            ears = socket.context.socket(zmq.PAIR)
+            taken.callback(ears.close, 0)
+            ears.linger = 0
+            ears.rcvhwm = 0  # or ZeroMQ's thread waits, while this host hangs, for news to be read
+            socket.monitor(address, WATCHED)
+            taken.callback(socket.disable_monitor)
+            ears.connect(address)
+            self._ears = Drained(ears, self._on_frames)
+            taken.pop_all()
 
     def close(self) -> None:
         """Stop, in this order: ZeroMQ waits for ever to tell its end to ears that are gone."""

@@ -10,12 +10,13 @@ import asyncio
 import secrets
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import zmq
 
 from nondum.sdk.errors import NondumError, Problem
 from nondum.transport import tcp
-from nondum.transport.peers import pairing, pairing_problems
+from nondum.transport.peers import descriptors, pairing, pairing_problems
 from nondum.transport.peers.dial import ANSWER_S, Attempt, Dial
 from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.events import DialFailed
@@ -93,7 +94,7 @@ class PairingHost:
         self._on_change, self._is_wanted, self._holder = on_change, is_wanted, holder
         self.refusals = Refusals(on_refusal)
         self._loop = asyncio.get_running_loop()
-        self._context: Context = zmq.Context()
+        self._context: Context | None = None
         self._window = PairingWindow(0.0)
         self._door: Door | None = None
         self._dial: Dial | None = None
@@ -121,7 +122,15 @@ class PairingHost:
 
         Raises `PeerRefused` (ZAP_TAKEN, ADDRESS_UNUSABLE).
         """
-        self._door = Door(self._context, self._keys, address, self._on_asked, self.refusals)
+        try:
+            descriptors.see_that_there_are()
+            self._context = zmq.Context()
+            self._door = Door(self._context, self._keys, address, self._on_asked, self.refusals)
+        except (OSError, zmq.ZMQError) as error:
+            told = f"this host cannot be asked there: {error.strerror}"
+            fix = descriptors.remedy(error)
+            problem = Problem("ADDRESS_UNUSABLE", told, where=address, fix=fix)
+            raise PeerRefused(problem) from error
         now_s = self._loop.time()
         self._window = PairingWindow(now_s)
         self._timers = [
@@ -179,6 +188,8 @@ class PairingHost:
         """Close the window, if it is open still, and let go of everything."""
         if not self._is_over:
             self._end(Failed(pairing_problems.CLOSED), Ending.OVER)
+        if self._context is None:
+            return
         ending = asyncio.ensure_future(asyncio.to_thread(self._context.term))
         try:
             await asyncio.shield(ending)
@@ -222,9 +233,13 @@ class PairingHost:
     # Asking
 
     def _connect(self, key: PeerKey, address: str, receiver: Receiver) -> DialledRoute:
+        return DialledRoute(partial(self._dialling, key), address, receiver)
+
+    def _dialling(self, key: PeerKey) -> zmq.Socket[bytes]:
+        assert self._context is not None
         socket = dialling(self._context, self._keys, key)
         socket.setsockopt(zmq.MAXMSGSIZE, MAX_BYTES)
-        return DialledRoute(socket, address, receiver)
+        return socket
 
     def _on_won(self, attempt: Attempt) -> None:
         key = attempt.dial.key

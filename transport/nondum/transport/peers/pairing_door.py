@@ -6,16 +6,15 @@ It has a context of its own, so that the answer to who may connect is nobody els
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import zmq
 
-from nondum.sdk.errors import Problem
 from nondum.transport import tcp
 from nondum.transport.peers.arrivals import Arrivals
 from nondum.transport.peers.drained import Drained
-from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import HostKeys, PeerKey
 from nondum.transport.peers.link import Link
 from nondum.transport.peers.listener import Context, listening
@@ -51,26 +50,25 @@ class Door:
         on_data: Callable[[Asker, bytes], None],
         refusals: Refusals,
     ) -> None:
-        """`address` as ZeroMQ binds it. Raises `PeerRefused` (ZAP_TAKEN, ADDRESS_UNUSABLE)."""
+        """`address` as ZeroMQ binds it. Raises `PeerRefused` (ZAP_TAKEN), `zmq.ZMQError` and
+        `OSError`: with nothing of the context left open, which would wait for that at its end."""
         self._own_key, self._on_data = keys.public, on_data
         self._refusals = refusals
         self._arrivals = Arrivals(refusals.add, lambda _: None)
-        self._zap = ZapHandler(context, self._judge)
-        socket = listening(context, keys)
-        socket.setsockopt(zmq.MAXMSGSIZE, MAX_BYTES)
-        self._ears = Watch(socket, self._arrivals.on_event)
-        try:
+        with contextlib.ExitStack() as taken:
+            self._zap = ZapHandler(context, self._judge)
+            taken.callback(self._zap.close)
+            socket = listening(context, keys)
+            taken.callback(socket.close, 0)
+            socket.setsockopt(zmq.MAXMSGSIZE, MAX_BYTES)
+            self._ears = Watch(socket, self._arrivals.on_event)
+            taken.callback(self._ears.close)
             socket.bind(address)
-        except zmq.ZMQError as error:
-            self._ears.close()
-            socket.close(0)
-            self._zap.close()
-            told = f"this host cannot be asked there: {error}"
-            raise PeerRefused(Problem("ADDRESS_UNUSABLE", told, where=address)) from error
-        bound = socket.getsockopt(zmq.LAST_ENDPOINT)
-        assert isinstance(bound, bytes)
-        self.port = int(bound.rstrip(b"\0").rpartition(b":")[2])
-        self._listener = Drained(socket, self._on_frames)
+            bound = socket.getsockopt(zmq.LAST_ENDPOINT)
+            assert isinstance(bound, bytes)
+            self.port = int(bound.rstrip(b"\0").rpartition(b":")[2])
+            self._listener = Drained(socket, self._on_frames)
+            taken.pop_all()
 
     def link(self, asker: Asker) -> Link:
         """A link to who has asked in earnest."""

@@ -33,7 +33,12 @@ def create(path: Path, text: str) -> None:
 
 def replace(path: Path, text: str) -> None:
     """Write a file of mode 0600 in the place of what was there. Raises `OSError`."""
-    _staged(path, text).replace(path)
+    staged = _staged(path, text)
+    try:
+        staged.replace(path)
+    except BaseException:
+        staged.unlink()
+        raise
     _sync_folder(path.parent)
 
 
@@ -73,11 +78,16 @@ def _open_to_others(path: Path, status: os.stat_result) -> Problem:
 def _staged(path: Path, text: str) -> Path:
     _make_folder(path.parent)
     descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)  # 0600
-    with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    return Path(name)
+    staged = Path(name)
+    try:
+        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+    except BaseException:  # a full disk does not get fuller with each attempt
+        staged.unlink()
+        raise
+    return staged
 
 
 def _make_folder(folder: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable
 from enum import Enum
 
@@ -86,14 +87,12 @@ async def _probed(
         if event.kind in _KINDS and not answered.done():
             answered.set_result(_KINDS[event.kind])
 
-    probe = dialling(context, own, keys.public if keys else None)
-    ears = Watch(probe, on_event)
-    try:
+    with contextlib.ExitStack() as taken:
+        probe = dialling(context, own, keys.public if keys else None)
+        taken.callback(probe.close, 0)
+        taken.callback(Watch(probe, on_event).close)
         probe.connect(address)
         return await _while_awake(answered)
-    finally:
-        ears.close()
-        probe.close(0)
 
 
 async def _while_awake(answered: asyncio.Future[Answer]) -> Answer:

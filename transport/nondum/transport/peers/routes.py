@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable
 
 import zmq
 
 from nondum.sdk.errors import Problem
 from nondum.transport import tcp
+from nondum.transport.peers import descriptors
 from nondum.transport.peers.drained import Drained, Sent
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import PeerKey
@@ -64,8 +66,11 @@ class AcceptedRoute:
 class DialledRoute:
     """Over a socket of its own."""
 
-    def __init__(self, socket: zmq.Socket[bytes], address: str, receiver: Receiver) -> None:
-        """Own `socket` and connect it. Raises `PeerRefused` (ADDRESS_MALFORMED)."""
+    def __init__(
+        self, make: Callable[[], zmq.Socket[bytes]], address: str, receiver: Receiver
+    ) -> None:
+        """`make` a socket and connect it. Raises `PeerRefused`: ADDRESS_MALFORMED, or PEER_DOWN
+        where there are no descriptors for it, now."""
         self.address = address
         self.received: Received | None = None
         """The account of what came over the connection, once there is one."""
@@ -73,15 +78,25 @@ class DialledRoute:
         """Whether the other end has proved its key."""
         self.is_cut = False
         self._receiver = receiver
-        self._is_sealed = int(socket.getsockopt(zmq.MECHANISM)) == zmq.CURVE
-        self._ears = Watch(socket, self._take_event)
-        self._socket = Drained(socket, self._take)
-        try:
-            socket.connect(address)
-        except zmq.ZMQError as error:
-            self.cut()
-            told = f"the address cannot be dialled: {error}"
-            raise PeerRefused(Problem("ADDRESS_MALFORMED", told)) from error
+        with contextlib.ExitStack() as taken:
+            try:
+                socket = make()
+                taken.callback(socket.close, 0)
+                self._is_sealed = int(socket.getsockopt(zmq.MECHANISM)) == zmq.CURVE
+                self._socket = Drained(socket, self._take)
+                taken.callback(self._socket.close)
+                self._ears = Watch(socket, self._take_event)
+                taken.callback(self._ears.close)
+            except (OSError, zmq.ZMQError) as error:
+                told = f"nothing can be dialled now: {error.strerror}"
+                problem = Problem("PEER_DOWN", told, fix=descriptors.remedy(error))
+                raise PeerRefused(problem) from error
+            try:
+                socket.connect(address)
+            except zmq.ZMQError as error:
+                told = f"the address cannot be dialled: {error}"
+                raise PeerRefused(Problem("ADDRESS_MALFORMED", told)) from error
+            taken.pop_all()
 
     @property
     def receiver(self) -> Receiver:

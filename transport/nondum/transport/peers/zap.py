@@ -6,6 +6,7 @@ sockets demand an answer (`ZAP_ENFORCE_DOMAIN`), and `listener` proves that one 
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -64,19 +65,22 @@ class ZapHandler:
     """Answers for all sockets of one context. `close` it after them."""
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], judge: Judge) -> None:
-        """Raises `PeerRefused` (ZAP_TAKEN) when the context has a handler already."""
+        """Raises `PeerRefused` (ZAP_TAKEN) when the context has a handler already, `zmq.ZMQError`
+        and `OSError` where there are no descriptors for it."""
         self._judge = judge
         self._probes: set[str] = set()
-        socket = context.socket(zmq.REP)
-        socket.linger = 0
-        try:
-            socket.bind(ENDPOINT)
-        except zmq.ZMQError as error:
-            socket.close()
-            raise PeerRefused(
-                Problem("ZAP_TAKEN", "somebody else answers for this context's connections")
-            ) from error
-        self._replies = Drained(socket, self._answer)
+        with contextlib.ExitStack() as taken:
+            socket = context.socket(zmq.REP)
+            taken.callback(socket.close, 0)
+            socket.linger = 0
+            try:
+                socket.bind(ENDPOINT)
+            except zmq.ZMQError as error:
+                raise PeerRefused(
+                    Problem("ZAP_TAKEN", "somebody else answers for this context's connections")
+                ) from error
+            self._replies = Drained(socket, self._answer)
+            taken.pop_all()
 
     def expect_probe(self, key: str) -> None:
         """Turn away, once, the next connection under this key (or under none): the self-test's."""

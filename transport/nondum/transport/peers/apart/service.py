@@ -109,11 +109,13 @@ class Service:
 
     def _dial(self, number: int, key: PeerKey, address: str) -> None:
         assert self._here is not None
-        served = self._served[number] = _Served(self, number)
+        served = _Served(self, number)
         try:
             served.route = self._here.dial(key, address, served)
         except PeerRefused as refused:
             served.over(refused.problems[0])
+        else:
+            self._served[number] = served
 
     def _cut(self, number: int, linger_ms: int) -> None:
         served = self._served.get(number)

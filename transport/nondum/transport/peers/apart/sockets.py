@@ -7,6 +7,7 @@ and listens where it did.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import itertools
 import logging
 import socket
@@ -98,9 +99,9 @@ class SocketsApart:
 
     async def listen(self, addresses: Sequence[str]) -> tuple[str, ...]:
         """Listen (see `Sockets`)."""
-        if self._pipe is None:
-            self._begin()
         try:
+            if self._pipe is None:
+                self._begin()
             self._addresses = await self._listen(addresses)
         except PeerRefused as refused:
             if refused.code == "LINKS_START":
@@ -142,15 +143,12 @@ class SocketsApart:
         self._routes.pop(number, None)
 
     def _begin(self) -> None:
-        """Start the process, and tell it what it must know. Raises `PeerRefused` (LINKS_START)."""
-        ours, theirs = pipe_sockets()
-        with theirs:
-            try:
-                self._process = self._start(theirs)
-            except OSError as error:
-                ours.close()
-                raise _not_started(str(error)) from error
-        self._pipe = Pipe(ours, self._on_packet, self._on_closed, MOST_WAITING)
+        """Start the process, and tell it what it must know. Raises `PeerRefused` (LINKS_START);
+        where there is a process then, it is still to be given up."""
+        try:
+            self._pipe = self._piped()
+        except OSError as error:
+            raise _not_started(str(error)) from error
         self._since_s, self._unanswered = self._loop.time(), 0
         self._tell_trust()
         keys = self._me.keys
@@ -158,6 +156,16 @@ class SocketsApart:
         for route in self._routes.values():  # dialled while there was no process
             self.tell("dial", route.number, route.key, route.address)
         self._tick()
+
+    def _piped(self) -> Pipe:
+        """Start the process; the pipe to it. Raises `OSError`."""
+        ours, theirs = pipe_sockets()
+        with theirs, contextlib.ExitStack() as taken:
+            taken.callback(ours.close)
+            self._process = self._start(theirs)
+            pipe = Pipe(ours, self._on_packet, self._on_closed, MOST_WAITING)
+            taken.pop_all()
+        return pipe
 
     async def _listen(self, addresses: Sequence[str]) -> tuple[str, ...]:
         self._bound = self._loop.create_future()
