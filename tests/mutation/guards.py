@@ -343,7 +343,6 @@ ASIDE: Mapping[str, str] = {
     f"{_T}/peers/errands.py": "answers with what work of this host's own has failed by",
     f"{_T}/peers/apart/service.py": "does what its own daemon says",
     f"{_T}/peers/routes.py": "tells why a peer is not reached",
-    f"{_T}/peers/pairing_door.py": "tells that this machine cannot listen there",
     f"{_H}/peers/namesakes.py": "says what people are told; `roster` refuses",
     f"{_T}/peers/pairing_problems.py": "says what people are told; `pairing_channel` refuses",
     f"{_H}/peers/finder.py": "hands on the addresses that the mesh takes",
