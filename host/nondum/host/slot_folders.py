@@ -32,7 +32,7 @@ def dead_links(folder: Path) -> Iterator[Path]:
 
 
 def leads_nowhere(link: Path) -> Problem:
-    """What people are told of one. Raises `OSError` if it has just gone."""
+    """The problem to show for such a link. Raises `OSError` if it has just gone."""
     target = link.readlink()
     told = f"it is a link to {target}, and nothing is there"
     if not target.is_absolute():
@@ -47,7 +47,7 @@ def is_gone(error: OSError) -> bool:
 
 
 def unreadable(path: Path, error: OSError, *, is_plugged_in: bool) -> Problem:
-    """What people are told of a folder, or an entry of it, that cannot be read."""
+    """The problem to show for a folder, or an entry of it, that cannot be read."""
     stays = "; what was plugged in by it stays plugged in" if is_plugged_in else ""
     return Problem(
         "SLOT_UNREADABLE",

@@ -88,7 +88,7 @@ _PRAGMAS = (
 
 
 _UNREADABLE = (sqlite3.DatabaseError, NondumError, LookupError, TypeError, ValueError)
-"""What reading a file raises that says what nobody can read."""
+"""What is raised for a file whose rows cannot be parsed."""
 
 MODE = 0o600
 """Of the file: it holds the journal, goals and serial numbers, for no other user to read."""
@@ -120,8 +120,8 @@ def connect(path: Path) -> sqlite3.Connection:
 def opened(path: Path, host: str) -> tuple[sqlite3.Connection, HostState]:
     """Open the file and read all of it but the journal.
 
-    Raises `sqlite3.DatabaseError`, which is that of a damaged file also where it says what nobody
-    can read, and `ConfigRefused` (CATALOGUE_VERSION).
+    Raises `sqlite3.DatabaseError` (`is_damaged` is true for it also if a row cannot be parsed) and
+    `ConfigRefused` (CATALOGUE_VERSION).
     """
     connection = connect(path)
     try:

@@ -125,7 +125,7 @@ class Cages:
             self._tree.make(cage.name)  # of version 1 it may be made in part
             cage.limit(limits)
         except OSError:
-            with contextlib.suppress(OSError):  # what failed first is told
+            with contextlib.suppress(OSError):  # the first failure is the one to report
                 cage.remove()
             raise
         return cage

@@ -225,7 +225,8 @@ class ForkClient:
     async def _forked(
         self, channel: socket.socket, message: str, descriptors: Sequence[int]
     ) -> Forked:
-        # Before it is asked: an answer that nobody waits for would be taken for the next one.
+        # Watched before the request is sent: if watching failed later, the answer would stay unread
+        # and be taken for that of the next request.
         with _readable(channel) as is_answered, contextlib.ExitStack() as failed:
             ours, theirs = socket.socketpair()
             failed.callback(theirs.close)

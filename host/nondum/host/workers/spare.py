@@ -154,8 +154,8 @@ class Spare:
     async def scratch_mapped(self, user: int, startup_s: float) -> None:
         """`map_scratch` without holding up the loop.
 
-        Cancelled, it kills the process and is over when nobody hears it any more: then it may be
-        closed, as it is to be after all that is raised.
+        If it is cancelled, it kills the process and waits for the thread. Whatever it raises, the
+        caller closes this spare afterwards.
         """
         mapping = asyncio.create_task(asyncio.to_thread(self.map_scratch, user, startup_s))
         try:
@@ -165,7 +165,7 @@ class Spare:
             try:
                 await until_done(mapping)
             finally:
-                mapping.exception()  # nobody wants to know
+                mapping.exception()  # read, or asyncio logs it as never retrieved
             raise
         mapping.result()
 
