@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import os
 import socket
 import stat
@@ -15,7 +16,8 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.kit.until import arrived
+from tests.kit.descriptors import descriptors_left
+from tests.kit.until import arrived, until_async
 
 from nondum.host.control import protocol
 from nondum.host.control.client import ControlClient
@@ -131,6 +133,32 @@ async def test_the_socket_is_the_groups_whatever_the_umask_is(tmp_path: Path) ->
             assert stat.S_IMODE(path.stat().st_mode) == MODE
     finally:
         os.umask(before)
+
+
+async def test_client_for_which_there_is_no_descriptor_is_logged_once_and_answered_later(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "control.sock"
+    with socket.socket(socket.AF_UNIX) as client:
+        async with serving(path):
+            with descriptors_left(0):
+                client.connect(str(path))
+                await until_async("it is logged", lambda: bool(caplog.records))
+            reader, writer = await asyncio.open_unix_connection(sock=client)
+            writer.write(protocol.encode_request(protocol.Request("echo", {})))
+            answer = await arrived("the answer", reader.readline())
+            writer.close()
+    assert protocol.decode_answer(answer) == ({}, ())
+    assert [record.name for record in caplog.records] == ["nondum.host.control.shortage"]
+
+
+async def test_other_fault_of_the_loop_is_logged_by_the_loop(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with serving(tmp_path / "control.sock"):
+        fault = {"message": "a fault", "exception": OSError(errno.EMFILE, "too many")}
+        asyncio.get_running_loop().call_exception_handler(fault)
+    assert [record.name for record in caplog.records] == ["asyncio"]
 
 
 async def test_a_refusal_keeps_its_words(tmp_path: Path) -> None:

@@ -91,7 +91,7 @@ async def test_stream_without_descriptors_cannot_be_reached_and_leaves_nothing_o
     with context.socket(zmq.PAIR):  # the threads of the context run already
         with descriptors_left(left):
             reading = Reading(context, READER, place)
-        assert (await within(reading.over)).code == "STREAM_UNREACHABLE"
+        assert (await within(reading.over)).code == "DIAL_IMPOSSIBLE"
     reading.incoming.close()
     await arrived("no socket is left", asyncio.to_thread(context.term))
 

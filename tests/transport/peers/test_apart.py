@@ -274,7 +274,7 @@ async def test_connection_without_descriptors_is_over_and_may_be_cut(clock: Virt
         with descriptors_left(0):
             daemon.say("dial", 1, KEY, ADDRESS)
             what, number, problem = await daemon.hears()
-        assert (what, number, problem["code"]) == ("over", 1, "PEER_DOWN")
+        assert (what, number, problem["code"]) == ("over", 1, "DIAL_IMPOSSIBLE")
         daemon.say("cut", 1, 0)
         daemon.say("tick")
         assert await daemon.hears() == ["tock", 0]

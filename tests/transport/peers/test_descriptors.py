@@ -7,9 +7,11 @@ import subprocess
 import sys
 import threading
 from collections.abc import AsyncIterator
+from typing import Any
 
 import pytest
 import zmq
+from tests.kit.clock import VirtualClock
 from tests.kit.descriptors import descriptors_left, open_descriptors
 from tests.kit.until import until_async
 from tests.kit.watches import watches_left
@@ -19,6 +21,7 @@ from tests.transport.peers.hosts import PATIENCE_S, ROOT, host, identity, trusti
 from nondum.sdk.errors import Problem
 from nondum.transport.peers import HostKeys, PeerRefused, Reason, descriptors
 from nondum.transport.peers.events import DialFailed
+from nondum.transport.peers.here import LOOK_S
 from nondum.transport.peers.listener import Context, dialling, listening
 from nondum.transport.peers.monitor import Watch
 from nondum.transport.peers.pairing_door import Door
@@ -130,7 +133,7 @@ async def test_route_that_the_loop_does_not_watch_is_refused_and_leaves_nothing_
     context: Context, left: int
 ) -> None:
     other = HostKeys.generate().public
-    with watches_left(left), pytest.raises(PeerRefused, match="PEER_DOWN"):
+    with watches_left(left), pytest.raises(PeerRefused, match="DIAL_IMPOSSIBLE"):
         DialledRoute(lambda: dialling(context, KEYS, other), "tcp://127.0.0.1:9", Nowhere())
 
 
@@ -139,7 +142,7 @@ async def test_route_without_descriptors_is_refused_and_leaves_nothing_open(
     context: Context, left: int
 ) -> None:
     other = HostKeys.generate().public
-    with descriptors_left(left), pytest.raises(PeerRefused, match="PEER_DOWN") as refused:
+    with descriptors_left(left), pytest.raises(PeerRefused, match="DIAL_IMPOSSIBLE") as refused:
         DialledRoute(lambda: dialling(context, KEYS, other), "tcp://127.0.0.1:9", Nowhere())
     assert "LimitNOFILE" in refused.value.problems[0].fix
 
@@ -149,5 +152,16 @@ async def test_dial_goes_on_once_there_are_descriptors_again() -> None:
     async with host(base, trusting(rover)) as there, host(rover, trusting(base)) as here:
         with descriptors_left(0):
             here.node.dial(there.key, [there.address])
-        assert (await here.told(DialFailed)).problem.code == "PEER_DOWN"
+        assert (await here.told(DialFailed)).problem.code == "DIAL_IMPOSSIBLE"
         await up(here, there)
+
+
+async def test_host_without_descriptors_goes_on_looking_at_its_connections(
+    clock: VirtualClock,
+) -> None:
+    faults: list[dict[str, Any]] = []
+    clock.set_exception_handler(lambda _, fault: faults.append(fault))
+    async with host(identity("rover")):
+        with descriptors_left(0):
+            await clock.advance(3 * LOOK_S)
+    assert not faults

@@ -661,7 +661,7 @@ async def test_host_asks_again_once_there_are_descriptors() -> None:
     async with end("base") as base, end("rover") as rover:
         with descriptors_left(0):
             rover.asks(base)
-        await rover.gives_up("PEER_DOWN")
+        await rover.gives_up("DIAL_IMPOSSIBLE")
         await rover.sees(Comparing)
 
 

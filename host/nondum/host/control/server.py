@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.control import protocol
+from nondum.host.control.shortage import AcceptFailures
 from nondum.sdk.errors import ConfigRefused, NondumError, Problem, ProtocolViolation
 from nondum.sdk.packets import CROWDED_S, CROWDED_TRIES
 
@@ -66,6 +67,7 @@ class ControlServer:
                 raise
         except OSError as error:
             raise _refused("CONTROL_SOCKET", self._path, f"cannot listen ({error})") from error
+        asyncio.get_running_loop().set_exception_handler(AcceptFailures())
 
     async def close(self) -> None:
         """Stop listening and let every client go."""

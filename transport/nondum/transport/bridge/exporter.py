@@ -7,6 +7,7 @@ message claims one grant, which must be its key's; it holds for that connection.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from collections.abc import Callable, Sequence
 
@@ -54,17 +55,16 @@ class Exporter:
         Raises `PeerRefused` (ZAP_INEFFECTIVE, ADDRESS_UNUSABLE).
         """
         self._zap = ZapHandler(self._context, self._judge)
-        socket = sockets.listening(self._context, self._keys)
-        try:
+        with contextlib.ExitStack() as taken:
+            socket = sockets.listening(self._context, self._keys)
+            taken.callback(socket.close, 0)
             await prove_enforced(socket, self._keys, self._zap.expect_probe)
-            self._ears = Watch(socket, self._arrivals.on_event)
+            ears = Watch(socket, self._arrivals.on_event)
+            taken.callback(ears.close)
             port = sockets.bind(socket, interfaces, port)
-        except BaseException:
-            if self._ears is not None:
-                self._ears.close()
-            socket.close(0)
-            raise
-        self._listener = Drained(socket, self._on_frames)
+            self._listener = Drained(socket, self._on_frames)
+            self._ears = ears
+            taken.pop_all()
         self._beating = self._loop.call_later(BEAT_S, self._beat)
         return port
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -16,11 +15,10 @@ from nondum.transport.bridge import packets, sockets
 from nondum.transport.bridge.clocks import Clocks
 from nondum.transport.bridge.packets import Claim, Frame, Handled, Opened, Over, Ping, Pong
 from nondum.transport.bridge.window import Window
-from nondum.transport.peers import descriptors
-from nondum.transport.peers.drained import Drained
+from nondum.transport.peers.dialled import Dialled
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import HostKeys, PeerKey
-from nondum.transport.peers.monitor import SocketEvent, Watch
+from nondum.transport.peers.monitor import SocketEvent
 from nondum.transport.token_bucket import TokenBucket
 
 BEAT_S = 0.3
@@ -193,37 +191,18 @@ class _Attempt:
     def __init__(
         self, incoming: Incoming, make: Callable[[], zmq.Socket[bytes]], address: str
     ) -> None:
-        """`make` its socket. Raises `PeerRefused`: ADDRESS_MALFORMED, or STREAM_UNREACHABLE where
+        """`make` its socket. Raises `PeerRefused`: ADDRESS_MALFORMED, or DIAL_IMPOSSIBLE where
         there are no descriptors for it."""
         self._incoming = incoming
-        self._address = address
         self.descriptor: int | None = None
         """Of the connection, once there is one."""
-        with contextlib.ExitStack() as taken:
-            try:
-                socket = make()
-                taken.callback(socket.close, 0)
-                self._socket = Drained(socket, incoming.receive)
-                taken.callback(self._socket.close)
-                self._ears = Watch(socket, self._on_event)
-                taken.callback(self._ears.close)
-            except (OSError, zmq.ZMQError) as error:
-                told = f"nothing can be dialled now: {error.strerror}"
-                problem = Problem("STREAM_UNREACHABLE", told, fix=descriptors.remedy(error))
-                raise PeerRefused(problem) from error
-            try:
-                socket.connect(address)
-            except zmq.ZMQError as error:
-                problem = Problem("ADDRESS_MALFORMED", str(error), where=address)
-                raise PeerRefused(problem) from error
-            taken.pop_all()
+        self._dialled = Dialled(make, address, incoming.receive, self._on_event)
 
     def send(self, data: bytes) -> None:
-        self._socket.send([data])
+        self._dialled.socket.send([data])
 
     def close(self) -> None:
-        self._ears.close()
-        self._socket.close()
+        self._dialled.close()
 
     def _on_event(self, event: SocketEvent) -> None:
         if event.kind == zmq.EVENT_CONNECTED:
@@ -232,7 +211,7 @@ class _Attempt:
         if event.kind == zmq.EVENT_HANDSHAKE_SUCCEEDED:
             self._incoming.connected(self)
             return
-        self._socket.drain()  # the last words
+        self._dialled.socket.drain()  # the last words
         if event.kind == zmq.EVENT_HANDSHAKE_FAILED_AUTH:
             problem = Problem("STREAM_NOT_GRANTED", "the bridge there does not let this one in")
         else:

@@ -33,7 +33,7 @@ GREETING_S = 12.0
 
 Connect: TypeAlias = Callable[[PeerKey, str, Receiver], Route]
 """Begins one connection to an address. Raises `PeerRefused` (ADDRESS_MALFORMED,
-PEER_DOWN)."""
+DIAL_IMPOSSIBLE)."""
 
 
 class Attempt:

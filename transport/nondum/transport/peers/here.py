@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import resource
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -241,8 +242,12 @@ def _is_endless(route: AcceptedRoute | DialledRoute) -> bool:
 
 
 def _resident_bytes() -> int:
-    """Memory of this process (proc_pid_statm(5))."""
-    fields = Path("/proc/self/statm").read_text(encoding="ascii").split()
+    """Memory of this process (proc_pid_statm(5)); the most that it had where no descriptor is left
+    to read that by."""
+    try:
+        fields = Path("/proc/self/statm").read_text(encoding="ascii").split()
+    except OSError:
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
     return int(fields[1]) * os.sysconf("SC_PAGE_SIZE")
 
 

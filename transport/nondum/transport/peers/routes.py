@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 from collections.abc import Callable
 
 import zmq
 
 from nondum.sdk.errors import Problem
 from nondum.transport import tcp
-from nondum.transport.peers import descriptors
+from nondum.transport.peers.dialled import Dialled
 from nondum.transport.peers.drained import Drained, Sent
-from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import PeerKey
-from nondum.transport.peers.monitor import HANDSHAKE_FAILED, SocketEvent, Watch
+from nondum.transport.peers.monitor import HANDSHAKE_FAILED, SocketEvent
 from nondum.transport.peers.received import Received
 from nondum.transport.peers.refusals import Reason
 from nondum.transport.peers.sockets import Receiver
@@ -69,8 +67,8 @@ class DialledRoute:
     def __init__(
         self, make: Callable[[], zmq.Socket[bytes]], address: str, receiver: Receiver
     ) -> None:
-        """`make` a socket and connect it. Raises `PeerRefused`: ADDRESS_MALFORMED, or PEER_DOWN
-        where there are no descriptors for it, now."""
+        """`make` a socket and connect it. Raises `PeerRefused`: ADDRESS_MALFORMED, or
+        DIAL_IMPOSSIBLE where there are no descriptors for it, now."""
         self.address = address
         self.received: Received | None = None
         """The account of what came over the connection, once there is one."""
@@ -78,25 +76,7 @@ class DialledRoute:
         """Whether the other end has proved its key."""
         self.is_cut = False
         self._receiver = receiver
-        with contextlib.ExitStack() as taken:
-            try:
-                socket = make()
-                taken.callback(socket.close, 0)
-                self._is_sealed = int(socket.getsockopt(zmq.MECHANISM)) == zmq.CURVE
-                self._socket = Drained(socket, self._take)
-                taken.callback(self._socket.close)
-                self._ears = Watch(socket, self._take_event)
-                taken.callback(self._ears.close)
-            except (OSError, zmq.ZMQError) as error:
-                told = f"nothing can be dialled now: {error.strerror}"
-                problem = Problem("PEER_DOWN", told, fix=descriptors.remedy(error))
-                raise PeerRefused(problem) from error
-            try:
-                socket.connect(address)
-            except zmq.ZMQError as error:
-                told = f"the address cannot be dialled: {error}"
-                raise PeerRefused(Problem("ADDRESS_MALFORMED", told)) from error
-            taken.pop_all()
+        self._dialled = Dialled(make, address, self._take, self._take_event)
 
     @property
     def receiver(self) -> Receiver:
@@ -105,25 +85,24 @@ class DialledRoute:
 
     def send(self, data: bytes) -> Sent:
         """Send without waiting."""
-        return self._socket.send([data])
+        return self._dialled.socket.send([data])
 
     def drain(self) -> bool:
         """Take in what has come, if only just before the end; whether nothing is left."""
-        return self._socket.drain()
+        return self._dialled.socket.drain()
 
     def hold(self) -> None:
         """Read nothing until `release`."""
-        self._socket.hold()
+        self._dialled.socket.hold()
 
     def release(self) -> None:
         """Read again."""
-        self._socket.release()
+        self._dialled.socket.release()
 
     def cut(self, linger_ms: int = 0) -> None:
         """Close the socket."""
         self.is_cut = True
-        self._ears.close()
-        self._socket.close(linger_ms)
+        self._dialled.close(linger_ms)
 
     def _take(self, frames: list[zmq.Frame]) -> None:
         if self.received is not None:
@@ -138,12 +117,12 @@ class DialledRoute:
     def _take_event(self, event: SocketEvent) -> None:
         if event.kind == zmq.EVENT_CONNECTED:
             # Also where ZeroMQ dials again by itself: that is another connection.
-            self.received = Received(event.value, is_sealed=self._is_sealed)
+            self.received = Received(event.value, is_sealed=self._dialled.is_sealed)
         elif event.kind == zmq.EVENT_HANDSHAKE_SUCCEEDED:
             self.is_peers = True
             self._receiver.connected()
         else:
-            self._socket.drain()
+            self._dialled.socket.drain()
             self._receiver.over(_why(event))
 
 

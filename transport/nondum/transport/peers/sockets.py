@@ -80,7 +80,7 @@ class Sockets(Protocol):
     def dial(self, key: PeerKey, address: str, receiver: Receiver) -> Route:
         """Begin one connection to a host that must prove this key.
 
-        Raises `PeerRefused` (ADDRESS_MALFORMED, PEER_DOWN), or tells it later.
+        Raises `PeerRefused` (ADDRESS_MALFORMED, DIAL_IMPOSSIBLE), or tells it later.
         """
 
     def set_trust(self, trust: Trust) -> None:

@@ -46,6 +46,11 @@ CODES = (
         "use 127.0.0.1, or give the host keys",
     ),
     Code(
+        "DIAL_IMPOSSIBLE",
+        "This host has nothing left to make a connection with.",
+        "raise the limit of open files, or end programs that have many open: it is tried again",
+    ),
+    Code(
         "ENTRY_KEY",
         "The key of something that is shared is too long, or empty.",
         "tell the plugin's author: use shorter names",
