@@ -51,16 +51,18 @@ def test_spoken_goal_is_reached_and_told_aloud(
     host.bring("beacon", Part("beacon", BEACON))
     (scratch,) = host.state.glob("scratch/*/speech")
     until_logged(host, f"{2 + 2 * len(STOPS) + len(ASKED)} phrases can be heard")
-    for name, text in (
-        ("no phrase", "the weather is fine today"),
-        ("question", "what can you do"),
-        ("goal", "greet people"),
-    ):
+
+    def say(text: str) -> None:
         sound = espeak.say(text, voice="en-us", words_per_minute=150)
         (scratch / "unfinished").write_bytes(sound.to_wav())
-        (scratch / "unfinished").rename(scratch / "in" / f"{name}.wav")
-    host.until_told("speech heard 'greet people': that is goal")
+        (scratch / "unfinished").rename(scratch / "in" / f"{text}.wav")
+
+    say("the weather is fine today")
+    say("what can you do")
     host.until_told("I can greet people and shine.")
+    said_before = set((scratch / "out").iterdir())
+    say("greet people")
+    host.until_told("speech heard 'greet people': that is goal")
     host.until("the goal is reached", greeted, timeout_s=READY_S)
     assert not any("weather" in goal["text"] for goal in host.view["goals"])
 
@@ -71,10 +73,9 @@ def test_spoken_goal_is_reached_and_told_aloud(
     heard: dict[Path, bool] = {}
 
     def repeated(_view: object) -> bool:
-        for file in (scratch / "out").glob("*.wav"):
-            if file not in heard:  # hearing takes longer than saying
-                sentences = sentences_of(read_wav(file))
-                heard[file] = any(ears.hear(one).said == said.phrases[0] for one in sentences)
+        for file in {*(scratch / "out").glob("*.wav")} - said_before - {*heard}:
+            sentences = sentences_of(read_wav(file))  # hearing takes longer than saying
+            heard[file] = any(ears.hear(one).said == said.phrases[0] for one in sentences)
         return any(heard.values())
 
     host.until("the answer was said", repeated, timeout_s=READY_S)
