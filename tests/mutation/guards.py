@@ -209,6 +209,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_T}/fleet/zenoh_node.py": _ZENOH,
     f"{_T}/bridge/exporter.py": _GRANTS,
     f"{_T}/bridge/incoming.py": _GRANTS,
+    f"{_T}/peers/dialled.py": ("tests/transport/peers/test_descriptors.py",),
     f"{_T}/bridge/outgoing.py": _GRANTS,
     f"{_T}/bridge/packets.py": _GRANTS,
     f"{_T}/bridge/sockets.py": _GRANTS,

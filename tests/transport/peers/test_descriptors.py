@@ -147,6 +147,14 @@ async def test_route_without_descriptors_is_refused_and_leaves_nothing_open(
     assert "LimitNOFILE" in refused.value.problems[0].fix
 
 
+async def test_route_to_what_is_no_address_is_refused_and_leaves_nothing_open(
+    context: Context,
+) -> None:
+    other = HostKeys.generate().public
+    with pytest.raises(PeerRefused, match="ADDRESS_MALFORMED"):
+        DialledRoute(lambda: dialling(context, KEYS, other), "tcp://127.0.0.1", Nowhere())
+
+
 async def test_dial_goes_on_once_there_are_descriptors_again() -> None:
     base, rover = identity("base"), identity("rover")
     async with host(base, trusting(rover)) as there, host(rover, trusting(base)) as here:
