@@ -174,6 +174,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
         *_IN_ROOMS[1:],
         f"{_TH}/workers/test_devices.py",
         f"{_TC}/test_walls.py::test_wall_of_a_room_matters[user namespaces]",
+        f"{_TC}/test_walls.py::test_nothing_of_that_is_possible_in_a_whole_room",
     ),
     f"{_H}/inside/walls.py": (f"{_TI}/test_walls.py",),
     f"{_H}/helper/requests.py": (f"{_TH}/helper/test_requests.py",),

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 import pytest
 import zmq
 from tests.transport.peers.dealers import hello_of, raw_dealer
-from tests.transport.peers.hosts import PATIENCE_S, host, identity, trusting, two_hosts
+from tests.transport.peers.hosts import PATIENCE_S, Servant, host, identity, trusting, two_hosts
 
 from nondum.transport.peers import (
     HostKeys,
@@ -17,6 +17,7 @@ from nondum.transport.peers import (
     Loss,
     PeerKey,
     PeerLost,
+    PeerNode,
     PeerRefused,
     PeerUp,
     Reason,
@@ -126,6 +127,18 @@ async def test_host_listens_at_addresses_of_this_machine_only() -> None:
     with pytest.raises(PeerRefused, match="ADDRESS_UNUSABLE"):
         async with host(identity("base"), address="tcp://203.0.113.9:0"):
             pass
+
+
+@pytest.mark.anyio
+async def test_address_that_is_taken_is_named_among_those_to_listen_at() -> None:
+    async with host(identity("base")) as there:
+        other = PeerNode(identity("rover"), Trust(), Servant(), on_event=lambda _: None)
+        try:
+            with pytest.raises(PeerRefused, match="ADDRESS_UNUSABLE") as refused:
+                await other.start(["tcp://127.0.0.1:0", there.address])
+        finally:
+            await other.close()
+    assert refused.value.problems[0].where == there.address
 
 
 @pytest.mark.anyio
