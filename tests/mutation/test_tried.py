@@ -61,3 +61,14 @@ def test_all_steps_are_due_once_something_has_changed(root: Path, changed: str) 
     (root / changed).write_text("2", encoding="utf-8")
     for machine in ("one", "two"):
         assert not tried_on(machine, root).tally.done
+
+
+def test_all_steps_are_due_once_another_test_of_the_same_file_is_a_guard(
+    root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(GUARDS, MODULE, (GUARD,))
+    for step in STEPS:
+        tried_on("one", root).add(step, GUARD)
+    assert not [step for step in STEPS if tried_on("one", root).is_due(step)]
+    monkeypatch.setitem(GUARDS, MODULE, (GUARD, f"{GUARD}_too"))
+    assert all(tried_on("one", root).is_due(step) for step in STEPS)
