@@ -20,7 +20,7 @@ from nondum.host.inside import room
 SEEN = Path("/srv/nondum/venvs")
 FLAGS = (
     *("--unshare-user", "--unshare-pid", "--as-pid-1", "--unshare-ipc", "--unshare-uts"),
-    *("--unshare-net", "--unshare-cgroup-try", "--die-with-parent"),
+    *("--unshare-net", "--unshare-cgroup-try"),
 )
 
 

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import os
 import shutil
-import signal
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,16 +12,12 @@ from typing import Any
 
 import pytest
 from tests.confinement.baits import SMALL, attempted, laid, unlimited
-from tests.confinement.processes import children
-from tests.kit.processes import is_alive, until_gone
-from tests.kit.until import until
 
 from nondum.host.confinement import bubblewrap, refusals
 from nondum.host.workers.confinements import Boxed, Confinement, Held
 
 pytestmark = pytest.mark.anyio
 
-PENDING = ("SigPnd:", "ShdPnd:")
 BWRAP = shutil.which("bwrap") or "bwrap"
 
 IN_A_ROOM = {
@@ -194,74 +187,8 @@ async def test_limit_matters(tmp_path: Path, bait: dict[str, Any], name: str) ->
 
 
 def test_every_wall_is_shown_to_matter() -> None:
-    assert set(bubblewrap.NAMESPACES) - {"daemon's end"} <= set(IN_A_ROOM)
+    assert set(bubblewrap.NAMESPACES) <= set(IN_A_ROOM)
     assert set(refusals.GROUPS) <= set(IN_A_ROOM)
     assert set(refusals.WITHOUT_NAMESPACES) <= set(ON_THE_HOST)
     assert set(refusals.WITH_THE_HOSTS_USER) <= set(ON_THE_HOST)
     assert set(refusals.TRUNCATION) <= set(OF_OLD_LANDLOCK)
-
-
-DAEMON = """
-import sys, time
-from nondum.host.workers.confinements import Boxed
-from nondum.host.workers.spare import Spare
-
-room = Boxed(sys.argv[1], without=sys.argv[2:])
-print(Spare(room, room.ground(None)).popen.pid, flush=True)
-time.sleep(600)
-"""
-
-
-async def spare_of_a_daemon_that_dies(*without: str) -> tuple[int, int]:
-    """What made the room of a spare that does not listen, and its keeper; the daemon is dead."""
-    daemon = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-c", DAEMON, BWRAP, *without), stdout=asyncio.subprocess.PIPE
-    )
-    assert daemon.stdout is not None
-    outer = int(await daemon.stdout.readline())
-    keeper = await asyncio.to_thread(keeper_of, outer)
-    os.kill(keeper, signal.SIGSTOP)
-    daemon.kill()
-    await daemon.communicate()
-    return outer, keeper
-
-
-def keeper_of(pid: int) -> int:
-    """The only child of what makes a room, as soon as the room is made."""
-
-    def is_made() -> bool:
-        return any(name.startswith("python") for name in map(name_of, children(pid)))
-
-    until("the room's keeper", is_made)
-    (keeper,) = children(pid)
-    return keeper
-
-
-def name_of(pid: int) -> str:
-    return Path(f"/proc/{pid}/comm").read_text(encoding="utf-8")
-
-
-def is_killed(pid: int) -> bool:
-    """Whether SIGKILL is on its way to a process (proc_pid_status(5))."""
-    status = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
-    pending = (line.split()[1] for line in status.splitlines() if line.startswith(PENDING))
-    return any(int(mask, 16) >> (signal.SIGKILL - 1) & 1 for mask in pending)
-
-
-async def test_spare_that_hangs_ends_with_its_daemon() -> None:
-    outer, keeper = await spare_of_a_daemon_that_dies()
-    await until_gone(outer)
-    await until_gone(keeper)
-
-
-async def test_without_that_wall_it_would_not() -> None:
-    outer, keeper = await spare_of_a_daemon_that_dies("daemon's end")
-    try:
-        # A signal for the end of its parent would have been sent before that was reaped.
-        assert is_alive(keeper) and is_alive(outer)
-        assert not is_killed(outer)
-    finally:
-        os.kill(outer, signal.SIGKILL)
-        os.kill(keeper, signal.SIGKILL)
-        for pid in (outer, keeper):  # their control group is removed next
-            await until_gone(pid)

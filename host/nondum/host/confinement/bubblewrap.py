@@ -33,9 +33,12 @@ NAMESPACES: Mapping[str, tuple[str, ...]] = {
     "host name": ("--unshare-uts", "--hostname", "worker"),
     "network": ("--unshare-net",),
     "cgroups": ("--unshare-cgroup-try",),
-    "daemon's end": ("--die-with-parent",),
 }
-"""Walls that bubblewrap puts up, each by itself."""
+"""Walls that bubblewrap puts up, each by itself.
+
+Not `--die-with-parent`: a daemon that died while bubblewrap makes a user namespace would have it
+killed before it lets the process in the namespace go on, which would wait for ever. What is in the
+room sees the daemon's end by its socket, see `nondum.host.inside`."""
 SEALED: tuple[str, ...] = (
     *("/proc/sys", "/proc/sysrq-trigger", "/proc/irq", "/proc/bus", "/proc/fs", "/proc/acpi"),
 )

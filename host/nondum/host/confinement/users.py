@@ -85,18 +85,23 @@ class NewNamespace:
             os.close(self._tells)
             os.close(told)
             raise
-        self.descriptors = (told, waits)
-        """What bubblewrap is to inherit."""
+        self._its_ends = (told, waits)
+
+    @property
+    def descriptors(self) -> tuple[int, ...]:
+        """What bubblewrap is to inherit. The end that is read here is among them: else bubblewrap
+        could tell nobody of its namespace once the daemon has died, and would leave it as it is."""
+        return *self._its_ends, self._tells
 
     @property
     def flags(self) -> tuple[str, ...]:
         """What bubblewrap is told."""
-        told, waits = self.descriptors
+        told, waits = self._its_ends
         return "--info-fd", str(told), "--userns-block-fd", str(waits)
 
     def started(self) -> None:
         """Bubblewrap has been started, or could not be."""
-        for descriptor in self.descriptors:
+        for descriptor in self._its_ends:
             os.close(descriptor)
 
     def map_users(self, startup_s: float) -> None:
