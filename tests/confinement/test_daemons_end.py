@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from tests.confinement.processes import children
+from tests.kit.descendants import pids
 from tests.kit.processes import is_alive
 from tests.kit.until import until_async
 
@@ -98,11 +99,7 @@ async def test_room_that_waits_for_its_worker_ends_with_its_daemon(users: str) -
 
 def has_ended(group: int) -> bool:
     """Whether no process of a group is left, but for the dead ones."""
-    return not any(is_alive(pid) for pid in every_process() if group_of(pid) == group)
-
-
-def every_process() -> list[int]:
-    return [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()]
+    return not any(is_alive(pid) for pid in pids() if group_of(pid) == group)
 
 
 def group_of(pid: int) -> int | None:
