@@ -103,7 +103,7 @@ def until_over(host: RunningHost, id: str) -> Row:
 def test_a_goal_is_pursued_while_its_drive_is_in(host: RunningHost) -> None:
     beacon(host)
     name = host.plug(errand(host, "shine"))
-    assert host.until_goal(wanted(host), "active")["text"] == "shine"
+    assert host.until_goal(wanted(host), "holds")["text"] == "shine"
     host.until_runs("shine")
     host.pull(name)
     assert until_over(host, wanted(host))["reason"] == "the payload that wants it is withdrawn"
@@ -115,7 +115,7 @@ def test_a_drive_that_comes_back_gives_its_goal_again(host: RunningHost) -> None
     drive = errand(host, "shine")
     for _ in range(2):
         name = host.plug(drive)
-        host.until_goal(wanted(host), "active")
+        host.until_goal(wanted(host), "holds")
         host.pull(name)
         until_over(host, wanted(host))
 
@@ -126,7 +126,7 @@ def test_words_wait_for_the_payload_that_knows_them(host: RunningHost) -> None:
     shown = until_shown(host, "needs-help", "PHRASE_UNKNOWN")
     assert shown["payload"] == errand_id(host)
     beacon(host)
-    host.until_goal(wanted(host), "active")
+    host.until_goal(wanted(host), "holds")
 
 
 def test_words_that_wait_are_forgotten_with_their_drive(host: RunningHost) -> None:
@@ -142,7 +142,7 @@ def test_words_that_wait_are_forgotten_with_their_drive(host: RunningHost) -> No
 def test_each_line_is_a_goal(host: RunningHost) -> None:
     beacon(host)
     host.plug(errand(host, "blink", "shine"))
-    host.until_goal(wanted(host, 2), "active")
+    host.until_goal(wanted(host, 2), "holds")
     host.until_goal(wanted(host), "reached")
 
 
@@ -193,10 +193,10 @@ def test_a_daemon_that_starts_again_gives_the_goal_once(tmp_path: Path) -> None:
     with trusting(tmp_path, ["goals"]) as host:
         beacon(host)
         host.plug(errand(host, "shine"))
-        host.until_goal(wanted(host), "active")
+        host.until_goal(wanted(host), "holds")
         host.kill()
         host.start()
-        host.until_goal(wanted(host), "active")
+        host.until_goal(wanted(host), "holds")
         assert [row["id"] for row in host.goals()] == [wanted(host)]
 
 
@@ -204,7 +204,7 @@ def test_a_goal_whose_drive_was_pulled_meanwhile_is_not_taken_up(tmp_path: Path)
     with trusting(tmp_path, ["goals"]) as host:
         beacon(host)
         name = host.plug(errand(host, "shine"))
-        host.until_goal(wanted(host), "active")
+        host.until_goal(wanted(host), "holds")
         host.kill()
         host.pull(name)
         host.start()

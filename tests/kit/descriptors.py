@@ -9,6 +9,9 @@ import resource
 from collections.abc import Iterator
 from pathlib import Path
 
+STANDARD = 3
+"""Those of a program from its start: below it no number is ever free."""
+
 
 def open_descriptors() -> set[int]:
     """Those that are open; the one by which they are listed is gone again."""
@@ -19,10 +22,14 @@ def open_descriptors() -> set[int]:
 
 @contextlib.contextmanager
 def descriptors_left(left: int) -> Iterator[None]:
-    """This process may open only so many more (EMFILE): a new one is the lowest that is free."""
+    """This process may open only so many more (EMFILE): a new one is the lowest that is free.
+
+    Where none is left, none is left either once others are closed, by threads for example.
+    """
     used, (soft, hard) = open_descriptors(), resource.getrlimit(resource.RLIMIT_NOFILE)
     free = (number for number in itertools.count() if number not in used)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (next(itertools.islice(free, left, None)), hard))
+    limit = next(itertools.islice(free, left, None)) if left else STANDARD
+    resource.setrlimit(resource.RLIMIT_NOFILE, (limit, hard))
     try:
         yield
     finally:

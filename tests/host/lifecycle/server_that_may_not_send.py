@@ -22,9 +22,10 @@ if __name__ == "__main__":
     asked: list[bytes] = []
 
     def prepare(message: bytes) -> None:
-        """Have them read by the second time."""
+        """Have them received, and so closed, by the second time. That the socket is closed would
+        not do: the process that was forked the first time may be there yet, and has it too."""
         asked.append(message)
         if len(asked) == 2:
-            unread.close()
+            unread.recv(1)
 
     fork_server.serve(socket.socket(fileno=int(sys.argv[2])), prepare=prepare)
