@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 STANDARD = 3
-"""Those of a program from its start: below it no number is ever free."""
+"""A program has standard input, output and error from its start: numbers below this are in use."""
 
 
 def open_descriptors() -> set[int]:
@@ -22,9 +22,11 @@ def open_descriptors() -> set[int]:
 
 @contextlib.contextmanager
 def descriptors_left(left: int) -> Iterator[None]:
-    """This process may open only so many more (EMFILE): a new one is the lowest that is free.
+    """Lower RLIMIT_NOFILE until the kernel refuses this process all descriptors but `left` more
+    (EMFILE): it gives each new one the lowest number that is free, and none from the limit on.
 
-    Where none is left, none is left either once others are closed, by threads for example.
+    Descriptors that other threads close meanwhile come on top of `left`, but for 0: then the limit
+    is below all of them.
     """
     used, (soft, hard) = open_descriptors(), resource.getrlimit(resource.RLIMIT_NOFILE)
     free = (number for number in itertools.count() if number not in used)

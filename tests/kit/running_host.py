@@ -216,17 +216,18 @@ class RunningHost(Robot):
 
         return self.until(f"{id}: {state}", found, timeout_s=READY_S)
 
-    def until_goal(self, id: str, state: str) -> Row:
-        """Wait until a goal is in a state; an active one that is true `holds`."""
+    def until_goal(self, id: str, *states: str) -> Row:
+        """Wait until a goal is in one of some states; an active one that is true `holds`. A state
+        that others follow by themselves may be over before it is shown."""
 
         def found(view: View) -> Row | None:
             row = goal(view, id)
             if row is None:
                 return None
             is_kept = row["state"] == "active" and row["holds"]
-            return row if state == ("holds" if is_kept else row["state"]) else None
+            return row if ("holds" if is_kept else row["state"]) in states else None
 
-        return self.until(f"goal {id}: {state}", found, timeout_s=READY_S)
+        return self.until(f"goal {id}: {' or '.join(states)}", found, timeout_s=READY_S)
 
     def until_told(self, words: str, *, since: int = 0) -> str:
         """Wait for a sentence with these words in it, told since `forget`."""

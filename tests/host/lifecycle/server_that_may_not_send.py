@@ -22,8 +22,8 @@ if __name__ == "__main__":
     asked: list[bytes] = []
 
     def prepare(message: bytes) -> None:
-        """Have them received, and so closed, by the second time. That the socket is closed would
-        not do: the process that was forked the first time may be there yet, and has it too."""
+        """Receive them at the second request, so that the kernel closes them. To close the socket
+        is not enough: the process that was forked for the first request may still hold it."""
         asked.append(message)
         if len(asked) == 2:
             unread.recv(1)

@@ -212,7 +212,7 @@ class TestStrangers:
                 for number in range(10_000):
                     liar = Announcement(_invented(number), "liar", 1, ("tcp://[::]:7410",))
                     stranger.sendto(spoofed(liar), spoofing.GROUP)
-                    # Enough of them are read one by one: what is sent faster, the kernel drops.
+                    # The kernel drops what comes too fast to be read: enough are read one by one.
                     if number < 4 * MAX_PEERS or number % 20 == 0:
                         await asyncio.sleep(0)
             await until_refused(rover, "HINT_CROWDED")
