@@ -28,8 +28,8 @@ import zmq
 from benchmarks import measuring
 from benchmarks.measuring import Spread
 
-from nondum.host.bridge.bridge import Bridge
-from nondum.host.lifecycle.children import Children
+from nondum.host.jobs.children import Children
+from nondum.host.peers.streams.bridge import Bridge
 from nondum.sdk import Header, Image
 from nondum.sdk.packets import SocketPackets
 from nondum.sdk.streams import Consumer, Producer

@@ -20,7 +20,7 @@ from nondum.sdk.errors import HostUnreachable, NondumError
 
 _T = TypeVar("_T")
 View = Mapping[str, Any]
-NONDUM = [sys.executable, "-m", "nondum.host.cli"]
+NONDUM = [sys.executable, "-m", "nondum.cli"]
 
 
 class TooLate(Exception):

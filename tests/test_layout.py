@@ -3,40 +3,25 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from graphlib import CycleError
 from pathlib import Path
 
 import pytest
+from tests.kit.packages import PORTIONS, imported_names, imports, layers, modules
 
 ROOT = Path(__file__).parent.parent
-PORTIONS = {
-    "nondum.sdk": ROOT / "plugins/sdk/nondum/sdk",
-    "nondum.planning": ROOT / "planning/nondum/planning",
-    "nondum.transport": ROOT / "transport/nondum/transport",
-    "nondum.wheelhouse": ROOT / "wheelhouse/nondum/wheelhouse",
-    "nondum.host": ROOT / "host/nondum/host",
-}
 MAY_IMPORT = {
     "nondum.sdk": set(),
     "nondum.planning": {"nondum.sdk"},
     "nondum.transport": {"nondum.sdk"},
     "nondum.wheelhouse": {"nondum.sdk"},
     "nondum.host": {"nondum.sdk", "nondum.planning", "nondum.transport", "nondum.wheelhouse"},
+    "nondum.cli": {
+        *("nondum.sdk", "nondum.planning", "nondum.transport", "nondum.wheelhouse"),
+        "nondum.host",
+    },
 }
 IMPURE = {"asyncio", "logging", "os", "random", "socket", "sqlite3", "subprocess", "time"}
-
-
-def modules(portion: str) -> Iterator[Path]:
-    """A portion's modules; the text that new plugins are made from is none."""
-    return (p for p in PORTIONS[portion].rglob("*.py") if "template" not in p.parts)
-
-
-def imported_names(path: Path) -> Iterator[str]:
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            yield node.module
 
 
 def imported_test_modules(text: str) -> set[str]:
@@ -57,6 +42,30 @@ def test_imports_point_inwards(portion: str) -> None:
         for name in imported_names(path):
             if name.startswith("nondum."):
                 assert ".".join(name.split(".")[:2]) in allowed, f"{path} imports {name}"
+
+
+@pytest.mark.parametrize("portion", PORTIONS)
+def test_no_packages_import_each_other(portion: str) -> None:
+    """Neither two of them nor more in a circle (`CycleError`)."""
+    assert layers(imports(portion))
+
+
+@pytest.mark.parametrize(
+    ("graph", "expected"),
+    [
+        ({"a": {"b"}, "b": set()}, [["b"], ["a"]]),
+        ({"a": {"b", "c"}, "b": {"c"}, "c": set()}, [["c"], ["b"], ["a"]]),
+    ],
+)
+def test_layers_are_told_innermost_first(
+    graph: dict[str, set[str]], expected: list[list[str]]
+) -> None:
+    assert layers(graph) == expected
+
+
+def test_circle_of_packages_is_found() -> None:
+    with pytest.raises(CycleError):
+        layers({"a": {"b"}, "b": {"c"}, "c": {"a"}})
 
 
 def test_planning_has_no_clock_and_no_io() -> None:

@@ -14,22 +14,22 @@ from benchmarks.composition import peer
 from benchmarks.composition.strangers import HOST, stranger, text_bytes
 from benchmarks.measuring import Spread, machine, ratio, table, write
 
-from nondum.planning.claims import claims_of
-from nondum.planning.contribution import Contribution
-from nondum.planning.domain import Merged
-from nondum.planning.goal import parse_goal
-from nondum.planning.ground import ground
-from nondum.planning.merge import merge
-from nondum.planning.pddl_text import pddl_text
-from nondum.planning.phrases import phrasebook
-from nondum.planning.pricing import at_own_cost, handicaps, priced
-from nondum.planning.replay import replayed
-from nondum.planning.running import RunningAction
+from nondum.planning.execute.replay import replayed
+from nondum.planning.execute.running import RunningAction
+from nondum.planning.execute.step import Step
+from nondum.planning.execute.task_tree import TaskTree
+from nondum.planning.execute.world import WorldModel
+from nondum.planning.ground.ground import ground
+from nondum.planning.ground.pddl_text import pddl_text
+from nondum.planning.ground.pricing import at_own_cost, handicaps, priced
+from nondum.planning.merge.claims import claims_of
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.domain import Merged
+from nondum.planning.merge.goal import parse_goal
+from nondum.planning.merge.merge import merge
 from nondum.planning.search import solve
-from nondum.planning.step import Step
-from nondum.planning.task_tree import TaskTree
-from nondum.planning.validate import validate
-from nondum.planning.world import WorldModel
+from nondum.planning.search.validate import validate
+from nondum.planning.words.phrases import phrasebook
 from nondum.sdk.planner import GroundTask, Plan
 
 PRESENT = 50

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import pairwise
 
-from nondum.planning.contribution import Contribution
+from nondum.planning.merge.contribution import Contribution
 from nondum.sdk.description import Behaviour, Fragment, Output, PluginDescription, Unit
 
 HOST = "rover"

@@ -19,7 +19,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Composite, Selector, Sequence
 
-from nondum.planning.step import Step
+from nondum.planning.execute.step import Step
 from nondum.sdk.planner import Plan
 
 MOST_NODES = 600

@@ -12,10 +12,10 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 
-from nondum.planning.attempts import Patience
-from nondum.planning.step import Step, steps_of
-from nondum.planning.task_control import Phase
-from nondum.planning.task_tree import TaskTree
+from nondum.planning.execute.attempts import Patience
+from nondum.planning.execute.plan_executive import Phase
+from nondum.planning.execute.step import Step, steps_of
+from nondum.planning.execute.task_tree import TaskTree
 from nondum.sdk.planner import Plan
 
 

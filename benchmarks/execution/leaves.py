@@ -6,8 +6,8 @@ from benchmarks.execution.robot import SimulatedAction, SimulatedRobot
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from nondum.planning.running import RunState
-from nondum.planning.step import Step
+from nondum.planning.execute.running import RunState
+from nondum.planning.execute.step import Step
 
 
 class Check(Behaviour):

@@ -9,8 +9,8 @@ from random import Random
 from benchmarks.execution.scenes import Scene
 from benchmarks.execution.troubles import Troubles
 
-from nondum.planning.running import RunState
-from nondum.planning.step import Step
+from nondum.planning.execute.running import RunState
+from nondum.planning.execute.step import Step
 
 SHORTEST_LOSS, LONGEST_LOSS = 3, 8
 """Moments that a unit is away."""

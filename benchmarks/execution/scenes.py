@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from nondum.planning.facts import parts
-from nondum.planning.ground import ground
-from nondum.planning.standalone import load
+from nondum.planning.ground.ground import ground
+from nondum.planning.pddl.facts import parts
+from nondum.planning.workbench.standalone import load
 from nondum.sdk.planner import GroundTask
 
 DOMAINS = Path(__file__).with_name("domains")

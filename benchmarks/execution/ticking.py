@@ -12,9 +12,9 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 
-from nondum.planning.running import RunState
-from nondum.planning.step import Step
-from nondum.planning.task_tree import TaskTree
+from nondum.planning.execute.running import RunState
+from nondum.planning.execute.step import Step
+from nondum.planning.execute.task_tree import TaskTree
 from nondum.sdk.planner import GroundAction, GroundTask, Plan
 
 LENGTHS = (10, 100, 1000)

@@ -38,7 +38,7 @@ def running(folder: Path, *, apart: bool = False) -> Iterator[tuple[int, float]]
     ready.unlink(missing_ok=True)
     configuration = CONFIGURATION.format(folder=folder, process=str(apart).lower())
     (folder / "host.toml").write_text(configuration, encoding="utf-8")
-    command = [sys.executable, "-m", "nondum.host.cli", "host", "run", "--user"]
+    command = [sys.executable, "-m", "nondum.cli", "host", "run", "--user"]
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as told:
         told.bind(str(ready))
         told.settimeout(PATIENCE_S)

@@ -18,7 +18,7 @@ from typing import Any
 PROC = Path("/proc")
 KINDS = {
     "nondum.host.mind.planner_child": "planner",
-    "nondum.host.lifecycle.child": "drive child",
+    "nondum.host.jobs.child": "drive child",
     "nondum.host.peers.links": "links",
     "bootstrap.py": "worker",
 }

@@ -23,9 +23,9 @@ from benchmarks.measuring import machine, table
 
 from nondum.host.mind.planner_process import PlannerProcess
 from nondum.host.mind.planners import GROUP, Planners
-from nondum.planning import standalone
-from nondum.planning.bounds import INSTANCES_LIMIT
-from nondum.planning.ground import ground
+from nondum.planning.ground.bounds import INSTANCES_LIMIT
+from nondum.planning.ground.ground import ground
+from nondum.planning.workbench import standalone
 from nondum.sdk.errors import NondumError
 from nondum.sdk.planner import AlreadyTrue, Answer, GaveUp, Plan, Unsolvable
 

@@ -15,7 +15,7 @@ from benchmarks.misbehaviour.scene import LIMITS, Scene, scene
 from benchmarks.misbehaviour.ways import WAYS, Way
 from benchmarks.misbehaviour.windows import Window, p99, window
 
-from nondum.host import heap
+from nondum.host.service import malloc
 from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined
 
 PAGE = Path(__file__).parents[2] / "docs/reliability/workers.md"
@@ -133,7 +133,7 @@ def _spread(values: Sequence[float | None]) -> str:
 
 async def main(times: int, confinement: Confinement) -> tuple[str, str]:
     """Have all of it happen, and answer the two tables."""
-    heap.keep_what_is_loaded()  # as a daemon does
+    malloc.keep_what_is_loaded()  # as a daemon does
     decisions = Decisions()
     told, peace = [], []
     async with scene(confinement) as made:

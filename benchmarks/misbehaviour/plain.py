@@ -15,7 +15,7 @@ from pathlib import Path
 from benchmarks.misbehaviour.scene import LIBRARIES, LIMITS
 from benchmarks.misbehaviour.ways import Way
 
-from nondum.host.cgroups import Cages
+from nondum.host.sandbox.cgroups import Cages
 from nondum.host.workers.spec import base_interpreter
 
 SOURCE = """

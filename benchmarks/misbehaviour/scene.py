@@ -15,8 +15,8 @@ from pathlib import Path
 import pluggy
 from benchmarks.misbehaviour.windows import Call, Frame
 
-from nondum.host.cgroups import Cages
-from nondum.host.events import Event, WorkerExited, WorkerLogged, WorkerStrained
+from nondum.host.core.events import Event, WorkerExited, WorkerLogged, WorkerStrained
+from nondum.host.sandbox.cgroups import Cages
 from nondum.host.workers.confinements import Confinement
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import Limits, WorkerSpec, base_interpreter

@@ -14,7 +14,7 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from nondum.host.config import PeersSection
+from nondum.host.config.host_config import PeersSection
 from nondum.host.peers.finder import PeerFinder
 from nondum.transport.fleet import FleetEvent, Mesh
 from nondum.transport.peers import (

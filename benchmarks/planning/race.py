@@ -17,8 +17,8 @@ from benchmarks.planning.contenders import GAVE_UP, PLAN
 from benchmarks.planning.problems import Problem
 from benchmarks.planning.results import Attempt
 
-from nondum.planning.rehearsal import Rehearsed, rehearsed
-from nondum.planning.standalone import Standalone, load
+from nondum.planning.workbench.rehearsal import Rehearsed, rehearsed
+from nondum.planning.workbench.standalone import Standalone, load
 from nondum.sdk.errors import FragmentRefused
 
 ROOT = Path(__file__).parents[2]

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from nondum.wheelhouse import build
-from nondum.wheelhouse.target import Target
+from nondum.wheelhouse.build import build
+from nondum.wheelhouse.format.target import Target
 
 HERE = Path(__file__).parent
 SDK = HERE.parent.parent / "plugins/sdk"

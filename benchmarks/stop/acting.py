@@ -23,9 +23,9 @@ from demo.search.talking import Talking
 from demo.search.three_hosts import BASE, CAMERA, NODE, ROBOT, search_kit
 from demo.stage import INSTALL_S, Mark, until_active
 
-from nondum.host.stop_button.input_device import EV_KEY, EVENT
-from nondum.host.stop_button.keys import code_of
-from nondum.planning.stop_words import STOPS
+from nondum.host.config.stop_keys import code_of
+from nondum.host.sandbox.helper.stop_key import EV_KEY, EVENT
+from nondum.planning.words.stop_words import STOPS
 
 FOLLOW = "follow me through the facility"
 FOR_NODE = ("people-detector", "visual-tracker", "speech")

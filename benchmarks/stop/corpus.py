@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from benchmarks.speech import FAR, NEAR, PHRASES, VOCABULARY
 
-from nondum.planning.asking import ASKED
-from nondum.planning.stop_words import stop_patterns
+from nondum.planning.words.asking import ASKED
+from nondum.planning.words.stop_words import stop_patterns
 from nondum_speech.grammar import Vocabulary
 
 HOST = "rover"

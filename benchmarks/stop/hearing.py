@@ -20,8 +20,8 @@ from benchmarks.stop.corpus import HOST, KNOWN, OF_ROBOT, OTHERS
 from benchmarks.stop.results import Hearing, Spoken
 from benchmarks.stop.room import Room
 
-from nondum.planning.addressee import addressed_to
-from nondum.planning.stop_words import STOPS, host_behind_stop, is_stop
+from nondum.planning.words.addressee import addressed_to
+from nondum.planning.words.stop_words import STOPS, host_behind_stop, is_stop
 from nondum_speech.ears import Ears
 from nondum_speech.espeak import Espeak
 from nondum_speech.settings import Settings

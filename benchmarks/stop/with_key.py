@@ -10,12 +10,12 @@ import os
 import sys
 from pathlib import Path
 
-from nondum.host.cli.main import main as nondum
-from nondum.host.helper.client import HelperClient
-from nondum.host.helper.privileged import InProcess
-from nondum.host.stop_button.input_device import PressesOfDevice
+from nondum.cli.main import main as nondum
+from nondum.host.sandbox.helper.client import HelperClient
+from nondum.host.sandbox.helper.privileged import InProcess
+from nondum.host.sandbox.helper.stop_key import PressesOfDevice
 
-MODULE = "nondum.host.cli"
+MODULE = "nondum.cli"
 
 
 def main() -> None:

@@ -17,7 +17,9 @@ class Core:
     """The words that nondum-core shares; nobody may call them otherwise."""
 
     def __init__(self) -> None:
-        text = resources.files("nondum.planning").joinpath("nondum-core.pddl").read_text("utf-8")
+        text = (
+            resources.files("nondum.planning.merge").joinpath("nondum-core.pddl").read_text("utf-8")
+        )
         self._names = {(part, token.text) for part, token in pddl.fragment(text)} | _ALWAYS
 
     def has(self, part: Part, name: str) -> bool:

@@ -18,8 +18,8 @@ from benchmarks.execution.troubles import KINDS, Troubles
 from benchmarks.measuring import Spread
 from py_trees.composites import Selector, Sequence
 
-from nondum.planning.running import RunState
-from nondum.planning.step import Step
+from nondum.planning.execute.running import RunState
+from nondum.planning.execute.step import Step
 
 CALM = KINDS["none"]
 

@@ -34,7 +34,7 @@ OF_TOOLS = {"_distutils_hack", "coverage"}
 HEAVY = {"PIL", "cryptography", "http.client", "multiprocessing.pool", "pip", "unittest", "xml"}
 IMPORTED = """
 import json, sys
-import nondum.host.app, nondum.host.peers.neighbourhood
+import nondum.host.app, nondum.host.peers.peer_services
 print(json.dumps(sorted(sys.modules)))
 """
 

@@ -10,8 +10,8 @@ import pytest
 from benchmarks.stop import acting, report
 from benchmarks.stop.results import Hearing, Results, Spoken, Stop, Way
 
-from nondum.host.stop_button.input_device import PressesOfDevice
-from nondum.host.stop_button.keys import code_of
+from nondum.host.config.stop_keys import code_of
+from nondum.host.sandbox.helper.stop_key import PressesOfDevice
 
 SINCE_S = 100.0
 ACTIONS = ("detect eye", "drive base")

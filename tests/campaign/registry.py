@@ -50,12 +50,18 @@ class Campaign:
 
 _SEED = ("--seed", "{seed}")
 
+_OF_PAYLOADS = tuple(
+    f"{HOST}/{name}" for name in ("core", "lifecycle", "manager", "jobs", "catalogue", "workers")
+)
+"""What a payload's life is made of."""
+
 _ALL = (
     Campaign(
         "faults",
         "Kills, failing system calls and power cuts at points of a payload's life",
         (
-            *(f"{HOST}/{room}" for room in ("lifecycle", "catalogue", "drives", "workers")),
+            *_OF_PAYLOADS,
+            f"{HOST}/sources",
             "wheelhouse/nondum",
             "tests/faults",
         ),
@@ -66,7 +72,7 @@ _ALL = (
         "restarts",
         "Daemons killed at random moments and started again at once, under load",
         (
-            *(f"{HOST}/{room}" for room in ("lifecycle", "catalogue", "workers")),
+            *_OF_PAYLOADS,
             "tests/faults",
             "tests/kit",
         ),
@@ -92,7 +98,8 @@ _ALL = (
         "drives",
         "Hostile drives, drives yanked at any moment, a crowd of a hundred drives and a soak",
         (
-            *(f"{HOST}/{room}" for room in ("drives", "lifecycle", "workers", "catalogue")),
+            *_OF_PAYLOADS,
+            f"{HOST}/sources",
             "wheelhouse/nondum",
             "tests/faults",
         ),
@@ -104,8 +111,7 @@ _ALL = (
         "Every scenario of the laboratory on emulated machines",
         (
             "packaging",
-            *(f"{HOST}/{room}" for room in ("drives", "helper", "confinement", "service")),
-            *(f"{HOST}/{room}" for room in ("devices", "cgroups", "feedback", "peers")),
+            *(f"{HOST}/{name}" for name in ("sources", "sandbox", "service", "people", "peers")),
             "tests/lab",
         ),
         "tests.lab",
@@ -146,7 +152,6 @@ _ALL = (
         (
             "transport/nondum",
             f"{HOST}/peers",
-            f"{HOST}/bridge",
             "tests/daemon/peer_faults",
         ),
         SUITES,

@@ -13,8 +13,8 @@ from pathlib import Path
 import pyudev
 
 from nondum.host.app import run_host
-from nondum.host.config import load, user_config
-from nondum.host.drives.blocks import BlockSource
+from nondum.host.config.host_config import load, user_config
+from nondum.host.sources.drives.blocks import BlockSource
 
 
 def main() -> None:

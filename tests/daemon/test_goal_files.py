@@ -14,7 +14,8 @@ from tests.kit.running_host import READY_S, Row, RunningHost, running
 from tests.kit.shared import Shared
 from tests.kit.signing import Key, sign_payload, trust_of
 
-from nondum.wheelhouse import goal_payload, goals
+from nondum.wheelhouse.build import goal_payload
+from nondum.wheelhouse.format import goals
 from nondum.wheelhouse.trust import trust_text
 
 pytestmark = pytest.mark.daemon

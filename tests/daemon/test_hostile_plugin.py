@@ -6,11 +6,11 @@ import json
 from pathlib import Path
 
 import pytest
-from tests.confinement.baits import ESCAPE, LEFT_WHEN_RESTRICTED, judged, laid
-from tests.confinement.escape import ATTEMPTS
 from tests.daemon.plugins import talker
 from tests.kit.payloads import Part
 from tests.kit.running_host import RunningHost
+from tests.sandbox.baits import ESCAPE, LEFT_WHEN_RESTRICTED, judged, laid
+from tests.sandbox.escape import ATTEMPTS
 
 pytestmark = pytest.mark.daemon
 

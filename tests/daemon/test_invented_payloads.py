@@ -12,8 +12,8 @@ from demo.robot import Robot, View, running
 from demo.shuffle.words import Words
 from tests.demo.invented import Invented, listener, sentence, talker
 
-from nondum.wheelhouse.build import Options, build
-from nondum.wheelhouse.target import Target
+from nondum.wheelhouse.build.build import Options, build
+from nondum.wheelhouse.format.target import Target
 
 pytestmark = [pytest.mark.daemon, pytest.mark.slow]
 

@@ -10,7 +10,7 @@ from tests.daemon.plugins import TALKER, talker
 from tests.kit.payloads import Part
 from tests.kit.running_host import RunningHost
 
-from nondum.host.confinement.users import is_workers
+from nondum.host.sandbox.levels.users import is_workers
 
 pytestmark = pytest.mark.daemon
 

@@ -12,8 +12,8 @@ from tests.kit.payloads import Part
 from tests.kit.running_host import READY_S, Row, RunningHost
 from tests.kit.until import until
 
-from nondum.planning.asking import ASKED
-from nondum.planning.stop_words import STOPS
+from nondum.planning.words.asking import ASKED
+from nondum.planning.words.stop_words import STOPS
 
 pytestmark = pytest.mark.daemon
 

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from nondum.planning.contribution import Contribution
-from nondum.planning.ground import ground
-from nondum.planning.merge import merge
-from nondum.planning.phrases import phrasebook
+from nondum.planning.ground.ground import ground
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.merge import merge
+from nondum.planning.words.phrases import phrasebook
 from nondum.sdk.errors import GoalRefused
 from nondum.sdk.planner import GroundTask
 from nondum.sdk.plugin import describe, load
-from nondum.wheelhouse.manifest import parse
+from nondum.wheelhouse.format.manifest import parse
 
 PLUGINS = Path(__file__).parents[2] / "plugins"
 NAMES = ("compton-camera", "pan-tilt-unit")

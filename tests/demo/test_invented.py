@@ -12,19 +12,19 @@ from demo.shuffle.words import Words
 from tests.demo.invented import Invented, listener, sentence, talker
 from tests.planning.strangers import planner
 
-from nondum.planning.contribution import Contribution
-from nondum.planning.goal import parse_goal
-from nondum.planning.ground import ground
-from nondum.planning.merge import merge
-from nondum.planning.phrases import phrasebook
+from nondum.planning.ground.ground import ground
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.goal import parse_goal
+from nondum.planning.merge.merge import merge
+from nondum.planning.words.phrases import phrasebook
 from nondum.sdk import Header, Text
 from nondum.sdk.bench import WorkerFactory
 from nondum.sdk.planner import Plan, Unsolvable
 from nondum.sdk.plugin import describe, load
-from nondum.wheelhouse.build import Options, build
-from nondum.wheelhouse.signatures import UnsignedAllowed
-from nondum.wheelhouse.target import Target
-from nondum.wheelhouse.verification import verify
+from nondum.wheelhouse.build.build import Options, build
+from nondum.wheelhouse.build.verification import verify
+from nondum.wheelhouse.format.signatures import UnsignedAllowed
+from nondum.wheelhouse.format.target import Target
 
 ROOT = Path(__file__).parents[2]
 HOST = "rover"

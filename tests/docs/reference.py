@@ -15,14 +15,14 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 import click
-from tests.docs import codes, sdk_reference
+from tests.docs import codes, packages, sdk_reference
 from tests.docs.dataclass_fields import field_docs
 
-from nondum.host import config
-from nondum.host.cli import explain
-from nondum.host.cli.main import cli
-from nondum.host.configuration import reference as keys_of
-from nondum.host.configuration.effective import as_toml
+from nondum.cli import explain
+from nondum.cli.main import cli
+from nondum.host.config import host_config
+from nondum.host.config import reference as keys_of
+from nondum.host.config.effective import as_toml
 from nondum.sdk import hooks
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -64,8 +64,8 @@ def commands() -> str:
 def configuration() -> str:
     """A section a table of the file, a row a key."""
     rows: dict[str, list[str]] = {}
-    for section, key, default in config.documented():
-        kind = type(getattr(config.HostConfig(), section))
+    for section, key, default in host_config.documented():
+        kind = type(getattr(host_config.HostConfig(), section))
         meaning = field_docs(kind)[key]
         rows.setdefault(section, []).append(f"| `{key}` | {_shown(default)} | {meaning} |")
     return "\n".join(_section(section, found) for section, found in rows.items())
@@ -73,13 +73,13 @@ def configuration() -> str:
 
 def configuration_keys() -> str:
     """What `nondum config explain` tells, as JSON."""
-    hints = {f.name: get_type_hints(f.default_factory) for f in fields(config.HostConfig)}
+    hints = {f.name: get_type_hints(f.default_factory) for f in fields(host_config.HostConfig)}
     told = {}
-    for section, key, default in config.documented():
+    for section, key, default in host_config.documented():
         name, shown = f"{section}.{key}", as_toml(default)
         told[name] = {
-            "meaning": field_docs(type(getattr(config.HostConfig(), section)))[key],
-            "kind": config.KINDS[hints[section][key]],
+            "meaning": field_docs(type(getattr(host_config.HostConfig(), section)))[key],
+            "kind": host_config.KINDS[hints[section][key]],
             "unit": keys_of.unit_of(key),
             "default": shown,
             "example": keys_of.EXAMPLES.get(name, shown),
@@ -127,7 +127,7 @@ def _command(name: str, command: click.Command, context: click.Context) -> str:
 
 
 def _section(name: str, rows: list[str]) -> str:
-    kind = type(getattr(config.HostConfig(), name))
+    kind = type(getattr(host_config.HostConfig(), name))
     heads = ["| key | default | |", "|---|---|---|"]
     return "\n".join([f"## [{name}]\n", f"{inspect.getdoc(kind)}\n", *heads, *rows, ""])
 
@@ -156,6 +156,7 @@ def main() -> None:
         path.write_text(f"{words}{MARK}\n{make()}", encoding="utf-8")
     KEYS.write_text(configuration_keys(), encoding="utf-8")
     TOLD.write_text(codes.told_words(), encoding="utf-8")
+    packages.draw()
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from typing import Any, get_args, get_type_hints
 
 from tests.docs.dataclass_fields import field_docs
 
-from nondum.planning.core import core, core_value_types
+from nondum.planning.merge.core import core, core_value_types
 from nondum.sdk.bench import Bench, Call, WorkerFactory
 from nondum.sdk.messages import MESSAGES, Message
 
@@ -69,7 +69,9 @@ def _default(field: Field[Any]) -> str:
 
 def core_words() -> str:
     """The types and the predicates, with who says them."""
-    text = (resources.files("nondum.planning") / "nondum-core.pddl").read_text(encoding="utf-8")
+    text = (resources.files("nondum.planning.merge") / "nondum-core.pddl").read_text(
+        encoding="utf-8"
+    )
     by_parent: dict[str, list[str]] = {}
     for declared in core().types:
         by_parent.setdefault(" ".join(declared.types), []).append(f"`{declared.name}`")

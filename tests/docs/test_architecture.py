@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
+from tests.docs import packages
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("host", "planning", "transport", "wheelhouse", "plugins", "tests", "docs", "demo")
@@ -32,3 +33,7 @@ def sources() -> str:
 @pytest.mark.parametrize("name", CLASSES)
 def test_named_class_is_there(name: str, sources: str) -> None:
     assert re.search(rf"\bclass {name}\b", sources)
+
+
+def test_picture_shows_the_packages_as_they_are() -> None:
+    assert packages.drawn() == packages.picture(), "run: python -m tests.docs.reference"

@@ -14,10 +14,9 @@ from tests.docs.dataclass_fields import field_docs
 from tests.docs.reference import DOCS, DOCUMENTS, KEYS, MARK, all_commands, configuration_keys
 from tests.docs.sdk_reference import core_words, message_classes
 
-from nondum.host import config
-from nondum.host.cli.main import cli
-from nondum.host.configuration import reference
-from nondum.planning.core import core
+from nondum.cli.main import cli
+from nondum.host.config import host_config, reference
+from nondum.planning.merge.core import core
 from nondum.sdk import hooks
 
 ROOT = DOCS.parent
@@ -46,7 +45,7 @@ def test_every_command_has_a_heading_and_its_usage(
 
 def test_every_key_of_the_configuration_has_a_row_with_its_meaning() -> None:
     written = (DOCS / "configuration.md").read_text(encoding="utf-8")
-    for section, key, _ in config.documented():
+    for section, key, _ in host_config.documented():
         part = written.partition(f"\n## [{section}]\n")[2].partition("\n## ")[0]
         assert re.search(rf"^\| `{key}` \| \S.* \| \S.* \|$", part, re.MULTILINE), (section, key)
 
@@ -60,7 +59,9 @@ def test_every_example_of_a_key_is_taken() -> None:
     for name, told in reference.keys().items():
         section, _, key = name.partition(".")
         assert told["example"], name
-        config.parse(f"[{section}]\n{key} = {told['example']}\n", name, config.HostConfig())
+        host_config.parse(
+            f"[{section}]\n{key} = {told['example']}\n", name, host_config.HostConfig()
+        )
 
 
 def test_every_hook_is_documented() -> None:
@@ -120,7 +121,7 @@ def test_commands_that_are_shown_exist(page: Path, line: str) -> None:
 
 
 def test_bench_begins_as_the_readme_of_a_new_package_says() -> None:
-    template = (ROOT / "wheelhouse/nondum/wheelhouse/template/README.md").read_text("utf-8")
+    template = (ROOT / "wheelhouse/nondum/wheelhouse/build/template/README.md").read_text("utf-8")
     bench = (ROOT / "docs/bench.md").read_text("utf-8")
     for command in ("pip install -e .", "pytest"):
         assert f"\n    {command}" in template

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 from tests.docs.reference import DOCS
 
-from nondum.planning.contribution import Contribution
-from nondum.planning.merge import merge
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.merge import merge
 from nondum.sdk import GpsFix
 from nondum.sdk.bench import WorkerFactory
 from nondum.sdk.plugin import describe, load

@@ -128,7 +128,7 @@ def readers(daemon: int) -> Iterator[int]:
     """Processes that read drives for a daemon, or are ready to."""
     for pid in descendants(daemon):
         with contextlib.suppress(OSError):  # it ended meanwhile
-            if b"nondum.host.lifecycle.child" in Path(f"/proc/{pid}/cmdline").read_bytes():
+            if b"nondum.host.jobs.child" in Path(f"/proc/{pid}/cmdline").read_bytes():
                 yield pid
 
 

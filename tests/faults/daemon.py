@@ -29,20 +29,21 @@ from typing import Any
 
 from tests.faults import kept
 
-from nondum.host import events
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.catalogue.records import DriveState, JournalEntry, Step
-from nondum.host.catalogue.state import HostState
-from nondum.host.drives.slots import SlotSource
-from nondum.host.lifecycle import state_lock
-from nondum.host.lifecycle.bus import Bus
-from nondum.host.lifecycle.children import watched_without_threads
-from nondum.host.lifecycle.component_manager import ComponentManager
-from nondum.host.lifecycle.executor import Executor
-from nondum.host.lifecycle.folders import Folders
-from nondum.host.lifecycle.installation import InstallOptions
+from nondum.host.core import events
+from nondum.host.core.bus import Bus
+from nondum.host.core.records import DriveState, JournalEntry, Step
+from nondum.host.core.state import HostState
+from nondum.host.core.transitions import COMPONENT_TRANSITIONS, TRANSITIONS
+from nondum.host.jobs.children import watched_without_threads
+from nondum.host.lifecycle.advance import RULES
+from nondum.host.manager import state_lock
+from nondum.host.manager.component_manager import ComponentManager
+from nondum.host.manager.effect_handlers import Executor
+from nondum.host.manager.installation import InstallOptions
+from nondum.host.manager.state_folders import Folders
 from nondum.host.service.stop_signals import told_to_stop
-from nondum.host.transitions import COMPONENT_TRANSITIONS, TRANSITIONS
+from nondum.host.sources.drives.slots import SlotSource
 from nondum.host.workers.spec import Timing
 from nondum.host.workers.workers import Workers
 from nondum.sdk.errors import Problem
@@ -226,7 +227,7 @@ async def _main(orders: dict[str, Any], stop: asyncio.Event) -> None:
     told = os.open(root / "told", os.O_CREAT | os.O_APPEND | os.O_WRONLY | os.O_CLOEXEC)
     folders = Folders(root / "state")
     held = await state_lock.lock(folders.root)
-    bus = Bus()
+    bus = Bus(RULES)
     catalogue = await DeadlyCatalogue.open(folders.catalogue, HOST)
     assert isinstance(catalogue, DeadlyCatalogue)
     catalogue.orders, catalogue.bus, catalogue.told = orders, bus, told

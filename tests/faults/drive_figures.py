@@ -30,7 +30,7 @@ from tests.faults.hostile.gauntlet import gauntlet
 from tests.faults.yanks import PHASES, bench, yank_all
 from tests.kit.running_host import running
 
-from nondum.host.lifecycle.children import QUIET_S
+from nondum.host.jobs.children import QUIET_S
 
 FOLDER = Path("build/drives")
 PAGE = Path("docs/reliability/drives.md")

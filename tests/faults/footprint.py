@@ -11,7 +11,7 @@ from pathlib import Path
 
 from tests.kit.descendants import descendants, pids
 
-from nondum.host.drives.mounts import mounted_below
+from nondum.host.sandbox.helper.mountinfo import mounted_below
 
 CALM, CALM_S = 8, 1.6
 OWN = ("catalogue", "staging")

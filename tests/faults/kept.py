@@ -15,8 +15,8 @@ from tests.kit.signing import Key, signed, trust_of
 
 from nondum.host.catalogue.backups import Backups
 from nondum.host.lifecycle import rebuilding
-from nondum.host.lifecycle.folders import Folders
-from nondum.host.lifecycle.tally import Tally
+from nondum.host.manager.crash_loop import Tally
+from nondum.host.manager.state_folders import Folders
 from nondum.host.peers.trust_keeper import KEY_NAME, TRUST_NAME
 from nondum.host.trust import chain
 from nondum.transport.peers import HostKeys, Trust, trust_file

@@ -20,13 +20,14 @@ from tests.faults.ways import let_start
 from tests.kit.host import HostInProcess, host_in_process, left_over
 from tests.kit.until import until
 
-from nondum.host import events
-from nondum.host.catalogue.catalogue import Catalogue, now
-from nondum.host.catalogue.records import DriveState, Step
-from nondum.host.drives.mounts import mounted_below
-from nondum.host.lifecycle.folders import Folders, missing, sweep
+from nondum.host.catalogue.catalogue import Catalogue
+from nondum.host.core import events
+from nondum.host.core.clock import now
+from nondum.host.core.records import DriveState, Step
 from nondum.host.lifecycle.recovery import recover
-from nondum.wheelhouse.store import Store
+from nondum.host.manager.state_folders import Folders, missing, sweep
+from nondum.host.sandbox.helper.mountinfo import mounted_below
+from nondum.wheelhouse.store.store import Store
 
 ENDED_S = 5.0
 """So long processes may take to follow their daemon."""

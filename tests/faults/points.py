@@ -17,8 +17,8 @@ from tests.faults.ways import COMPONENT_WAYS, newer, sound, way
 from tests.kit.evidence import logged
 from tests.kit.fork_server import Nursery
 
-from nondum.host.catalogue.records import Step
-from nondum.host.transitions import COMPONENT_TRANSITIONS, TRANSITIONS
+from nondum.host.core.records import Step
+from nondum.host.core.transitions import COMPONENT_TRANSITIONS, TRANSITIONS
 
 ERRORS = ("ENOSPC", "EIO", "EMFILE", "ENOMEM", "EROFS")
 

@@ -21,17 +21,19 @@ from tests.kit.signing import Key, signed, trust_of
 from nondum.host.catalogue import opening
 from nondum.host.catalogue.backups import Backups
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.catalogue.records import Safety
-from nondum.host.lifecycle import installation, installing, rebuilding
-from nondum.host.lifecycle.folders import Folders
-from nondum.host.lifecycle.tally import Tally
+from nondum.host.core.records import Safety
+from nondum.host.jobs import install as install_job
+from nondum.host.lifecycle import rebuilding
+from nondum.host.manager import installation
+from nondum.host.manager.crash_loop import Tally
+from nondum.host.manager.state_folders import Folders
 from nondum.host.peers.placement.pins import Pins
 from nondum.host.peers.trust_keeper import CERTIFICATE_NAME, KEY_NAME, TRUST_NAME, TrustKeeper
 from nondum.host.trust import anchors, chain
 from nondum.transport.peers import HostKeys, fleet_files
 from nondum.transport.peers.certificate import issue, new_fleet
-from nondum.wheelhouse.store import Store
-from nondum.wheelhouse.stored import MANIFEST
+from nondum.wheelhouse.store.store import Store
+from nondum.wheelhouse.store.stored import MANIFEST
 from nondum.wheelhouse.trust import owners_folder, trust_text
 
 ROOT_KEY = Key("root")
@@ -152,7 +154,7 @@ def _install(folders: Folders, elsewhere: Path, key: str, method: str) -> None:
         "allow_unsigned": True,
         "room": None,
     }
-    installing.install(arguments, told)
+    install_job.install(arguments, told)
     promise(Kind.SAFE, kept)
 
 

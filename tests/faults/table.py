@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from tests.faults.points import Result
 from tests.faults.ways import COMPONENT_WAYS
 
-from nondum.host.transitions import TRANSITIONS
+from nondum.host.core.transitions import TRANSITIONS
 
 WHAT = {
     "boundary": "SIGKILL before or after the commit of a row of the transition tables",

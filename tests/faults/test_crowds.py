@@ -13,7 +13,7 @@ from tests.faults.crowds import SOUND, make, plug_all
 from tests.kit.payloads import Part, make_payload
 from tests.kit.running_host import RunningHost, running
 
-from nondum.host.lifecycle.installation import AT_ONCE
+from nondum.host.manager.installation import AT_ONCE
 
 pytestmark = pytest.mark.daemon
 

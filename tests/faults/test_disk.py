@@ -14,13 +14,13 @@ from tests.faults.ways import LAMP_ID, newer, sound
 from tests.kit.host import LAMP, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload, make_wheel
 
-from nondum.host import events
-from nondum.host.catalogue.records import Step
 from nondum.host.catalogue.reserve import RESERVE_BYTES
-from nondum.host.lifecycle import state_lock
-from nondum.host.lifecycle.installation import InstallOptions
-from nondum.host.lifecycle.installed import install, uninstall
-from nondum.host.lifecycle.trying_again import TryingAgain
+from nondum.host.core import events
+from nondum.host.core.records import Step
+from nondum.host.manager import state_lock
+from nondum.host.manager.initial_components import install, uninstall
+from nondum.host.manager.installation import InstallOptions
+from nondum.host.manager.refusal_retry import TryingAgain
 from nondum.sdk.errors import ConfigRefused
 
 pytestmark = pytest.mark.anyio

@@ -12,7 +12,7 @@ from tests.faults.hostile import DRIVES, FAMILIES, HostileDrive
 from tests.faults.hostile.gauntlet import Gauntlet, gauntlet
 from tests.kit.loop_devices import can_be_made
 
-from nondum.host.lifecycle.children import KEPT
+from nondum.host.jobs.children import KEPT
 
 pytestmark = pytest.mark.daemon
 

@@ -11,9 +11,9 @@ from tests.faults.ways import LAMP_ID, Way, sound
 from tests.kit.fork_server import Nursery
 from tests.kit.host import host_in_process
 
-from nondum.host import events
-from nondum.host.catalogue.records import Step
-from nondum.host.lifecycle.tries import ATTEMPTS
+from nondum.host.core import events
+from nondum.host.core.records import Step
+from nondum.host.lifecycle.crash_attribution import ATTEMPTS
 
 pytestmark = pytest.mark.slow
 

@@ -15,9 +15,9 @@ from tests.faults.chains import CHAINS
 from tests.faults.model import Told, check, look, recover_twice
 from tests.kit.fork_server import Nursery
 
-from nondum.host import events
-from nondum.host.catalogue.records import Step
-from nondum.host.transitions import COMPONENT_TRANSITIONS, TRANSITIONS
+from nondum.host.core import events
+from nondum.host.core.records import Step
+from nondum.host.core.transitions import COMPONENT_TRANSITIONS, TRANSITIONS
 
 KILLED = -9
 ENDINGS = (events.PayloadSentAway, events.PayloadDistrusted, events.PayloadWithdrawn)

@@ -11,9 +11,9 @@ from tests.faults.ways import LAMP_ID, sound
 from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 
-from nondum.host import events
-from nondum.host.catalogue.records import Step
-from nondum.host.events import Event
+from nondum.host.core import events
+from nondum.host.core.events import Event
+from nondum.host.core.records import Step
 
 pytestmark = pytest.mark.anyio
 

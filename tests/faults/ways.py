@@ -10,9 +10,9 @@ from typing import Any
 from tests.kit.host import LAMP
 from tests.kit.payloads import Part, make_payload, seal, sha256
 
-from nondum.host import events
-from nondum.host.catalogue.records import ComponentState, Step
-from nondum.host.events import Event
+from nondum.host.core import events
+from nondum.host.core.events import Event
+from nondum.host.core.records import ComponentState, Step
 from nondum.sdk.description import PluginDescription
 
 LAMP_ID = "org.example.lamp"

@@ -21,10 +21,10 @@ from tests.kit.loop_devices import attach, cut_off, detach
 from tests.kit.payloads import Part, make_payload, make_wheel
 from tests.kit.until import until_async
 
-from nondum.host.catalogue.records import Step
-from nondum.host.drives.blocks import BlockSource
-from nondum.host.drives.mounts import mounted_below
-from nondum.host.lifecycle.folders import Folders
+from nondum.host.core.records import Step
+from nondum.host.manager.state_folders import Folders
+from nondum.host.sandbox.helper.mountinfo import mounted_below
+from nondum.host.sources.drives.blocks import BlockSource
 
 GOOD, BAD = "org.example.good", "org.example.lamp"
 PHASES = ("look", "copy", "install", "run")

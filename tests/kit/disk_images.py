@@ -9,7 +9,7 @@ import pyudev
 from tests.kit import loop_devices
 from tests.kit.payloads import Part, make_payload
 
-from nondum.host.drives.blocks import Accepts
+from nondum.host.sources.drives.blocks import Accepts
 
 LAMP_ID = "org.example.lamp"
 

@@ -1,6 +1,6 @@
 """Programs forked from a process that has imported them, in place of a start of Python for each.
 
-    process = fork_server().start(["nondum.host.cli", "host", "run", "--user"])
+    process = fork_server().start(["nondum.cli", "host", "run", "--user"])
 
 A process of the fork server is what `python -m MODULE …` would be, with its own arguments,
 environment, folder and standard streams; it has no other descriptors, and ends as a program ends.
@@ -32,16 +32,16 @@ from typing import IO, Any, Self
 
 from tests.kit.evidence import logged
 
-from nondum.host.cli.main import COMMANDS
-from nondum.host.heap import keep_what_is_loaded
-from nondum.host.lifecycle.fork_server import ANSWER_BYTES, answer, ask, serve
+from nondum.cli.main import COMMANDS
+from nondum.host.jobs.fork_server import ANSWER_BYTES, answer, ask, serve
+from nondum.host.service.malloc import keep_what_is_loaded
 
 ROOT = Path(__file__).parent.parent.parent
 PATIENCE_S = 90.0
 IMPORTED = (
     "nondum.host.app",
-    "nondum.host.peers.neighbourhood",
-    *(f"nondum.host.cli.{module}" for module, _ in COMMANDS.values()),
+    "nondum.host.peers.peer_services",
+    *(f"nondum.cli.{module}" for module, _ in COMMANDS.values()),
 )
 """What daemons and commands import, and the fork server before them."""
 

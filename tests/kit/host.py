@@ -11,16 +11,17 @@ from pathlib import Path
 from tests.kit.until import arrived
 
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.catalogue.records import JournalEntry, PayloadRecord, Snapshot, Step
-from nondum.host.drives.slots import SlotSource
-from nondum.host.drives.source import DriveSource
-from nondum.host.events import Event, HostStarted, WheelsCompiled
-from nondum.host.lifecycle.bus import Bus
-from nondum.host.lifecycle.component_manager import ComponentManager
-from nondum.host.lifecycle.executor import Executor
-from nondum.host.lifecycle.folders import Folders
-from nondum.host.lifecycle.installation import InstallOptions
-from nondum.host.lifecycle.tries import STEADY_S
+from nondum.host.core.bus import Bus
+from nondum.host.core.events import Event, HostStarted, WheelsCompiled
+from nondum.host.core.records import JournalEntry, PayloadRecord, Snapshot, Step
+from nondum.host.lifecycle.advance import RULES
+from nondum.host.lifecycle.crash_attribution import STEADY_S
+from nondum.host.manager.component_manager import ComponentManager
+from nondum.host.manager.effect_handlers import Executor
+from nondum.host.manager.installation import InstallOptions
+from nondum.host.manager.state_folders import Folders
+from nondum.host.sources.drives.slots import SlotSource
+from nondum.host.sources.drives.source import DriveSource
 from nondum.host.workers.spec import Timing
 from nondum.host.workers.workers import Workers
 
@@ -149,7 +150,7 @@ async def host_in_process(
 ) -> AsyncIterator[HostInProcess]:
     """Run a host's lifecycle under `root`; its state stays there for the next one."""
     folders, slots = Folders(root / "state"), root / "slots"
-    bus = Bus()
+    bus = Bus(RULES)
     catalogue = await Catalogue.open(folders.catalogue, HOST)
     workers = Workers(HOST, bus.emit, timing=timing)
     options = options or InstallOptions(allow_unsigned=True)

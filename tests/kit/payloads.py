@@ -26,7 +26,7 @@ from typing import Any
 
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.plugin import describe, load
-from nondum.wheelhouse.contents import Contents, Entry
+from nondum.wheelhouse.format.contents import Contents, Entry
 
 SDK = Path(__file__).parents[2] / "plugins/sdk"
 NOT_IN_WHEELS = {"INSTALLER", "REQUESTED", "RECORD", "direct_url.json"}

@@ -126,6 +126,6 @@ def test_processes_end_with_the_server(folder: Path) -> None:
 
 
 def test_only_modules_are_run_by_the_server() -> None:
-    assert module_of(DAEMON) == ("nondum.host.cli", "host", "run", "--user")
+    assert module_of(DAEMON) == ("nondum.cli", "host", "run", "--user")
     assert module_of(COMMAND) is None
     assert module_of(("setarch", "linux32", *DAEMON)) is None

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from tests.kit.descendants import pids
 
-from nondum.host.drives.mounts import mounted_below
+from nondum.host.sandbox.helper.mountinfo import mounted_below
 
 FOLDERS = ("staging", "payloads", "venvs", "scratch", "mounts")
 LASTING = {"host", "highwater", "former", "journal"}

@@ -15,16 +15,16 @@ from typing import Any, TypeVar
 import pluggy
 from tests.kit.until import PATIENCE_S, arrived
 
-from nondum.host.confinement import choice
-from nondum.host.confinement.level import Standing, parse_wanted
-from nondum.host.events import BehaviourEnded, Event, WorkerExited, WorkerReady
+from nondum.host.config.confinement_level import Standing, parse_wanted
+from nondum.host.core.events import BehaviourEnded, Event, WorkerExited, WorkerReady
+from nondum.host.workers import confinement_choice
 from nondum.host.workers.call import Call
 from nondum.host.workers.confinements import Confinement
 from nondum.host.workers.launcher import MARK, WorkerLauncher
 from nondum.host.workers.spec import Limits, Timing, WorkerSpec, base_interpreter
 from nondum.host.workers.workers import Workers
 from nondum.sdk.description import Behaviour, Condition, Input, Output, PluginDescription, Unit
-from nondum.wheelhouse.confinement import Level
+from nondum.wheelhouse.format.confinement import Level
 
 SDK = Path(__file__).parents[2] / "plugins/sdk"
 LIBRARIES = Path(pluggy.__file__).parents[1]
@@ -41,7 +41,7 @@ _E = TypeVar("_E", bound=Event)
 @functools.cache
 def standing() -> Standing:
     """How workers are tested."""
-    return choice.standing(parse_wanted(LEVEL), Level.NONE)
+    return confinement_choice.standing(parse_wanted(LEVEL), Level.NONE)
 
 
 def level() -> Level:
@@ -62,7 +62,9 @@ class WorkersUnderTest:
 
     def __post_init__(self) -> None:
         if self.confinement is None:
-            self.confinement = choice.confinement(standing(), (self.folder, SDK, LIBRARIES))
+            self.confinement = confinement_choice.confinement(
+                standing(), (self.folder, SDK, LIBRARIES)
+            )
         launcher = WorkerLauncher(self.confinement)
         self.workers = Workers(HOST, self._on_event, launcher=launcher, timing=self.timing)
 

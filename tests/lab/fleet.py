@@ -8,7 +8,7 @@ from pathlib import Path
 from tests.lab.cache import call
 from tests.lab.installed import Installed
 
-NONDUM = (sys.executable, "-m", "nondum.host.cli")
+NONDUM = (sys.executable, "-m", "nondum.cli")
 KEY, CERTIFICATE, PUBLIC = "/run/lab/host.pub", "/run/lab/certificate", "/run/lab/fleet.pub"
 
 

@@ -42,7 +42,7 @@ _MACHINE = frozenset(
 _JUDGES = re.compile(r"(flaw|overlap|use|excess|contradiction|twice)s?$")
 """What functions are called that return what is wrong as text."""
 
-_CONFINEMENT = "host/nondum/host/confinement"
+_CONFINEMENT = "host/nondum/host/sandbox/levels"
 TABLES: Mapping[str, tuple[str, ...]] = {
     f"{_CONFINEMENT}/refusals.py": (
         *("GROUPS", "WITHOUT_NAMESPACES", "SOCKETS_OF_THE_HOST"),
@@ -51,13 +51,13 @@ TABLES: Mapping[str, tuple[str, ...]] = {
     f"{_CONFINEMENT}/bubblewrap.py": ("NAMESPACES", "SEALED", "PROTECTED"),
 }
 """Module → its tables that say, row by row, what workers are kept from."""
-_INSIDE = "host/nondum/host/inside"
+_INSIDE = "host/nondum/host/sandbox/inside"
 CONFINING = frozenset(
     {
         *(f"{_INSIDE}/{name}.py" for name in ("bootstrap", "keeper", "kernel", "limits")),
         *(f"{_INSIDE}/{name}.py" for name in ("look", "room", "walls")),
         *(f"{_CONFINEMENT}/{name}.py" for name in ("bubblewrap", "landlock", "own_children")),
-        "host/nondum/host/bridge/process.py",
+        "host/nondum/host/peers/streams/process.py",
     }
 )
 """Modules that do hardly anything but take away what a process could do."""

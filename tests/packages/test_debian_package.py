@@ -18,8 +18,8 @@ import pytest
 from tests.packages.checkout import copied
 from tests.packages.conftest import ROOT, Build, Package
 
-from nondum.host import config
-from nondum.wheelhouse.elf import ARCHITECTURES, HEAD_BYTES, Elf
+from nondum.host.config import host_config
+from nondum.wheelhouse.wheels.elf import ARCHITECTURES, HEAD_BYTES, Elf
 
 pytestmark = [
     pytest.mark.slow,
@@ -99,19 +99,19 @@ def test_own_distributions_and_planners_are_in_it(tree: Tree, architecture: str)
 @both
 def test_configuration_is_a_conffile_that_the_daemon_reads(tree: Tree, architecture: str) -> None:
     root = tree(architecture)
-    assert (root / "DEBIAN/conffiles").read_text() == f"{config.SYSTEM_FILE}\n"
-    file = root / config.SYSTEM_FILE.relative_to("/")
-    defaults = config.HostConfig()
-    assert config.load(file, defaults) == defaults, "as delivered it changes nothing"
+    assert (root / "DEBIAN/conffiles").read_text() == f"{host_config.SYSTEM_FILE}\n"
+    file = root / host_config.SYSTEM_FILE.relative_to("/")
+    defaults = host_config.HostConfig()
+    assert host_config.load(file, defaults) == defaults, "as delivered it changes nothing"
 
 
 @both
 def test_commented_keys_are_keys(tree: Tree, architecture: str) -> None:
-    text = (tree(architecture) / config.SYSTEM_FILE.relative_to("/")).read_text()
+    text = (tree(architecture) / host_config.SYSTEM_FILE.relative_to("/")).read_text()
     lines = [
         line[2:] if line.startswith("# ") and " = " in line else line for line in text.splitlines()
     ]
-    config.parse("\n".join(lines), "host.toml", config.HostConfig())
+    host_config.parse("\n".join(lines), "host.toml", host_config.HostConfig())
 
 
 @both
@@ -154,7 +154,7 @@ def test_command_of_the_tree_runs_wherever_it_lies(tree: Tree) -> None:
     if MACHINES[MINE] != platform.machine() or not Path("/usr/bin/python3.11").exists():
         pytest.skip("neither architecture is this machine's, or Debian 12's Python is not here")
     python = tree(MINE) / "opt/nondum/bin/python"
-    command: list[str | Path] = [python, "-I", "-m", "nondum.host.cli"]
+    command: list[str | Path] = [python, "-I", "-m", "nondum.cli"]
     said = subprocess.run([*command, "--version"], capture_output=True, text=True, check=True)
     assert "0.1.0" in said.stdout
     completion = (tree(MINE) / "usr/share/bash-completion/completions/nondum").read_text()

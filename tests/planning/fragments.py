@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nondum.planning.contribution import Contribution, StreamObject, UnitObject
+from nondum.planning.merge.contribution import Contribution, StreamObject, UnitObject
 from nondum.sdk.description import Behaviour, Fragment
 
 HOST = "rover"

@@ -7,14 +7,14 @@ from random import Random
 
 from tests.planning.tasks import search
 
-from nondum.planning.attempts import Patience
-from nondum.planning.facts import parts
-from nondum.planning.goal import GoalKind
-from nondum.planning.running import RunState
-from nondum.planning.step import Step
-from nondum.planning.task_control import Phase
-from nondum.planning.task_tree import TaskTree
-from nondum.planning.world import WorldModel
+from nondum.planning.execute.attempts import Patience
+from nondum.planning.execute.plan_executive import Phase
+from nondum.planning.execute.running import RunState
+from nondum.planning.execute.step import Step
+from nondum.planning.execute.task_tree import TaskTree
+from nondum.planning.execute.world import WorldModel
+from nondum.planning.merge.goal import GoalKind
+from nondum.planning.pddl.facts import parts
 from nondum.sdk.planner import GroundAction, GroundTask, Plan
 
 

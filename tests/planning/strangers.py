@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from importlib.metadata import entry_points
 
-from nondum.planning.contribution import Contribution
-from nondum.planning.domain import Merged
-from nondum.planning.goal import parse_goal
-from nondum.planning.ground import ground
-from nondum.planning.merge import merge
+from nondum.planning.ground.ground import ground
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.domain import Merged
+from nondum.planning.merge.goal import parse_goal
+from nondum.planning.merge.merge import merge
 from nondum.sdk.description import Behaviour, Fragment, Output, PluginDescription, Unit
 from nondum.sdk.planner import GroundTask, Planner
 

@@ -25,12 +25,12 @@ from tests.planning.strangers import (
     components,
 )
 
-from nondum.planning.advise import Advice, Candidate, Here, Way, advise
-from nondum.planning.advise.trial import Outcome, Trials
-from nondum.planning.contribution import Contribution
-from nondum.planning.merge import merge
+from nondum.planning.explain.advise import Advice, Candidate, Here, Way, advise
+from nondum.planning.explain.advise.trial import Outcome, Trials
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.merge import merge
 from nondum.planning.search import solve
-from nondum.planning.validate import validate
+from nondum.planning.search.validate import validate
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import GoalRefused
 from nondum.sdk.planner import Answer, GaveUp, GroundTask

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from nondum.planning.asking import ASKED, Question, question_in
-from nondum.planning.stop_words import is_stop
+from nondum.planning.words.asking import ASKED, Question, question_in
+from nondum.planning.words.stop_words import is_stop
 
 
 def test_what_listeners_are_told_to_hear_is_understood_and_stops_nothing() -> None:

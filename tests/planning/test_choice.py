@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from tests.planning.tasks import FOLLOW_LASTING, FOLLOW_PLAN, Written, follow_task, ground, plan_of
 
-from nondum.planning.choice import Alternatives
-from nondum.planning.regression import Regression
-from nondum.planning.step import steps_of, words
+from nondum.planning.execute.choice import Alternatives
+from nondum.planning.execute.regression import Regression
+from nondum.planning.execute.step import steps_of, words
 from nondum.sdk.planner import GroundTask
 
 

@@ -10,7 +10,7 @@ CODE = re.compile(r"\b(?:E-[A-Z]+(?:-[A-Z]+)*|(?:PDDL|PHRASE|PLAN|WHY)_[A-Z_]+)\
 
 
 def test_documented_codes_are_those_that_are_given() -> None:
-    sources = (ROOT / "planning/nondum/planning").glob("*.py")
+    sources = (ROOT / "planning/nondum/planning").rglob("*.py")
     quoted = re.compile(rf'"({CODE.pattern})"')
     given = {code for path in sources for code in quoted.findall(path.read_text("utf-8"))}
     documented = set(CODE.findall((ROOT / "docs/fragments.md").read_text("utf-8")))

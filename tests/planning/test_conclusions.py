@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from tests.planning.fragments import HOST, brings
 
-from nondum.planning.conclusions import conclusions
-from nondum.planning.domain import Merged
-from nondum.planning.merge import merge
+from nondum.planning.ground.conclusions import conclusions
+from nondum.planning.merge.domain import Merged
+from nondum.planning.merge.merge import merge
 
 WORDS = """(:constants hall kitchen attic - place)
            (:predicates (next ?a ?b - place) (near ?a ?b - place) (lit ?p - place) (dark)

@@ -18,11 +18,11 @@ from tests.planning.strangers import (
     components,
 )
 
-from nondum.planning.cause import Lack
-from nondum.planning.contribution import Contribution
-from nondum.planning.explain import Diagnosis, explain, suppliers
-from nondum.planning.goal import parse_goal
-from nondum.planning.merge import merge
+from nondum.planning.explain.cause import Lack
+from nondum.planning.explain.explain import Diagnosis, explain, suppliers
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.goal import parse_goal
+from nondum.planning.merge.merge import merge
 from nondum.planning.search import solve
 from nondum.sdk.planner import Answer, GaveUp, GroundTask
 

@@ -19,9 +19,9 @@ from tests.planning.strangers import (
     task,
 )
 
-from nondum.planning.contribution import Contribution
-from nondum.planning.merge import merge
-from nondum.planning.validate import validate
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.merge import merge
+from nondum.planning.search.validate import validate
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import GoalRefused
 from nondum.sdk.planner import GroundTask, Plan, Unsolvable

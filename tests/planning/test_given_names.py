@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.host.cgroups.cage import NAME as CAGE
-from nondum.host.helper.requests import COMPONENT
-from nondum.planning.given_names import (
+from nondum.host.sandbox.cgroups.limits import NAME as CAGE
+from nondum.host.sandbox.helper.requests import COMPONENT
+from nondum.planning.merge.given_names import (
     LONGEST,
     GivenNames,
     forms,
@@ -19,9 +19,9 @@ from nondum.planning.given_names import (
     of_plugin,
     plugins_of_others,
 )
-from nondum.planning.parse import parse_formula
+from nondum.planning.pddl.parse import parse_formula
 from nondum.sdk.description import Fragment
-from nondum.wheelhouse.names import COMPONENT_ID
+from nondum.wheelhouse.format.names import COMPONENT_ID
 
 IDS = st.sampled_from(["gps", "gps-", "g-p", "clock", "g" * 63, "g" * 62 + "-", "0"])
 PAYLOADS = st.sampled_from(

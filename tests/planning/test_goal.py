@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT, ROVER, components
 
-from nondum.planning.goal import goal_problems, goal_text, parse_goal
-from nondum.planning.merge import merge
+from nondum.planning.merge.goal import goal_problems, goal_text, parse_goal
+from nondum.planning.merge.merge import merge
 from nondum.sdk.errors import GoalRefused
 
 BOTH = merge(components([COMPTON_CAMERA, PAN_TILT_UNIT]), ROVER)

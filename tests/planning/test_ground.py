@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.planning.fragments import HOST, brings
 
-from nondum.planning.domain import Merged
-from nondum.planning.exploration import explore
-from nondum.planning.facts import holds, is_twin, twin
-from nondum.planning.goal import parse_goal
-from nondum.planning.ground import ground
-from nondum.planning.merge import merge
-from nondum.planning.relaxed import quick_answer
+from nondum.planning.ground.delete_relaxation import quick_answer
+from nondum.planning.ground.exploration import explore
+from nondum.planning.ground.ground import ground
+from nondum.planning.merge.domain import Merged
+from nondum.planning.merge.goal import parse_goal
+from nondum.planning.merge.merge import merge
+from nondum.planning.pddl.facts import holds, is_twin, twin
 from nondum.sdk.errors import FragmentRefused
 from nondum.sdk.planner import AlreadyTrue, GroundAction, GroundTask, Unsolvable
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 from tests.kit.work import steps_of
 from tests.planning.strangers import ROVER, STRANGERS, at_rest, component, planner
 
-from nondum.planning.contribution import Contribution
-from nondum.planning.goal import parse_goal
-from nondum.planning.ground import ground
-from nondum.planning.merge import merge
+from nondum.planning.ground.ground import ground
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.goal import parse_goal
+from nondum.planning.merge.merge import merge
 from nondum.sdk.planner import GroundTask, Plan
 
 

@@ -8,12 +8,12 @@ from itertools import permutations
 import pytest
 from tests.planning.fragments import HOST, brings
 
-from nondum.planning.contribution import Contribution
-from nondum.planning.core import core, core_value_types
-from nondum.planning.domain import Merged
-from nondum.planning.merge import merge
-from nondum.planning.parse import parse_fragment
-from nondum.planning.syntax import DomainFragment
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.core import core, core_value_types
+from nondum.planning.merge.domain import Merged
+from nondum.planning.merge.merge import merge
+from nondum.planning.pddl.parse import parse_fragment
+from nondum.planning.pddl.syntax import DomainFragment
 from nondum.sdk.description import Behaviour, Fragment, PluginDescription, Unit
 from nondum.sdk.errors import Problem
 from nondum.sdk.messages import MESSAGES
@@ -614,7 +614,7 @@ def test_who_says_no_type_of_a_value_agrees(order: tuple[int, int]) -> None:
 
 def test_workers_read_the_types_of_values_as_planning_does() -> None:
     texts = {
-        "core": (resources.files("nondum.planning") / "nondum-core.pddl").read_text("utf-8"),
+        "core": (resources.files("nondum.planning.merge") / "nondum-core.pddl").read_text("utf-8"),
         "odd": "(define (domain d) (:predicates (A ?h) (b ?h) (c ?h)) ; (:valued c - text)\n"
         "(:valued A b\n - Pose c))",
     }

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from tests.planning.fragments import HOST, brings
 from tests.planning.strangers import STRANGERS, component
 
-from nondum.planning.contribution import Contribution
-from nondum.planning.merge import merge
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.merge import merge
 
 TYPES = st.sampled_from(["cart", "cart - base", "cart - unit", "van - cart", "van - base"])
 PREDICATES = st.sampled_from(

@@ -16,15 +16,15 @@ from tests.planning.strangers import (
     components,
 )
 
-from nondum.planning import standalone
-from nondum.planning.bounds import INSTANCES_LIMIT, TooManyBindings
-from nondum.planning.contribution import Contribution
-from nondum.planning.domain import Merged
-from nondum.planning.goal import parse_goal
-from nondum.planning.ground import ground
-from nondum.planning.merge import merge
-from nondum.planning.oversize import Fitted, fitted
+from nondum.planning.ground.bounds import INSTANCES_LIMIT, TooManyBindings
+from nondum.planning.ground.ground import ground
+from nondum.planning.ground.oversize import Fitted, fitted
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.domain import Merged
+from nondum.planning.merge.goal import parse_goal
+from nondum.planning.merge.merge import merge
 from nondum.planning.search import solve
+from nondum.planning.workbench import standalone
 from nondum.sdk.errors import Problem
 from nondum.sdk.planner import GroundTask, Plan
 

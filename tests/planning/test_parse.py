@@ -6,14 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.planning.parse import (
+from nondum.planning.pddl.parse import (
     NAME_LIMIT,
     SIZE_LIMIT_BYTES,
     parse_formula,
     parse_fragment,
     parse_signature,
 )
-from nondum.planning.syntax import (
+from nondum.planning.pddl.syntax import (
     And,
     Atom,
     DomainFragment,

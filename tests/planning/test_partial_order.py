@@ -14,7 +14,7 @@ from tests.planning.tasks import (
     plan_of,
 )
 
-from nondum.planning.partial_order import (
+from nondum.planning.execute.partial_order import (
     GOAL,
     CausalLink,
     PartialOrder,
@@ -23,7 +23,7 @@ from nondum.planning.partial_order import (
     partial_order,
     threats,
 )
-from nondum.planning.step import Step, steps_of, words
+from nondum.planning.execute.step import Step, steps_of, words
 
 DELIVERY = (
     "load p1 t1 x",

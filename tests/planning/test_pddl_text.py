@@ -10,12 +10,12 @@ import pytest
 from tests.planning.differential.texts import TEXTS, Text, text
 from tests.planning.fragments import HOST, brings
 
-from nondum.planning.goal import parse_goal
-from nondum.planning.ground import ground
-from nondum.planning.merge import merge
-from nondum.planning.pddl_text import pddl_text
-from nondum.planning.standalone import Standalone, load
-from nondum.planning.wording import without_dots
+from nondum.planning.ground.ground import ground
+from nondum.planning.ground.pddl_text import pddl_text
+from nondum.planning.merge.goal import parse_goal
+from nondum.planning.merge.merge import merge
+from nondum.planning.pddl.wording import without_dots
+from nondum.planning.workbench.standalone import Standalone, load
 from nondum.sdk.planner import GroundTask, PddlTask
 
 EYE = """(:predicates (seen ?c - class ?h - host))

@@ -17,10 +17,10 @@ from tests.planning.strangers import (
     components,
 )
 
-from nondum.planning.goal import Goal, goal_text
-from nondum.planning.merge import merge
-from nondum.planning.pattern import PatternInvalid, Word, parse_pattern
-from nondum.planning.phrases import MAX_OFFERS, Phrasebook, phrasebook
+from nondum.planning.merge.goal import Goal, goal_text
+from nondum.planning.merge.merge import merge
+from nondum.planning.words.pattern import PatternInvalid, Word, parse_pattern
+from nondum.planning.words.phrases import MAX_OFFERS, Phrasebook, phrasebook
 from nondum.sdk.description import Behaviour, Fragment, Label, Phrase, PluginDescription
 from nondum.sdk.errors import GoalRefused
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.planning.contribution import Contribution, UnitObject
-from nondum.planning.pricing import at_own_cost, handicaps, priced
+from nondum.planning.ground.pricing import at_own_cost, handicaps, priced
+from nondum.planning.merge.contribution import Contribution, UnitObject
 from nondum.sdk.planner import GroundAction, GroundTask, Plan
 
 

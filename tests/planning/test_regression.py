@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.planning.tasks import FOLLOW_LASTING, FOLLOW_PLAN, follow_task, plan_of
 
-from nondum.planning.partial_order import GOAL, bits
-from nondum.planning.regression import Regression, Rest, Stuck
-from nondum.planning.step import Step, steps_of, words
+from nondum.planning.execute.partial_order import GOAL, bits
+from nondum.planning.execute.regression import Regression, Rest, Stuck
+from nondum.planning.execute.step import Step, steps_of, words
 from nondum.sdk.planner import GroundAction
 
 FACTS = [f"f{i}" for i in range(7)]

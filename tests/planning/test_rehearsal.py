@@ -6,9 +6,9 @@ import pytest
 from tests.planning.differential.semantics import Problem
 from tests.planning.differential.texts import TEXTS, Text
 
-from nondum.planning.lifted import Meaning
-from nondum.planning.rehearsal import rehearsed
 from nondum.planning.search import solve
+from nondum.planning.workbench.lifted import Meaning
+from nondum.planning.workbench.rehearsal import rehearsed
 from nondum.sdk.planner import Plan
 
 BY_NAME = {text.name: text for text in TEXTS}

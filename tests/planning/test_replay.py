@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from tests.planning.tasks import FOLLOW_LASTING, FOLLOW_PLAN, follow_task, plan_of
 
-from nondum.planning.replay import replayed
-from nondum.planning.step import words
+from nondum.planning.execute.replay import replayed
+from nondum.planning.execute.step import words
 from nondum.sdk.planner import GroundTask
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from nondum.planning.ground import ground
+from nondum.planning.ground.ground import ground
 from nondum.planning.search import solve
-from nondum.planning.standalone import Standalone, load
+from nondum.planning.workbench.standalone import Standalone, load
 from nondum.sdk.errors import FragmentRefused, Problem
 from nondum.sdk.planner import GroundTask, Plan
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from nondum.planning.stop_words import (
+from nondum.planning.words.stop_words import (
     STOPS,
     host_behind_stop,
     is_stop,

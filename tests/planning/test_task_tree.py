@@ -20,10 +20,10 @@ from tests.planning.tasks import (
     survey_task,
 )
 
-from nondum.planning.attempts import Patience
-from nondum.planning.running import RunState
-from nondum.planning.task_control import Phase
-from nondum.planning.task_tree import TaskTree
+from nondum.planning.execute.attempts import Patience
+from nondum.planning.execute.plan_executive import Phase
+from nondum.planning.execute.running import RunState
+from nondum.planning.execute.task_tree import TaskTree
 from nondum.sdk.planner import GroundTask
 
 CAMERA, DETECT, TRACK, DRIVE = FOLLOW_PLAN

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from nondum.planning.typegraph import TypeGraph
+from nondum.planning.pddl.typegraph import TypeGraph
 
 
 def graph(**parents: str) -> TypeGraph:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from nondum.planning.validate import validate
+from nondum.planning.search.validate import validate
 from nondum.sdk.planner import GroundAction, GroundTask, Plan
 
 

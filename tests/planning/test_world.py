@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from nondum.planning.facts import twin
-from nondum.planning.testimony import Source
-from nondum.planning.world import MOST_DENIALS, WorldModel
+from nondum.planning.execute.provenance import Source
+from nondum.planning.execute.world import MOST_DENIALS, WorldModel
+from nondum.planning.pddl.facts import twin
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from nondum.planning.world import WorldModel
+from nondum.planning.execute.world import WorldModel
 
 COMPONENTS = ("arm", "camera", "map")
 FACTS = ("at cup a", "at cup b", "at pot a", "open door", "near attic")

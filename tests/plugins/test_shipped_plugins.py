@@ -9,17 +9,17 @@ from pathlib import Path
 import pytest
 from tests.planning.strangers import ROVER, at_rest, components, planner, task
 
-from nondum.host.optional_inputs import choose, sockets_of, sources_of
-from nondum.planning.domain import bind
-from nondum.planning.goal import goal_text
-from nondum.planning.ground import ground
-from nondum.planning.merge import merge
-from nondum.planning.phrases import phrasebook
+from nondum.host.workers.optional_inputs import choose, sockets_of, sources_of
+from nondum.planning.ground.ground import ground
+from nondum.planning.merge.domain import bind
+from nondum.planning.merge.goal import goal_text
+from nondum.planning.merge.merge import merge
+from nondum.planning.words.phrases import phrasebook
 from nondum.sdk.bench import WorkerFactory
 from nondum.sdk.description import Output, PluginDescription, Unit
 from nondum.sdk.planner import Plan, Unsolvable
 from nondum.sdk.plugin import describe, load
-from nondum.wheelhouse import manifest
+from nondum.wheelhouse.format import manifest
 
 PLUGINS = Path(__file__).parents[2] / "plugins"
 FOLDERS = sorted(path.parent for path in PLUGINS.glob("*/payload.toml"))

@@ -11,7 +11,7 @@ from tests.runner.result import Result
 from tests.runner.stages import ROOT
 from tests.runner.yardstick import Usage, load_of_others
 
-BUDGET = Budget(1.0, {"tests/host": 100.0, "tests/host/cli": 20.0, "tests/sdk": 4.0}, {})
+BUDGET = Budget(1.0, {"tests/host": 100.0, "tests/cli": 20.0, "tests/sdk": 4.0}, {})
 
 
 def passed(test: str, seconds: float) -> Result:
@@ -19,7 +19,7 @@ def passed(test: str, seconds: float) -> Result:
 
 
 def test_a_test_counts_for_the_nearest_folder_that_has_a_budget() -> None:
-    assert BUDGET.folder_of("tests/host/cli/test_main.py::test_it") == "tests/host/cli"
+    assert BUDGET.folder_of("tests/cli/test_main.py::test_it") == "tests/cli"
     assert BUDGET.folder_of("tests/host/mind/test_mind.py::test_it") == "tests/host"
     assert BUDGET.folder_of("tests/hostile/test_x.py::test_it") == "tests/hostile"
 

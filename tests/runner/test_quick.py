@@ -12,7 +12,7 @@ from tests.runner.stages import ROOT
     [
         ("host/nondum/host/mind/mind.py", "tests/host/mind"),
         ("host/nondum/host/app.py", "tests/host"),
-        ("planning/nondum/planning/goal.py", "tests/planning"),
+        ("planning/nondum/planning/merge/goal.py", "tests/planning"),
         ("plugins/sdk/nondum/sdk/wire.py", "tests/sdk"),
         ("plugins/speech/nondum_speech/plugin.py", "tests/plugins"),
         ("tests/host/trust/test_chain.py", "tests/host/trust"),
@@ -24,7 +24,7 @@ def test_file_is_tested_in_the_folder_of_its_name(file: str, folder: str) -> Non
 
 
 def test_folders_of_changed_files_come_first() -> None:
-    changed = ["host/nondum/host/trust/chain.py", "wheelhouse/nondum/wheelhouse/lock.py"]
+    changed = ["host/nondum/host/trust/chain.py", "wheelhouse/nondum/wheelhouse/format/lock.py"]
     first, second, *others = quick.ordered(changed)
     assert {first, second} == {"tests/host/trust", "tests/wheelhouse"}
     assert sorted([first, second, *others]) == sorted(quick.PURE)

@@ -10,12 +10,12 @@ from tests.runner.result import Result
 from tests.runner.verdict import Findings
 
 NEED_ROOT = (
-    "tests/host/helper/test_disks.py",
-    "tests/host/helper/test_nodes.py",
-    "tests/host/helper/test_server.py",
-    "tests/host/helper/test_service.py",
-    "tests/host/cgroups/test_cages.py",
-    "tests/host/drives/test_uses.py",
+    "tests/host/sandbox/helper/test_disks.py",
+    "tests/host/sandbox/helper/test_device_nodes.py",
+    "tests/host/sandbox/helper/test_server.py",
+    "tests/host/sandbox/helper/test_service.py",
+    "tests/host/sandbox/cgroups/test_groups.py",
+    "tests/host/sandbox/helper/test_block_devices.py",
     "tests/faults/test_power.py",
     "tests/faults/test_disk.py",
     "tests/transport/peers/test_keys.py",

@@ -24,9 +24,9 @@ from pathlib import Path
 from packaging.utils import parse_wheel_filename
 
 from nondum.sdk.errors import Problem
-from nondum.wheelhouse import wheel
-from nondum.wheelhouse.locking import sha256
-from nondum.wheelhouse.target import ARCHITECTURES, Target
+from nondum.wheelhouse.build.locking import sha256
+from nondum.wheelhouse.format.target import ARCHITECTURES, Target
+from nondum.wheelhouse.wheels import wheel
 
 LIST = Path(__file__).parents[1] / "data/popular-wheels.txt"
 CACHE = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "nondum-wheels"

@@ -20,14 +20,16 @@ from nondum.sdk.errors import (
     PayloadRefused,
     Problem,
 )
-from nondum.wheelhouse import build, contents, drive, index, lock, payload, preflight
-from nondum.wheelhouse.confinement import Level
-from nondum.wheelhouse.cost import Cost, costs
-from nondum.wheelhouse.library_wheels import library_wheel
-from nondum.wheelhouse.resolve import ADD_IT, Sources
-from nondum.wheelhouse.signatures import UnsignedAllowed
-from nondum.wheelhouse.target import Target, targets
-from nondum.wheelhouse.verification import verify
+from nondum.wheelhouse.build import build
+from nondum.wheelhouse.build.cost import Cost, costs
+from nondum.wheelhouse.build.library_wheels import library_wheel
+from nondum.wheelhouse.build.resolve import ADD_IT, Sources
+from nondum.wheelhouse.build.verification import verify
+from nondum.wheelhouse.format import contents, index, lock
+from nondum.wheelhouse.format.confinement import Level
+from nondum.wheelhouse.format.signatures import UnsignedAllowed
+from nondum.wheelhouse.format.target import Target, targets
+from nondum.wheelhouse.payload import drive, payload, preflight
 
 HERE = Target.here()
 OTHER = Target("aarch64" if HERE.architecture != "aarch64" else "x86_64", HERE.python)

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.wheelhouse import bytecode
-from nondum.wheelhouse.unpacking import StoredFile
+from nondum.wheelhouse.store import bytecode
+from nondum.wheelhouse.store.unpacking import StoredFile
 
 UNCOMPILABLE = {
     "a template": b"class {{ name }}: pass",

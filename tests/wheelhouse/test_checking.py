@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from tests.kit.descriptors import descriptors_left
 
-from nondum.wheelhouse import checking
-from nondum.wheelhouse.unpacking import StoredFile
+from nondum.wheelhouse.store import checking
+from nondum.wheelhouse.store.unpacking import StoredFile
 
 DATA = b"d" * 300_000
 

@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from nondum.wheelhouse.confinement import Level, parse
+from nondum.wheelhouse.format.confinement import Level, parse
 
 
 def test_levels_are_ordered_by_how_much_they_confine() -> None:

@@ -19,11 +19,15 @@ from pathlib import Path
 import pytest
 from tests.kit.payloads import installed_wheel
 
-from nondum.wheelhouse import bytecode, lock, locking, preflight, venvs, wheel
-from nondum.wheelhouse.confinement import Level
-from nondum.wheelhouse.store import Store
-from nondum.wheelhouse.stored import StoredWheel
-from nondum.wheelhouse.target import Target
+from nondum.wheelhouse.build import locking
+from nondum.wheelhouse.format import lock
+from nondum.wheelhouse.format.confinement import Level
+from nondum.wheelhouse.format.target import Target
+from nondum.wheelhouse.payload import preflight
+from nondum.wheelhouse.store import bytecode, venvs
+from nondum.wheelhouse.store.store import Store
+from nondum.wheelhouse.store.stored import StoredWheel
+from nondum.wheelhouse.wheels import wheel
 
 PYTHON = Path(sys.base_prefix) / "bin" / f"python{sys.version_info.major}.{sys.version_info.minor}"
 POPULAR = (

@@ -10,8 +10,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from nondum.sdk.errors import PayloadRefused
-from nondum.wheelhouse import contents
-from nondum.wheelhouse.contents import Contents, Entry
+from nondum.wheelhouse.format import contents
+from nondum.wheelhouse.format.contents import Contents, Entry
 
 SHA = "a" * 64
 DIGITS = "9" * 5_000

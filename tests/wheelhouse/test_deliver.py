@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from nondum.wheelhouse import build, disk
+from nondum.wheelhouse.build import build
+from nondum.wheelhouse.store import disk
 
 ID = "org.example.lamp"
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.wheelhouse.device_rules import WORDS, fits, judged, names_id, wrong_rules
+from nondum.wheelhouse.format.device_rules import WORDS, fits, judged, names_id, wrong_rules
 
 FACTS = {"usb": ["0403:6001"], "interface": ["0e:01:00", "01:01:00"], "ID_MODEL": ["PTU-D46"]}
 

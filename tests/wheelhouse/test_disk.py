@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from nondum.wheelhouse import disk
+from nondum.wheelhouse.store import disk
 
 
 @pytest.mark.parametrize(

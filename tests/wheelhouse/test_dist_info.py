@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import pytest
 from tests.wheelhouse.hostile_wheels import METADATA, NAME, WHEEL
 
-from nondum.wheelhouse import dist_info
-from nondum.wheelhouse.dist_info import WheelName
+from nondum.wheelhouse.wheels import dist_info
+from nondum.wheelhouse.wheels.dist_info import WheelName
 
 NAMED = WheelName.parse(NAME)
 PLAIN, TAGGED = METADATA.decode(), WHEEL.decode()

@@ -12,8 +12,9 @@ import pytest
 from tests.wheelhouse.file_systems import file_system, needs_mount
 
 from nondum.sdk.errors import DriveGone, InstallFailed, PayloadRefused
-from nondum.wheelhouse import contents, drive
-from nondum.wheelhouse.contents import Contents, Entry
+from nondum.wheelhouse.format import contents
+from nondum.wheelhouse.format.contents import Contents, Entry
+from nondum.wheelhouse.payload import drive
 
 FILES = {"payload.toml": b"x = 1\n", "wheels/a.whl": b"w" * 3_000_000, "wheels/deep/b.whl": b""}
 

@@ -14,9 +14,9 @@ from tests.kit.payloads import installed_wheel
 from tests.wheelhouse.hostile.machines import ARM, ARM_32, MODULE, X86, X86_32, elf, native
 
 from nondum.sdk.errors import Problem
-from nondum.wheelhouse import extensions, wheel
-from nondum.wheelhouse.elf import ARCHITECTURES, HEAD_BYTES, Elf
-from nondum.wheelhouse.extensions import MAX_TOLD
+from nondum.wheelhouse.wheels import extensions, wheel
+from nondum.wheelhouse.wheels.elf import ARCHITECTURES, HEAD_BYTES, Elf
+from nondum.wheelhouse.wheels.extensions import MAX_TOLD
 
 PURE = "py3-none-any"
 LIBRARY = b"\0gst_init\0"

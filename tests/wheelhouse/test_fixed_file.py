@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.wheelhouse.fixed_file import PIECE, FixedFile, pieces
+from nondum.wheelhouse.format.fixed_file import PIECE, FixedFile, pieces
 
 DATA = bytes(range(256)) * 8
 positions = st.none() | st.integers(-3000, 3000)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from nondum.wheelhouse import contents, manifest
-from nondum.wheelhouse.manifest import Requires
+from nondum.wheelhouse.format import contents, manifest
+from nondum.wheelhouse.format.manifest import Requires
 
 ROOT = Path(__file__).parent.parent.parent
 TEXT = (ROOT / "docs/payload-format.md").read_text(encoding="utf-8")
@@ -27,9 +27,10 @@ KEYS = (
 
 def codes() -> set[str]:
     folder = ROOT / "wheelhouse/nondum/wheelhouse"
-    texts = [(folder / f"{name}.py").read_text() for name in (*READING, "wheel", "signatures")]
+    names = (*READING, "wheel", "signatures")
+    texts = [path.read_text() for name in names for path in folder.rglob(f"{name}.py")]
     found = {match for text in texts for match in CODE.findall(text)}
-    kinds = re.findall(r'report\.add\(\s*"([A-Z]+)"', (folder / "tables.py").read_text())
+    kinds = re.findall(r'report\.add\(\s*"([A-Z]+)"', (folder / "format/tables.py").read_text())
     return found | {f"MANIFEST_{kind}" for kind in (*kinds, "VALUE", "TWICE")}
 
 

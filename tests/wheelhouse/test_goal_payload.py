@@ -9,11 +9,13 @@ from tests.kit.payloads import seal
 from tests.kit.signing import Key, sign_payload, trust_of
 
 from nondum.sdk.errors import PayloadRefused
-from nondum.wheelhouse import drive, goal_payload, goals, preflight
-from nondum.wheelhouse.confinement import Level
-from nondum.wheelhouse.signatures import UnsignedAllowed
+from nondum.wheelhouse.build import goal_payload
+from nondum.wheelhouse.build.verification import Verified, verify
+from nondum.wheelhouse.format import goals
+from nondum.wheelhouse.format.confinement import Level
+from nondum.wheelhouse.format.signatures import UnsignedAllowed
+from nondum.wheelhouse.payload import drive, preflight
 from nondum.wheelhouse.trust.judging import Circumstances, Judging
-from nondum.wheelhouse.verification import Verified, verify
 
 ALICE, ROOT, ID = Key("alice"), Key("root"), "org.example.errand"
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nondum.sdk.errors import PayloadRefused
-from nondum.wheelhouse import goals
+from nondum.wheelhouse.format import goals
 
 WORDS = st.text("abcäö xyz,-", min_size=1, max_size=30).map(str.strip).filter(bool)
 

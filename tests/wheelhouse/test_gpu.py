@@ -9,8 +9,8 @@ from types import ModuleType
 
 import pytest
 
-from nondum.wheelhouse import gpu
-from nondum.wheelhouse.gpu import Gpu
+from nondum.wheelhouse.payload import gpu
+from nondum.wheelhouse.payload.gpu import Gpu
 
 MB = 1024 * 1024
 

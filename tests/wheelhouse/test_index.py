@@ -21,7 +21,7 @@ from nondum.sdk.description import (
     Unit,
 )
 from nondum.sdk.errors import PayloadRefused
-from nondum.wheelhouse import index
+from nondum.wheelhouse.format import index
 
 PLAIN = b'{"format": 1, "components": {}}'
 

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.wheelhouse.fixed_file import pieces
-from nondum.wheelhouse.inflate import crc32, inflated
+from nondum.wheelhouse.format.fixed_file import pieces
+from nondum.wheelhouse.wheels.inflate import crc32, inflated
 
 MEGABYTE = 1024 * 1024
 either_library = pytest.mark.parametrize(

@@ -18,7 +18,7 @@ import pytest
 from tests.kit.payloads import make_wheel, sha256
 from tests.wheelhouse.hostile_wheels import INFO, METADATA, WHEEL, record_of
 
-from nondum.wheelhouse.contents import MAX_FILES
+from nondum.wheelhouse.format.contents import MAX_FILES
 
 MEGABYTE = 1024 * 1024
 SPARE = 128 * MEGABYTE
@@ -26,8 +26,8 @@ SPARE = 128 * MEGABYTE
 CHILD = """
 import json, re, sys
 from pathlib import Path
-from nondum.host.lifecycle import allowance
-from nondum.wheelhouse.store import Store
+from nondum.host.jobs import allowance
+from nondum.wheelhouse.store.store import Store
 
 store, spare, *wheels = json.loads(sys.argv[1])
 if spare:

@@ -13,7 +13,7 @@ from packaging.version import Version
 from tests.wheelhouse.locks import HEAD, SHA, host, package, wheel
 
 from nondum.sdk.errors import PayloadRefused, Problem
-from nondum.wheelhouse import lock
+from nondum.wheelhouse.format import lock
 
 PLAIN = HEAD + package("a", "1.0", wheel("a-1.0-py3-none-any.whl"))
 

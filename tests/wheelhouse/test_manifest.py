@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from nondum.sdk.description import DeviceNeed
 from nondum.sdk.errors import PayloadRefused, Problem
-from nondum.wheelhouse import manifest
-from nondum.wheelhouse.confinement import Level
-from nondum.wheelhouse.manifest import UnitMount
+from nondum.wheelhouse.format import manifest
+from nondum.wheelhouse.format.confinement import Level
+from nondum.wheelhouse.format.manifest import UnitMount
 
 PLAIN = """\
 id = "org.example.blinker"

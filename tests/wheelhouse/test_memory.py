@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.wheelhouse import memory
-from nondum.wheelhouse.gpu import Gpu
-from nondum.wheelhouse.manifest import Requires
-from nondum.wheelhouse.memory import Memory, Promised
+from nondum.wheelhouse.format.manifest import Requires
+from nondum.wheelhouse.payload import memory
+from nondum.wheelhouse.payload.gpu import Gpu
+from nondum.wheelhouse.payload.memory import Memory, Promised
 
 MB = st.integers(0, 10_000)
 PLENTY = 10**9

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from nondum.wheelhouse import names
+from nondum.wheelhouse.format import names
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 from tests.wheelhouse.hostile_wheels import End, ZipBuilder
 
-from nondum.wheelhouse import outline
+from nondum.wheelhouse.wheels import outline
 
 PLAIN = ZipBuilder().add("evil/__init__.py", b"X = 1\n")
 DATA = PLAIN.bytes()

@@ -16,17 +16,13 @@ from tests.kit.payloads import Part, make_payload, make_wheel, seal
 from tests.wheelhouse.hostile_wheels import WheelBuilder
 
 from nondum.sdk.errors import PayloadRefused, Problem
-from nondum.wheelhouse import contents, drive, payload, preflight
-from nondum.wheelhouse.confinement import Level
-from nondum.wheelhouse.payload import (
-    StagedPayload,
-    check_wheels,
-    is_metadata,
-    load,
-)
-from nondum.wheelhouse.preflight import HostFacts
-from nondum.wheelhouse.signatures import UnsignedAllowed
-from nondum.wheelhouse.verification import verify
+from nondum.wheelhouse.build.verification import verify
+from nondum.wheelhouse.format import contents
+from nondum.wheelhouse.format.confinement import Level
+from nondum.wheelhouse.format.signatures import UnsignedAllowed
+from nondum.wheelhouse.payload import drive, payload, preflight
+from nondum.wheelhouse.payload.payload import StagedPayload, check_wheels, is_metadata, load
+from nondum.wheelhouse.payload.preflight import HostFacts
 
 PLAIN = Part("blinker", "X = 1\n", with_sdk=False)
 ID = "org.example.test"

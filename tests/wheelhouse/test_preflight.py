@@ -12,11 +12,11 @@ import pytest
 from tests.wheelhouse.locks import HEAD, host, package, wheel
 
 from nondum.sdk.errors import PayloadRefused
-from nondum.wheelhouse import lock, manifest
-from nondum.wheelhouse.confinement import Level
-from nondum.wheelhouse.lock import Lock
-from nondum.wheelhouse.memory import Memory
-from nondum.wheelhouse.preflight import HostFacts, preflight, probe, select, unmet
+from nondum.wheelhouse.format import lock, manifest
+from nondum.wheelhouse.format.confinement import Level
+from nondum.wheelhouse.format.lock import Lock
+from nondum.wheelhouse.payload.memory import Memory
+from nondum.wheelhouse.payload.preflight import HostFacts, preflight, probe, select, unmet
 
 ENVIRONMENT, TAGS = host((3, 11), "x86_64")
 FACTS = HostFacts(

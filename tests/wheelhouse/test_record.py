@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from tests.wheelhouse.hostile_wheels import digest
 
-from nondum.wheelhouse import record
-from nondum.wheelhouse.record import Row
+from nondum.wheelhouse.wheels import record
+from nondum.wheelhouse.wheels.record import Row
 
 DIGEST = digest(b"")
 

@@ -13,12 +13,14 @@ import pytest
 from tests.kit.payloads import SDK
 
 from nondum.sdk.errors import ConfigRefused
-from nondum.wheelhouse import build, manifest, preflight
-from nondum.wheelhouse.confinement import Level
-from nondum.wheelhouse.scaffold import NewPackage, build_command, new_package
-from nondum.wheelhouse.signatures import UnsignedAllowed
-from nondum.wheelhouse.target import Target
-from nondum.wheelhouse.verification import verify
+from nondum.wheelhouse.build import build
+from nondum.wheelhouse.build.scaffold import NewPackage, build_command, new_package
+from nondum.wheelhouse.build.verification import verify
+from nondum.wheelhouse.format import manifest
+from nondum.wheelhouse.format.confinement import Level
+from nondum.wheelhouse.format.signatures import UnsignedAllowed
+from nondum.wheelhouse.format.target import Target
+from nondum.wheelhouse.payload import preflight
 
 
 @pytest.fixture

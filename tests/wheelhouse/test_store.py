@@ -15,8 +15,8 @@ from tests.wheelhouse.file_systems import file_system, needs_mount
 from tests.wheelhouse.hostile_wheels import INFO, METADATA, WHEEL, Lie, WheelBuilder, record_of
 
 from nondum.sdk.errors import InstallFailed, PayloadRefused
-from nondum.wheelhouse.store import Store
-from nondum.wheelhouse.stored import StoredWheel
+from nondum.wheelhouse.store.store import Store
+from nondum.wheelhouse.store.stored import StoredWheel
 
 SOURCES = {"plain/__init__.py": "X = 1\n", "plain/data.bin": "d" * 10_000}
 
@@ -238,7 +238,7 @@ def test_what_is_renamed_in_was_synced(tmp_path: Path) -> None:
     """The order of the system calls, as the kernel saw them."""
     path = plain(tmp_path / "w")
     script = (
-        "from pathlib import Path; import sys; from nondum.wheelhouse.store import Store\n"
+        "from pathlib import Path; import sys; from nondum.wheelhouse.store.store import Store\n"
         f"Store(Path({str(tmp_path / 'store')!r})).add(Path({str(path)!r}), {sha256(path)!r})"
     )
     trace = tmp_path / "trace"

@@ -14,9 +14,9 @@ from tests.kit.payloads import make_wheel, sha256
 from tests.wheelhouse.file_systems import file_system, needs_mount
 
 from nondum.sdk.errors import InstallFailed
-from nondum.wheelhouse import bytecode, venvs
-from nondum.wheelhouse.store import UNFINISHED, Store
-from nondum.wheelhouse.stored import StoredWheel
+from nondum.wheelhouse.store import bytecode, venvs
+from nondum.wheelhouse.store.store import UNFINISHED, Store
+from nondum.wheelhouse.store.stored import StoredWheel
 
 PYTHON = Path(sys.base_prefix) / "bin" / f"python{sys.version_info.major}.{sys.version_info.minor}"
 SOURCES = {"a/__init__.py": "", "a/b.py": "B = 1\n", "a/t.py": "{% template %}", "a/data": "x"}
@@ -140,7 +140,7 @@ def test_killed_at_any_call_the_entry_is_whole(
     store: Store, entry: StoredWheel, tmp_path: Path
 ) -> None:
     script = (
-        "from pathlib import Path; from nondum.wheelhouse.store import Store\n"
+        "from pathlib import Path; from nondum.wheelhouse.store.store import Store\n"
         f"Store(Path({str(store.root)!r})).compile({entry.sha256!r})"
     )
     made = counted(script, tmp_path / "trace")

@@ -15,10 +15,10 @@ from tests.kit.until import until
 from tests.wheelhouse.file_systems import file_system, needs_mount
 
 from nondum.sdk.errors import InstallFailed
-from nondum.wheelhouse import bytecode, venvs
-from nondum.wheelhouse.lock import LockedWheel
-from nondum.wheelhouse.store import Store
-from nondum.wheelhouse.stored import StoredWheel
+from nondum.wheelhouse.format.lock import LockedWheel
+from nondum.wheelhouse.store import bytecode, venvs
+from nondum.wheelhouse.store.store import Store
+from nondum.wheelhouse.store.stored import StoredWheel
 
 PYTHON = Path(sys.base_prefix) / "bin" / f"python{sys.version_info.major}.{sys.version_info.minor}"
 
@@ -229,8 +229,8 @@ def test_pip_makes_one_too(folder: Path, tmp_path: Path) -> None:
 INSTALLER = """
 import sys
 from pathlib import Path
-from nondum.wheelhouse import venvs
-from nondum.wheelhouse.lock import LockedWheel
+from nondum.wheelhouse.store import venvs
+from nondum.wheelhouse.format.lock import LockedWheel
 venv, python, folder = map(Path, sys.argv[1:])
 wheel = LockedWheel("one", "1", "wheels/one-1-py3-none-any.whl", "0" * 64, 1)
 venvs.make_with_pip(venv, python, folder, [wheel])

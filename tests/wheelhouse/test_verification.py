@@ -10,12 +10,12 @@ from tests.kit.signing import Key, sign_payload, trust_of
 from tests.wheelhouse.hostile import WHEELS, HostileWheel
 from tests.wheelhouse.hostile_wheels import WheelBuilder
 
-from nondum.wheelhouse import preflight
-from nondum.wheelhouse.confinement import Level
-from nondum.wheelhouse.signatures import UnsignedAllowed, Verdict
-from nondum.wheelhouse.target import Target, targets
+from nondum.wheelhouse.build.verification import Verified, verify
+from nondum.wheelhouse.format.confinement import Level
+from nondum.wheelhouse.format.signatures import UnsignedAllowed, Verdict
+from nondum.wheelhouse.format.target import Target, targets
+from nondum.wheelhouse.payload import preflight
 from nondum.wheelhouse.trust.judging import Circumstances, Judging
-from nondum.wheelhouse.verification import Verified, verify
 
 ID = "org.example.test"
 PLAIN = Part("blinker", "X = 1\n", with_sdk=False)

@@ -33,7 +33,7 @@ from tests.wheelhouse.hostile_wheels import (
 )
 
 from nondum.sdk.errors import PayloadRefused
-from nondum.wheelhouse import archive, wheel
+from nondum.wheelhouse.wheels import archive, wheel
 
 INIT = "evil/__init__.py"
 SOURCE = b"X = 1\n"

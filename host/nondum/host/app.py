@@ -11,26 +11,18 @@ import logging
 from collections.abc import Awaitable, Callable, Coroutine, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from nondum.host import heap, machine, verbs
-from nondum.host.announcements import announced
-from nondum.host.answering import Answering
+from nondum.host import verbs
 from nondum.host.catalogue import backups, opening
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.catalogue.records import Safety
-from nondum.host.cgroups import Cages
-from nondum.host.config import HostConfig
-from nondum.host.confinement import choice
+from nondum.host.config.host_config import HostConfig
+from nondum.host.control import machine
+from nondum.host.control.news import News
+from nondum.host.control.orders import Orders
+from nondum.host.control.questions import Questions
 from nondum.host.control.server import ControlServer
-from nondum.host.conversation import Conversation, Reply, Take, wanted
-from nondum.host.devices.slots import DeviceSlotSource
-from nondum.host.devices.software import Software
-from nondum.host.devices.source import DeviceSource
-from nondum.host.devices.udev import UdevSource
-from nondum.host.drives.blocks import BlockSource
-from nondum.host.drives.slots import SlotSource
-from nondum.host.drives.source import DriveSource
-from nondum.host.drives.steady import Steady
-from nondum.host.events import (
+from nondum.host.control.trust_orders import TrustOrders
+from nondum.host.core.bus import Bus
+from nondum.host.core.events import (
     DriveRemoved,
     Event,
     HostStarted,
@@ -39,50 +31,61 @@ from nondum.host.events import (
     Recomposed,
     RetryAsked,
 )
-from nondum.host.feedback import parts as feedback_parts
-from nondum.host.feedback.feedback import Feedback
-from nondum.host.goal_files import GoalFiles, of_people
-from nondum.host.helper import privileged
-from nondum.host.lifecycle import safe_mode, state_lock, trials, tries
-from nondum.host.lifecycle.bus import Bus
-from nondum.host.lifecycle.children import watched_without_threads
-from nondum.host.lifecycle.component_manager import ComponentManager
-from nondum.host.lifecycle.executor import Executor
-from nondum.host.lifecycle.folders import Folders, let_pass, make_private, remove_temporary
-from nondum.host.lifecycle.installation import InstallOptions
-from nondum.host.lifecycle.lanes import in_thread
-from nondum.host.lifecycle.tally import Tally
-from nondum.host.lifecycle.trying_again import TryingAgain
+from nondum.host.core.keyed_queues import in_thread
+from nondum.host.core.records import Safety
+from nondum.host.jobs.children import watched_without_threads
+from nondum.host.lifecycle import crash_attribution, safe_mode
+from nondum.host.lifecycle.advance import RULES
+from nondum.host.manager import automatic_retry, state_lock
+from nondum.host.manager.component_manager import ComponentManager
+from nondum.host.manager.crash_loop import Tally
+from nondum.host.manager.effect_handlers import Executor
+from nondum.host.manager.installation import InstallOptions
+from nondum.host.manager.payload_trust import TrustOptions
+from nondum.host.manager.refusal_retry import TryingAgain
+from nondum.host.manager.state_folders import Folders, let_pass, make_private, remove_temporary
 from nondum.host.mind.frames import mounts_of_all
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.mounts import TellingMounts
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.system_tree import load_system_tree
-from nondum.host.news import News
-from nondum.host.orders import Orders
-from nondum.host.questions import Questions
-from nondum.host.service import journal
+from nondum.host.people.announcements import announced
+from nondum.host.people.answering import Answering
+from nondum.host.people.conversation import Conversation, Reply, Take, wanted
+from nondum.host.people.feedback import parts as feedback_parts
+from nondum.host.people.feedback.feedback import Feedback
+from nondum.host.people.goal_files import GoalFiles, of_people
+from nondum.host.people.stop_button.button import StopButton
+from nondum.host.people.stop_button.hook import StopHook
+from nondum.host.people.stopping import Stopped, Stopping, is_stop_for_stranger, said_to
+from nondum.host.sandbox.cgroups import Cages
+from nondum.host.sandbox.helper import privileged
+from nondum.host.service import journal, malloc
 from nondum.host.service.notify import Notifier
 from nondum.host.service.service import Part, Service
 from nondum.host.service.stop_signals import told_to_stop
 from nondum.host.service.telling import Telling
 from nondum.host.service.words import words
-from nondum.host.stop_button.button import StopButton
-from nondum.host.stop_button.hook import StopHook
-from nondum.host.stopping import Stopped, Stopping, is_stop_for_stranger, said_to
+from nondum.host.sources.devices.slots import DeviceSlotSource
+from nondum.host.sources.devices.software import Software
+from nondum.host.sources.devices.source import DeviceSource
+from nondum.host.sources.devices.udev import UdevSource
+from nondum.host.sources.drives.blocks import BlockSource
+from nondum.host.sources.drives.debounce import Steady
+from nondum.host.sources.drives.slots import SlotSource
+from nondum.host.sources.drives.source import DriveSource
 from nondum.host.trust.clock import ClockWatch
-from nondum.host.trust.orders import TrustOrders
-from nondum.host.trust.payload_trust import TrustOptions
+from nondum.host.workers import confinement_choice
 from nondum.host.workers.confinements import changes_user
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import Limits, Timing
 from nondum.host.workers.workers import Workers
-from nondum.planning.attempts import Patience
-from nondum.planning.stop_words import is_stop
+from nondum.planning.execute.attempts import Patience
+from nondum.planning.words.stop_words import is_stop
 from nondum.sdk.errors import ConfigRefused, NondumError, Problem
 
 if TYPE_CHECKING:
-    from nondum.host.peers.neighbourhood import Neighbourhood
+    from nondum.host.peers.peer_services import Neighbourhood
 
 log = logging.getLogger(__name__)
 
@@ -111,7 +114,7 @@ async def _run_as(
     asked: Safety,
     stop: asyncio.Event,
 ) -> None:
-    heap.give_back_what_is_big()
+    malloc.give_back_what_is_big()
     _make_slots(config)
     folders = Folders(config.host.state)
     held = await state_lock.lock(folders.root, service.waits)
@@ -143,17 +146,17 @@ async def _run(
     more_drives: Sequence[DriveSource],
     stop: asyncio.Event,
 ) -> None:
-    bus = Bus()
+    bus = Bus(RULES)
     timing = Timing(startup_s=config.workers.startup_s, settle_beats=config.workers.settle_beats)
     cages = await in_thread(_cages, folders)
     standing = await in_thread(
-        choice.standing,
+        confinement_choice.standing,
         config.workers.confinement,
         config.workers.minimum_confinement,
         folders.confinement,
         folders.probes,
     )
-    confinement = choice.confinement(standing, folders.of_workers)
+    confinement = confinement_choice.confinement(standing, folders.of_workers)
     if changes_user(confinement):
         await in_thread(let_pass, folders)
     launcher = WorkerLauncher(confinement, cages, folders.scratches, timing.startup_s)
@@ -209,7 +212,7 @@ async def _run(
             *map(str, clock.problems),
             *_warnings(catalogue, safety[1]),
             *tally.warnings(),
-            *tries.counts(catalogue.snapshot()),
+            *crash_attribution.counts(catalogue.snapshot()),
             *standing.warnings(),
             *feedback.warnings,
             *stop_hook.warnings,
@@ -293,7 +296,7 @@ async def _run(
         await workers.keep_spare()
         if neighbours is not None:
             await neighbours.start()
-        heap.keep_what_is_loaded()
+        malloc.keep_what_is_loaded()
         await _until(
             stop,
             manager.run(),
@@ -317,7 +320,7 @@ async def _run(
             goal_files.run(),
             trying_again.run(),
             clock.run(),
-            trials.hold(catalogue.snapshot, tally, bus.emit),
+            automatic_retry.hold(catalogue.snapshot, tally, bus.emit),
             *(source.watch(bus.emit) for source in devices),
         )
     finally:
@@ -348,7 +351,7 @@ async def _neighbours(
     """
     if not config.peers.enabled:
         return None
-    from nondum.host.peers.neighbourhood import Neighbourhood
+    from nondum.host.peers.peer_services import Neighbourhood
 
     return await Neighbourhood.open(
         config,

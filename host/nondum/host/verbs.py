@@ -6,15 +6,15 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from nondum.host.control.arguments import Arguments
+from nondum.host.control.orders import Orders
+from nondum.host.control.questions import Questions
 from nondum.host.control.server import Follow, Verb
-from nondum.host.orders import Orders
-from nondum.host.questions import Questions
-from nondum.host.rows import Row
-from nondum.host.trust.orders import TrustOrders
+from nondum.host.control.trust_orders import TrustOrders
+from nondum.host.core.plain import Row
 from nondum.sdk.errors import ConfigRefused, Problem
 
 if TYPE_CHECKING:  # its import costs ten megabytes, which hosts without peers need not pay
-    from nondum.host.peers.neighbourhood import Neighbourhood
+    from nondum.host.peers.peer_services import Neighbourhood
 
 PEER_VERBS = (
     "peers",

@@ -30,7 +30,7 @@ LAUNCHER = """\
 #!/opt/nondum/bin/python -I
 import sys
 
-from nondum.host.cli import main
+from nondum.cli import main
 
 sys.exit(main())
 """
@@ -139,7 +139,7 @@ def _machine_files(root: Path) -> None:
 
 def _completions(root: Path) -> None:
     """As this checkout's own command prints them: they ask nothing of an architecture."""
-    command = (sys.executable, "-P", "-m", "nondum.host.cli", "completion")
+    command = (sys.executable, "-P", "-m", "nondum.cli", "completion")
     for shell, path in COMPLETIONS.items():
         _write(root / path, call(*command, shell))
 

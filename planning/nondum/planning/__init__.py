@@ -6,5 +6,5 @@ actions a ground task (`ground`), a planner's plan is checked (`validate`) and r
 `world`), and what has no plan is explained (`explain`).
 
 Nothing is re-exported here: several modules are named after the one function that they offer, and
-each is imported by itself: `from nondum.planning.merge import merge`.
+each is imported by itself: `from nondum.planning.merge.merge import merge`.
 """

@@ -22,7 +22,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from nondum.host.config import PeersSection
+from nondum.host.config.host_config import PeersSection
 from nondum.host.peers.finder import PeerFinder
 from nondum.sdk.errors import NondumError, Problem
 from nondum.sdk.wire import Body

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from demo.search.sites import Lan, Loopback, site
 
-from nondum.host.config import HostConfig, PeersSection, parse
+from nondum.host.config.host_config import HostConfig, PeersSection, parse
 
 NAMES = ("rover", "mule", "scout")
 

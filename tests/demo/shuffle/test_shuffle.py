@@ -12,11 +12,11 @@ from demo.shuffle.package import Package
 from demo.shuffle.vocabulary import Core, declared, spoken
 from tests.planning.strangers import planner
 
-from nondum.planning.contribution import Contribution
-from nondum.planning.ground import ground
-from nondum.planning.merge import merge
-from nondum.planning.phrases import Phrasebook, phrasebook
-from nondum.planning.validate import validate
+from nondum.planning.ground.ground import ground
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.merge import merge
+from nondum.planning.search.validate import validate
+from nondum.planning.words.phrases import Phrasebook, phrasebook
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.planner import GroundTask, Plan
 

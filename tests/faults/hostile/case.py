@@ -9,7 +9,7 @@ from pathlib import Path
 from tests.faults.hostile.draft import Draft, Sign, draft, plain, unsigned
 from tests.kit.payloads import make_payload
 
-from nondum.wheelhouse import contents
+from nondum.wheelhouse.format import contents
 
 NO_PAYLOAD = "DRIVE_NOT_PAYLOAD"
 

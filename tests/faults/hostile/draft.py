@@ -14,7 +14,7 @@ from typing import Any
 from tests.kit.payloads import Part, lock_text, make_wheel, manifest_text
 
 from nondum.sdk.description import PluginDescription
-from nondum.wheelhouse import contents
+from nondum.wheelhouse.format import contents
 
 Sign = Callable[[bytes], bytes | None]
 """Gives the signature of a contents list; None: it has none."""

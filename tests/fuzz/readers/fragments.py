@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from tests.fuzz.target import Target, of_text
 
-from nondum.planning.claims import claims_of
-from nondum.planning.contribution import Contribution
-from nondum.planning.parse import parse_formula
+from nondum.planning.merge.claims import claims_of
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.pddl.parse import parse_formula
 from nondum.sdk.description import Fragment
 from nondum.sdk.errors import FragmentRefused
 

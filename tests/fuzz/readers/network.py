@@ -11,7 +11,6 @@ from tests.fuzz.target import Target, of_text
 from tests.fuzz.tokens import MSGPACK
 
 from nondum.sdk.errors import Problem
-from nondum.transport.bridge import packets as bridge
 from nondum.transport.discovery import hint
 from nondum.transport.discovery import packets as discovery
 from nondum.transport.discovery.announcement import Announcement
@@ -19,6 +18,7 @@ from nondum.transport.discovery.hint import Source
 from nondum.transport.peers import certificate, messages, pairing, pairing_messages
 from nondum.transport.peers.identity import Security
 from nondum.transport.peers.keys import PeerKey
+from nondum.transport.streams import packets as bridge
 
 KEY = PeerKey("rq:rM>}U?@Lns47E1%kR.o@n%FcmmsL/@{H8]yf7")
 

@@ -15,8 +15,9 @@ from tests.wheelhouse.hostile_wheels import NAME, WheelBuilder
 
 from nondum.sdk.description import Behaviour, Fragment, PluginDescription
 from nondum.sdk.errors import PayloadRefused
-from nondum.wheelhouse import archive, contents, goals, index, lock, manifest, wheel
-from nondum.wheelhouse.contents import Contents, Entry
+from nondum.wheelhouse.format import contents, goals, index, lock, manifest
+from nondum.wheelhouse.format.contents import Contents, Entry
+from nondum.wheelhouse.wheels import archive, wheel
 
 SHA256 = "0123456789abcdef" * 4
 WHERE = "fuzzed"

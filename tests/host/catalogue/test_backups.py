@@ -13,7 +13,7 @@ from nondum.host.catalogue import backups
 from nondum.host.catalogue.backups import Backups
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.reserve import RESERVE_BYTES, Reserve
-from nondum.host.catalogue.state import HostState
+from nondum.host.core.state import HostState
 
 pytestmark = pytest.mark.anyio
 

@@ -18,7 +18,8 @@ from nondum.host.catalogue import database, journal
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.journal import Since
 from nondum.host.catalogue.opening import Instead
-from nondum.host.catalogue.records import (
+from nondum.host.catalogue.rows import as_json
+from nondum.host.core.records import (
     ComponentRecord,
     ComponentState,
     DeviceClaim,
@@ -37,9 +38,8 @@ from nondum.host.catalogue.records import (
     Rollback,
     Step,
 )
-from nondum.host.catalogue.rows import as_json
-from nondum.host.catalogue.state import Highwater, HostState
-from nondum.planning.given_names import GivenNames
+from nondum.host.core.state import Highwater, HostState
+from nondum.planning.merge.given_names import GivenNames
 from nondum.sdk.description import (
     Behaviour,
     Fragment,

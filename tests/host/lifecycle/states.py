@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from nondum.host import events
-from nondum.host.catalogue.records import (
+from nondum.host.core import events
+from nondum.host.core.effects import Effect
+from nondum.host.core.events import Event
+from nondum.host.core.records import (
     ComponentRecord,
     ComponentState,
     DeviceClaim,
@@ -14,9 +16,7 @@ from nondum.host.catalogue.records import (
     MountPose,
     Step,
 )
-from nondum.host.catalogue.state import HostState
-from nondum.host.effects import Effect
-from nondum.host.events import Event
+from nondum.host.core.state import HostState
 from nondum.host.lifecycle.advance import advance
 from nondum.sdk.description import Fragment, PluginDescription
 from nondum.sdk.errors import Problem

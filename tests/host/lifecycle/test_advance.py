@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.host.devices.sightings import appeared
 from tests.host.lifecycle.states import (
     AT,
     PROBLEM,
@@ -19,19 +18,16 @@ from tests.host.lifecycle.states import (
     way_to_active,
     with_newer,
 )
+from tests.host.sources.devices.sightings import appeared
 
-from nondum.host import effects, events
-from nondum.host.catalogue.records import (
-    ComponentState,
-    DriveState,
-    Step,
-)
-from nondum.host.catalogue.state import HostState
-from nondum.host.events import Event
+from nondum.host.core import effects, events
+from nondum.host.core.events import Event
+from nondum.host.core.records import ComponentState, DriveState, Step
+from nondum.host.core.state import HostState
+from nondum.host.core.transitions import COMPONENT_TRANSITIONS, RECOVERY, TRANSITIONS
 from nondum.host.lifecycle.advance import advance
+from nondum.host.lifecycle.crash_attribution import ATTEMPTS
 from nondum.host.lifecycle.recovery import recover
-from nondum.host.lifecycle.tries import ATTEMPTS
-from nondum.host.transitions import COMPONENT_TRANSITIONS, RECOVERY, TRANSITIONS
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
 

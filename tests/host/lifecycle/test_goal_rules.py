@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from nondum.host.catalogue.records import GoalRecord, Moment
-from nondum.host.catalogue.state import HostState
-from nondum.host.events import Event, GoalEnded, GoalGiven, GoalReached
+from nondum.host.core.events import Event, GoalEnded, GoalGiven, GoalReached
+from nondum.host.core.records import GoalRecord, Moment
+from nondum.host.core.state import HostState
 from nondum.host.lifecycle.advance import advance
 from nondum.host.lifecycle.recovery import recover
 

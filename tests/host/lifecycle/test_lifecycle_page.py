@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from nondum.host.catalogue.records import Step
-from nondum.host.transitions import COMPONENT_TRANSITIONS, RECOVERY, diagram
+from nondum.host.core.records import Step
+from nondum.host.core.transitions import COMPONENT_TRANSITIONS, RECOVERY, diagram
 
 PAGE = (Path(__file__).parents[3] / "docs/lifecycle.md").read_text(encoding="utf-8")
 

@@ -13,13 +13,13 @@ from tests.kit.host import HOST, LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.catalogue.records import ComponentState, Step
-from nondum.host.catalogue.state import HostState
-from nondum.host.events import DrivesScanned, Emit, HostSteady, MountSet
-from nondum.host.lifecycle.folders import Folders
-from nondum.host.lifecycle.installation import InstallOptions
-from nondum.host.lifecycle.installed import install, uninstall
-from nondum.host.lifecycle.tries import STEADY_S
+from nondum.host.core.events import DrivesScanned, Emit, HostSteady, MountSet
+from nondum.host.core.records import ComponentState, Step
+from nondum.host.core.state import HostState
+from nondum.host.lifecycle.crash_attribution import STEADY_S
+from nondum.host.manager.initial_components import install, uninstall
+from nondum.host.manager.installation import InstallOptions
+from nondum.host.manager.state_folders import Folders
 from nondum.sdk.errors import PayloadRefused
 
 pytestmark = pytest.mark.anyio

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from tests.kit.lamp_drive import PAYLOAD, lamp, told
 
-from nondum.host.catalogue import payload_key
+from nondum.host.core import payload_key
 from nondum.host.lifecycle import rebuilding
 
 

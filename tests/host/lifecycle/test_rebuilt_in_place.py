@@ -13,14 +13,14 @@ from tests.host.lifecycle.states import AT, PROBLEM, after, drive, found, way_to
 from tests.kit.host import LAMP, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 
-from nondum.host import events
-from nondum.host.catalogue.records import Step
-from nondum.host.catalogue.state import HostState
-from nondum.host.events import Event
+from nondum.host.core import events
+from nondum.host.core.events import Event
+from nondum.host.core.records import Step
+from nondum.host.core.state import HostState
 from nondum.host.lifecycle.advance import advance
 from nondum.host.workers.spec import Timing
 from nondum.sdk.errors import Problem
-from nondum.wheelhouse import build
+from nondum.wheelhouse.build import build
 
 SCANNED = events.DriveRead("a", ("k2",))
 UNSIGNED = Problem("SIG_MISSING", "made up")

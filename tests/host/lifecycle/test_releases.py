@@ -8,7 +8,6 @@ import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
-from tests.host.devices.sightings import appeared
 from tests.host.lifecycle.states import (
     AT,
     PROBLEM,
@@ -20,16 +19,17 @@ from tests.host.lifecycle.states import (
     upgrade,
     way_to_active,
 )
+from tests.host.sources.devices.sightings import appeared
 
-from nondum.host import effects, events
-from nondum.host.catalogue.records import ComponentState, PayloadRecord, Step
-from nondum.host.catalogue.state import HostState
-from nondum.host.effects import Effect
-from nondum.host.events import Event
+from nondum.host.core import effects, events
+from nondum.host.core.effects import Effect
+from nondum.host.core.events import Event
+from nondum.host.core.records import ComponentState, PayloadRecord, Step
+from nondum.host.core.state import HostState
 from nondum.host.lifecycle import releases
 from nondum.host.lifecycle.advance import advance
+from nondum.host.lifecycle.crash_attribution import ATTEMPTS
 from nondum.host.lifecycle.recovery import recover
-from nondum.host.lifecycle.tries import ATTEMPTS
 from nondum.sdk.description import Behaviour, Fragment, Phrase, PluginDescription, Unit
 
 RELEASES = (1, 2, 3)

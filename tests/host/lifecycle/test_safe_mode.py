@@ -5,22 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.host.lifecycle.states import (
-    AT,
-    active,
-    after,
-    at_step,
-    drive,
-    found,
-    way_to_active,
-)
+from tests.host.lifecycle.states import AT, active, after, at_step, drive, found, way_to_active
 
-from nondum.host import effects, events
-from nondum.host.catalogue.records import DriveState, Safety, Step
-from nondum.host.catalogue.state import HostState
+from nondum.host.core import effects, events
+from nondum.host.core.records import DriveState, Safety, Step
+from nondum.host.core.state import HostState
 from nondum.host.lifecycle import safe_mode
 from nondum.host.lifecycle.recovery import recover
-from nondum.host.lifecycle.tally import Tally
+from nondum.host.manager.crash_loop import Tally
 
 SAFE = (Safety.INITIAL, Safety.NOTHING)
 STARTING = (effects.ProbeComponents, effects.ReadDrive, effects.CopyPayload)

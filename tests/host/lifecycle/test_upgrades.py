@@ -11,10 +11,10 @@ from tests.kit.clock import VirtualClock
 from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 
-from nondum.host import events
-from nondum.host.catalogue.records import Step
-from nondum.host.lifecycle.going_back import go_back
-from nondum.host.lifecycle.installed import install, uninstall
+from nondum.host.core import events
+from nondum.host.core.records import Step
+from nondum.host.manager.initial_components import install, uninstall
+from nondum.host.manager.rollback import go_back
 from nondum.host.workers.spec import Timing
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem

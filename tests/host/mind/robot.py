@@ -12,14 +12,7 @@ from typing import Any
 
 from tests.kit.until import arrived
 
-from nondum.host.catalogue.records import (
-    ComponentRecord,
-    ComponentState,
-    FormerPayload,
-    MountPose,
-    Snapshot,
-)
-from nondum.host.events import (
+from nondum.host.core.events import (
     BehaviourEnded,
     BehaviourEstablished,
     Event,
@@ -27,14 +20,21 @@ from nondum.host.events import (
     FactKnown,
     StreamFlowing,
 )
+from nondum.host.core.records import (
+    ComponentRecord,
+    ComponentState,
+    FormerPayload,
+    MountPose,
+    Snapshot,
+)
 from nondum.host.mind.frames import mounts_of_all
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.mounts import TellingMounts
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.runner import FactValue
 from nondum.host.mind.system_tree import SystemTree, default_tree
-from nondum.planning.attempts import Patience
-from nondum.planning.running import RunState
+from nondum.planning.execute.attempts import Patience
+from nondum.planning.execute.running import RunState
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import HostUnreachable, Problem
 

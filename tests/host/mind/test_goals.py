@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from nondum.host.catalogue.records import GoalRecord
+from nondum.host.core.records import GoalRecord
 from nondum.host.mind.goals import GoalQueue, GoalState
-from nondum.planning.goal import GoalKind
+from nondum.planning.merge.goal import GoalKind
 from nondum.sdk.errors import GoalRefused
 
 

@@ -8,7 +8,7 @@ import pytest
 from tests.host.mind.robot import Robot
 from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT
 
-from nondum.host.conversation import Conversation, wanted
+from nondum.host.people.conversation import Conversation, wanted
 from nondum.sdk.description import Label
 from nondum.sdk.errors import GoalRefused, Problem
 

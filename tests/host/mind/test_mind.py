@@ -23,13 +23,13 @@ from tests.planning.strangers import (
     VISUAL_TRACKER,
 )
 
-from nondum.host.catalogue.records import ComponentState, MountPose
-from nondum.host.events import FactKnown, GoalReached, PlanMade, PlanMissing
+from nondum.host.core.events import FactKnown, GoalReached, PlanMade, PlanMissing
+from nondum.host.core.records import ComponentState, MountPose
 from nondum.host.mind.mind import PAUSE_S
 from nondum.host.mind.planners import Planners
-from nondum.planning.attempts import Patience
-from nondum.planning.facts import twin
-from nondum.planning.running import RunState
+from nondum.planning.execute.attempts import Patience
+from nondum.planning.execute.running import RunState
+from nondum.planning.pddl.facts import twin
 from nondum.sdk.description import Fragment, Output, Unit
 from nondum.sdk.errors import GoalRefused
 

@@ -6,8 +6,8 @@ import pytest
 from tests.host.mind.robot import HOST, Robot
 from tests.planning.strangers import COMPTON_CAMERA
 
-from nondum.host.events import GoalReached
-from nondum.planning.goal import GoalKind
+from nondum.host.core.events import GoalReached
+from nondum.planning.merge.goal import GoalKind
 
 pytestmark = pytest.mark.anyio
 

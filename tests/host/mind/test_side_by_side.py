@@ -18,8 +18,8 @@ from tests.planning.strangers import (
     VISUAL_TRACKER,
 )
 
-from nondum.host.events import BehavioursHalted, PlanMade
-from nondum.planning.running import RunState
+from nondum.host.core.events import BehavioursHalted, PlanMade
+from nondum.planning.execute.running import RunState
 
 pytestmark = pytest.mark.anyio
 

@@ -8,7 +8,7 @@ import pytest
 from tests.host.mind.robot import HOST, Robot
 from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT
 
-from nondum.host.stopping import is_stop_for_stranger, said_to
+from nondum.host.people.stopping import is_stop_for_stranger, said_to
 from nondum.sdk.description import Label
 
 pytestmark = pytest.mark.anyio

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from tests.host.cli import pictures
+from tests.cli import pictures
 from tests.host.mind.robot import Robot
 from tests.planning.strangers import (
     COMPTON_CAMERA,

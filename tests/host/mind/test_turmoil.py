@@ -20,8 +20,8 @@ from tests.planning.strangers import (
     VISUAL_TRACKER,
 )
 
-from nondum.host.catalogue.records import ComponentState
-from nondum.planning.running import RunState
+from nondum.host.core.records import ComponentState
+from nondum.planning.execute.running import RunState
 from nondum.sdk.errors import GoalRefused
 
 pytestmark = pytest.mark.anyio

@@ -16,8 +16,8 @@ from tests.planning.strangers import (
     VISUAL_TRACKER,
 )
 
-from nondum.host.catalogue.records import ComponentState, MountPose
-from nondum.host.events import BehaviourProgressed
+from nondum.host.core.events import BehaviourProgressed
+from nondum.host.core.records import ComponentState, MountPose
 from nondum.sdk.description import (
     Behaviour,
     Fragment,

@@ -9,7 +9,7 @@ from typing import Any, cast
 import pytest
 
 from nondum.host.peers.asking import METHOD, Asking
-from nondum.host.peers.desk import Desk
+from nondum.host.peers.dispatch import Desk
 from nondum.host.peers.goals import MAX_WORDS
 from nondum.sdk.errors import GoalRefused, HostUnreachable, Problem
 from nondum.sdk.wire import Body

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from nondum.host.mind.mind import Mind
-from nondum.host.peers.given_away import MOST_KEPT
+from nondum.host.peers.forwarded_goals import MOST_KEPT
 from nondum.host.peers.goals import MAX_WORDS, Goals
-from nondum.host.stopping import Stopped
+from nondum.host.people.stopping import Stopped
 from nondum.sdk.wire import Body
 from nondum.transport.peers import Admission, Call, CallFailed, Errand, PeerKey
 from nondum.transport.peers.messages import Request

@@ -12,10 +12,10 @@ import pytest
 from tests.host.peers.watcher import component, merged_watcher, snapshot
 
 from nondum.host.mind.composition import Composition
-from nondum.host.peers.offered import Policy
+from nondum.host.peers.offered_entries import Policy
 from nondum.host.peers.serving import FactValue, Serving
 from nondum.host.workers.call import Call
-from nondum.planning.running import RunState
+from nondum.planning.execute.running import RunState
 from nondum.sdk.wire import Body
 from nondum.transport.peers import Admission, CallFailed, Errand, PeerKey
 from nondum.transport.peers.messages import Request

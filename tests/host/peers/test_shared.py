@@ -8,20 +8,13 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.host.peers.watcher import (
-    HEAD,
-    component,
-    merged_watcher,
-    no_claims,
-    snapshot,
-)
+from tests.host.peers.watcher import HEAD, component, merged_watcher, no_claims, snapshot
 
-from nondum.host.catalogue.records import (
-    DeviceClaim,
-)
-from nondum.host.events import FactForgotten, FactKnown, StreamFlowing
-from nondum.host.peers import heard
-from nondum.host.peers.heard import (
+from nondum.host.core.events import FactForgotten, FactKnown, StreamFlowing
+from nondum.host.core.records import DeviceClaim
+from nondum.host.peers import peer_entries
+from nondum.host.peers.offered_entries import Policy, changes, passing, standing
+from nondum.host.peers.peer_entries import (
     BELOW_OWN,
     Introduced,
     claims_of,
@@ -30,7 +23,6 @@ from nondum.host.peers.heard import (
     taken_in,
     withdrawal,
 )
-from nondum.host.peers.offered import Policy, changes, passing, standing
 from nondum.host.peers.uses import taken_by
 from nondum.sdk.description import Unit
 
@@ -160,7 +152,7 @@ def test_entry_that_is_wrong_costs_itself_and_is_told(
 
 
 def test_only_so_many_components_are_taken_over(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(heard, "MOST_COMPONENTS", 1)
+    monkeypatch.setattr(peer_entries, "MOST_COMPONENTS", 1)
     (key, body), *_ = standing(snapshot(component()), Policy()).items()
     assert key == "component/watcher"
     record = record_of(ME, {key: body, "component/watcher-2": body})

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from nondum.host.events import Event, PeerTurnedAway
-from nondum.host.peers.strangers import Strangers
+from nondum.host.core.events import Event, PeerTurnedAway
+from nondum.host.peers.rejected_hosts import Strangers
 from nondum.transport.peers import HostKeys, PeerKey, Reason, Refusal
 
 KEY = HostKeys.generate().public

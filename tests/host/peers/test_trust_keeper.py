@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from nondum.host.peers.drive_certificates import certificates_on
+from nondum.host.jobs.certificates import certificates_on
 from nondum.host.peers.trust_keeper import CERTIFICATE_NAME, KEY_NAME, TRUST_NAME, TrustKeeper
 from nondum.transport.peers import HostKeys, PeerKey, PeerRefused, Security, Trust, private_file
 from nondum.transport.peers.certificate import issue, new_fleet

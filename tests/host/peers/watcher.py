@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from nondum.host.catalogue.records import ComponentRecord, ComponentState, MountPose, Snapshot
-from nondum.host.events import FactKnown
-from nondum.planning.contribution import Contribution
-from nondum.planning.domain import Merged
-from nondum.planning.merge import merge
+from nondum.host.core.events import FactKnown
+from nondum.host.core.records import ComponentRecord, ComponentState, MountPose, Snapshot
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.domain import Merged
+from nondum.planning.merge.merge import merge
 from nondum.sdk.description import Behaviour, Fragment, Output, PluginDescription, Unit
 
 EYE = Unit("eye", "camera", outputs=(Output("image", "image"),))

@@ -18,10 +18,11 @@ from tests.kit.command_line import quiet_environment
 from tests.kit.running_host import DAEMON, RunningHost, running, until_ended
 from tests.kit.until import until
 
-from nondum.host.events import HostStarted
-from nondum.host.lifecycle import state_lock
-from nondum.host.lifecycle.bus import Bus
-from nondum.host.lifecycle.state_lock import Holder
+from nondum.host.core.bus import Bus
+from nondum.host.core.events import HostStarted
+from nondum.host.lifecycle.advance import RULES
+from nondum.host.manager import state_lock
+from nondum.host.manager.state_lock import Holder
 from nondum.host.service.notify import Notifier
 from nondum.host.service.service import BETWEEN_WORDS_S, LONGEST_START_S, STARTING_S, Part, Service
 
@@ -171,7 +172,7 @@ async def test_part_that_hangs_ends_the_signs_of_life(
     manager: socket.socket, clock: VirtualClock
 ) -> None:
     """And one that comes back begins them again."""
-    bus, passed = Bus(), asyncio.Event()
+    bus, passed = Bus(RULES), asyncio.Event()
 
     async def follow() -> None:
         while True:

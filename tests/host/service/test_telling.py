@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from tests.host.lifecycle.states import active, component
 
-from nondum.host import events
-from nondum.host.catalogue.state import HostState
-from nondum.host.events import Event
+from nondum.host.core import events
+from nondum.host.core.events import Event
+from nondum.host.core.state import HostState
 from nondum.host.service.telling import Telling
 from nondum.sdk.errors import Problem
 

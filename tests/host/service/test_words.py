@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from nondum.host.catalogue.records import (
-    DriveRecord,
-    DriveState,
-    Moment,
-    Safety,
-    Snapshot,
-)
+from nondum.host.core.records import DriveRecord, DriveState, Moment, Safety, Snapshot
 from nondum.host.service.words import words
 from nondum.sdk.errors import Problem
 

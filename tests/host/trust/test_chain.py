@@ -14,7 +14,7 @@ from tests.kit.signing import Key, sign_payload, signed, trust_of
 from nondum.host.trust import chain
 from nondum.host.trust.anchors import Origin
 from nondum.sdk.errors import PayloadRefused
-from nondum.wheelhouse import manifest
+from nondum.wheelhouse.format import manifest
 from nondum.wheelhouse.trust import sshsig, trust_file, trust_text
 
 ROOT, ALICE, BOB = Key("root"), Key("alice"), Key("bob")

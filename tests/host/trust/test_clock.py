@@ -10,9 +10,9 @@ import pytest
 from tests.host.trust.trusted import FIRST
 from tests.kit.clock import VirtualClock
 
-from nondum.host.announcements import announced
-from nondum.host.catalogue.records import Snapshot
-from nondum.host.events import ClockDoubted, Event
+from nondum.host.core.events import ClockDoubted, Event
+from nondum.host.core.records import Snapshot
+from nondum.host.people.announcements import announced
 from nondum.host.trust.clock import LOOK_S, ClockWatch
 from nondum.wheelhouse.trust.judging import EARLIEST
 from nondum.wheelhouse.trust.trust import Trust

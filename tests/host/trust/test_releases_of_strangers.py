@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from nondum.host.catalogue.records import Moment
-from nondum.host.catalogue.state import Highwater, HostState
-from nondum.host.events import PayloadFound
+from nondum.host.core.events import PayloadFound
+from nondum.host.core.records import Moment
+from nondum.host.core.state import Highwater, HostState
 from nondum.host.lifecycle import admission
-from nondum.wheelhouse.signatures import Grant
+from nondum.wheelhouse.format.signatures import Grant
 from nondum.wheelhouse.trust.judging import EARLIEST
 
 LAMP = "org.example.lamp"

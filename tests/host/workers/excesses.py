@@ -9,8 +9,8 @@ from tests.kit.processes import is_alive
 from tests.kit.until import until_async
 from tests.kit.workers import TIMING, WorkersUnderTest
 
-from nondum.host.events import WorkerExited, WorkerStrained
-from nondum.host.workers.gauge import Gauge
+from nondum.host.core.events import WorkerExited, WorkerStrained
+from nondum.host.workers.usage import Gauge
 
 FORK = "while True:\n    try:\n        os.fork()\n    except OSError:\n        pass"
 WATCHED = replace(TIMING, look_s=0.1, spin_s=0.5, missed=1_000_000)

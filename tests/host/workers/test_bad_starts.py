@@ -14,8 +14,8 @@ from tests.kit.processes import is_alive
 from tests.kit.watches import watches_left
 from tests.kit.workers import WorkersUnderTest
 
-from nondum.host.cgroups.cages import Cages
-from nondum.host.events import WorkerLogged, WorkerReady
+from nondum.host.core.events import WorkerLogged, WorkerReady
+from nondum.host.sandbox.cgroups.groups import Cages
 from nondum.host.workers.confinements import Unconfined
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import WorkerSpec

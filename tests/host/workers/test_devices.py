@@ -8,11 +8,11 @@ import signal
 import pytest
 from tests.kit.workers import HOST, WorkersUnderTest
 
-from nondum.host.events import FactKnown
-from nondum.planning.running import RunState
+from nondum.host.core.events import FactKnown
+from nondum.planning.execute.running import RunState
 from nondum.sdk.description import Behaviour, Unit
 from nondum.sdk.messages import Bearing, Header, value_to_wire
-from nondum.wheelhouse.confinement import Level
+from nondum.wheelhouse.format.confinement import Level
 
 pytestmark = pytest.mark.anyio
 

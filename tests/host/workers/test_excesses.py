@@ -8,22 +8,17 @@ from pathlib import Path
 
 import anyio
 import pytest
-from tests.host.workers.excesses import (
-    FORK,
-    WATCHED,
-    exited_by_forking,
-    strained_by_spinning,
-)
+from tests.host.workers.excesses import FORK, WATCHED, exited_by_forking, strained_by_spinning
 from tests.kit.clock import VirtualClock
 from tests.kit.guest import do, guest_spec
 from tests.kit.processes import is_alive
 from tests.kit.workers import WorkersUnderTest
 
-from nondum.host.cgroups import Cages
-from nondum.host.events import WorkerExited, WorkerLogged
+from nondum.host.core.events import WorkerExited, WorkerLogged
+from nondum.host.sandbox.cgroups import Cages
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import Limits
-from nondum.planning.running import RunState
+from nondum.planning.execute.running import RunState
 
 pytestmark = pytest.mark.anyio
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from tests.kit.workers import HOST, WorkersUnderTest
 
-from nondum.host.events import FactKnown, WorkerExited, WorkerFaulted
+from nondum.host.core.events import FactKnown, WorkerExited, WorkerFaulted
 from nondum.host.workers.faults import MOST, Faults
-from nondum.planning.running import RunState
+from nondum.planning.execute.running import RunState
 from nondum.sdk.description import Behaviour, Output, Unit
 from nondum.sdk.errors import Problem
 

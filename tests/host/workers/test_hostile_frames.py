@@ -19,14 +19,14 @@ from tests.kit.guest import do, guest_spec
 from tests.kit.until import arrived
 from tests.kit.workers import HOST, TIMING, WorkersUnderTest
 
-from nondum.host.events import Event, WorkerLogged, WorkerReady
+from nondum.host.core.events import Event, WorkerLogged, WorkerReady
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spec import WorkerSpec
 from nondum.host.workers.workers import Workers
-from nondum.planning.running import RunState
+from nondum.planning.execute.running import RunState
 from nondum.sdk.errors import WorkerFailed
 from nondum.sdk.wire import PROTOCOL_VERSIONS
-from nondum.wheelhouse.confinement import Level
+from nondum.wheelhouse.format.confinement import Level
 
 pytestmark = pytest.mark.anyio
 

@@ -14,15 +14,15 @@ from tests.host.workers.flooding import fills_and_streams
 from tests.host.workers.streaming import sees
 from tests.kit.workers import LIBRARIES, SDK, TIMING, WorkersUnderTest, level, standing
 
-from nondum.host.cgroups import Cages
-from nondum.host.confinement import choice
-from nondum.host.events import WorkerExited, WorkerReady
+from nondum.host.core.events import WorkerExited, WorkerReady
+from nondum.host.sandbox.cgroups import Cages
+from nondum.host.workers import confinement_choice
 from nondum.host.workers.in_flight import culprit, sent
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spec import WorkerSpec
 from nondum.sdk.errors import Problem, WorkerFailed
-from nondum.wheelhouse.confinement import Level
+from nondum.wheelhouse.format.confinement import Level
 
 pytestmark = pytest.mark.anyio
 
@@ -30,7 +30,9 @@ pytestmark = pytest.mark.anyio
 @pytest.fixture
 async def tested(tmp_path: Path) -> AsyncIterator[WorkersUnderTest]:
     """Workers that share a user, also where each could have its own."""
-    shared = choice.confinement(replace(standing(), findings=()), (tmp_path, SDK, LIBRARIES))
+    shared = confinement_choice.confinement(
+        replace(standing(), findings=()), (tmp_path, SDK, LIBRARIES)
+    )
     tested = WorkersUnderTest(tmp_path, confinement=shared)
     cages = Cages.open(tmp_path)
     tested.workers.launcher = WorkerLauncher(tested.confinement, cages)

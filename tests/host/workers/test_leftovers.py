@@ -11,8 +11,8 @@ from tests.host.workers.trees import StuckTree
 from tests.kit.processes import is_alive, until_gone
 from tests.kit.workers import WorkersUnderTest
 
-from nondum.host.cgroups.cages import Cages
-from nondum.host.events import WorkerLogged
+from nondum.host.core.events import WorkerLogged
+from nondum.host.sandbox.cgroups.groups import Cages
 from nondum.host.workers.confinements import Unconfined
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.leftovers import clear_away

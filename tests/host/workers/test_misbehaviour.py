@@ -14,7 +14,7 @@ from tests.kit.processes import is_alive, until_gone
 from tests.kit.until import arrived, until
 from tests.kit.workers import WorkersUnderTest
 
-from nondum.host.events import (
+from nondum.host.core.events import (
     BehaviourEstablished,
     ConditionEnded,
     WorkerExited,
@@ -27,7 +27,7 @@ from nondum.host.events import (
 from nondum.host.workers.call import Call
 from nondum.host.workers.spec import Limits
 from nondum.host.workers.supervision import RESTARTS, WINDOW_S
-from nondum.planning.running import RunState
+from nondum.planning.execute.running import RunState
 from nondum.sdk.description import Condition
 
 pytestmark = pytest.mark.anyio

@@ -8,7 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.host.events import FactForgotten, FactKnown, StreamFlowing, WorkerFaulted, WorkerLogged
+from nondum.host.core.events import (
+    FactForgotten,
+    FactKnown,
+    StreamFlowing,
+    WorkerFaulted,
+    WorkerLogged,
+)
 from nondum.host.workers.news import (
     MAX_CLAIMS,
     MAX_TEXT,

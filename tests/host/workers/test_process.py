@@ -15,7 +15,7 @@ from tests.kit.descriptors import descriptors_left, open_descriptors
 from tests.kit.processes import is_alive
 from tests.kit.watches import watches_left
 
-from nondum.host.workers.keeper import Keeper
+from nondum.host.workers.init_link import Keeper
 from nondum.host.workers.process import WorkerProcess
 
 pytestmark = pytest.mark.anyio

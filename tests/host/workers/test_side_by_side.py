@@ -9,9 +9,9 @@ import pytest
 from tests.kit.processes import is_alive
 from tests.kit.workers import HOST, WorkersUnderTest
 
-from nondum.host.events import FactKnown, TrialFailed, WorkerExited, WorkerReady
+from nondum.host.core.events import FactKnown, TrialFailed, WorkerExited, WorkerReady
 from nondum.host.workers.spec import WorkerSpec
-from nondum.planning.running import RunState
+from nondum.planning.execute.running import RunState
 from nondum.sdk.description import Behaviour, Unit
 from nondum.sdk.errors import WorkerFailed
 

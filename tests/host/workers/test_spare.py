@@ -20,9 +20,9 @@ from tests.kit.processes import is_alive, until_gone
 from tests.kit.until import PATIENCE_S
 from tests.kit.workers import SDK, WorkersUnderTest
 
-from nondum.host.cgroups.cages import Cages, NoTree
-from nondum.host.confinement.bubblewrap import Ground
-from nondum.host.inside.bootstrap import PRELOADED
+from nondum.host.sandbox.cgroups.groups import Cages, NoTree
+from nondum.host.sandbox.inside.bootstrap import PRELOADED
+from nondum.host.sandbox.levels.bubblewrap import Ground
 from nondum.host.workers.confinements import Entry, Unconfined
 from nondum.host.workers.launcher import MARK, WorkerLauncher, owner_mark
 from nondum.host.workers.leftovers import end_leftovers

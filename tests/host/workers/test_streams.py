@@ -11,9 +11,9 @@ import pytest
 from tests.host.workers.streaming import CAMERA, STREAM, WATCH, WATCHER, sees
 from tests.kit.workers import HOST, WorkersUnderTest
 
-from nondum.host.events import BehaviourEstablished, StreamFlowing
+from nondum.host.core.events import BehaviourEstablished, StreamFlowing
 from nondum.host.workers.call import Call
-from nondum.planning.running import RunState
+from nondum.planning.execute.running import RunState
 from nondum.sdk.description import Behaviour, Input, Output, Unit
 
 pytestmark = pytest.mark.anyio

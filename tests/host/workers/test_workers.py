@@ -8,7 +8,7 @@ import pytest
 from tests.kit.processes import is_alive
 from tests.kit.workers import HOST, WorkersUnderTest
 
-from nondum.host.events import (
+from nondum.host.core.events import (
     BehaviourEnded,
     BehaviourEstablished,
     BehaviourProgressed,
@@ -17,7 +17,7 @@ from nondum.host.events import (
     WorkerLogged,
     WorkerReady,
 )
-from nondum.planning.running import RunState
+from nondum.planning.execute.running import RunState
 from nondum.sdk.description import Behaviour, Unit
 from nondum.sdk.errors import WorkerFailed
 

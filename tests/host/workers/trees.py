@@ -6,8 +6,8 @@ import errno
 import os
 import threading
 
-from nondum.host.cgroups.cage import CageLimits
-from nondum.host.cgroups.cages import NoTree
+from nondum.host.sandbox.cgroups.groups import NoTree
+from nondum.host.sandbox.cgroups.limits import CageLimits
 
 
 class CountedTree(NoTree):

@@ -9,12 +9,12 @@ from tests.lab.lab import Lab
 from tests.lab.machine import Machine
 from tests.lab.plugins import opener, until_said
 
-from nondum.host.helper import worker_users
+from nondum.host.sandbox.helper import worker_users
 
 DROP_IN = "/etc/systemd/system/nondum-helper.service.d/devices.conf"
 ALLOWED = """[Service]
 ExecStart=
-ExecStart=/opt/nondum/bin/python -I -m nondum.host.helper --user nondum \
+ExecStart=/opt/nondum/bin/python -I -m nondum.host.sandbox.helper --user nondum \
  --allow-subsystem video4linux --allow-subsystem sound --allow-subsystem i2c-dev
 """
 """What does not hang on USB is granted only where root has said so."""

@@ -14,10 +14,10 @@ from tests.lab.plugins import doer
 WATCH = """
 import asyncio, json
 from pathlib import Path
-from nondum.host.drives import mounting
-from nondum.host.drives.blocks import BlockSource
+from nondum.host.sandbox.helper import mounting
+from nondum.host.sources.drives.blocks import BlockSource
 from nondum.sdk.errors import NondumError
-from nondum.wheelhouse import drive
+from nondum.wheelhouse.payload import drive
 
 def tell(event):
     said = {"event": event.name, "drive": getattr(event, "drive", "")}

@@ -11,13 +11,13 @@ from tests.lab.lab import Lab
 
 CHECKOUT = Path(__file__).parents[3]
 PARTS = (
-    *("tests/confinement/baits.py", "tests/confinement/escape.py", "tests/confinement/table.py"),
+    *("tests/sandbox/baits.py", "tests/sandbox/escape.py", "tests/sandbox/table.py"),
     *("tests/kit/until.py", "tests/kit/workers.py", "demo/robot.py", "plugins/sdk/nondum"),
 )
 PLACE = "/var/lib/checkout"
 PROGRAM = """
 import asyncio, json, shutil
-from tests.confinement.table import column
+from tests.sandbox.table import column
 from nondum.host.workers.confinements import Boxed
 
 print(json.dumps(asyncio.run(column(Boxed(shutil.which("bwrap"))))))

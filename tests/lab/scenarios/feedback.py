@@ -10,9 +10,9 @@ from tests.lab.installed import REPLUGS, Installed
 from tests.lab.lab import Lab
 from tests.lab.machine import Machine
 
-from nondum.host.feedback.patterns import PATTERNS, Pattern
-from nondum.host.feedback.state import State
-from nondum.wheelhouse import goal_payload
+from nondum.host.core.feedback_state import State
+from nondum.host.sandbox.helper.lamp_patterns import PATTERNS, Pattern
+from nondum.wheelhouse.build import goal_payload
 
 PATIENT = "/run/systemd/system/nondum.service.d/patient.conf"
 """A new keyboard, a new service, and emulated processors: nothing here is judged by its time."""

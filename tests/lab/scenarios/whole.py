@@ -7,7 +7,7 @@ from tests.kit.payloads import Part
 from tests.lab.installed import Installed
 from tests.lab.lab import Lab
 
-from nondum.wheelhouse.confinement import Level
+from nondum.wheelhouse.format.confinement import Level
 
 PAYLOAD = "org.example.gauge"
 GOAL = "(measured spot)"

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn
 from tests.planning.differential.texts import Text
 
-from nondum.planning.syntax import type_text
+from nondum.planning.pddl.syntax import type_text
 
 TYPES = ("object", "a", "b", "c")
 """`c` is a kind of `a` and, in some domains, of `b` too."""

@@ -14,8 +14,8 @@ from typing import TypeAlias
 
 from tests.planning.differential.texts import Text
 
-from nondum.planning.parse import parse_fragment
-from nondum.planning.syntax import (
+from nondum.planning.pddl.parse import parse_fragment
+from nondum.planning.pddl.syntax import (
     ActionDeclaration,
     And,
     Atom,

@@ -5,17 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from hypothesis import assume
-from tests.planning.differential.semantics import (
-    Problem,
-    State,
-    TooManyStates,
-    reachable,
-)
+from tests.planning.differential.semantics import Problem, State, TooManyStates, reachable
 
-from nondum.planning.draft import drafted
-from nondum.planning.exploration import explore
-from nondum.planning.polarity import positive_task
-from nondum.planning.standalone import Standalone
+from nondum.planning.ground.draft import drafted
+from nondum.planning.ground.exploration import explore
+from nondum.planning.ground.negation import positive_task
+from nondum.planning.workbench.standalone import Standalone
 from nondum.sdk.planner import GroundTask
 
 Graph = Mapping[State, frozenset[tuple[str, State]]]

@@ -16,10 +16,10 @@ from tests.planning.differential.semantics import Problem
 from tests.planning.differential.states import all_that_can_be_done, small
 from tests.planning.differential.texts import TEXTS, Text
 
-from nondum.planning.pddl_text import pddl_text
-from nondum.planning.rehearsal import rehearsed
+from nondum.planning.ground.pddl_text import pddl_text
 from nondum.planning.search import solve
-from nondum.planning.standalone import Standalone
+from nondum.planning.workbench.rehearsal import rehearsed
+from nondum.planning.workbench.standalone import Standalone
 from nondum.sdk.planner import AlreadyTrue, GaveUp, PddlTask, Plan, PlanText, Unsolvable
 from nondum_planner_fast_downward import FastDownwardPlanner
 from nondum_planner_fast_downward.engine import find_engine

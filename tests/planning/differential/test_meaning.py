@@ -8,23 +8,18 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from tests.planning.differential.generated import texts
-from tests.planning.differential.semantics import (
-    Problem,
-    State,
-    distance,
-    reachable,
-)
+from tests.planning.differential.semantics import Problem, State, distance, reachable
 from tests.planning.differential.states import Graph, all_that_can_be_done, small
 from tests.planning.differential.texts import TEXTS, Text, text
 
-from nondum.planning.facts import is_twin, twin
-from nondum.planning.ground import ground
-from nondum.planning.pddl_text import pddl_text
-from nondum.planning.progression import progress, start
-from nondum.planning.rehearsal import rehearsed
+from nondum.planning.ground.ground import ground
+from nondum.planning.ground.pddl_text import pddl_text
+from nondum.planning.ground.progression import progress, start
+from nondum.planning.pddl.facts import is_twin, twin
 from nondum.planning.search import solve
-from nondum.planning.standalone import load
-from nondum.planning.validate import validate
+from nondum.planning.search.validate import validate
+from nondum.planning.workbench.rehearsal import rehearsed
+from nondum.planning.workbench.standalone import load
 from nondum.sdk.planner import AlreadyTrue, GroundTask, Plan, Unsolvable
 
 

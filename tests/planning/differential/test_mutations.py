@@ -12,9 +12,9 @@ from tests.kit.examples import a_share
 from tests.planning.differential.generated import texts
 from tests.planning.differential.texts import TEXTS, Text
 
-from nondum.planning.ground import ground
-from nondum.planning.parse import parse_formula, parse_signature
-from nondum.planning.standalone import load, load_domain
+from nondum.planning.ground.ground import ground
+from nondum.planning.pddl.parse import parse_formula, parse_signature
+from nondum.planning.workbench.standalone import load, load_domain
 from nondum.sdk.errors import FragmentRefused
 
 PIECES = re.compile(r"[^\s()]+|[()]|\s+")

@@ -14,11 +14,11 @@ from tests.kit.examples import a_share
 from tests.planning.differential.generated import texts
 from tests.planning.differential.texts import TEXTS, Text
 
-from nondum.planning.parse import parse_fragment
-from nondum.planning.pddl_text import pddl_text
-from nondum.planning.standalone import load_domain
-from nondum.planning.syntax import DomainFragment
-from nondum.planning.wording import without_dots
+from nondum.planning.ground.pddl_text import pddl_text
+from nondum.planning.pddl.parse import parse_fragment
+from nondum.planning.pddl.syntax import DomainFragment
+from nondum.planning.pddl.wording import without_dots
+from nondum.planning.workbench.standalone import load_domain
 from nondum.sdk.errors import FragmentRefused
 
 NOT_READ_BY_THE_OTHER = {"costs"}

@@ -11,9 +11,9 @@ import pytest
 from tests.planning.differential.texts import Text, text
 
 from nondum.host.mind.native_planner import NativePlanner
-from nondum.planning.ground import ground
+from nondum.planning.ground.ground import ground
 from nondum.planning.search import solve
-from nondum.planning.standalone import load, load_domain
+from nondum.planning.workbench.standalone import load, load_domain
 from nondum.sdk.errors import FragmentRefused
 from nondum.sdk.planner import GaveUp, GroundTask, Plan, Unsolvable
 from nondum_planner_pyperplan import PyperplanPlanner
@@ -221,8 +221,8 @@ def test_a_parent_that_is_not_declared_is_a_type_all_the_same() -> None:
 
 SEEDED = """
 import json, sys
-from nondum.planning.ground import ground
-from nondum.planning.standalone import load
+from nondum.planning.ground.ground import ground
+from nondum.planning.workbench.standalone import load
 from nondum.host.mind.native_planner import NativePlanner
 from nondum_planner_pyperplan import PyperplanPlanner
 loaded = load(*json.loads(sys.argv[1]))

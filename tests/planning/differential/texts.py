@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-from nondum.planning.ground import ground
-from nondum.planning.standalone import Standalone, load
+from nondum.planning.ground.ground import ground
+from nondum.planning.workbench.standalone import Standalone, load
 from nondum.sdk.planner import GroundTask
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from nondum.planning.progression import progress, start
+from nondum.planning.ground.progression import progress, start
 from nondum.sdk.planner import ConditionalEffect, GroundAction, GroundTask, Layer, Rule
 
 BASIC = 5

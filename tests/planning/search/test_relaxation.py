@@ -9,7 +9,7 @@ from tests.planning.search.random_tasks import shortest
 from tests.planning.search.walks import Walk, walks
 from tests.planning.tasks import delivery_task
 
-from nondum.planning.progression import derived_facts
+from nondum.planning.ground.progression import derived_facts
 from nondum.planning.search.changes import Changes
 from nondum.planning.search.encoding import encode
 from nondum.planning.search.relaxation import Relaxation

@@ -6,8 +6,8 @@ from hypothesis import assume
 from hypothesis import strategies as st
 from tests.planning.search.random_tasks import tasks
 
-from nondum.planning.progression import State, progress, start
-from nondum.planning.relaxed import reachable
+from nondum.planning.ground.delete_relaxation import reachable
+from nondum.planning.ground.progression import State, progress, start
 from nondum.planning.search import encoding
 from nondum.planning.search.encoding import Encoded, encode
 from nondum.sdk.planner import GroundTask

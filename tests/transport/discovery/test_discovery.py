@@ -13,8 +13,8 @@ from tests.transport.discovery.hosts import Seeker, here, seeking
 
 from nondum.transport.discovery import Announcement, Hint
 from nondum.transport.discovery import interfaces as network
-from nondum.transport.discovery.book import MAX_PEERS
 from nondum.transport.discovery.hint import MAX_ADDRESSES, instance, to_txt
+from nondum.transport.discovery.hint_table import MAX_PEERS
 from nondum.transport.discovery.multicast import Multicast
 from nondum.transport.peers.keys import PeerKey
 

@@ -16,13 +16,7 @@ from demo.namespaces import Machine, Network
 from tests.kit.command_line import command
 from tests.transport.discovery.hosts import Host, here, seeking
 
-from nondum.transport.discovery.doctor import (
-    Result,
-    judge_interface,
-    judge_used,
-    try_tcp,
-    try_udp,
-)
+from nondum.transport.discovery.doctor import Result, judge_interface, judge_used, try_tcp, try_udp
 from nondum.transport.discovery.interfaces import Flags, Interface, looked_on
 
 ADDRESS = (ipaddress.ip_interface("10.77.0.1/24"),)

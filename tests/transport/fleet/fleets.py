@@ -24,15 +24,7 @@ from nondum.transport.fleet import Fleet, FleetEvent, Mesh, PeerChanged
 from nondum.transport.fleet.mesh import Find
 from nondum.transport.fleet.zenoh import ZenohFleet
 from nondum.transport.fleet.zenoh_line import RouterAccess
-from nondum.transport.peers import (
-    HostKeys,
-    Identity,
-    PeerKey,
-    PeerLost,
-    PeerUp,
-    Refusal,
-    Trust,
-)
+from nondum.transport.peers import HostKeys, Identity, PeerKey, PeerLost, PeerUp, Refusal, Trust
 
 ROOT = Path(__file__).parents[3]
 PATIENCE_S = 60.0

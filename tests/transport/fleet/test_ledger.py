@@ -11,14 +11,7 @@ from hypothesis import strategies as st
 
 from nondum.sdk.errors import ProtocolViolation
 from nondum.transport.fleet import EntryRefused
-from nondum.transport.fleet.chunk import (
-    MAX_CATALOGUE,
-    MAX_ENTRY,
-    MAX_KEY,
-    MAX_PARTS,
-    Chunk,
-    parse,
-)
+from nondum.transport.fleet.chunk import MAX_CATALOGUE, MAX_ENTRY, MAX_KEY, MAX_PARTS, Chunk, parse
 from nondum.transport.fleet.ledger import Ledger
 from nondum.transport.peers.messages import Notice, decode, encode
 from nondum.transport.peers.pulse import State

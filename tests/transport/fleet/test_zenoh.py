@@ -9,13 +9,7 @@ from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 
 import pytest
-from tests.transport.fleet.fleets import (
-    Member,
-    ZenohWorld,
-    refusals,
-    router,
-    zenoh_member,
-)
+from tests.transport.fleet.fleets import Member, ZenohWorld, refusals, router, zenoh_member
 
 from nondum.transport.fleet import PeerChanged
 from nondum.transport.fleet.zenoh_line import RouterAccess

@@ -38,8 +38,8 @@ from nondum.transport.peers import (
     Refusal,
     Trust,
 )
-from nondum.transport.peers.apart.sockets import SocketsApart
-from nondum.transport.peers.here import SocketsHere
+from nondum.transport.peers.local_sockets import SocketsHere
+from nondum.transport.peers.socket_process.sockets import SocketsApart
 from nondum.transport.peers.sockets import MakeSockets
 
 ROOT = Path(__file__).parents[3]

@@ -12,8 +12,8 @@ from typing import Any
 from tests.kit.until import arrived
 
 from nondum.transport.peers import Trust, trust_file
-from nondum.transport.peers.apart.pipe import Pipe, pipe_sockets
-from nondum.transport.peers.apart.service import MOST_WAITING, Service
+from nondum.transport.peers.socket_process.pipe import Pipe, pipe_sockets
+from nondum.transport.peers.socket_process.service import MOST_WAITING, Service
 
 ADDRESS = "tcp://127.0.0.1:7410"
 

@@ -14,7 +14,7 @@ from tests.kit.descriptors import descriptors_left
 from tests.transport.peers.hosts import identity
 
 from nondum.transport.peers import PeerRefused, Trust
-from nondum.transport.peers.here import SocketsHere
+from nondum.transport.peers.local_sockets import SocketsHere
 from nondum.transport.peers.pairing_channel import PairingHost
 from nondum.transport.peers.sockets import Owner
 

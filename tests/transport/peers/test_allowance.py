@@ -9,15 +9,7 @@ import pytest
 from tests.kit.clock import VirtualClock
 from tests.transport.peers.hosts import Host, Servant, host, identity, raises, trusting, up
 
-from nondum.transport.peers import (
-    Loss,
-    PeerLost,
-    PeerNode,
-    PeerUp,
-    Reason,
-    allowance,
-    roster,
-)
+from nondum.transport.peers import Loss, PeerLost, PeerNode, PeerUp, Reason, allowance, peer_table
 from nondum.transport.peers.allowance import LOOK_S, Allowance, Paced
 from nondum.transport.peers.messages import Pong, Reply, encode
 from nondum.transport.peers.session import Doubt
@@ -170,7 +162,7 @@ async def test_flooding_peer_is_let_in_after_a_while(
     narrow: tuple[Host, Host], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rover, base = narrow
-    monkeypatch.setattr(roster, "BARRED_S", 0.0)
+    monkeypatch.setattr(peer_table, "BARRED_S", 0.0)
     for _ in range(250):
         rover.node.notify(base.key, "values", {})
     await base.told(PeerLost)

@@ -49,14 +49,14 @@ from nondum.transport.peers import (
     Trust,
 )
 from nondum.transport.peers.accepted import AWAITED_S
-from nondum.transport.peers.apart import sockets
-from nondum.transport.peers.apart.pipe import WINDOW
-from nondum.transport.peers.apart.service import MOST_WAITING
-from nondum.transport.peers.apart.sockets import LONGEST_WAIT_S, SocketsApart
-from nondum.transport.peers.beats import BEAT_S
-from nondum.transport.peers.here import SECOND_LOOK_S
+from nondum.transport.peers.heartbeat import BEAT_S
 from nondum.transport.peers.listener import HIGH_WATER
+from nondum.transport.peers.local_sockets import SECOND_LOOK_S
 from nondum.transport.peers.messages import MAX_MESSAGE, Notice, encode
+from nondum.transport.peers.socket_process import sockets
+from nondum.transport.peers.socket_process.pipe import WINDOW
+from nondum.transport.peers.socket_process.service import MOST_WAITING
+from nondum.transport.peers.socket_process.sockets import LONGEST_WAIT_S, SocketsApart
 
 pytestmark = pytest.mark.anyio
 

@@ -22,15 +22,7 @@ from tests.transport.peers.hosts import (
     up,
 )
 
-from nondum.transport.peers import (
-    DialFailed,
-    HostKeys,
-    Lease,
-    Loss,
-    PeerLost,
-    PeerUp,
-    Reason,
-)
+from nondum.transport.peers import DialFailed, HostKeys, Lease, Loss, PeerLost, PeerUp, Reason
 
 pytestmark = pytest.mark.anyio
 

@@ -21,10 +21,10 @@ from tests.transport.peers.hosts import PATIENCE_S, ROOT, host, identity, trusti
 from nondum.sdk.errors import Problem
 from nondum.transport.peers import HostKeys, PeerRefused, Reason, descriptors
 from nondum.transport.peers.events import DialFailed
-from nondum.transport.peers.here import LOOK_S
 from nondum.transport.peers.listener import Context, dialling, listening
+from nondum.transport.peers.local_sockets import LOOK_S
 from nondum.transport.peers.monitor import Watch
-from nondum.transport.peers.pairing_door import Door
+from nondum.transport.peers.pairing_listener import Door
 from nondum.transport.peers.refusals import Refusals
 from nondum.transport.peers.routes import DialledRoute
 from nondum.transport.peers.zap import Entry, ZapHandler

@@ -22,7 +22,7 @@ from nondum.transport.peers import (
     PeerUp,
     Reason,
     Trust,
-    here,
+    local_sockets,
     node,
 )
 from nondum.transport.peers.certificate import new_fleet
@@ -206,7 +206,7 @@ async def test_message_under_another_key_than_the_links_is_not_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Two peers may choose one routing id: the second takes the place of the first as it goes."""
-    for module in (node, here):  # what is over is looked for no more
+    for module in (node, local_sockets):  # what is over is looked for no more
         monkeypatch.setattr(module, "BEAT_S", 3600.0)
     base, rover, other = identity("base"), identity("rover"), identity("other")
     async with host(base, trusting(rover, other)) as there, asyncio.timeout(PATIENCE_S):

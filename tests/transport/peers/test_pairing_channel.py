@@ -39,7 +39,7 @@ from nondum.transport.peers.listener import dialling
 from nondum.transport.peers.pairing import TRIES, Ask, Commit, Nonce
 from nondum.transport.peers.pairing import Agreed as yes
 from nondum.transport.peers.pairing_channel import PairingHost
-from nondum.transport.peers.pairing_door import MOST_SENT
+from nondum.transport.peers.pairing_listener import MOST_SENT
 from nondum.transport.peers.pairing_messages import (
     MAX_BYTES,
     Beat,

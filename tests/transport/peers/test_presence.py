@@ -16,7 +16,7 @@ from tests.transport.peers.bad_ends import bad_dealer, hello_of
 from tests.transport.peers.connections import Accepted
 from tests.transport.peers.hosts import PATIENCE_S, Host, host, identity, trusting, two_hosts, up
 
-from nondum.transport.peers import DialFailed, HostKeys, Loss, PeerLost, PeerUp, Reason, roster
+from nondum.transport.peers import DialFailed, HostKeys, Loss, PeerLost, PeerUp, Reason, peer_table
 from nondum.transport.peers.accepted import AWAITED_S
 from nondum.transport.peers.dial import ANSWER_S, GREETING_S
 from nondum.transport.peers.drained import Sent
@@ -175,7 +175,7 @@ async def test_peer_that_no_other_hears_is_given_up_at_the_limit(clock: VirtualC
 async def test_peer_of_an_older_version_is_not_asked(
     clock: VirtualClock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(roster, "VERSIONS", (1,))
+    monkeypatch.setattr(peer_table, "VERSIONS", (1,))
     async with three_hosts() as (fleet, cables):
         cables.rover_base.break_silently()
         assert await silence_of_base(fleet, clock) <= TERMS.limit_s(BEAT_S) + STEP_S
@@ -185,7 +185,7 @@ async def test_peer_of_an_older_version_is_not_asked(
 async def test_question_that_the_agreed_version_has_not_is_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(roster, "VERSIONS", (1,))
+    monkeypatch.setattr(peer_table, "VERSIONS", (1,))
     async with two_hosts() as (rover, base):
         say(rover, base, Ask(1, rover.key))
         await base.counted(Reason.GARBAGE)

@@ -15,20 +15,20 @@ from tests.kit.clock import VirtualClock
 from tests.kit.until import until, until_async
 from tests.transport.peers.bad_ends import bad_dealer, bad_router, greeting, hello_of
 from tests.transport.peers.held_back import held_back
-from tests.transport.peers.hosts import (
-    PATIENCE_S,
-    Host,
-    host,
-    identity,
-    trusting,
-    two_hosts,
-    up,
-)
+from tests.transport.peers.hosts import PATIENCE_S, Host, host, identity, trusting, two_hosts, up
 
-from nondum.transport import tcp
-from nondum.transport.peers import Identity, Loss, PeerLost, PeerUp, Reason, drained, here
+from nondum.transport.peers import (
+    Identity,
+    Loss,
+    PeerLost,
+    PeerUp,
+    Reason,
+    drained,
+    local_sockets,
+    tcp,
+)
 from nondum.transport.peers.dial import Attempt
-from nondum.transport.peers.here import LOOK_S
+from nondum.transport.peers.local_sockets import LOOK_S
 from nondum.transport.peers.messages import MAX_MESSAGE, Welcome, encode
 from nondum.transport.peers.received import MOST_AHEAD, Received
 from nondum.transport.peers.routes import AcceptedRoute, DialledRoute
@@ -141,7 +141,7 @@ async def test_what_waits_while_this_host_hangs_is_not_taken_for_a_message_witho
     at_once: int, clock: VirtualClock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its time stands still, so that it does not take its peer for lost."""
-    monkeypatch.setattr(here, "LOOK_S", 0.0)  # each turn of the loop
+    monkeypatch.setattr(local_sockets, "LOOK_S", 0.0)  # each turn of the loop
     monkeypatch.setattr(drained, "AT_ONCE", at_once)
     async with two_hosts() as (rover, base):
         (route,) = base.node.accepted

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.transport.peers.beats import beat_s
+from nondum.transport.peers.heartbeat import beat_s
 from nondum.transport.peers.suspicion import Awake, Terms, Verdict, Watched
 
 TERMS = Terms()

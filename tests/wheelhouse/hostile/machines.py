@@ -7,7 +7,7 @@ import struct
 from tests.wheelhouse.hostile.case import INIT, SOURCE, HostileWheel, built
 from tests.wheelhouse.hostile_wheels import Lie, WheelBuilder, ZipMember
 
-from nondum.wheelhouse.elf import ARCHITECTURES, Elf
+from nondum.wheelhouse.wheels.elf import ARCHITECTURES, Elf
 
 CODE = "WHEEL_MACHINE"
 X86, ARM, ARM_32, X86_32 = (ARCHITECTURES[name] for name in ("x86_64", "aarch64", "armv7l", "i686"))

@@ -6,14 +6,7 @@ import struct
 from dataclasses import replace
 
 from tests.wheelhouse.hostile.case import INIT, HostileWheel, built, raw
-from tests.wheelhouse.hostile_wheels import (
-    INFO,
-    NAME,
-    End,
-    Lie,
-    WheelBuilder,
-    ZipBuilder,
-)
+from tests.wheelhouse.hostile_wheels import INFO, NAME, End, Lie, WheelBuilder, ZipBuilder
 
 CODE = "WHEEL_STRUCTURE"
 OTHER = ZipBuilder().add("other.py", b"x").bytes()

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.kit.signing import MADE, NOW, Key, trust_of
 
-from nondum.wheelhouse.contents import Contents, Entry
-from nondum.wheelhouse.manifest import PERMISSIONS, ComponentManifest, Manifest, Requires
-from nondum.wheelhouse.signatures import Grant, Verdict
+from nondum.wheelhouse.format.contents import Contents, Entry
+from nondum.wheelhouse.format.manifest import PERMISSIONS, ComponentManifest, Manifest, Requires
+from nondum.wheelhouse.format.signatures import Grant, Verdict
 from nondum.wheelhouse.trust import sshsig
 from nondum.wheelhouse.trust.judging import (
     EARLIEST,

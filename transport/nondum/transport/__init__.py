@@ -1,8 +1,8 @@
 """How messages get to workers, and frames from worker to worker."""
 
-from nondum.transport.broker import StreamBroker, Wire
-from nondum.transport.token_bucket import TokenBucket
-from nondum.transport.worker_link import WorkerLink, agreed_version, link_sockets
+from nondum.transport.link.token_bucket import TokenBucket
+from nondum.transport.link.worker_link import WorkerLink, agreed_version, link_sockets
+from nondum.transport.streams.broker import StreamBroker, Wire
 
 __all__ = [
     "StreamBroker",

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from nondum.host.catalogue.database import CACHE
-from nondum.wheelhouse import disk
+from nondum.wheelhouse.store import disk
 
 FOLDER = "backups"
 """Beside the catalogue."""

@@ -20,10 +20,10 @@ from nondum.host.catalogue import database, journal, opening
 from nondum.host.catalogue.backups import Backups
 from nondum.host.catalogue.journal import Since
 from nondum.host.catalogue.opening import Instead, Loss, Opened
-from nondum.host.catalogue.records import JournalEntry, Moment, Snapshot
 from nondum.host.catalogue.reserve import Reserve
-from nondum.host.catalogue.state import HostState
-from nondum.host.waiting import until_done
+from nondum.host.core.records import JournalEntry, Snapshot
+from nondum.host.core.shielded import until_done
+from nondum.host.core.state import HostState
 from nondum.sdk.errors import ConfigRefused, Problem
 
 _P = ParamSpec("_P")
@@ -214,8 +214,3 @@ class Catalogue:
             return function(*args, **kwargs)
 
         return await asyncio.get_running_loop().run_in_executor(self._thread, call)
-
-
-def now() -> Moment:
-    """This moment by both clocks."""
-    return Moment(time.monotonic(), time.time())

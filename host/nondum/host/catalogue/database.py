@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.catalogue import journal, rows
-from nondum.host.catalogue.records import ComponentRecord, JournalEntry, Rollback
-from nondum.host.catalogue.state import HostState
+from nondum.host.core.records import ComponentRecord, JournalEntry, Rollback
+from nondum.host.core.state import HostState
 from nondum.sdk.errors import ConfigRefused, NondumError, Problem
 
 SCHEMA = 8

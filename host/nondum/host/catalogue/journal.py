@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from nondum.host.catalogue import rows
-from nondum.host.catalogue.records import JournalEntry, Moment
+from nondum.host.core.records import JournalEntry, Moment
 
 KEEP = 20_000
 """So many of the last entries are kept unless somebody says otherwise: some eight megabytes."""

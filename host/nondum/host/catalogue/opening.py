@@ -11,9 +11,9 @@ from pathlib import Path
 
 from nondum.host.catalogue import database
 from nondum.host.catalogue.backups import Backups
-from nondum.host.catalogue.state import HostState
+from nondum.host.core.state import HostState
 from nondum.sdk.errors import ConfigRefused, Problem
-from nondum.wheelhouse import disk
+from nondum.wheelhouse.store import disk
 
 TRACES = ("store", "installed")
 """Folders that are filled only after the catalogue was made."""

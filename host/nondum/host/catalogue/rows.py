@@ -8,7 +8,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from nondum.host.catalogue.records import (
+from nondum.host.core.plain import plain
+from nondum.host.core.records import (
     ComponentRecord,
     ComponentState,
     DeviceClaim,
@@ -26,9 +27,8 @@ from nondum.host.catalogue.records import (
     PayloadRecord,
     Step,
 )
-from nondum.host.catalogue.state import Highwater
-from nondum.host.plain import plain
-from nondum.planning.given_names import GivenNames
+from nondum.host.core.state import Highwater
+from nondum.planning.merge.given_names import GivenNames
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, Problem
 

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 from datetime import datetime
 
-from nondum.host.catalogue.records import Moment, PayloadRecord
-from nondum.host.catalogue.state import Highwater, HostState
-from nondum.host.events import PayloadActivated, PayloadFound
+from nondum.host.core.events import PayloadActivated, PayloadFound
+from nondum.host.core.records import Moment, PayloadRecord
+from nondum.host.core.state import Highwater, HostState
 from nondum.host.lifecycle import releases
 from nondum.sdk.errors import Problem
-from nondum.wheelhouse.signatures import Grant
+from nondum.wheelhouse.format.signatures import Grant
 from nondum.wheelhouse.trust.judging import EARLIEST
 
 RELEASE_JUMP = 1_000_000

@@ -9,25 +9,25 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from nondum.host import events
-from nondum.host.catalogue.records import Moment
-from nondum.host.catalogue.state import HostState
-from nondum.host.events import Event
+from nondum.host.core import events
+from nondum.host.core.events import Event
+from nondum.host.core.records import Moment
+from nondum.host.core.state import HostState
+from nondum.host.core.transitions import TRANSITIONS
 from nondum.host.lifecycle import (
-    claims,
     component_rules,
+    crash_attribution,
+    device_allocation,
     drive_rules,
     goal_rules,
     payload_rules,
     peer_rules,
     rebuilding,
     releases,
+    retry_rules,
     safe_mode_rules,
-    trial_rules,
-    tries,
 )
 from nondum.host.lifecycle.turn import Outcome, Turn
-from nondum.host.transitions import TRANSITIONS
 
 _Rule = Callable[[Turn, Any], None]
 
@@ -62,9 +62,9 @@ RULES: Mapping[type[Event], _Rule] = {
     events.GoalGiven: goal_rules.on_goal_given,
     events.GoalReached: goal_rules.on_goal_over,
     events.GoalEnded: goal_rules.on_goal_over,
-    events.HostSteady: tries.on_host_steady,
-    events.TrialDue: trial_rules.on_trial_due,
-    events.DriveRetried: trial_rules.on_drive_retried,
+    events.HostSteady: crash_attribution.on_host_steady,
+    events.TrialDue: retry_rules.on_trial_due,
+    events.DriveRetried: retry_rules.on_drive_retried,
     events.SafeModeLeft: safe_mode_rules.on_left,
     events.PeerJoined: peer_rules.on_peer_joined,
     events.PeerShared: peer_rules.on_peer_shared,
@@ -92,7 +92,7 @@ def follow_all(turn: Turn) -> None:
 
 def follow(turn: Turn, event: Event) -> None:
     """Apply the rule for one event; what follows from it is left pending."""
-    tries.on_event(turn, event)
+    crash_attribution.on_event(turn, event)
     rule = RULES.get(type(event))
     if rule is not None:
         rule(turn, event)
@@ -105,7 +105,7 @@ def settle(turn: Turn, before: HostState) -> Outcome:
     drive_rules.release_idle_drives(turn)
     rebuilding.settle(turn, before)
     if turn.state.components != before.components or turn.state.devices != before.devices:
-        claims.settle(turn, before.devices)
+        device_allocation.settle(turn, before.devices)
     parts = ("components", "mounts", "connections", "former")
     is_recomposed = any(getattr(turn.state, part) != getattr(before, part) for part in parts)
     if is_recomposed or peer_rules.offers(turn.state) != peer_rules.offers(before):

@@ -4,15 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from nondum.host.catalogue.records import (
-    ComponentRecord,
-    ComponentState,
-    DeviceRecord,
-    MountPose,
-    Step,
-)
-from nondum.host.effects import RestartWorker
-from nondum.host.events import (
+from nondum.host.core.effects import RestartWorker
+from nondum.host.core.events import (
     ConditionEnded,
     DeviceAppeared,
     DeviceChanged,
@@ -27,10 +20,11 @@ from nondum.host.events import (
     WorkerReady,
     WorkerSteady,
 )
+from nondum.host.core.records import ComponentRecord, ComponentState, DeviceRecord, MountPose, Step
+from nondum.host.core.transitions import COMPONENT_TRANSITIONS
 from nondum.host.lifecycle import known_devices, releases
 from nondum.host.lifecycle.payload_rules import on_payload_tried
 from nondum.host.lifecycle.turn import Turn
-from nondum.host.transitions import COMPONENT_TRANSITIONS
 from nondum.sdk.errors import Problem
 
 CONDITION = "CONDITION_RAISED"

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from nondum.host.catalogue.records import DriveRecord, DriveState, PayloadRecord, Step
-from nondum.host.catalogue.state import HostState
-from nondum.host.effects import CopyPayload, ReadDrive, ReleaseDrive
-from nondum.host.events import (
+from nondum.host.core.effects import CopyPayload, ReadDrive, ReleaseDrive
+from nondum.host.core.events import (
     DriveInserted,
     DriveRead,
     DriveRemoved,
@@ -16,7 +14,9 @@ from nondum.host.events import (
     PayloadFound,
     PayloadWithdrawn,
 )
-from nondum.host.lifecycle import releases, safe_mode, tries
+from nondum.host.core.records import DriveRecord, DriveState, PayloadRecord, Step
+from nondum.host.core.state import HostState
+from nondum.host.lifecycle import crash_attribution, releases, safe_mode
 from nondum.host.lifecycle.turn import Turn
 from nondum.sdk.errors import Problem
 
@@ -40,7 +40,7 @@ def on_drive_inserted(turn: Turn, event: DriveInserted) -> None:
     )
     if problems := (
         *event.problems,
-        *tries.drive_problems(turn.state, drive),
+        *crash_attribution.drive_problems(turn.state, drive),
         *safe_mode.drive_problems(turn.state, drive.kind, drive.id),
     ):
         turn.put_drive(drive)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import cast
 
-from nondum.host.catalogue.records import GoalRecord
-from nondum.host.events import GoalEnded, GoalGiven, GoalReached
+from nondum.host.core.events import GoalEnded, GoalGiven, GoalReached
+from nondum.host.core.records import GoalRecord
 from nondum.host.lifecycle.turn import Turn
-from nondum.planning.goal import GoalKind
+from nondum.planning.merge.goal import GoalKind
 
 
 def on_goal_given(turn: Turn, event: GoalGiven) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from nondum.host.catalogue.records import DeviceRecord, KnownDevice
+from nondum.host.core.records import DeviceRecord, KnownDevice
 
 MOST = 200
 """So many are remembered; beyond them those that were seen last longest ago are forgotten."""

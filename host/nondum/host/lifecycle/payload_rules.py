@@ -6,9 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
-from nondum.host.catalogue.records import ComponentRecord, MountPose, PayloadRecord, Step
-from nondum.host.catalogue.state import HostState
-from nondum.host.effects import (
+from nondum.host.core.effects import (
     ActivatePayload,
     AttachDevice,
     ClearPayload,
@@ -20,7 +18,7 @@ from nondum.host.effects import (
     StoreWheels,
     SuspendPayload,
 )
-from nondum.host.events import (
+from nondum.host.core.events import (
     Event,
     ForgetAsked,
     PayloadActivated,
@@ -39,11 +37,21 @@ from nondum.host.events import (
     TrustChanged,
     WheelsStored,
 )
-from nondum.host.lifecycle import admission, causes, naming, releases, replacement, safe_mode, tries
-from nondum.host.lifecycle.claims import granted
+from nondum.host.core.records import ComponentRecord, MountPose, PayloadRecord, Step
+from nondum.host.core.state import HostState
+from nondum.host.core.transitions import TRANSITIONS, Transition
+from nondum.host.lifecycle import (
+    admission,
+    component_names,
+    crash_attribution,
+    releases,
+    replacement,
+    retry_causes,
+    safe_mode,
+)
+from nondum.host.lifecycle.device_allocation import granted
 from nondum.host.lifecycle.drive_rules import copy_of, drop_replaced, drop_rewritten, read
 from nondum.host.lifecycle.turn import Turn
-from nondum.host.transitions import TRANSITIONS, Transition
 
 PHASES = {Step.VERIFIED: "verified", Step.STORED: "installed", Step.ACTIVE: "ready"}
 """The steps whose moments people are shown."""
@@ -65,7 +73,7 @@ def on_payload_found(turn: Turn, event: PayloadFound) -> None:
             turn.events.append(event)
         sources = {**known.sources, event.drive: event.folder}
         turn.put_payload(replace(known, sources=sources))
-        is_refused = known.step is Step.REFUSED and causes.is_unsigned(known.problems)
+        is_refused = known.step is Step.REFUSED and retry_causes.is_unsigned(known.problems)
         if is_refused and not event.problems:
             turn.pending.append(RetryAsked(event.payload, "it has been signed since"))
         return
@@ -85,7 +93,7 @@ def on_payload_found(turn: Turn, event: PayloadFound) -> None:
     problems = (
         *event.problems,
         *admission.release_problems(turn.state, event, turn.at),
-        *tries.payload_problems(turn.state, event),
+        *crash_attribution.payload_problems(turn.state, event),
         *safe_mode.drive_problems(
             turn.state, turn.state.drives[event.drive].kind, event.payload_id
         ),
@@ -101,9 +109,9 @@ def on_payload_verified(turn: Turn, event: PayloadVerified) -> None:
     payload = turn.state.payloads.get(event.payload)
     if payload is None or payload.step is not Step.COPIED:
         return
-    payload = naming.named(turn.state, payload, event.components)
+    payload = component_names.named(turn.state, payload, event.components)
     said = {payload.names[id]: description for id, description in event.index.items()}
-    index = naming.as_called(turn.state, payload.payload_id, said)
+    index = component_names.as_called(turn.state, payload.payload_id, said)
     if worse := replacement.problems(turn.state, payload, index):
         turn.pending.append(PayloadRefused(event.payload, worse))
     else:
@@ -130,7 +138,7 @@ def on_payload_activated(turn: Turn, event: PayloadActivated) -> None:
     if payload is None or payload.step is not Step.PROBED:
         return
     said = {component.id: component.description for component in event.components}
-    index = naming.as_called(turn.state, payload.payload_id, said)
+    index = component_names.as_called(turn.state, payload.payload_id, said)
     if worse := replacement.problems(turn.state, payload, index):
         turn.pending.append(PayloadFailed(event.payload, worse))
     else:
@@ -170,8 +178,10 @@ def on_payload_step(turn: Turn, event: Any) -> None:
 def _foretold(state: HostState, payload: PayloadRecord, event: Any) -> Any:
     """A refusal, with whether it is tried again. What was to be installed for good is not: it is
     given up."""
-    if isinstance(event, PayloadRefused | PayloadFailed) and not tries.is_initial(state, payload):
-        return replace(event, problems=causes.foretold(event.problems, payload.payload_id))
+    if isinstance(event, PayloadRefused | PayloadFailed) and not crash_attribution.is_initial(
+        state, payload
+    ):
+        return replace(event, problems=retry_causes.foretold(event.problems, payload.payload_id))
     return event
 
 
@@ -222,7 +232,7 @@ def on_trust_changed(turn: Turn, event: TrustChanged) -> None:
     turn.pending.extend(
         RetryAsked(payload.key, "whom this host trusts has changed")
         for payload in turn.state.payloads.values()
-        if payload.step is Step.REFUSED and causes.is_untrusted(payload.problems)
+        if payload.step is Step.REFUSED and retry_causes.is_untrusted(payload.problems)
     )
 
 
@@ -274,7 +284,7 @@ def _activate(turn: Turn, payload: PayloadRecord, event: PayloadActivated) -> No
     reached = admission.reached(turn.state, payload, event)
     turn.change(
         highwater={**turn.state.highwater, payload.payload_id: reached},
-        names=naming.remembering(turn.state, payload, event.components),
+        names=component_names.remembering(turn.state, payload, event.components),
     )
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from nondum.host.catalogue.records import PeerRecord
-from nondum.host.catalogue.state import HostState
-from nondum.host.events import PeerJoined, PeerLeft, PeerShared
+from nondum.host.core.events import PeerJoined, PeerLeft, PeerShared
+from nondum.host.core.records import PeerRecord
+from nondum.host.core.state import HostState
 from nondum.host.lifecycle.turn import Turn
 
 

@@ -13,23 +13,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from nondum.host.catalogue import payload_key
-from nondum.host.catalogue.records import (
-    INSTALLED,
-    DriveRecord,
-    DriveState,
-    Moment,
-    PayloadRecord,
-    Step,
-)
-from nondum.host.catalogue.state import Highwater, HostState
-from nondum.host.drives.reader import Arguments, Report
-from nondum.host.effects import NoteInstalled
-from nondum.host.lifecycle import naming, tries
-from nondum.host.lifecycle.folders import KEEPS_FOLDER
+from nondum.host.core import payload_key
+from nondum.host.core.effects import NoteInstalled
+from nondum.host.core.records import INSTALLED, DriveRecord, DriveState, Moment, PayloadRecord, Step
+from nondum.host.core.state import Highwater, HostState
+from nondum.host.core.transitions import KEEPS_FOLDER
+from nondum.host.jobs.look import Arguments, Report
+from nondum.host.lifecycle import component_names, crash_attribution
 from nondum.host.lifecycle.turn import Turn
 from nondum.sdk.errors import NondumError
-from nondum.wheelhouse import contents, disk, payload
+from nondum.wheelhouse.format import contents
+from nondum.wheelhouse.payload import payload
+from nondum.wheelhouse.store import disk
 
 
 def settle(turn: Turn, before: HostState) -> None:
@@ -49,7 +44,11 @@ def noting_all(state: HostState) -> Iterator[NoteInstalled]:
 
 def _noted(state: HostState, record: PayloadRecord | None) -> tuple[str, Path] | None:
     """Drive and folder of a payload that is installed for good and has its files here."""
-    if record is None or record.step not in KEEPS_FOLDER or not tries.is_initial(state, record):
+    if (
+        record is None
+        or record.step not in KEEPS_FOLDER
+        or not crash_attribution.is_initial(state, record)
+    ):
         return None
     drives = (state.drives[name] for name in record.sources if name in state.drives)
     return next((drive.id, drive.root) for drive in drives if drive.kind == INSTALLED)
@@ -123,7 +122,7 @@ def _with(state: HostState, one: Mapping[str, Any], at: Moment) -> HostState:
         sources={drive.id: folder},
         phases={"seen": at},
     )
-    record = naming.named(state, record, one["components"])
+    record = component_names.named(state, record, one["components"])
     newest = state.highwater.get(record.payload_id)
     reached = Highwater(record.release, record.digest)
     if newest is not None and newest.release >= record.release:

@@ -8,16 +8,15 @@ from __future__ import annotations
 from collections.abc import Set
 from dataclasses import replace
 
-from nondum.host.catalogue.records import Moment, PayloadRecord, Safety, Step
-from nondum.host.catalogue.state import HostState
-from nondum.host.effects import SuspendPayload
-from nondum.host.events import HostStarted, Recovered, SafeModeEntered
-from nondum.host.lifecycle import releases, safe_mode, tries
+from nondum.host.core.effects import SuspendPayload
+from nondum.host.core.events import HostStarted, Recovered, SafeModeEntered
+from nondum.host.core.records import Moment, PayloadRecord, Safety, Step
+from nondum.host.core.state import HostState
+from nondum.host.core.transitions import KEEPS_FOLDER, RECOVERY, Transition
+from nondum.host.lifecycle import crash_attribution, releases, safe_mode
 from nondum.host.lifecycle.advance import follow_all
-from nondum.host.lifecycle.folders import KEEPS_FOLDER
 from nondum.host.lifecycle.payload_rules import effect_for
 from nondum.host.lifecycle.turn import Outcome, Turn
-from nondum.host.transitions import RECOVERY, Transition
 from nondum.sdk.errors import Problem
 
 
@@ -33,7 +32,7 @@ def recover(
     `missing` are keys of payloads whose folders are not there any more; `why` it is safe mode.
     """
     turn = Turn(state, at)
-    turn.change(devices={}, tries=tries.counted(state), is_stopped=False, safety=safety)
+    turn.change(devices={}, tries=crash_attribution.counted(state), is_stopped=False, safety=safety)
     state = replace(state, payloads=safe_mode.roused(state, safety))
     for payload in state.payloads.values():
         turn.drop_components(payload.key)
@@ -68,10 +67,12 @@ def _row(
     row = RECOVERY[payload.step]
     if is_missing and row.to in KEEPS_FOLDER:
         # A guest is found on its drive again; what was installed for good is not, and is told.
-        return Transition(Step.QUARANTINED if tries.is_initial(state, payload) else Step.GONE)
+        return Transition(
+            Step.QUARANTINED if crash_attribution.is_initial(state, payload) else Step.GONE
+        )
     if row.to in (Step.STORED, Step.SUPERSEDED) and _is_kept_out(state, payload):
         return Transition(Step.QUARANTINED, SuspendPayload)
-    if row.to is Step.STORED and tries.is_left_alone(state, payload.key):
+    if row.to is Step.STORED and crash_attribution.is_left_alone(state, payload.key):
         return Transition(Step.QUARANTINED, SuspendPayload)
     if row.to is Step.STORED and releases.waits_for_recovery(found, payload):
         return RECOVERY[Step.SUPERSEDED]
@@ -80,7 +81,9 @@ def _row(
 
 def _is_kept_out(state: HostState, payload: PayloadRecord) -> bool:
     """Whether safe mode leaves it alone."""
-    return safe_mode.is_left_alone(state.safety, is_initial=tries.is_initial(state, payload))
+    return safe_mode.is_left_alone(
+        state.safety, is_initial=crash_attribution.is_initial(state, payload)
+    )
 
 
 def _why_not(state: HostState, payload: PayloadRecord, *, is_missing: bool) -> Problem:
@@ -88,7 +91,7 @@ def _why_not(state: HostState, payload: PayloadRecord, *, is_missing: bool) -> P
         return _lost(payload)
     if _is_kept_out(state, payload):
         return safe_mode.problem(state.safety, payload.payload_id)
-    return tries.left_alone(state, payload.key, payload.payload_id)
+    return crash_attribution.left_alone(state, payload.key, payload.payload_id)
 
 
 def _lost(payload: PayloadRecord) -> Problem:

@@ -10,16 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from nondum.host.catalogue.records import (
-    ComponentRecord,
-    DeviceRecord,
-    PayloadRecord,
-    Rollback,
-    Step,
-)
-from nondum.host.catalogue.state import HostState
-from nondum.host.effects import ProbeComponents
-from nondum.host.events import (
+from nondum.host.core.effects import ProbeComponents
+from nondum.host.core.events import (
     BesideRefused,
     PayloadFailed,
     PayloadFound,
@@ -28,7 +20,9 @@ from nondum.host.events import (
     RetryAsked,
     RollbackAsked,
 )
-from nondum.host.lifecycle.claims import handed_over
+from nondum.host.core.records import ComponentRecord, DeviceRecord, PayloadRecord, Rollback, Step
+from nondum.host.core.state import HostState
+from nondum.host.lifecycle.device_allocation import handed_over
 from nondum.host.lifecycle.turn import Turn
 from nondum.sdk.errors import Problem
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from nondum.host import vocabulary_check
-from nondum.host.catalogue.records import PayloadRecord, Step
-from nondum.host.catalogue.state import HostState
+from nondum.host.core.records import PayloadRecord, Step
+from nondum.host.core.state import HostState
 from nondum.host.lifecycle import releases
-from nondum.planning.contribution import Contribution
-from nondum.planning.merge import merge
-from nondum.planning.phrases import phrasebook
+from nondum.host.trust import vocabulary_check
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.merge import merge
+from nondum.planning.words.phrases import phrasebook
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
 

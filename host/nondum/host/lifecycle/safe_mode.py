@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from nondum.host.catalogue.records import INSTALLED, PayloadRecord, Safety, Step
-from nondum.host.catalogue.state import HostState
-from nondum.host.lifecycle import tries
+from nondum.host.core.records import INSTALLED, PayloadRecord, Safety, Step
+from nondum.host.core.state import HostState
+from nondum.host.lifecycle import crash_attribution
 from nondum.sdk.errors import Problem
 
 CODE = "SAFE_MODE"
@@ -85,7 +85,8 @@ def roused(state: HostState, safety: Safety) -> Mapping[str, PayloadRecord]:
     as they were, if this one lets them."""
     return {
         key: replace(payload, step=Step.STORED, problems=())
-        if waits(payload) and not is_left_alone(safety, is_initial=tries.is_initial(state, payload))
+        if waits(payload)
+        and not is_left_alone(safety, is_initial=crash_attribution.is_initial(state, payload))
         else payload
         for key, payload in state.payloads.items()
     }

@@ -6,7 +6,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, TypeVar
 
-from nondum.host.catalogue.records import (
+from nondum.host.core.effects import Effect
+from nondum.host.core.events import Event
+from nondum.host.core.records import (
     ComponentRecord,
     DriveRecord,
     Moment,
@@ -14,10 +16,8 @@ from nondum.host.catalogue.records import (
     PeerRecord,
     Step,
 )
-from nondum.host.catalogue.state import HostState
-from nondum.host.effects import Effect
-from nondum.host.events import Event
-from nondum.host.lifecycle.former import remembering, remembering_peer
+from nondum.host.core.state import HostState
+from nondum.host.lifecycle.former_payloads import remembering, remembering_peer
 
 _V = TypeVar("_V")
 

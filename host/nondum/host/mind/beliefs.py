@@ -6,8 +6,7 @@ import logging
 import re
 from collections.abc import Callable, Mapping
 
-from nondum.host.catalogue.records import Snapshot
-from nondum.host.events import (
+from nondum.host.core.events import (
     Event,
     FactForgotten,
     FactKnown,
@@ -15,11 +14,12 @@ from nondum.host.events import (
     UnitsTaken,
     WorkerExited,
 )
+from nondum.host.core.records import Snapshot
 from nondum.host.mind.composition import Composition, always_produced, body_facts, own_objects
-from nondum.planning.core import HOST_PREDICATES
-from nondum.planning.facts import fact, is_twin
-from nondum.planning.scope import SELF
-from nondum.planning.world import WorldModel
+from nondum.planning.execute.world import WorldModel
+from nondum.planning.merge.core import HOST_PREDICATES
+from nondum.planning.merge.scope import SELF
+from nondum.planning.pddl.facts import fact, is_twin
 from nondum.sdk.errors import Problem
 
 log = logging.getLogger(__name__)

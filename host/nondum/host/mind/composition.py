@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from nondum.host.catalogue.records import ComponentRecord, PeerComponent, Snapshot
-from nondum.planning.contribution import Contribution, object_name
-from nondum.planning.domain import Merged
-from nondum.planning.facts import fact
-from nondum.planning.merge import merge
-from nondum.planning.phrases import Phrasebook, phrasebook
+from nondum.host.core.records import ComponentRecord, PeerComponent, Snapshot
+from nondum.planning.merge.contribution import Contribution, object_name
+from nondum.planning.merge.domain import Merged
+from nondum.planning.merge.merge import merge
+from nondum.planning.pddl.facts import fact
+from nondum.planning.words.phrases import Phrasebook, phrasebook
 from nondum.sdk.description import ACTUATORS, PluginDescription
 
 

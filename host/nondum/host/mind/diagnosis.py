@@ -7,15 +7,15 @@ import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from nondum.host.catalogue.records import FormerPayload, Snapshot
-from nondum.host.mind.need import Need
-from nondum.host.mind.silence import Silence
-from nondum.planning.claims import claims_of
-from nondum.planning.contribution import Contribution
-from nondum.planning.domain import Merged
-from nondum.planning.explain import explain, suppliers
-from nondum.planning.goal import Goal
-from nondum.planning.ground import ground
+from nondum.host.core.records import FormerPayload, Snapshot
+from nondum.host.mind.lack import Need
+from nondum.host.mind.missing_reports import Silence
+from nondum.planning.explain.explain import explain, suppliers
+from nondum.planning.ground.ground import ground
+from nondum.planning.merge.claims import claims_of
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.domain import Merged
+from nondum.planning.merge.goal import Goal
 from nondum.planning.search import solve
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import FragmentRefused, Problem

@@ -7,15 +7,15 @@ from typing import Any, TypeAlias
 
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition
-from nondum.planning.caret import nearest, refusal
-from nondum.planning.conclusions import conclusions
-from nondum.planning.core import HOST_PREDICATES, TAKEN_PREDICATES
-from nondum.planning.domain import Action, DerivedRule, Merged
-from nondum.planning.facts import fact, parts
-from nondum.planning.parse import parse_formula
-from nondum.planning.scope import SELF
-from nondum.planning.syntax import Atom, Not
-from nondum.planning.testimony import Source, SourceKind
+from nondum.planning.execute.provenance import Source, SourceKind
+from nondum.planning.ground.conclusions import conclusions
+from nondum.planning.merge.core import HOST_PREDICATES, TAKEN_PREDICATES
+from nondum.planning.merge.domain import Action, DerivedRule, Merged
+from nondum.planning.merge.scope import SELF
+from nondum.planning.pddl.caret import nearest, refusal
+from nondum.planning.pddl.facts import fact, parts
+from nondum.planning.pddl.parse import parse_formula
+from nondum.planning.pddl.syntax import Atom, Not
 from nondum.sdk.errors import FragmentRefused
 
 Row: TypeAlias = dict[str, Any]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 
-from nondum.host.catalogue.records import MountPose, Snapshot
+from nondum.host.core.records import MountPose, Snapshot
 from nondum.sdk.geometry import FrameTree, Transform
 
 MAX_DISTANCE_M = 5.0

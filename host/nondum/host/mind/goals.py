@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from nondum.host.catalogue.records import GoalRecord
-from nondum.host.mind.need import Need
-from nondum.planning.goal import GoalKind
+from nondum.host.core.records import GoalRecord
+from nondum.host.mind.lack import Need
+from nondum.planning.merge.goal import GoalKind
 from nondum.sdk.errors import GoalRefused, Problem
 
 HIGHEST_PRIORITY = 1000

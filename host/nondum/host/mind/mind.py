@@ -15,13 +15,14 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from nondum.host.catalogue.records import GoalRecord, Snapshot
-from nondum.host.events import Emit, Event, GoalEnded, GoalGiven
+from nondum.host.core.events import Emit, Event, GoalEnded, GoalGiven
+from nondum.host.core.names import shortened
+from nondum.host.core.records import GoalRecord, Snapshot
+from nondum.host.mind.announcements import People, kept_out, recomposed
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition, compose
 from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState
-from nondum.host.mind.halts import Halts
-from nondum.host.mind.people import People, kept_out, recomposed
+from nondum.host.mind.halted import Halts
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.pursuit import Pursuit
 from nondum.host.mind.runner import BehaviourRunner, Calls
@@ -29,10 +30,9 @@ from nondum.host.mind.search import SMALL
 from nondum.host.mind.short_names import short_names
 from nondum.host.mind.system_tree import Duty, Hold, Parts, SystemTree, TaskSlot, default_tree
 from nondum.host.mind.views import Views
-from nondum.host.whole_names import shortened
-from nondum.planning.attempts import Patience
-from nondum.planning.facts import fact
-from nondum.planning.goal import Goal, GoalKind, goal_text, parse_goal
+from nondum.planning.execute.attempts import Patience
+from nondum.planning.merge.goal import Goal, GoalKind, goal_text, parse_goal
+from nondum.planning.pddl.facts import fact
 from nondum.sdk.errors import GoalRefused, Problem
 
 log = logging.getLogger(__name__)

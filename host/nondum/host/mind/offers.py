@@ -12,18 +12,18 @@ from typing import Any, TypeAlias
 
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.diagnosis import Seen, WhyNot, why_not
-from nondum.host.mind.need import Need
-from nondum.host.mind.silence import Silence
-from nondum.planning.cause import Lack
-from nondum.planning.domain import bind
-from nondum.planning.exploration import explore
-from nondum.planning.goal import Goal, goal_text
-from nondum.planning.ground import ground
-from nondum.planning.normal import Condition
-from nondum.planning.pattern import Slot
-from nondum.planning.phrases import Reading
-from nondum.planning.relaxed import quick_answer
-from nondum.planning.syntax import type_text
+from nondum.host.mind.lack import Need
+from nondum.host.mind.missing_reports import Silence
+from nondum.planning.explain.cause import Lack
+from nondum.planning.ground.delete_relaxation import quick_answer
+from nondum.planning.ground.exploration import explore
+from nondum.planning.ground.ground import ground
+from nondum.planning.merge.domain import bind
+from nondum.planning.merge.goal import Goal, goal_text
+from nondum.planning.pddl.normal import Condition
+from nondum.planning.pddl.syntax import type_text
+from nondum.planning.words.pattern import Slot
+from nondum.planning.words.phrases import Reading
 from nondum.sdk.errors import FragmentRefused
 from nondum.sdk.planner import AlreadyTrue, Unsolvable
 

@@ -14,8 +14,8 @@ import time
 from importlib import import_module
 from typing import Any, BinaryIO
 
-from nondum.host.confinement import own_children
 from nondum.host.mind import planner_wire as wire
+from nondum.host.sandbox.levels import host_children
 from nondum.sdk.planner import Planner, TextPlanner
 
 NICENESS = 10
@@ -35,7 +35,7 @@ def main(reference: str, memory_mb: int, daemon: int) -> int:
 
 
 def _limit(memory_mb: int, daemon: int) -> None:
-    own_children.settle(daemon)
+    host_children.settle(daemon)
     os.nice(NICENESS)
     size = memory_mb * 1024 * 1024
     resource.setrlimit(resource.RLIMIT_AS, (size, size))

@@ -19,9 +19,9 @@ from importlib_metadata import entry_points
 
 from nondum.host.mind.planner_process import PlannerProcess
 from nondum.host.mind.planner_wire import Request, TaskText
-from nondum.planning.plan_text import plan_of
-from nondum.planning.relaxed import quick_answer
-from nondum.planning.validate import validate
+from nondum.planning.ground.delete_relaxation import quick_answer
+from nondum.planning.ground.plan_text import plan_of
+from nondum.planning.search.validate import validate
 from nondum.sdk.errors import PlannerFailed, Problem
 from nondum.sdk.planner import (
     AlreadyTrue,

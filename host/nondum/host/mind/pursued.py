@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from nondum.planning.side_by_side import Reservation
-from nondum.planning.task_control import Phase
-from nondum.planning.task_tree import TaskTree
+from nondum.planning.execute.independence import Reservation
+from nondum.planning.execute.plan_executive import Phase
+from nondum.planning.execute.task_tree import TaskTree
 from nondum.sdk.planner import GroundTask, Plan
 
 

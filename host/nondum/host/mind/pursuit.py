@@ -12,28 +12,28 @@ import logging
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 
-from nondum.host.catalogue.records import ComponentState
-from nondum.host.events import Emit, GoalEnded, GoalReached, PlanMade, PlanMissing
+from nondum.host.core.events import Emit, GoalEnded, GoalReached, PlanMade, PlanMissing
+from nondum.host.core.records import ComponentState
 from nondum.host.mind import short_names
+from nondum.host.mind.announcements import People, kept_out
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.diagnosis import Seen, seen_in
 from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState, is_replaced, urgency
-from nondum.host.mind.people import People, kept_out
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.pursued import Pursued, conflicts
 from nondum.host.mind.runner import BehaviourRunner
 from nondum.host.mind.search import search, task_of
+from nondum.host.mind.search_order import Turns
 from nondum.host.mind.situation import NoPlan, Others, Outcome, Past, Planned, Situation, Waits
-from nondum.host.mind.turns import Turns
-from nondum.planning.attempts import Attempts, Patience, Setbacks
-from nondum.planning.goal import parse_goal
-from nondum.planning.plain import plain
-from nondum.planning.replay import beginning_at, replayed
-from nondum.planning.running import Run
-from nondum.planning.side_by_side import Reservation
-from nondum.planning.task_control import Phase, TaskControl
-from nondum.planning.task_tree import TaskTree
+from nondum.planning.execute.attempts import Attempts, Patience, Setbacks
+from nondum.planning.execute.independence import Reservation
+from nondum.planning.execute.plan_executive import Phase, TaskControl
+from nondum.planning.execute.replay import beginning_at, replayed
+from nondum.planning.execute.running import Run
+from nondum.planning.execute.task_tree import TaskTree
+from nondum.planning.ground.conditional_effects import plain
+from nondum.planning.merge.goal import parse_goal
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
 from nondum.sdk.planner import GroundTask, Plan
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeAlias
 
-from nondum.host.events import (
+from nondum.host.core.events import (
     BehaviourEnded,
     BehaviourEstablished,
     BehaviourProgressed,
@@ -17,9 +17,9 @@ from nondum.host.events import (
 )
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition
-from nondum.planning.facts import parts
-from nondum.planning.running import RunState
-from nondum.planning.step import Step
+from nondum.planning.execute.running import RunState
+from nondum.planning.execute.step import Step
+from nondum.planning.pddl.facts import parts
 from nondum.sdk.errors import NondumError
 
 FactValue: TypeAlias = tuple[str, tuple[str, ...], Any]

@@ -12,20 +12,20 @@ from typing import TypeAlias
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.diagnosis import WhyNot, why_not, words_gone
 from nondum.host.mind.goals import GivenGoal
+from nondum.host.mind.missing_reports import Silence
 from nondum.host.mind.planners import Planners
-from nondum.host.mind.silence import Silence
 from nondum.host.mind.situation import NoPlan, Outcome, Past, Planned, Situation, Waits
-from nondum.planning.bounds import INSTANCES_LIMIT
-from nondum.planning.cutting import cut_short
-from nondum.planning.domain import Merged
-from nondum.planning.goal import Goal, goal_problems, parse_goal
-from nondum.planning.ground import ground
-from nondum.planning.oversize import Fitted, fitted
-from nondum.planning.pddl_text import pddl_text
-from nondum.planning.plain import plain
-from nondum.planning.pricing import at_own_cost, handicaps, priced
-from nondum.planning.side_by_side import Reservation, conflicting, kept_clear
-from nondum.planning.step import steps_of, words
+from nondum.planning.execute.independence import Reservation, conflicting, kept_clear
+from nondum.planning.execute.step import steps_of, words
+from nondum.planning.ground.bounds import INSTANCES_LIMIT
+from nondum.planning.ground.conditional_effects import plain
+from nondum.planning.ground.ground import ground
+from nondum.planning.ground.oversize import Fitted, fitted
+from nondum.planning.ground.pddl_text import pddl_text
+from nondum.planning.ground.pricing import at_own_cost, handicaps, priced
+from nondum.planning.merge.domain import Merged
+from nondum.planning.merge.goal import Goal, goal_problems, parse_goal
+from nondum.planning.search.interruptions import cut_short
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
 from nondum.sdk.planner import AlreadyTrue, GaveUp, GroundTask, Plan, Unsolvable
 

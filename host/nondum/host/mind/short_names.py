@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 
-from nondum.host.whole_names import shortened
-from nondum.planning.contribution import id_at_home
-from nondum.planning.domain import Object
+from nondum.host.core.names import shortened
+from nondum.planning.merge.contribution import id_at_home
+from nondum.planning.merge.domain import Object
 
 
 def short_names(objects: Mapping[str, Object]) -> dict[str, str]:

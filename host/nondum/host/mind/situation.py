@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from nondum.host.mind.diagnosis import Seen
-from nondum.host.mind.need import Need
-from nondum.planning.side_by_side import Reservation
+from nondum.host.mind.lack import Need
+from nondum.planning.execute.independence import Reservation
 from nondum.sdk.errors import Problem
 from nondum.sdk.planner import GroundTask, Plan
 

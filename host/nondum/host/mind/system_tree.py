@@ -17,7 +17,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import ParallelPolicy, Status
 from py_trees.composites import Composite, Parallel
 
-from nondum.planning.task_tree import TaskTree
+from nondum.planning.execute.task_tree import TaskTree
 from nondum.sdk.errors import ConfigRefused, Problem
 
 

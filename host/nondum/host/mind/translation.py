@@ -14,9 +14,9 @@ from itertools import islice
 from typing import Any, TypeAlias, cast, get_args
 
 from nondum.host.mind.composition import Composition
-from nondum.planning.domain import Predicate
-from nondum.planning.goal import GoalKind, goal_text, parse_goal
-from nondum.planning.syntax import type_text
+from nondum.planning.merge.domain import Predicate
+from nondum.planning.merge.goal import GoalKind, goal_text, parse_goal
+from nondum.planning.pddl.syntax import type_text
 from nondum.sdk.errors import GoalRefused, Problem
 
 UNMATCHED = frozenset({"PHRASE_UNKNOWN", "PHRASE_WORDS_UNKNOWN"})

@@ -17,11 +17,11 @@ from nondum.host.mind.goals import GoalQueue
 from nondum.host.mind.pursued import Pursued
 from nondum.host.mind.pursuit import Pursuit
 from nondum.host.mind.runner import BehaviourRunner
-from nondum.planning.choice import Alternatives
-from nondum.planning.facts import parts
-from nondum.planning.partial_order import GOAL, CausalLink
-from nondum.planning.task_tree import StepLeaf, TaskTree
-from nondum.planning.whereabouts import Whereabouts
+from nondum.planning.execute.choice import Alternatives
+from nondum.planning.execute.partial_order import GOAL, CausalLink
+from nondum.planning.execute.step_status import Whereabouts
+from nondum.planning.execute.task_tree import StepLeaf, TaskTree
+from nondum.planning.pddl.facts import parts
 from nondum.sdk.planner import GroundAction
 
 Row = dict[str, Any]

@@ -9,21 +9,21 @@ from typing import Protocol
 
 from py_trees.behaviour import Behaviour as Node
 
-from nondum.host.catalogue.records import ComponentRecord, PeerComponent
+from nondum.host.core.records import ComponentRecord, PeerComponent
 from nondum.host.mind import evidence, offers, short_names
+from nondum.host.mind.announcements import People
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition, own_objects
 from nondum.host.mind.frames import implausible
 from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState
-from nondum.host.mind.people import People
+from nondum.host.mind.missing_reports import Silence
 from nondum.host.mind.pursued import Pursued
 from nondum.host.mind.pursuit import Pursuit
 from nondum.host.mind.runner import BehaviourRunner
-from nondum.host.mind.silence import Silence
 from nondum.host.mind.tree_view import Row, TreeView
-from nondum.planning.conclusions import conclusions
-from nondum.planning.task_control import Phase
-from nondum.planning.task_tree import StepLeaf
+from nondum.planning.execute.plan_executive import Phase
+from nondum.planning.execute.task_tree import StepLeaf
+from nondum.planning.ground.conclusions import conclusions
 from nondum.sdk.description import Behaviour
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
 
+from nondum.host.core.printable import printable
 from nondum.host.peers.goals import ASK_S, MAX_WORDS
 from nondum.host.peers.remote_calls import Reaches
-from nondum.host.printable import printable
-from nondum.planning.addressee import addressed_to
-from nondum.planning.asking import question_in
+from nondum.planning.words.addressee import addressed_to
+from nondum.planning.words.asking import question_in
 from nondum.sdk.errors import GoalRefused, NondumError, Problem
 from nondum.sdk.wire import Body
 from nondum.transport.peers import CallFailed, Errand

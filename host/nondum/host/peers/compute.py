@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 from typing import Any
 
-from nondum.wheelhouse import preflight
-from nondum.wheelhouse.confinement import Level
+from nondum.wheelhouse.format.confinement import Level
+from nondum.wheelhouse.payload import preflight
 
 Compute = dict[str, Any]
 

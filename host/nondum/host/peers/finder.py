@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import dataclasses
 
-from nondum.host.config import PeersSection
+from nondum.host.config.host_config import PeersSection
 from nondum.sdk.errors import Problem
 from nondum.transport.discovery import Announcement, Discovery, DiscoveryStatus, Hint
 from nondum.transport.fleet import Mesh

@@ -11,17 +11,17 @@ import contextlib
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from typing import Any
 
-from nondum.host.conversation import given_goal, wanted
-from nondum.host.events import Event, GoalEnded, GoalReached, PeerJoined, PeerLeft, PlanMissing
+from nondum.host.core.events import Event, GoalEnded, GoalReached, PeerJoined, PeerLeft, PlanMissing
+from nondum.host.core.plain import Row
+from nondum.host.core.printable import printable
 from nondum.host.mind.goals import HIGHEST_PRIORITY
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.offers import prospect
-from nondum.host.peers.given_away import MOST_KEPT, GivenAway, replaced, standing
+from nondum.host.peers.forwarded_goals import MOST_KEPT, GivenAway, replaced, standing
 from nondum.host.peers.remote_calls import Reaches
-from nondum.host.printable import printable
-from nondum.host.rows import Row
-from nondum.host.stopping import Stopped, is_stop_for_stranger, said_to
-from nondum.planning.stop_words import STOPS, is_stop
+from nondum.host.people.conversation import given_goal, wanted
+from nondum.host.people.stopping import Stopped, is_stop_for_stranger, said_to
+from nondum.planning.words.stop_words import STOPS, is_stop
 from nondum.sdk.errors import GoalRefused, NondumError, Problem
 from nondum.sdk.wire import Body
 from nondum.transport.peers import CallFailed, Errand

@@ -10,8 +10,7 @@ import asyncio
 import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
-from nondum.host.catalogue.records import Snapshot
-from nondum.host.events import (
+from nondum.host.core.events import (
     BehaviourEnded,
     BehaviourStarted,
     Emit,
@@ -26,7 +25,16 @@ from nondum.host.events import (
     UnitsTaken,
     WorkerExited,
 )
-from nondum.host.peers.heard import (
+from nondum.host.core.records import Snapshot
+from nondum.host.peers.offered_entries import (
+    Entries,
+    Policy,
+    changes,
+    objects_of,
+    passing,
+    standing,
+)
+from nondum.host.peers.peer_entries import (
     Claim,
     Introduced,
     claims_of,
@@ -34,11 +42,10 @@ from nondum.host.peers.heard import (
     taken_in,
     withdrawal,
 )
-from nondum.host.peers.offered import Entries, Policy, changes, objects_of, passing, standing
 from nondum.host.peers.remote_calls import host_of, is_peers
 from nondum.sdk.errors import NondumError, Problem
 from nondum.sdk.wire import Body
-from nondum.transport.fleet.seam import Fleet, FleetEvent, PeerChanged
+from nondum.transport.fleet.fleet import Fleet, FleetEvent, PeerChanged
 from nondum.transport.peers import Call, PeerKey, PeerLost, PeerUnreachable, PeerUp
 
 log = logging.getLogger(__name__)

@@ -8,14 +8,14 @@ import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
-from nondum.host.events import BehaviourProgressed, Emit, Event
+from nondum.host.core.events import BehaviourProgressed, Emit, Event
+from nondum.host.core.printable import printable
 from nondum.host.mind.runner import Call as RunCall
 from nondum.host.mind.runner import Calls, FactValue
-from nondum.host.printable import printable
 from nondum.host.workers import problems
 from nondum.host.workers.call import Call
-from nondum.planning.contribution import id_at_home
-from nondum.planning.running import RunState
+from nondum.planning.execute.running import RunState
+from nondum.planning.merge.contribution import id_at_home
 from nondum.sdk.errors import NondumError
 from nondum.sdk.wire import Body
 from nondum.transport.peers import Call as PeerCall

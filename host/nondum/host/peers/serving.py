@@ -11,18 +11,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from nondum.host.catalogue.records import Snapshot
-from nondum.host.events import (
-    BehaviourEnded,
-    BehaviourEstablished,
-    BehaviourProgressed,
-    Event,
-)
+from nondum.host.core.events import BehaviourEnded, BehaviourEstablished, BehaviourProgressed, Event
+from nondum.host.core.records import Snapshot
 from nondum.host.mind.composition import Composition, own_objects
-from nondum.host.peers.offered import Policy
+from nondum.host.peers.offered_entries import Policy
 from nondum.host.peers.uses import taken_by
 from nondum.host.workers.call import Call
-from nondum.planning.running import RunState
+from nondum.planning.execute.running import RunState
 from nondum.sdk.errors import MessageInvalid, Problem
 from nondum.sdk.messages import value_from_wire
 from nondum.sdk.signature import parse_signature

@@ -12,9 +12,9 @@ from datetime import datetime
 from typing import Any
 
 from nondum.host.control.arguments import Arguments
-from nondum.host.peers.pairing_desk import PairingDesk
+from nondum.host.core.plain import Row
+from nondum.host.peers.pairing_requests import PairingDesk
 from nondum.host.peers.trust_keeper import TrustKeeper
-from nondum.host.rows import Row
 from nondum.sdk.errors import NondumError, Problem
 from nondum.transport.peers.certificate import check_name
 from nondum.transport.peers.failures import PeerRefused

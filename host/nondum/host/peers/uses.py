@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping
 
 from nondum.host.mind.runner import RunningBehaviour
 from nondum.host.peers.remote_calls import is_peers
-from nondum.planning.core import TAKEN_PREDICATES
-from nondum.planning.domain import Merged, bind
-from nondum.planning.facts import predicate_of
+from nondum.planning.merge.core import TAKEN_PREDICATES
+from nondum.planning.merge.domain import Merged, bind
+from nondum.planning.pddl.facts import predicate_of
 
 
 def uses_of(running: Iterable[RunningBehaviour]) -> frozenset[str]:

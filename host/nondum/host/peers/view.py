@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from nondum.host.catalogue.records import PeerRecord, Snapshot
 from nondum.host.control.arguments import Arguments
-from nondum.host.printable import printable
-from nondum.host.rows import Row
+from nondum.host.core.plain import Row
+from nondum.host.core.printable import printable
+from nondum.host.core.records import PeerRecord, Snapshot
 from nondum.transport.discovery import DiscoveryStatus, Hint
 from nondum.transport.fleet import FleetEvent, Peer
 from nondum.transport.peers import (

@@ -5,9 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Sequence
 
-from nondum.host.announcements import announced
-from nondum.host.catalogue.records import Snapshot
-from nondum.host.events import (
+from nondum.host.core.events import (
     DriveInserted,
     DriveRemoved,
     Event,
@@ -20,6 +18,8 @@ from nondum.host.events import (
     WorkerExited,
     WorkerLogged,
 )
+from nondum.host.core.records import Snapshot
+from nondum.host.people.announcements import announced
 from nondum.sdk.errors import Problem
 
 FIELDS = ("component", "payload", "drive", "device", "goal")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from nondum.host.catalogue.records import Safety, Snapshot
-from nondum.host.printable import printable
-from nondum.host.rows import host_state, problems_of
+from nondum.host.control.rows import host_state, problems_of
+from nondum.host.core.printable import printable
+from nondum.host.core.records import Safety, Snapshot
 
 _DOES = {"active": "does", "suspended": "cannot yet"}
 """State of a goal → what is said of it."""

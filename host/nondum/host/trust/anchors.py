@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from nondum.sdk.errors import Problem, TrustRefused
-from nondum.wheelhouse import disk
+from nondum.wheelhouse.store import disk
 from nondum.wheelhouse.trust import sshsig, succession, trust_file
 from nondum.wheelhouse.trust.succession import SignedFile
 from nondum.wheelhouse.trust.trust import Trust

@@ -18,9 +18,10 @@ from typing import Any
 from nondum.host.trust import anchors
 from nondum.host.trust.rules import Rules, parsed
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem
-from nondum.wheelhouse import contents, disk
-from nondum.wheelhouse.manifest import Manifest
-from nondum.wheelhouse.signatures import Grant, Verdict
+from nondum.wheelhouse.format import contents
+from nondum.wheelhouse.format.manifest import Manifest
+from nondum.wheelhouse.format.signatures import Grant, Verdict
+from nondum.wheelhouse.store import disk
 from nondum.wheelhouse.trust import succession
 from nondum.wheelhouse.trust.succession import SignedFile
 

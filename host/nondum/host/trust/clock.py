@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 from datetime import UTC, datetime
 
-from nondum.host.events import ClockDoubted, ClockRight, Emit
+from nondum.host.core.events import ClockDoubted, ClockRight, Emit
 from nondum.sdk.errors import Problem
 from nondum.wheelhouse.trust.judging import clock_unsure
 from nondum.wheelhouse.trust.trust import Trust

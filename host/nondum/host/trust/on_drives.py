@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from nondum.sdk.errors import PayloadRefused, Problem
-from nondum.wheelhouse import drive
+from nondum.wheelhouse.payload import drive
 from nondum.wheelhouse.trust import sshsig, trust_file
 from nondum.wheelhouse.trust.succession import SignedFile
 

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from functools import lru_cache
 from typing import Any
 
-from nondum.wheelhouse.signatures import Verifier
+from nondum.wheelhouse.format.signatures import Verifier
 from nondum.wheelhouse.trust import succession, trust_file
 from nondum.wheelhouse.trust.judging import Circumstances, Developing, Judging
 from nondum.wheelhouse.trust.succession import SignedFile

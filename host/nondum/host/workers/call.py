@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from nondum.host.events import BehaviourEnded, BehaviourEstablished, BehaviourStarted, Emit
-from nondum.planning.running import RunState
+from nondum.host.core.events import BehaviourEnded, BehaviourEstablished, BehaviourStarted, Emit
+from nondum.planning.execute.running import RunState
 
 
 @dataclass(slots=True, eq=False)

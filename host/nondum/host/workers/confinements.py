@@ -16,14 +16,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from nondum.host.confinement import bubblewrap, landlock, refusals
-from nondum.host.confinement.bubblewrap import Ground
-from nondum.host.confinement.filters import Rule
-from nondum.host.confinement.users import FIRST_USER, USERS, NewNamespace, Users
-from nondum.host.helper import privileged
-from nondum.host.inside import room
+from nondum.host.sandbox.helper import privileged
+from nondum.host.sandbox.inside import mounts
+from nondum.host.sandbox.levels import bubblewrap, landlock, refusals
+from nondum.host.sandbox.levels.bubblewrap import Ground
+from nondum.host.sandbox.levels.filters import Rule
+from nondum.host.sandbox.levels.users import FIRST_USER, USERS, NewNamespace, Users
 from nondum.host.workers.spec import WorkerSpec, base_interpreter
-from nondum.wheelhouse.confinement import Level
+from nondum.wheelhouse.format.confinement import Level
 
 log = logging.getLogger(__name__)
 
@@ -51,9 +51,9 @@ class Entry:
     """How one interpreter becomes one worker."""
 
     walls: Mapping[str, Any]
-    """See `nondum.host.inside.walls`."""
+    """See `nondum.host.sandbox.inside.restrict`."""
     room: Mapping[str, Any] | None = None
-    """See `nondum.host.inside.room`; None: it stays where it is."""
+    """See `nondum.host.sandbox.inside.mounts`; None: it stays where it is."""
     ruleset: int | None = None
     """Landlock's, by descriptor."""
     user: int | None = None
@@ -244,7 +244,7 @@ class Boxed:
                 *([] if "system" in kept else bubblewrap.PROTECTED),
                 *([] if "nodes" in kept else bubblewrap.NODES),
             ],
-            "inotify_instances": room.INOTIFY_INSTANCES if "inotify" not in kept else 128,
+            "inotify_instances": mounts.INOTIFY_INSTANCES if "inotify" not in kept else 128,
             "is_last": "user namespaces" not in kept,
             "user": user,
             "groups": sorted(_groups_of(nodes)) if os.geteuid() == 0 else None,

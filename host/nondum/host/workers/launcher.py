@@ -15,15 +15,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Protocol
 
-from nondum.host.cgroups import Cages
-from nondum.host.confinement.bubblewrap import Ground
+from nondum.host.sandbox.cgroups import Cages
+from nondum.host.sandbox.levels.bubblewrap import Ground
 from nondum.host.workers import problems, scratch
 from nondum.host.workers.confinements import Confinement, Entry, Unconfined
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spare import ROOM, ROOM_BYTES, Spare
 from nondum.host.workers.spec import Timing, WorkerSpec
 from nondum.sdk.errors import Problem, WorkerFailed
-from nondum.wheelhouse.confinement import Level
+from nondum.wheelhouse.format.confinement import Level
 
 MARK = "NONDUM_WORKER"
 """Environment variable of every worker: its scratch folder. It tells whose a process is."""

@@ -7,15 +7,15 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, TypeAlias
 
-from nondum.host.events import (
+from nondum.host.core.events import (
     FactForgotten,
     FactKnown,
     StreamFlowing,
     WorkerFaulted,
     WorkerLogged,
 )
-from nondum.host.placed import placed
-from nondum.host.printable import printable, printable_text
+from nondum.host.core.placed import placed
+from nondum.host.core.printable import printable, printable_text
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import MessageInvalid, Problem, ProtocolViolation
 from nondum.sdk.messages import value_from_wire

@@ -6,8 +6,8 @@ import signal
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from nondum.host.cgroups import Usage
-from nondum.host.placed import placed
+from nondum.host.core.placed import placed
+from nondum.host.sandbox.cgroups import Usage
 from nondum.host.workers.process import exit_words
 from nondum.host.workers.spec import Limits
 from nondum.sdk.errors import NondumError, Problem, ProtocolViolation

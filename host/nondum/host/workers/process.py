@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
-from nondum.host.cgroups import Cage
-from nondum.host.workers.keeper import Keeper, OpenFiles, node_of
+from nondum.host.sandbox.cgroups import Cage
+from nondum.host.workers.init_link import Keeper, OpenFiles, node_of
 
 DETACH_S = 2.0
 """How long a process that was killed is waited for; one in the kernel's hands may never end."""

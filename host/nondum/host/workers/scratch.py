@@ -13,7 +13,7 @@ import stat
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from nondum.host.inside.open_files import BLOCK, deleted_sizes
+from nondum.host.sandbox.inside.open_files import BLOCK, deleted_sizes
 
 MOST_ENTRIES = 50_000
 """Files and folders; more count as too much, whatever their size."""

@@ -18,14 +18,14 @@ import subprocess
 from collections.abc import Collection, Mapping
 from typing import IO, Any
 
-from nondum.host.cgroups import Cage, CageLimits, Cages
-from nondum.host.confinement.bubblewrap import Ground
-from nondum.host.confinement.users import NewNamespace
-from nondum.host.helper import privileged
-from nondum.host.printable import printable
-from nondum.host.waiting import until_done
+from nondum.host.core.printable import printable
+from nondum.host.core.shielded import until_done
+from nondum.host.sandbox.cgroups import Cage, CageLimits, Cages
+from nondum.host.sandbox.helper import privileged
+from nondum.host.sandbox.levels.bubblewrap import Ground
+from nondum.host.sandbox.levels.users import NewNamespace
 from nondum.host.workers.confinements import Confinement
-from nondum.host.workers.keeper import CREDENTIALS, Keeper
+from nondum.host.workers.init_link import CREDENTIALS, Keeper
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spec import Limits
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from nondum.host.cgroups import CageLimits
-from nondum.planning.contribution import object_name
+from nondum.host.sandbox.cgroups import CageLimits
+from nondum.planning.merge.contribution import object_name
 from nondum.sdk.description import PluginDescription
 
 

@@ -7,14 +7,14 @@ import logging
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from nondum.host import events
-from nondum.host.events import Event
-from nondum.host.waiting import until_done
+from nondum.host.core import events
+from nondum.host.core.events import Event
+from nondum.host.core.shielded import until_done
 from nondum.host.workers import problems, supervision
 from nondum.host.workers.in_flight import Search
 from nondum.host.workers.launcher import Launcher
+from nondum.host.workers.role import HEARD, Standing
 from nondum.host.workers.spec import Timing, WorkerSpec
-from nondum.host.workers.standing import HEARD, Standing
 from nondum.host.workers.supervision import Supervision
 from nondum.host.workers.worker import Worker, start_worker
 from nondum.sdk.errors import Problem, WorkerFailed

@@ -13,8 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from nondum.host.cgroups import Usage
-from nondum.host.events import (
+from nondum.host.core.events import (
     BehaviourProgressed,
     ConditionEnded,
     Event,
@@ -22,19 +21,20 @@ from nondum.host.events import (
     WorkerFaulted,
     WorkerLogged,
 )
-from nondum.host.helper.grants import reachable, withdrawn
-from nondum.host.placed import placed
-from nondum.host.printable import printable
-from nondum.host.waiting import until_done
+from nondum.host.core.placed import placed
+from nondum.host.core.printable import printable
+from nondum.host.core.shielded import until_done
+from nondum.host.sandbox.cgroups import Usage
+from nondum.host.sandbox.helper.grants import reachable, withdrawn
 from nondum.host.workers import problems, scratch
 from nondum.host.workers.call import Call
-from nondum.host.workers.excess import Reading, Watch
+from nondum.host.workers.device_ownership import Lending
 from nondum.host.workers.faults import Faults
-from nondum.host.workers.gauge import Gauge
 from nondum.host.workers.index import mismatches
 from nondum.host.workers.launcher import Launcher
 from nondum.host.workers.leftovers import clear_away, end_leftovers
-from nondum.host.workers.lending import Lending
+from nondum.host.workers.limits import Reading, Watch
+from nondum.host.workers.loop_stacks import Standstill
 from nondum.host.workers.news import (
     Claims,
     parse_answer,
@@ -47,9 +47,9 @@ from nondum.host.workers.news import (
 from nondum.host.workers.output import Output, Valve
 from nondum.host.workers.process import WorkerProcess, names_of
 from nondum.host.workers.spec import Timing, WorkerSpec
-from nondum.host.workers.standstill import Standstill
-from nondum.planning.core import core_value_types
-from nondum.planning.running import RunState
+from nondum.host.workers.usage import Gauge
+from nondum.planning.execute.running import RunState
+from nondum.planning.merge.core import core_value_types
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import (
     LinkClosed,

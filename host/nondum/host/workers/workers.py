@@ -11,8 +11,7 @@ from typing import Any, TypeAlias
 
 import pluggy
 
-from nondum.host.catalogue.records import Moment
-from nondum.host.events import (
+from nondum.host.core.events import (
     Emit,
     Event,
     FactKnown,
@@ -21,22 +20,23 @@ from nondum.host.events import (
     WorkerFailed,
     WorkerLogged,
 )
-from nondum.host.optional_inputs import Choice
-from nondum.host.streams import Streams
+from nondum.host.core.records import Moment
 from nondum.host.workers import problems
 from nondum.host.workers.call import Call
+from nondum.host.workers.extra_workers import Granted, Others
 from nondum.host.workers.in_flight import Search
 from nondum.host.workers.launcher import Launcher, WorkerLauncher
 from nondum.host.workers.logs import LogLine, Logs
-from nondum.host.workers.others import Granted, Others
+from nondum.host.workers.optional_inputs import Choice
 from nondum.host.workers.proxies import Answer, Proxy, plugin_manager
-from nondum.host.workers.rounds import Rounds
+from nondum.host.workers.role import Standing
 from nondum.host.workers.spec import Timing, WorkerSpec
-from nondum.host.workers.standing import Standing
+from nondum.host.workers.streams import Streams
 from nondum.host.workers.supervisor import Supervisor
+from nondum.host.workers.usage_checks import Rounds
 from nondum.host.workers.worker import Worker
-from nondum.planning.core import core_value_types
-from nondum.planning.running import RunState
+from nondum.planning.execute.running import RunState
+from nondum.planning.merge.core import core_value_types
 from nondum.sdk import errors
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem

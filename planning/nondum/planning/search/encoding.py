@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from nondum.planning.relaxed import reachable
+from nondum.planning.ground.delete_relaxation import reachable
 from nondum.planning.search.derivation import MaskLayer, Stage, stages_of
 from nondum.sdk.planner import GroundAction, GroundTask
 

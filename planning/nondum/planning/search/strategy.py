@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeAlias
 
-from nondum.planning.relaxed import quick_answer
+from nondum.planning.ground.delete_relaxation import quick_answer
 from nondum.planning.search.changes import Changes
 from nondum.planning.search.encoding import Encoded, encode
 from nondum.planning.search.greedy import Greedy

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.host.catalogue.records import DriveRecord, PayloadRecord, Step
-from nondum.host.catalogue.state import HostState
+from nondum.host.core.records import DriveRecord, PayloadRecord, Step
+from nondum.host.core.state import HostState
 from nondum.host.peers.placement.decide import (
     ELSEWHERE,
     OTHERS_MAY_FIT,

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 from nondum.sdk.errors import Problem
 from nondum.transport.discovery import interfaces as network
 from nondum.transport.discovery.announcement import Announcement
-from nondum.transport.discovery.asking import Asker
-from nondum.transport.discovery.book import Change, HintBook
 from nondum.transport.discovery.hint import Hint, Source, host_of
+from nondum.transport.discovery.hint_table import Change, HintBook
 from nondum.transport.discovery.interfaces import Interface
 from nondum.transport.discovery.reach import worth_trying
 from nondum.transport.discovery.responder import Responder
 from nondum.transport.discovery.static_host import StaticHost
 from nondum.transport.discovery.status import DiscoveryStatus, InterfaceRow
+from nondum.transport.discovery.unicast_queries import Asker
 from nondum.transport.discovery.watch import InterfaceWatch
 from nondum.transport.peers.keys import PeerKey
 

@@ -15,7 +15,6 @@ from enum import Enum
 
 from nondum.sdk.errors import ProtocolViolation
 from nondum.transport.discovery import packets, udp
-from nondum.transport.discovery.air import PORT, Air
 from nondum.transport.discovery.interfaces import (
     Flags,
     Interface,
@@ -24,6 +23,7 @@ from nondum.transport.discovery.interfaces import (
     memberships,
     read,
 )
+from nondum.transport.discovery.loopback_test import PORT, Air
 
 PATIENCE_S = 0.5
 

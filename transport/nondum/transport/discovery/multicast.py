@@ -24,15 +24,9 @@ from zeroconf.asyncio import AsyncServiceInfo, AsyncZeroconf
 
 from nondum.sdk.errors import Problem
 from nondum.transport.discovery.announcement import Announcement
-from nondum.transport.discovery.ears import Ears
-from nondum.transport.discovery.hint import (
-    MAX_ADDRESSES,
-    SERVICE,
-    Hint,
-    instance,
-    to_txt,
-)
+from nondum.transport.discovery.hint import MAX_ADDRESSES, SERVICE, Hint, instance, to_txt
 from nondum.transport.discovery.interfaces import Flags, Interface, has_ipv6, memberships
+from nondum.transport.discovery.mdns_listener import Ears
 from nondum.transport.peers.identity import Security
 from nondum.transport.peers.keys import PeerKey, fingerprint
 

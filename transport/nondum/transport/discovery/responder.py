@@ -9,7 +9,7 @@ from typing import Any
 from nondum.sdk.errors import Problem
 from nondum.transport.discovery import packets, udp
 from nondum.transport.discovery.announcement import Announcement
-from nondum.transport.token_bucket import TokenBucket
+from nondum.transport.link.token_bucket import TokenBucket
 
 ANSWERS_PER_S = 100.0
 BURST = 200.0

@@ -15,17 +15,17 @@ from typing import Any, Protocol
 from nondum.sdk.errors import Problem, ProtocolViolation
 from nondum.sdk.wire import Body
 from nondum.transport.fleet.chunk import Chunk, parse, read_state
+from nondum.transport.fleet.fleet import OWN_METHODS, FleetEvent, Peer, PeerChanged
 from nondum.transport.fleet.ledger import Ledger
 from nondum.transport.fleet.replica import Replica
-from nondum.transport.fleet.seam import OWN_METHODS, FleetEvent, Peer, PeerChanged
+from nondum.transport.link.token_bucket import TokenBucket
 from nondum.transport.peers.calls import Call
-from nondum.transport.peers.errands import Errand, Handler, Lease
 from nondum.transport.peers.events import Loss, PeerEvent, PeerLost, PeerUp
 from nondum.transport.peers.failures import CallFailed, PeerUnreachable
+from nondum.transport.peers.incoming_calls import Errand, Handler, Lease
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.pulse import State
 from nondum.transport.peers.trust import Admission
-from nondum.transport.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
 

@@ -8,15 +8,15 @@ from typing import Protocol, TypeAlias
 
 from nondum.sdk.wire import Body
 from nondum.transport.fleet.catalogues import Catalogues
-from nondum.transport.fleet.meeting import Meeting
-from nondum.transport.fleet.seam import FleetEvent, Peer
+from nondum.transport.fleet.dialling import Meeting
+from nondum.transport.fleet.fleet import FleetEvent, Peer
 from nondum.transport.peers.allowance import USUAL, Allowance
 from nondum.transport.peers.calls import Call
-from nondum.transport.peers.errands import Handler
 from nondum.transport.peers.events import DialFailed, PeerEvent, PeerLost, PeerUp
-from nondum.transport.peers.here import SocketsHere
 from nondum.transport.peers.identity import Identity, Security
+from nondum.transport.peers.incoming_calls import Handler
 from nondum.transport.peers.keys import PeerKey
+from nondum.transport.peers.local_sockets import SocketsHere
 from nondum.transport.peers.node import PeerNode, fresh_epoch
 from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.refusals import Refusals

@@ -10,14 +10,7 @@ from dataclasses import dataclass, field, replace
 
 from nondum.sdk.errors import Problem, ProtocolViolation
 from nondum.sdk.wire import Body
-from nondum.transport.fleet.chunk import (
-    MAX_CATALOGUE,
-    Chunk,
-    Packed,
-    digest_of,
-    read_entry,
-    size,
-)
+from nondum.transport.fleet.chunk import MAX_CATALOGUE, Chunk, Packed, digest_of, read_entry, size
 from nondum.transport.peers.pulse import DIGEST_BYTES, State
 
 

@@ -14,13 +14,13 @@ from collections.abc import Callable, Mapping
 
 from nondum.sdk.wire import Body
 from nondum.transport.fleet.catalogues import Catalogues
-from nondum.transport.fleet.seam import FleetEvent, Peer
+from nondum.transport.fleet.fleet import FleetEvent, Peer
 from nondum.transport.fleet.zenoh_line import RouterAccess
 from nondum.transport.fleet.zenoh_node import ZenohNode
 from nondum.transport.peers.calls import Call
-from nondum.transport.peers.errands import Handler
 from nondum.transport.peers.events import PeerEvent, PeerUp
 from nondum.transport.peers.identity import Identity, Security
+from nondum.transport.peers.incoming_calls import Handler
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.node import fresh_epoch
 from nondum.transport.peers.refusals import Refusals

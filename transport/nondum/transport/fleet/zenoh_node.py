@@ -19,17 +19,17 @@ from nondum.transport.fleet.zenoh_line import Ears, Line, Place, RouterAccess
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.dial import FIRST_WAIT_S, LONGEST_WAIT_S
 from nondum.transport.peers.drained import Sent
-from nondum.transport.peers.errands import Handler
 from nondum.transport.peers.events import DialFailed, Loss, PeerEvent
 from nondum.transport.peers.failures import PeerUnreachable
 from nondum.transport.peers.gate import Gate
 from nondum.transport.peers.identity import Identity, Security
+from nondum.transport.peers.incoming_calls import Handler
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.link import Link
 from nondum.transport.peers.messages import Notice, encode
+from nondum.transport.peers.peer_table import Roster
 from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.refusals import Reason, Refusals
-from nondum.transport.peers.roster import Roster
 from nondum.transport.peers.suspicion import Terms
 from nondum.transport.peers.trust import Admission, Standing, Trust
 

@@ -1,12 +1,12 @@
 """Hosts among each other: keys and trust, pairing, and calls over authenticated links."""
 
 from nondum.transport.peers.calls import Call
-from nondum.transport.peers.errands import Errand, Handler, Lease
 from nondum.transport.peers.events import DialFailed, LinksFailed, Loss, PeerEvent, PeerLost, PeerUp
 from nondum.transport.peers.failures import CallFailed, PeerRefused, PeerUnreachable
-from nondum.transport.peers.here import SocketsHere
 from nondum.transport.peers.identity import Identity, Security
+from nondum.transport.peers.incoming_calls import Errand, Handler, Lease
 from nondum.transport.peers.keys import HostKeys, PeerKey, fingerprint, load_or_create
+from nondum.transport.peers.local_sockets import SocketsHere
 from nondum.transport.peers.node import PeerNode
 from nondum.transport.peers.refusals import Reason, Refusal, Refusals
 from nondum.transport.peers.trust import Admission, Trust

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from nondum.transport import tcp
+from nondum.transport.peers import tcp
 
 AWAITED_S = 4.5
 """How long a connection may take to become a peer's: a little less than ZeroMQ's own handshake."""

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from nondum.transport.token_bucket import TokenBucket
+from nondum.transport.link.token_bucket import TokenBucket
 
 LENGTH = 16 * 1024
 """Bytes after which a message counts as one more."""

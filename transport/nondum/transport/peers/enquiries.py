@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from nondum.transport.link.token_bucket import TokenBucket
 from nondum.transport.peers.keys import PeerKey
-from nondum.transport.token_bucket import TokenBucket
 
 PROBES_PER_S = 4.0
 """Pings to one peer because others ask about it; who asks sooner waits for the last one's answer,

@@ -8,17 +8,17 @@ from dataclasses import dataclass, field
 from datetime import datetime
 
 from nondum.sdk.errors import NondumError, Problem
+from nondum.transport.link.token_bucket import TokenBucket
 from nondum.transport.peers.allowance import USUAL, greetings
+from nondum.transport.peers.call_history import Once
 from nondum.transport.peers.enquiries import asks
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.identity import Identity, Security, is_loopback
 from nondum.transport.peers.keys import PeerKey, fingerprint
 from nondum.transport.peers.messages import Hello, agreed_version
-from nondum.transport.peers.once import Once
 from nondum.transport.peers.refusals import Reason
 from nondum.transport.peers.trust import Admission, Standing, Trust
 from nondum.transport.peers.zap import DOMAIN, Entry, Knock
-from nondum.transport.token_bucket import TokenBucket
 
 PAST_EPOCHS = 8
 """Lives of a peer that are remembered as over."""

@@ -13,22 +13,22 @@ from nondum.sdk.errors import Problem
 from nondum.sdk.wire import Body
 from nondum.sdk.wire_fields import MAX_ID
 from nondum.transport.peers.allowance import BARRED_S, USUAL, Allowance
-from nondum.transport.peers.beats import BEAT_S, beat_s
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.dial import Attempt, Dial
 from nondum.transport.peers.drained import Sent
-from nondum.transport.peers.errands import Handler
 from nondum.transport.peers.events import LinksFailed, Loss, PeerEvent
 from nondum.transport.peers.failures import PeerUnreachable
 from nondum.transport.peers.gate import Gate
-from nondum.transport.peers.here import SocketsHere
+from nondum.transport.peers.heartbeat import BEAT_S, beat_s
 from nondum.transport.peers.identity import Identity, Security
+from nondum.transport.peers.incoming_calls import Handler
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.link import Link, Route
+from nondum.transport.peers.local_sockets import SocketsHere
 from nondum.transport.peers.messages import Notice, encode
+from nondum.transport.peers.peer_table import Roster
 from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.refusals import Reason, Refusals
-from nondum.transport.peers.roster import Roster
 from nondum.transport.peers.sockets import Accepted, MakeSockets, Owner, Receiver
 from nondum.transport.peers.trust import Admission, Trust
 

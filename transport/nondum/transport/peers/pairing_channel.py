@@ -15,8 +15,7 @@ from functools import partial
 import zmq
 
 from nondum.sdk.errors import NondumError, Problem
-from nondum.transport import tcp
-from nondum.transport.peers import descriptors, pairing, pairing_problems
+from nondum.transport.peers import descriptors, pairing, pairing_problems, tcp
 from nondum.transport.peers.dial import ANSWER_S, Attempt, Dial
 from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.events import DialFailed
@@ -35,7 +34,7 @@ from nondum.transport.peers.pairing import (
     Role,
     Step,
 )
-from nondum.transport.peers.pairing_door import MOST_SENT, Asker, Door
+from nondum.transport.peers.pairing_listener import MOST_SENT, Asker, Door
 from nondum.transport.peers.pairing_messages import MAX_BYTES, Beat, Ended, Ending, decode, encode
 from nondum.transport.peers.pairing_state import (
     Agreed,

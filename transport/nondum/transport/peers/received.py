@@ -15,7 +15,7 @@ from collections.abc import Iterable
 
 import zmq
 
-from nondum.transport import tcp
+from nondum.transport.peers import tcp
 from nondum.transport.peers.messages import MAX_MESSAGE
 
 MOST_AHEAD = 4 * MAX_MESSAGE

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import zmq
 
 from nondum.sdk.errors import Problem
-from nondum.transport import tcp
+from nondum.transport.peers import tcp
 from nondum.transport.peers.dialled import Dialled
 from nondum.transport.peers.drained import Drained, Sent
 from nondum.transport.peers.keys import PeerKey

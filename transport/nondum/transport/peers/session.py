@@ -16,9 +16,9 @@ from nondum.sdk.errors import Problem, ProtocolViolation
 from nondum.transport.peers.allowance import Paced
 from nondum.transport.peers.calls import Calls
 from nondum.transport.peers.drained import Sent
-from nondum.transport.peers.errands import Errand, Errands, Handler
 from nondum.transport.peers.events import Loss
 from nondum.transport.peers.gate import Acquaintance
+from nondum.transport.peers.incoming_calls import Errand, Errands, Handler
 from nondum.transport.peers.link import Link
 from nondum.transport.peers.messages import (
     Ask,

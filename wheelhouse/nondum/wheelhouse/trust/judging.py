@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from nondum.sdk.errors import PayloadRefused, Problem
-from nondum.wheelhouse import contents as lists
-from nondum.wheelhouse.contents import Contents
-from nondum.wheelhouse.manifest import GRANTABLE
-from nondum.wheelhouse.signatures import EVERYTHING, Grant, Verdict
+from nondum.wheelhouse.format import contents as lists
+from nondum.wheelhouse.format.contents import Contents
+from nondum.wheelhouse.format.manifest import GRANTABLE
+from nondum.wheelhouse.format.signatures import EVERYTHING, Grant, Verdict
 from nondum.wheelhouse.trust import sshsig
 from nondum.wheelhouse.trust.public_key import PublicKey
 from nondum.wheelhouse.trust.sshsig import Signature

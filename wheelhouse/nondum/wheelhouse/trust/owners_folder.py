@@ -15,7 +15,8 @@ from datetime import datetime
 from pathlib import Path
 
 from nondum.sdk.errors import Problem, TrustRefused
-from nondum.wheelhouse import contents, disk
+from nondum.wheelhouse.format import contents
+from nondum.wheelhouse.store import disk
 from nondum.wheelhouse.trust import editing, signing, sshsig, succession, trust_file, trust_text
 from nondum.wheelhouse.trust.succession import SignedFile
 from nondum.wheelhouse.trust.trust import Roots, Trust

@@ -37,19 +37,11 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 from nondum.sdk.errors import PayloadRefused, Problem, TrustRefused
-from nondum.wheelhouse import names, tables
-from nondum.wheelhouse.manifest import GRANTABLE
-from nondum.wheelhouse.tables import Form, Table
+from nondum.wheelhouse.format import names, tables
+from nondum.wheelhouse.format.manifest import GRANTABLE
+from nondum.wheelhouse.format.tables import Form, Table
 from nondum.wheelhouse.trust.public_key import FINGERPRINT, PublicKey, parse_line
-from nondum.wheelhouse.trust.trust import (
-    ANY,
-    Bounds,
-    Revocation,
-    Role,
-    Roots,
-    Trust,
-    TrustedKey,
-)
+from nondum.wheelhouse.trust.trust import ANY, Bounds, Revocation, Role, Roots, Trust, TrustedKey
 from nondum.wheelhouse.trust.wire import Malformed
 
 NAME = "trust.toml"

@@ -15,8 +15,8 @@ import socket
 import sys
 from typing import Any
 
-from nondum.host.confinement import own_children
-from nondum.transport.peers.apart.service import Service
+from nondum.host.sandbox.levels import host_children
+from nondum.transport.peers.socket_process.service import Service
 
 FAILED = 70
 """Exit status after a failure of its own (sysexits.h, EX_SOFTWARE)."""
@@ -24,7 +24,7 @@ FAILED = 70
 
 def main(pipe: int, daemon: int, memory: int) -> int:
     """Serve until the daemon is gone, or needs it no more."""
-    own_children.settle(daemon)
+    host_children.settle(daemon)
     resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     fcntl.fcntl(pipe, fcntl.F_SETFD, fcntl.FD_CLOEXEC)

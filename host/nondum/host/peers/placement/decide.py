@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from nondum.host.catalogue.records import DriveRecord, PayloadRecord, Step
-from nondum.host.catalogue.state import HostState
+from nondum.host.core.records import DriveRecord, PayloadRecord, Step
+from nondum.host.core.state import HostState
 from nondum.sdk.errors import Problem
 from nondum.transport.peers import PeerKey
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from nondum.host.lifecycle.lanes import in_thread
+from nondum.host.core.keyed_queues import in_thread
 from nondum.host.peers.placement.pace import Pace
 from nondum.sdk.errors import PayloadRefused, Problem
 from nondum.transport.peers import Call

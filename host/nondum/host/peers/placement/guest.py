@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from nondum.host.printable import printable
+from nondum.host.core.printable import printable
 from nondum.sdk.errors import Problem
 from nondum.transport.peers import CallFailed, Errand
-from nondum.wheelhouse import contents, names
-from nondum.wheelhouse.signatures import MAX_SIGNATURE_BYTES
+from nondum.wheelhouse.format import contents, names
+from nondum.wheelhouse.format.signatures import MAX_SIGNATURE_BYTES
 
 PROGRESS_S = 0.2
 """Time between two reports of what was fetched."""

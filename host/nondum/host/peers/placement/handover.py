@@ -12,15 +12,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from nondum.host.helper import privileged
-from nondum.host.lifecycle.children import Children, OnProgress
-from nondum.host.lifecycle.folders import Folders, remove
-from nondum.host.lifecycle.lanes import in_thread
+from nondum.host.core.keyed_queues import in_thread
+from nondum.host.jobs.children import Children, OnProgress
+from nondum.host.manager.state_folders import Folders, remove
 from nondum.host.peers.placement.decide import Parcel
+from nondum.host.sandbox.helper import privileged
 from nondum.sdk.errors import Problem
 from nondum.transport.peers import CallFailed
-from nondum.wheelhouse import contents
-from nondum.wheelhouse.signatures import MAX_SIGNATURE_BYTES
+from nondum.wheelhouse.format import contents
+from nondum.wheelhouse.format.signatures import MAX_SIGNATURE_BYTES
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,17 +6,18 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.catalogue.records import PayloadRecord, Step
 from nondum.host.control.arguments import Arguments
-from nondum.host.events import Emit, RetryAsked
-from nondum.host.news import Progress
+from nondum.host.control.news import Progress
+from nondum.host.core.events import Emit, RetryAsked
+from nondum.host.core.plain import Row
+from nondum.host.core.records import PayloadRecord, Step
+from nondum.host.core.unknown import unknown
 from nondum.host.peers.placement.case import Case
 from nondum.host.peers.placement.decide import ELSEWHERE, movable_source
 from nondum.host.peers.placement.guest import Guest
 from nondum.host.peers.placement.pins import Pins
 from nondum.host.peers.placement.placing import Placing
 from nondum.host.peers.placement.taking import Taking
-from nondum.host.rows import Row, unknown
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem
 
 

@@ -7,19 +7,19 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 from typing import Any
 
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.config import HostConfig
+from nondum.host.config.host_config import HostConfig
 from nondum.host.control.arguments import Arguments
-from nondum.host.events import Emit, Event
-from nondum.host.lifecycle.children import Children
-from nondum.host.lifecycle.folders import Folders
-from nondum.host.peers.desk import Desk
+from nondum.host.core.events import Emit, Event
+from nondum.host.jobs.children import Children
+from nondum.host.manager.state_folders import Folders
+from nondum.host.peers.dispatch import Desk
 from nondum.host.peers.placement.decide import Compute
 from nondum.host.peers.placement.orders import PlaceOrders
 from nondum.host.peers.placement.pins import Pins
 from nondum.host.peers.placement.placing import Placing
 from nondum.host.peers.placement.taking import Taking
-from nondum.transport.fleet.seam import Fleet
-from nondum.wheelhouse.confinement import Level
+from nondum.transport.fleet.fleet import Fleet
+from nondum.wheelhouse.format.confinement import Level
 
 
 class Placement:

@@ -13,9 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-from nondum.host.catalogue.records import Step
-from nondum.host.catalogue.state import HostState
-from nondum.host.events import (
+from nondum.host.core.events import (
     Emit,
     Event,
     HostStarted,
@@ -24,8 +22,11 @@ from nondum.host.events import (
     PlaceLost,
     PlaceMissing,
 )
-from nondum.host.lifecycle.children import Children
-from nondum.host.lifecycle.folders import Folders
+from nondum.host.core.printable import printable
+from nondum.host.core.records import Step
+from nondum.host.core.state import HostState
+from nondum.host.jobs.children import Children
+from nondum.host.manager.state_folders import Folders
 from nondum.host.peers.placement.case import AGAIN_S, STEPS, Case, Declined
 from nondum.host.peers.placement.decide import (
     INSTALLING,
@@ -39,10 +40,9 @@ from nondum.host.peers.placement.decide import (
 from nondum.host.peers.placement.handover import Described, Handover
 from nondum.host.peers.placement.pace import LARGEST
 from nondum.host.peers.placement.pins import Pins
-from nondum.host.printable import printable
 from nondum.sdk.errors import NondumError, Problem
 from nondum.sdk.wire import Body
-from nondum.transport.fleet.seam import Fleet
+from nondum.transport.fleet.fleet import Fleet
 from nondum.transport.peers import CallFailed, Errand, PeerKey, PeerUnreachable
 
 TAKE_S = 30 * 86400.0

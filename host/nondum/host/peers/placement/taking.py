@@ -12,10 +12,8 @@ from collections.abc import Awaitable, Callable, Iterator, Mapping
 from functools import partial
 from typing import Any, NoReturn
 
-from nondum.host.catalogue.catalogue import now
-from nondum.host.catalogue.records import DriveState, PayloadRecord, Step
-from nondum.host.catalogue.state import HostState
-from nondum.host.events import (
+from nondum.host.core.clock import now
+from nondum.host.core.events import (
     DriveInserted,
     DriveRemoved,
     Emit,
@@ -24,19 +22,21 @@ from nondum.host.events import (
     PayloadFound,
     PayloadTaken,
 )
+from nondum.host.core.keyed_queues import in_thread
+from nondum.host.core.records import DriveState, PayloadRecord, Step
+from nondum.host.core.state import HostState
+from nondum.host.jobs.children import Children
 from nondum.host.lifecycle import admission
-from nondum.host.lifecycle.children import Children
-from nondum.host.lifecycle.folders import Folders, remove
-from nondum.host.lifecycle.lanes import in_thread
+from nondum.host.manager.state_folders import Folders, remove
 from nondum.host.peers.placement.decide import PLACED
 from nondum.host.peers.placement.fetching import Fetching, Listed
 from nondum.host.peers.placement.guest import Guest, Offer
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
 from nondum.sdk.wire import Body
-from nondum.transport.fleet.seam import Fleet
+from nondum.transport.fleet.fleet import Fleet
 from nondum.transport.peers import Call, CallFailed, Errand, PeerKey
-from nondum.wheelhouse import contents
-from nondum.wheelhouse.signatures import Grant
+from nondum.wheelhouse.format import contents
+from nondum.wheelhouse.format.signatures import Grant
 
 AT_ONCE = 2
 """Payloads that are fetched from one peer at the same time; others wait."""

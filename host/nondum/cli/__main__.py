@@ -1,0 +1,5 @@
+"""`python -P -m nondum.cli` is `nondum`."""
+
+from nondum.cli.main import main
+
+main()

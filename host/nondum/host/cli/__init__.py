@@ -1,5 +1,0 @@
-"""The `nondum` command: one group, each command loaded only when it is called."""
-
-from nondum.host.cli.main import main
-
-__all__ = ["main"]

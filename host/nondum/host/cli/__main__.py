@@ -1,5 +1,0 @@
-"""`python -P -m nondum.host.cli` is `nondum`."""
-
-from nondum.host.cli.main import main
-
-main()

@@ -1,0 +1,434 @@
+"""The host's configuration: one TOML file, every key with a default, all mistakes told at once."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import os
+import re
+import socket
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import MISSING, dataclass, field, fields, replace
+from pathlib import Path
+from types import GenericAlias
+from typing import Any, get_args, get_type_hints
+
+from nondum.host.config import feedback_section, stop_section
+from nondum.host.config.confinement_level import Wanted, parse_wanted
+from nondum.host.config.feedback_section import FeedbackSection
+from nondum.host.config.places import Places
+from nondum.host.config.stop_section import StopSection
+from nondum.sdk.errors import ConfigRefused, Problem
+from nondum.wheelhouse.format import confinement
+from nondum.wheelhouse.format.confinement import Level
+
+REACHED_BY = ("listen", "static", "development")
+"""Keys of [peers] that say how other hosts are reached."""
+SYSTEM_FILE = Path("/etc/nondum/host.toml")
+_REFERENCE = re.compile(r"[\w.]+:\w+")
+_AT_LINE = re.compile(r"at line (\d+)")
+HOST_NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
+
+
+@dataclass(frozen=True, slots=True)
+class HostSection:
+    """Who this host is, and where it keeps what it knows."""
+
+    name: str = field(default_factory=lambda: default_name(socket.gethostname()))
+    """Name of the host, and of its body's frame: lower-case letters, digits and single hyphens."""
+    state: Path = Path("/var/lib/nondum")
+    """Folder of catalogue, store and venvs."""
+    control: Path = Path("/run/nondum/control.sock")
+    """The control socket."""
+    system_tree: str = "nondum.host.mind.system_tree:default_tree"
+    """`package:function` that makes the system tree."""
+
+
+@dataclass(frozen=True, slots=True)
+class DrivesSection:
+    """Where drives come from, and what is asked of them."""
+
+    slots: tuple[Path, ...] = ()
+    """Folders whose entries stand for drives."""
+    block_devices: bool = True
+    """Mount USB drives; needs root."""
+    single_function: bool = True
+    """Refuse USB drives that are something else too, such as a keyboard or a network adapter."""
+    allow_unsigned: bool = False
+    """Accept payloads without a signature: for development; every status says so."""
+    look_s: float = 10.0
+    """A drive that cannot be mounted and listed in this time hangs; more on a computer that has
+    much else to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrustSection:
+    """Whose payloads are run."""
+
+    file: Path | None = Path("/etc/nondum/trust.toml")
+    """The first trust file, which `nondum keys trust` writes with its signatures. Without them,
+    who may write there vouches for it. With `--user`: `trust.toml` in the state folder."""
+    on_revoke: str = "stop"
+    """What becomes of payloads that are here and not trusted any more. `stop`: they are withdrawn.
+    `flag`: it is told only."""
+
+
+@dataclass(frozen=True, slots=True)
+class DevicesSection:
+    """Where devices come from."""
+
+    slots: tuple[Path, ...] = ()
+    """Folders of TOML files that stand for devices."""
+    udev: bool = True
+    """Follow the machine's own devices."""
+
+
+@dataclass(frozen=True, slots=True)
+class JournalSection:
+    """What is kept of what happened."""
+
+    keep: int = 20_000
+    """Entries; of older ones the oldest go first. At least 1000 are kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class BackupsSection:
+    """Copies of the catalogue, for the day on which its file is damaged."""
+
+    every_s: float = 900.0
+    """Time between two, if anything changed; the last two are kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class InstallSection:
+    """How payloads become venvs."""
+
+    method: str = "store"
+    """`store`: hard links from the store. `pip`: pip itself."""
+    reserve_mb: int = 64
+    """Disk that is left free whatever is plugged in."""
+    quota_mb: int = 4096
+    """Size that the store is pruned to, least recently used first."""
+
+
+@dataclass(frozen=True, slots=True)
+class WorkersSection:
+    """Limits of one worker, unless its payload asks for less."""
+
+    memory_mb: int = 2048
+    """Memory of all its processes, where the machine has the memory cgroup; else the data of each.
+    """
+    tasks: int = 256
+    """Processes and threads."""
+    descriptors: int = 1024
+    """Open files, sockets and streams, of each process."""
+    cpu_percent: int = 0
+    """Processor time of all its processes, in per cent of one processor; 0: no limit."""
+    scratch_mb: int = 256
+    """Disk that its scratch folder may take; more ends it, and the folder is emptied."""
+    startup_s: float = 30.0
+    """What a plugin has from its launch until it has started; then it counts as hung."""
+    settle_beats: int = 2
+    """Signs of life, two seconds apart, that each worker of a newer release gives before it takes
+    over."""
+    confinement: Wanted = "auto"
+    """Level at which workers are confined: `sandboxed` (bubblewrap), `restricted` (Landlock and
+    filtered system calls), `none` (resource limits only); `auto`: the highest that the machine has.
+    """
+    minimum_confinement: Level = Level.RESTRICTED
+    """Level below which this host does not start, where `auto` finds no better one; with `--user`
+    it is `none`, and every status says so."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanningSection:
+    """How plans are searched for."""
+
+    deadline_s: float = 10.0
+    """Time that a search for a plan is given."""
+    memory_mb: int = 512
+    """Memory of a planner's process."""
+    translate_s: float = 10.0
+    """Time that components have to translate words which match no phrase."""
+    establish_s: float = 30.0
+    """Time that a lasting behaviour is given, from its start or its last sign of progress, until
+    its effects hold; then it has failed."""
+    finish_s: float = 600.0
+    """Time that a finishing behaviour is given, from its start or its last sign of progress; then
+    it has failed."""
+
+
+@dataclass(frozen=True, slots=True)
+class PeersSection:
+    """Other hosts: whether they are looked for, and what they may have of this one."""
+
+    enabled: bool = True
+    """Listen for other hosts, and look for them. With `--user` `false`, unless `--peer` is given,
+    or the file sets `listen`, `static`, `development` or a router."""
+    listen: tuple[str, ...] = ("tcp://*:7410",)
+    """Where this host listens; port 0 picks one."""
+    stream_port: int = 0
+    """Where streams are fetched from this host; 0 picks a port each time."""
+    discover: bool = True
+    """Announce this host by multicast, and listen for others."""
+    static: tuple[str, ...] = ()
+    """Hosts to look for where multicast does not reach: `HOST` or `HOST:PORT`."""
+    process: bool = False
+    """Hold the links to other hosts in a process of their own, with a memory limit: what they send
+    cannot fill the daemon's memory then. Links by way of a router stay in the daemon."""
+    development: bool = False
+    """No keys: every host on this machine is a peer. Nothing leaves the machine; every status says
+    so."""
+    offer_actuators: tuple[str, ...] = ()
+    """Components whose actuators peers may use; those of no other may move for a peer."""
+    accept_goals: bool = True
+    """Whether goals that a peer heard are taken. Where a router is named, `false` by default: no
+    peer proves its key there."""
+    place: bool = True
+    """Whether payloads that do not fit here are offered to peers, and theirs are taken here. Where
+    a router is named, `false` by default: no peer proves its key there."""
+
+
+@dataclass(frozen=True, slots=True)
+class RouterSection:
+    """A Zenoh router by which hosts reach each other, instead of links from each to each."""
+
+    endpoints: tuple[str, ...] = ()
+    """Where routers are, any of which will do: `tls/router.example:7447`. None: no router."""
+    fleet: str = "nondum"
+    """What tells fleets apart that share a router."""
+    authorities: Path | None = None
+    """Certificates (PEM) that the router's must come from."""
+    certificate: Path | None = None
+    """This host's (PEM), for a router that asks for one."""
+    private_key: Path | None = None
+    """Its key (PEM)."""
+
+
+@dataclass(frozen=True, slots=True)
+class HostConfig:
+    """All of it."""
+
+    host: HostSection = field(default_factory=HostSection)
+    drives: DrivesSection = field(default_factory=DrivesSection)
+    trust: TrustSection = field(default_factory=TrustSection)
+    devices: DevicesSection = field(default_factory=DevicesSection)
+    install: InstallSection = field(default_factory=InstallSection)
+    journal: JournalSection = field(default_factory=JournalSection)
+    backups: BackupsSection = field(default_factory=BackupsSection)
+    workers: WorkersSection = field(default_factory=WorkersSection)
+    planning: PlanningSection = field(default_factory=PlanningSection)
+    peers: PeersSection = field(default_factory=PeersSection)
+    router: RouterSection = field(default_factory=RouterSection)
+    feedback: FeedbackSection = field(default_factory=FeedbackSection)
+    stop: StopSection = field(default_factory=StopSection)
+
+    @property
+    def first_trust_file(self) -> Path:
+        """Where this host's trust begins."""
+        return self.trust.file or self.host.state / "trust.toml"
+
+
+def default_name(hostname: str) -> str:
+    """A host name made of the machine's.
+
+    >>> default_name("Spot_7.local")
+    'spot-7'
+    """
+    name = re.sub(r"[^a-z0-9]+", "-", hostname.split(".")[0].lower()).strip("-")
+    return name or "host"
+
+
+def user_state() -> Path:
+    """Where a host that a user runs without root keeps what it knows."""
+    return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "nondum"
+
+
+def user_config() -> HostConfig:
+    """The defaults of a host that a user runs without root: state and socket are the user's."""
+    state = user_state()
+    runtime = os.environ.get("XDG_RUNTIME_DIR")
+    control = (Path(runtime) / "nondum" if runtime else state) / "control.sock"
+    return HostConfig(
+        host=HostSection(state=state, control=control),
+        drives=DrivesSection(slots=(state / "slots",), block_devices=False),
+        trust=TrustSection(file=None),
+        devices=DevicesSection(slots=(state / "device-slots",)),
+        peers=PeersSection(enabled=False),
+        workers=WorkersSection(minimum_confinement=Level.NONE),
+    )
+
+
+def load(path: Path, defaults: HostConfig) -> HostConfig:
+    """Read a file over the defaults. Raises `ConfigRefused` with everything wrong in it."""
+    return parse(read(path), str(path), defaults)
+
+
+def read(path: Path) -> str:
+    """The text of a file. Raises `ConfigRefused` (CONFIG_UNREADABLE)."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigRefused(
+            Problem("CONFIG_UNREADABLE", f"cannot be read ({error})", where=str(path))
+        ) from error
+
+
+def parse(text: str, where: str, defaults: HostConfig) -> HostConfig:
+    """Parse TOML over the defaults. Raises `ConfigRefused` with everything wrong in it."""
+    try:
+        data = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError, or a number without end
+        at = _AT_LINE.search(str(error))
+        place = f"{where}:{at[1] if at else len(text.splitlines())}"
+        raise ConfigRefused(Problem("CONFIG_TOML", str(error), where=place)) from error
+    places = Places(where, text)
+    problems: list[Problem] = []
+    sections = {f.name: getattr(defaults, f.name) for f in fields(HostConfig)}
+    for name, table in data.items():
+        if name not in sections:
+            problems.append(_unknown(name, sections, places.of(name)))
+        elif not isinstance(table, dict):
+            problems.append(_wrong(f"[{name}]", "a table", table, places.of(name)))
+        else:
+            sections[name] = _section(name, sections[name], table, places, problems)
+    has_router = bool(sections["router"].endpoints)
+    sections["peers"] = _wanted(sections["peers"], data.get("peers"), has_router=has_router)
+    if has_router:
+        sections["peers"] = _unproved(sections["peers"], data.get("peers"))
+    problems.extend(_contradictions(HostConfig(**sections), places))
+    problems.extend(feedback_section.problems(sections["feedback"], places))
+    problems.extend(stop_section.problems(sections["stop"], places))
+    if problems:
+        raise ConfigRefused(*problems)
+    return HostConfig(**sections)
+
+
+def check_name(name: str, *, where: str) -> None:
+    """Raise `ConfigRefused` (CONFIG_VALUE) unless a name is one that a host can have."""
+    if problems := tuple(_name_problems(name, where)):
+        raise ConfigRefused(*problems)
+
+
+def documented() -> Iterator[tuple[str, str, Any]]:
+    """Section, key and default of every key, for the reference and its test."""
+    for section in fields(HostConfig):
+        kind = get_type_hints(HostConfig)[section.name]
+        for key in fields(kind):
+            yield section.name, key.name, None if key.default is MISSING else key.default
+
+
+def _wanted(peers: PeersSection, table: object, *, has_router: bool) -> PeersSection:
+    """With `--user` peers are off by default; a file that says how they are to be reached wants
+    them on, unless it says itself that they are off."""
+    said = table.keys() if isinstance(table, dict) else set()
+    is_wanted = has_router or not said.isdisjoint(REACHED_BY)
+    return replace(peers, enabled=True) if is_wanted and "enabled" not in said else peers
+
+
+def _unproved(peers: PeersSection, table: object) -> PeersSection:
+    """What holds among peers that prove no keys, but for what the file's table says."""
+    said = table.keys() if isinstance(table, dict) else set()
+    return replace(
+        peers,
+        accept_goals="accept_goals" in said and peers.accept_goals,
+        place="place" in said and peers.place,
+    )
+
+
+def _section(
+    name: str, default: Any, table: Mapping[str, Any], places: Places, problems: list[Problem]
+) -> Any:
+    hints = get_type_hints(type(default))
+    values = {key: getattr(default, key) for key in hints}
+    for key, value in table.items():
+        if key not in hints:
+            problems.append(_unknown(key, hints, f"{places.of(name, key)} [{name}]"))
+            continue
+        typed = _typed(hints[key], value)
+        if typed is None:
+            kind = KINDS.get(hints[key], "another kind of value")
+            problems.append(_wrong(f"[{name}] {key}", kind, value, places.of(name, key)))
+        else:
+            values[key] = typed
+    return type(default)(**values)
+
+
+KINDS: Mapping[Any, str] = {
+    str: "a string",
+    int: "a whole number of at least 0",
+    float: "a number above 0",
+    bool: "true or false",
+    Path: "a path as a string",
+    Path | None: "a path as a string",
+    tuple[Path, ...]: "a list of paths",
+    tuple[str, ...]: "a list of strings",
+    Level: confinement.EXPECTED,
+    Wanted: f'"auto", {confinement.EXPECTED}',
+}
+_PARSERS: Mapping[Any, Callable[[object], Any]] = {Level: confinement.parse, Wanted: parse_wanted}
+"""Kinds of values that are read from text or numbers; each raises `ValueError`."""
+
+
+def _typed(hint: Any, value: Any) -> Any:
+    """The value as `hint` wants it, or None when it is of another kind."""
+    if hint in _PARSERS:
+        with contextlib.suppress(ValueError):
+            return _PARSERS[hint](value)
+        return None
+    if isinstance(hint, GenericAlias):
+        (item, _) = get_args(hint)
+        typed = [_typed(item, v) for v in value] if isinstance(value, list) else [None]
+        return None if None in typed else tuple(typed)
+    if hint in (Path, Path | None):
+        # Absolute: processes that the daemon starts work in other folders.
+        return Path(value).expanduser().absolute() if isinstance(value, str) and value else None
+    if hint is float:
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        return float(value) if is_number and value > 0 else None
+    if hint is int:
+        return value if type(value) is int and value >= 0 else None
+    return value if type(value) is hint else None
+
+
+def _contradictions(config: HostConfig, places: Places) -> Iterator[Problem]:
+    """What has the right kind, and a value that there is not."""
+    name = config.host.name
+    yield from _name_problems(name, places.of("host", "name"), key="[host] name = ")
+    for section, key, is_right, expected in (
+        ("trust", "on_revoke", _one_of("stop", "flag"), '"stop" or "flag"'),
+        ("install", "method", _one_of("store", "pip"), '"store" or "pip"'),
+        ("host", "system_tree", _REFERENCE.fullmatch, '"package:function"'),
+    ):
+        value = getattr(getattr(config, section), key)
+        if not is_right(value):
+            yield _wrong(f"[{section}] {key}", expected, value, places.of(section, key))
+
+
+def _one_of(*values: str) -> Callable[[Any], object]:
+    return frozenset(values).__contains__
+
+
+def _name_problems(name: str, where: str, *, key: str = "") -> Iterator[Problem]:
+    if not HOST_NAME.fullmatch(name):
+        yield Problem(
+            "CONFIG_VALUE",
+            f"{key}{name!r} is not a host name",
+            where=where,
+            fix=f"lower-case letters, digits and single hyphens: {default_name(name)!r}",
+        )
+
+
+def _unknown(key: str, known: Mapping[str, Any], where: str) -> Problem:
+    near = difflib.get_close_matches(key, known, n=1)
+    fix = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(sorted(known))}"
+    return Problem("CONFIG_KEY", f"unknown key {key!r}", where=where, fix=fix)
+
+
+def _wrong(key: str, expected: str, value: Any, where: str) -> Problem:
+    try:
+        shown = repr(value)
+    except ValueError:  # of a number with thousands of digits (sys.set_int_max_str_digits)
+        shown = "a value too long to be shown"
+    return Problem("CONFIG_VALUE", f"{key} = {shown}: expected {expected}", where=where)

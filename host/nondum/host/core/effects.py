@@ -1,0 +1,162 @@
+"""What the component manager wants done: frozen values in the imperative, for the executor.
+
+Each is idempotent: after a crash it may be carried out again from the start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from nondum.host.core.records import DeviceNode
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """Anything to be done."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReadDrive(Effect):
+    """Mount the drive where it needs that, and look for payloads on it."""
+
+    drive: str
+    kind: str
+    root: Path
+    node: Path | None = None
+    filesystem: str = ""
+    keys: Mapping[str, str] = field(default_factory=dict)
+    """Digest of a contents list → key of the payload that is here already."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReleaseDrive(Effect):
+    """Let go of a drive: end its reader, unmount it."""
+
+    drive: str
+
+
+@dataclass(frozen=True, slots=True)
+class JudgePayloads(Effect):
+    """Ask anew whether payloads that are here are trusted."""
+
+    payloads: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadEffect(Effect):
+    """Something to be done for one payload; one at a time for each."""
+
+    payload: str
+
+
+@dataclass(frozen=True, slots=True)
+class CopyPayload(PayloadEffect):
+    """Copy what this host needs into staging, hashing on the way."""
+
+    drive: str
+    folder: Path
+    digest: str
+    beside: str = ""
+    """Key of the release of it that is in force, which would make room for it."""
+
+
+@dataclass(frozen=True, slots=True)
+class VerifyPayload(PayloadEffect):
+    """Check the staged copy: manifest, locks, index, wheels, preflight."""
+
+
+@dataclass(frozen=True, slots=True)
+class StagePayload(PayloadEffect):
+    """Move the checked copy to its lasting place."""
+
+
+@dataclass(frozen=True, slots=True)
+class StoreWheels(PayloadEffect):
+    """Unpack each wheel that the store lacks into it, and promise it the memory that it needs."""
+
+    beside: str = ""
+    """Key of the release of it that is in force, which would make room for it."""
+    renamed: Mapping[str, str] = field(default_factory=dict, hash=False)
+    """Id in the manifest → name on this host, of those components where that is another."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProbeComponents(PayloadEffect):
+    """Make the venvs, start the workers, compare what they say with the index."""
+
+    beside: str = ""
+    """Key of the release of it that is in force, and goes on meanwhile."""
+    after: str = ""
+    """Key of a payload whose workers must have ended first."""
+    renamed: Mapping[str, str] = field(default_factory=dict, hash=False)
+    """Id in the manifest → name on this host, of those components where that is another."""
+
+
+@dataclass(frozen=True, slots=True)
+class ActivatePayload(PayloadEffect):
+    """Make the components' records for the catalogue."""
+
+    beside: str = ""
+    """Key of the release that it is to take over from, once it was seen to be healthy."""
+
+
+@dataclass(frozen=True, slots=True)
+class CompileWheels(PayloadEffect):
+    """Byte-compile what an active payload runs, for the next start; it may fail or never end."""
+
+
+@dataclass(frozen=True, slots=True)
+class RestPayload(PayloadEffect):
+    """Stop what runs of a superseded payload; it may be wanted again at once."""
+
+    components: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class NoteInstalled(PayloadEffect):
+    """Write down beside a payload's files that it was installed for good, or undo that."""
+
+    drive: str
+    folder: Path | None
+    """Where it came from; None: it is not installed for good any more."""
+
+
+@dataclass(frozen=True, slots=True)
+class SuspendPayload(PayloadEffect):
+    """Stop what runs of a quarantined payload and drop its venvs; it may be tried again."""
+
+    components: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ClearPayload(PayloadEffect):
+    """Stop what runs of a payload and delete all of it but the wheels in the store."""
+
+    components: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RestartWorker(Effect):
+    """Start a quarantined component's worker once more."""
+
+    component: str
+
+
+@dataclass(frozen=True, slots=True)
+class AttachDevice(Effect):
+    """Give nodes of a device to a component: these, instead of any that it has for that need."""
+
+    component: str
+    need: str
+    nodes: tuple[DeviceNode, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class DetachDevice(Effect):
+    """Take a device from a component."""
+
+    component: str
+    need: str
+    device: str

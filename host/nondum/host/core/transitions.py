@@ -1,0 +1,118 @@
+"""The life of a payload as tables: which event leads from which step where, and what is then done.
+
+`lifecycle/advance.py` follows them, `lifecycle/recovery.py` the one for a daemon that starts; the
+diagram in docs/lifecycle.md is drawn from them, and the kill tests go through every row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from nondum.host.core import effects, events
+from nondum.host.core.effects import PayloadEffect
+from nondum.host.core.events import Event
+from nondum.host.core.records import ComponentState, Step
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """Where an event leads, and what is then to be done."""
+
+    to: Step
+    effect: type[PayloadEffect] | None = None
+
+
+_Rows = Mapping[tuple[Step, type[Event]], Transition]
+
+_INSTALLING = (Step.RECEIVED, Step.COPIED, Step.VERIFIED, Step.STAGED)
+_PRESENT = (
+    *_INSTALLING,
+    Step.STORED,
+    Step.PROBED,
+    Step.ACTIVE,
+    Step.SUPERSEDED,
+    Step.REFUSED,
+    Step.QUARANTINED,
+)
+
+TRANSITIONS: _Rows = {
+    (Step.GONE, events.PayloadFound): Transition(Step.RECEIVED, effects.CopyPayload),
+    (Step.RECEIVED, events.PayloadCopied): Transition(Step.COPIED, effects.VerifyPayload),
+    (Step.COPIED, events.PayloadVerified): Transition(Step.VERIFIED, effects.StagePayload),
+    (Step.VERIFIED, events.PayloadStaged): Transition(Step.STAGED, effects.StoreWheels),
+    (Step.STAGED, events.WheelsStored): Transition(Step.STORED, effects.ProbeComponents),
+    (Step.STORED, events.ComponentsProbed): Transition(Step.PROBED, effects.ActivatePayload),
+    (Step.PROBED, events.PayloadActivated): Transition(Step.ACTIVE, effects.CompileWheels),
+    **{
+        (step, events.PayloadRefused): Transition(Step.REFUSED, effects.ClearPayload)
+        for step in _INSTALLING
+    },
+    **{
+        (step, events.PayloadFailed): Transition(Step.QUARANTINED, effects.SuspendPayload)
+        for step in (Step.STORED, Step.PROBED, Step.ACTIVE)
+    },
+    (Step.STORED, events.PayloadSuperseded): Transition(Step.SUPERSEDED, effects.RestPayload),
+    (Step.ACTIVE, events.PayloadSuperseded): Transition(Step.SUPERSEDED, effects.RestPayload),
+    (Step.SUPERSEDED, events.PayloadResumed): Transition(Step.STORED, effects.ProbeComponents),
+    **{
+        (step, events.PayloadSentAway): Transition(Step.REFUSED, effects.ClearPayload)
+        for step in _PRESENT
+        if step is not Step.REFUSED
+    },
+    **{
+        (step, events.PayloadDistrusted): Transition(Step.REFUSED, effects.ClearPayload)
+        for step in _PRESENT
+        if step is not Step.REFUSED
+    },
+    (Step.REFUSED, events.RetryAsked): Transition(Step.REMOVING, effects.ClearPayload),
+    (Step.REFUSED, events.RollbackAsked): Transition(Step.REMOVING, effects.ClearPayload),
+    (Step.QUARANTINED, events.RetryAsked): Transition(Step.STORED, effects.ProbeComponents),
+    **{
+        (step, events.PayloadWithdrawn): Transition(Step.REMOVING, effects.ClearPayload)
+        for step in _PRESENT
+    },
+    (Step.REMOVING, events.PayloadCleared): Transition(Step.GONE),
+}
+"""(step, event) → transition. What is not here is ignored: it comes from an earlier life."""
+
+RECOVERY: Mapping[Step, Transition] = {
+    Step.RECEIVED: Transition(Step.GONE),
+    Step.COPIED: Transition(Step.GONE),
+    Step.VERIFIED: Transition(Step.GONE),
+    Step.STAGED: Transition(Step.GONE),
+    Step.STORED: Transition(Step.STORED, effects.ProbeComponents),
+    Step.PROBED: Transition(Step.STORED, effects.ProbeComponents),
+    Step.ACTIVE: Transition(Step.STORED, effects.ProbeComponents),
+    Step.SUPERSEDED: Transition(Step.SUPERSEDED),
+    Step.REMOVING: Transition(Step.REMOVING, effects.ClearPayload),
+    Step.REFUSED: Transition(Step.REFUSED),
+    Step.QUARANTINED: Transition(Step.QUARANTINED),
+}
+"""Where a payload goes that a starting daemon finds at a step: back before STORED, else forward."""
+
+COMPONENT_TRANSITIONS: Mapping[tuple[ComponentState, type[Event]], ComponentState] = {
+    (ComponentState.READY, events.WorkerExited): ComponentState.RESTARTING,
+    (ComponentState.RESTARTING, events.WorkerReady): ComponentState.READY,
+    (ComponentState.READY, events.WorkerFailed): ComponentState.QUARANTINED,
+    (ComponentState.RESTARTING, events.WorkerFailed): ComponentState.QUARANTINED,
+    (ComponentState.QUARANTINED, events.RetryAsked): ComponentState.RESTARTING,
+}
+"""The same for the components of an active payload."""
+
+
+def diagram() -> str:
+    """The tables as a Mermaid state diagram."""
+    lines = ["stateDiagram-v2", f"    [*] --> {Step.GONE.name}"]
+    lines += [
+        f"    {step.name} --> {row.to.name}: {event.__name__}"
+        for (step, event), row in TRANSITIONS.items()
+    ]
+    return "\n".join(lines) + "\n"
+
+
+KEEPS_VENVS = frozenset({Step.STORED, Step.PROBED, Step.ACTIVE, Step.SUPERSEDED})
+
+
+KEEPS_FOLDER = KEEPS_VENVS | {Step.STAGED, Step.QUARANTINED}
+"""Steps at which a payload's checked files are there."""

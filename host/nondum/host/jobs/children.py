@@ -1,0 +1,287 @@
+"""Child processes that do what may block, hang or choke on hostile bytes: the daemon's end.
+
+Requests go to a child and answers come back over a socket, one JSON object a line. Children are
+forked from a process that has imported what they need and has read nothing (`fork_server.py`). What
+a child reads of a drive could take it over, so from then on it works for that drive only and never
+for anybody else.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from nondum.host.jobs.fork_client import ForkClient, Forked
+from nondum.sdk import errors
+from nondum.sdk.errors import InstallFailed, NondumError, Problem
+from nondum.wheelhouse.store import disk
+
+KEPT = 4
+"""Children that wait for more work of their owners; those that worked last are kept."""
+
+QUIET_S = 30.0
+"""Without work for so long, no child is kept."""
+
+STALL_S = 60.0
+"""Silence that is borne from a child, unless its job is one that says more or less of itself."""
+
+START_S = 60.0
+"""How long the fork server may take to start, and a child until it begins with its job."""
+
+ASIDE_STALL_S = 600.0
+"""Silence that is borne from a child that works only while nobody else does."""
+
+END_S = 1.0
+"""How long a killed child is waited for: one that hangs in its disk cannot even die."""
+
+OnProgress = Callable[[str, int, int], None]
+
+log = logging.getLogger(__name__)
+
+
+class Children:
+    """A pool that grows as jobs need it, and shrinks to nothing. `close` it."""
+
+    def __init__(
+        self, *, quiet_s: float = QUIET_S, on_crowded: Callable[[], None] = lambda: None
+    ) -> None:
+        """`on_crowded`: see `ForkClient`."""
+        self._quiet_s = quiet_s
+        self.forks = ForkClient("nondum.host.jobs.child", on_crowded)
+        """What they are forked by, and services of the host beside them (`jobs.SERVICES`)."""
+        self._kept: dict[str, Forked] = {}
+        """Owner → the child that worked for it, and for nobody else; the last ones last."""
+        self._busy: set[Forked] = set()
+        self._left_behind: set[Forked] = set()
+        """Those that were killed and have not ended yet: a disk may hold one for ever."""
+        self._shrinking: asyncio.Task[None] | None = None
+
+    async def run(
+        self,
+        job: str,
+        arguments: Mapping[str, Any],
+        *,
+        owner: str = "",
+        on_progress: OnProgress | None = None,
+        stall_s: float = STALL_S,
+    ) -> Any:
+        """Have a child do a job, and give what it answers. Cancelling kills the child.
+
+        The child is one that worked for no other `owner`, which is whatever the bytes came from;
+        without one, it does this job and ends. Raises the `NondumError` that the job did, or
+        `InstallFailed`: CHILD_STALLED when nothing was heard for `stall_s`, which begin once it has
+        started, CHILD_LIMIT when it used up its processor time, CHILD_DIED when it ended without an
+        answer otherwise.
+        """
+        child = await self._take(owner, job)
+        self._busy.add(child)
+        try:
+            async with asyncio.timeout(None) as deadline:
+                answer = await _converse(child, job, arguments, on_progress, deadline, stall_s)
+        except TimeoutError as error:
+            await self._end(child)
+            raise _stalled(job, stall_s) from error
+        except BaseException:
+            await self._end(child)
+            raise
+        finally:
+            self._tend()
+        await self._keep(child, owner)
+        return _result(answer)
+
+    async def run_aside(
+        self, job: str, arguments: Mapping[str, Any], *, stall_s: float = ASIDE_STALL_S
+    ) -> Any:
+        """Have a child of its own do a job with what processor and disk time nobody else wants.
+
+        Otherwise as `run`; the child ends with its job.
+        """
+        child = await self._spawn(job)
+        self._busy.add(child)
+        try:
+            _make_idle(child.pid)
+            async with asyncio.timeout(None) as deadline:
+                answer = await _converse(child, job, arguments, None, deadline, stall_s)
+        except TimeoutError as error:
+            raise _stalled(job, stall_s) from error
+        finally:
+            await self._end(child)
+        return _result(answer)
+
+    async def release(self, owner: str) -> None:
+        """End the child that is kept for an owner whose work is done."""
+        child = self._kept.pop(owner, None)
+        if child is not None:
+            await self._end(child)
+
+    def pids(self) -> set[int]:
+        """Processes of all children."""
+        return {child.pid for child in (*self._kept.values(), *self._busy)}
+
+    @property
+    def server(self) -> int | None:
+        """The process that they are forked from, while there is one."""
+        return self.forks.pid
+
+    def kept(self) -> dict[str, int]:
+        """Owner → the process of the child that waits for more of its work."""
+        return {owner: child.pid for owner, child in self._kept.items()}
+
+    async def close(self) -> None:
+        """Kill all children."""
+        if self._shrinking is not None:
+            self._shrinking.cancel()
+            await asyncio.wait([self._shrinking])
+        everyone = {*self._kept.values(), *self._busy, *self._left_behind}
+        await asyncio.gather(*(self._end(child) for child in everyone))
+        self._kept.clear()
+        for child in self._left_behind:
+            child.close()
+        await self.forks.close()
+
+    async def _take(self, owner: str, job: str) -> Forked:
+        """A child that nobody else's bytes have touched."""
+        return self._kept.pop(owner, None) or await self._spawn(job)
+
+    async def _spawn(self, job: str) -> Forked:
+        """A new child.
+
+        Raises `InstallFailed` (NO_RESOURCES, IO_ERROR, CHILD_DIED, CHILD_STALLED).
+        """
+        try:
+            return await self.forks.fork(job, START_S)
+        except TimeoutError as error:
+            raise _stalled(job, START_S) from error
+        except OSError as error:
+            text = "a child process cannot be started"
+            raise disk.failed(error, text, Path(sys.executable)) from error
+        except EOFError as error:
+            message = f"{job}: no child can be forked: {error}"
+            raise InstallFailed(Problem("CHILD_DIED", message, fix=_TRY_AGAIN)) from error
+
+    async def _keep(self, child: Forked, owner: str) -> None:
+        """Keep a child for its owner, in the place of whichever was kept longest."""
+        self._busy.discard(child)
+        if not owner:
+            await self._end(child)
+            return
+        former = self._kept.pop(owner, None)
+        self._kept[owner] = child
+        oldest = next(iter(self._kept)) if len(self._kept) > KEPT else None
+        over = former or (self._kept.pop(oldest) if oldest else None)
+        if over is not None:
+            await self._end(over)
+
+    def _tend(self) -> None:
+        if self._shrinking is not None:
+            self._shrinking.cancel()
+        self._shrinking = asyncio.create_task(self._shrink())
+
+    async def _shrink(self) -> None:
+        await asyncio.sleep(self._quiet_s)
+        while self._kept:
+            await self._end(self._kept.pop(next(iter(self._kept))))
+
+    async def _end(self, child: Forked) -> None:
+        self._busy.discard(child)
+        self._left_behind.add(child)  # whoever waits here may be cancelled: then `close` waits
+        _make_ordinary(child.pid)  # or, while others work, it gets no processor to end with
+        child.kill()
+        try:
+            await asyncio.wait_for(child.over(), END_S)
+        except TimeoutError:
+            log.warning("child %d hangs in its disk and is left behind", child.pid)
+        for other in [each for each in self._left_behind if each.is_over]:
+            self._left_behind.discard(other)
+            other.close()
+
+
+@contextlib.contextmanager
+def watched_without_threads() -> Iterator[None]:
+    """Wait for children by descriptors (pidfd_open(2)) meanwhile, as Python 3.12 does by itself.
+
+    3.11 has a thread for each child, which there is no memory for just when it is needed.
+    """
+    if sys.version_info >= (3, 12):
+        yield
+        return
+    former, watcher = asyncio.get_child_watcher(), asyncio.PidfdChildWatcher()
+    watcher.attach_loop(asyncio.get_running_loop())
+    asyncio.set_child_watcher(watcher)
+    try:
+        yield
+    finally:
+        asyncio.set_child_watcher(former)
+
+
+async def _converse(
+    child: Forked,
+    job: str,
+    arguments: Mapping[str, Any],
+    on_progress: OnProgress | None,
+    deadline: asyncio.Timeout,
+    stall_s: float,
+) -> dict[str, Any]:
+    loop = asyncio.get_running_loop()
+    line = json.dumps({"job": job, "arguments": dict(arguments)}) + "\n"
+    await child.say(line.encode())
+    patience_s = max(stall_s, START_S)  # on a small computer that has much to do, Python takes long
+    while True:
+        deadline.reschedule(loop.time() + patience_s)
+        heard = await child.hear()
+        if not heard:
+            raise _died(job, await child.wait())
+        answer: dict[str, Any] = json.loads(heard)
+        patience_s = stall_s
+        if "begun" in answer:
+            continue
+        if "progress" not in answer:
+            return answer
+        if on_progress is not None:
+            on_progress(*answer["progress"])
+
+
+def _make_idle(pid: int) -> None:
+    """SCHED_IDLE (sched(7)): below any niceness, and its disk accesses are idle, too."""
+    with contextlib.suppress(OSError):  # it died, which is told later, or a sandbox forbids it
+        os.sched_setscheduler(pid, os.SCHED_IDLE, os.sched_param(0))
+
+
+def _make_ordinary(pid: int) -> None:
+    with contextlib.suppress(OSError):  # it died, or RLIMIT_NICE leaves no way back
+        os.sched_setscheduler(pid, os.SCHED_OTHER, os.sched_param(0))
+
+
+def _result(answer: Mapping[str, Any]) -> Any:
+    """What a job gave. Raises what it raised."""
+    if "problems" in answer:
+        kind = getattr(errors, answer["error"], InstallFailed)
+        error: NondumError = kind(*(Problem(**problem) for problem in answer["problems"]))
+        raise error
+    return answer["result"]
+
+
+def _stalled(job: str, stall_s: float) -> InstallFailed:
+    message = f"{job}: nothing was heard for {stall_s:g} s"
+    return InstallFailed(Problem("CHILD_STALLED", message, fix=_TRY_AGAIN))
+
+
+def _died(job: str, code: int) -> InstallFailed:
+    """What is told of a child that ended before it answered."""
+    if code == -signal.SIGXCPU:
+        message = f"{job}: took more processor time than it may"
+        return InstallFailed(Problem("CHILD_LIMIT", message, fix=_TRY_AGAIN))
+    names = {-number.value: number.name for number in signal.Signals}
+    message = f"{job}: the child ended with {names.get(code, code)} before it answered"
+    return InstallFailed(Problem("CHILD_DIED", message, fix=_TRY_AGAIN))
+
+
+_TRY_AGAIN = "pull the drive and plug it in again; if that does not help, build it anew"

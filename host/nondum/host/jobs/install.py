@@ -1,0 +1,214 @@
+"""Installing a staged payload, in a child process: wheels into the store, venvs of links to it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from nondum.host.core.plain import plain
+from nondum.host.jobs import look
+from nondum.host.jobs.look import Arguments, Report
+from nondum.host.trust import chain
+from nondum.sdk.errors import InstallFailed, Problem
+from nondum.wheelhouse.build import source
+from nondum.wheelhouse.format.lock import LockedWheel
+from nondum.wheelhouse.format.manifest import ComponentManifest
+from nondum.wheelhouse.payload import memory
+from nondum.wheelhouse.payload.payload import StagedPayload
+from nondum.wheelhouse.payload.preflight import HostFacts
+from nondum.wheelhouse.store import venvs
+from nondum.wheelhouse.store.store import Store
+from nondum.wheelhouse.store.stored import StoredWheel
+from nondum.wheelhouse.store.unpacking import THREADS
+
+
+def install(arguments: Arguments, report: Report) -> dict[str, Any]:
+    """Make a payload's venvs and tell what its workers are started from. Idempotent.
+
+    Afterwards, whatever a starting daemon needs to make them again is safe on disk. Raises
+    `InstallFailed` (DISK_FULL, STORE_DAMAGED, …) and `PayloadRefused`, also when it is not trusted
+    any more, or others were promised the memory that it needs; without `room`, nobody asks.
+    """
+    folder, root = Path(arguments["folder"]), Path(arguments["venvs"])
+    by_pip = arguments["method"] == "pip"
+    staged = look.load_staged(folder)
+    grant = chain.grant_of_kept(arguments, folder, staged.manifest, staged.goals)
+    facts = look.facts_of(arguments)
+    requires = staged.manifest.requires
+    if arguments["room"] is not None:
+        have = look.memory_for(arguments, facts)
+        look.refuse_if_any(tuple(memory.problems(requires, have, staged.manifest.id)))
+    root.mkdir(parents=True, exist_ok=True)
+    with ThreadPoolExecutor(1) as pool:  # disks take their time; what is linked is not waited for
+        synced = pool.submit(_sync, folder, with_wheels=by_pip)
+        if by_pip:
+            _make_with_pip(arguments, staged, facts, report)
+            fresh, uncompiled = 0, False
+        else:
+            fresh, uncompiled = _make(arguments, staged, facts, report)
+        synced.result()
+    if not by_pip:
+        shutil.rmtree(folder / "wheels", ignore_errors=True)  # the store has them now
+    components = [_told(staged, component, root) for component in staged.manifest.components]
+    needs = {
+        "payload_id": staged.manifest.id,
+        "memory_mb": requires.memory_mb,
+        "gpu_memory_mb": requires.gpu_memory_mb,
+        "alone": requires.alone,
+    }
+    gpu = facts.memory.gpu
+    return {
+        "fresh": fresh,
+        "uncompiled": uncompiled,
+        "components": components,
+        "needs": needs,
+        "gpu": asdict(gpu) if gpu is not None else None,
+        "grant": grant.to_dict(),
+        "goals": list(staged.goals),
+    }
+
+
+def _make(
+    arguments: Arguments, staged: StagedPayload, facts: HostFacts, report: Report
+) -> tuple[int, bool]:
+    """Make the venvs from the store; how many wheels it did not have, and whether any was there
+    that is not compiled yet."""
+    wheels = look.chosen(staged, facts)
+    stored, fresh = _stored(arguments, staged.folder, wheels, report)
+    for component, chosen in staged.wheels(facts).items():
+        linked = [stored[locked.sha256] for locked in chosen]
+        venvs.make(Path(arguments["venvs"]) / component, Path(arguments["python"]), linked)
+    return fresh, any(wheel.compiled_here is None for wheel in stored.values())
+
+
+def _make_with_pip(
+    arguments: Arguments, staged: StagedPayload, facts: HostFacts, report: Report
+) -> None:
+    selected = staged.wheels(facts)
+    for number, (component, chosen) in enumerate(selected.items()):
+        venv, python = Path(arguments["venvs"]) / component, Path(arguments["python"])
+        # pip tells nothing of its progress: that it is at work is all that there is to report.
+        alive = partial(report, "pip", number, len(selected))
+        venvs.make_with_pip(venv, python, staged.folder, chosen, alive)
+
+
+def _sync(folder: Path, *, with_wheels: bool) -> None:
+    """Have a payload's folder on disk: its metadata, and wheels where the store has them not."""
+    files = [path for path in folder.iterdir() if path.is_file()]
+    wheels = folder / "wheels"
+    if with_wheels and wheels.exists():
+        files += [*wheels.iterdir(), wheels]
+    for path in (*files, folder, folder.parent):
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def stored_names(wheels: dict[str, tuple[LockedWheel, ...]]) -> set[str]:
+    """Hashes of all wheels that components are made of."""
+    return {locked.sha256 for group in wheels.values() for locked in group}
+
+
+def wheels_in_use(arguments: Arguments, report: Report) -> dict[str, list[str]]:
+    """Payload key → hashes of the wheels that it needs, of the payload folders given."""
+    facts = look.facts_of(arguments)
+    folders = [Path(folder) for folder in arguments["folders"]]
+    return {
+        folder.name: sorted(stored_names(look.load_staged(folder).wheels(facts)))
+        for folder in folders
+        if folder.exists()
+    }
+
+
+def prune(arguments: Arguments, report: Report) -> list[str]:
+    """Delete wheels that no payload needs, least recently used first, down to the quota."""
+    used = {sha256 for group in wheels_in_use(arguments, report).values() for sha256 in group}
+    gone = Store(Path(arguments["store"])).prune(used, arguments["quota_mb"] * 1024 * 1024)
+    return [stored.filename for stored in gone]
+
+
+def listing(arguments: Arguments, report: Report) -> list[dict[str, Any]]:
+    """What the store holds, and which payloads need it."""
+    used = wheels_in_use(arguments, report)
+    return [
+        {
+            "wheel": stored.filename,
+            "bytes": stored.size,
+            "used_by": sorted(key for key, group in used.items() if stored.sha256 in group),
+            "sha256": stored.sha256,
+        }
+        for stored in Store(Path(arguments["store"])).listing()
+    ]
+
+
+def sweep(arguments: Arguments, report: Report) -> list[str]:
+    """Delete what an interrupted run left half done in the store."""
+    return [path.name for path in Store(Path(arguments["store"])).sweep()]
+
+
+def _stored(
+    arguments: Arguments, folder: Path, wheels: Sequence[LockedWheel], report: Report
+) -> tuple[dict[str, StoredWheel], int]:
+    """The wheels in the store, and how many were not there before."""
+    store = Store(Path(arguments["store"]))
+    fresh = sum(store.get(locked.sha256) is None for locked in wheels)
+    paths = [(folder / locked.path, locked.sha256) for locked in wheels]
+    copied = [(path, sha256) for path, sha256 in paths if path.exists()]
+    alive = partial(report, "check", 0, 1)  # how much there is to be read is not counted
+    added = store.add_all(copied, partial(report, "install"), alive)
+    stored = {wheel.sha256: wheel for wheel in added}
+    known = [locked for locked in wheels if locked.sha256 not in stored]
+    with ThreadPoolExecutor(THREADS) as pool:
+        checked = pool.map(lambda locked: _checked(store, locked, alive), known)
+        stored.update((wheel.sha256, wheel) for wheel in checked)
+    return stored, fresh
+
+
+def _checked(store: Store, locked: LockedWheel, alive: Callable[[], None]) -> StoredWheel:
+    """A wheel that was not copied because the store had it."""
+    found = store.whole(locked.sha256, alive)
+    if found is not None:
+        return found
+    store.remove(locked.sha256)  # so that it is copied the next time
+    raise InstallFailed(
+        Problem(
+            "STORE_DAMAGED",
+            f"{locked.filename} in the store is not what was stored",
+            where=str(store.root),
+            fix="pull the payload and plug it in again",
+        )
+    )
+
+
+def _told(staged: StagedPayload, component: ComponentManifest, root: Path) -> dict[str, Any]:
+    """A component as `Prepared.parse` reads it."""
+    venv = root / component.id
+    site_packages = venvs.site_packages(venv)
+    described = staged.index[component.id]
+    return {
+        "id": component.id,
+        "distribution": component.distribution,
+        "entry_point": source.installed_entry_point(
+            component.distribution, component.id, site_packages
+        ),
+        "description": described.to_dict(),
+        "venv": str(venv),
+        "site_packages": str(site_packages),
+        "permissions": list(component.permissions),
+        "settings": plain(component.settings),
+        "devices": [plain(need) for need in component.devices],
+        "mounts": list(_mounts(component)),
+    }
+
+
+def _mounts(component: ComponentManifest) -> Iterator[dict[str, Any]]:
+    for unit in component.units:
+        yield {"unit": unit.name, "xyz": list(unit.xyz), "rpy": list(unit.rpy)}

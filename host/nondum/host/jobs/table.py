@@ -1,0 +1,59 @@
+"""What a child process can be asked to do: name → blocking function of plain data.
+
+Functions are named by module, and imported when they are wanted: a child that is started for one
+job need not wait for what others import.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from typing import Any
+
+Arguments = Mapping[str, Any]
+Report = Callable[[str, int, int], None]
+"""Phase, done, total."""
+Job = Callable[[Arguments, Report], Any]
+
+JOBS: Mapping[str, str] = {
+    "look": "nondum.host.jobs.look:look",
+    "copy": "nondum.host.jobs.look:copy",
+    "verify": "nondum.host.jobs.look:verify",
+    "hand_over": "nondum.host.jobs.parcel:hand_over",
+    "outline": "nondum.host.jobs.parcel:outline",
+    "judge": "nondum.host.jobs.parcel:judge",
+    "install": "nondum.host.jobs.install:install",
+    "compile": "nondum.host.jobs.compile:compile_wheels",
+    "prune": "nondum.host.jobs.install:prune",
+    "listing": "nondum.host.jobs.install:listing",
+    "sweep": "nondum.host.jobs.install:sweep",
+    "found": "nondum.host.lifecycle.rebuilding:found",
+    "trust_load": "nondum.host.trust.chain:load",
+    "trust_extend": "nondum.host.trust.chain:extend",
+    "trust_judge_kept": "nondum.host.trust.chain:judge_kept",
+}
+"""`module:function`."""
+
+SERVICES: Mapping[str, str] = {"bridge": "nondum.host.peers.streams.process:main"}
+"""Service → `module:function`. The function runs until the process ends; its argument is the pid of
+the fork server."""
+
+AT_ONCE = ("look", "copy", "verify", "install")
+"""What people wait for: a child that has time imports these before it is asked."""
+
+
+def find(name: str) -> Job:
+    """The function that does a job. Raises `KeyError`."""
+    job: Job = _imported(JOBS[name])
+    return job
+
+
+def find_service(name: str) -> Callable[[int], None]:
+    """The function that runs a service. Raises `KeyError`."""
+    service: Callable[[int], None] = _imported(SERVICES[name])
+    return service
+
+
+def _imported(name: str) -> Any:
+    module, _, function = name.partition(":")
+    return getattr(import_module(module), function)

@@ -1,0 +1,1 @@
+"""The component manager: commits decisions, carries their effects out, and starts safely."""

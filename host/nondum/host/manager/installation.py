@@ -1,0 +1,377 @@
+"""What is done for one payload, from copying it to deleting it: each method one effect.
+
+Each may be done again after a crash, and leaves either its result or what was there before.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import shutil
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from nondum.host.core import effects
+from nondum.host.core.events import (
+    BesideRefused,
+    ComponentsProbed,
+    Emit,
+    Event,
+    PayloadActivated,
+    PayloadCleared,
+    PayloadCopied,
+    PayloadStaged,
+    PayloadVerified,
+    ProgressMade,
+    WheelsCompiled,
+    WheelsStored,
+)
+from nondum.host.core.keyed_queues import in_thread
+from nondum.host.core.records import ComponentRecord, Moment
+from nondum.host.core.state import HostState
+from nondum.host.jobs.children import STALL_S, Children
+from nondum.host.jobs.prepared import Prepared
+from nondum.host.jobs.queue import Queue
+from nondum.host.lifecycle.rebuilding import with_found, write_note
+from nondum.host.lifecycle.retry_causes import Amounts
+from nondum.host.manager.drive_reading import LOOK_S, telling_stalls
+from nondum.host.manager.headroom import Needs
+from nondum.host.manager.memory_reservations import Promises
+from nondum.host.manager.payload_trust import PayloadTrust, TrustOptions
+from nondum.host.manager.state_folders import Folders, missing, remove, sweep
+from nondum.host.workers.leftovers import end_leftovers
+from nondum.host.workers.role import Standing
+from nondum.host.workers.spec import Limits, base_interpreter
+from nondum.host.workers.workers import Workers
+from nondum.sdk.description import PluginDescription
+from nondum.sdk.errors import NondumError, WorkerFailed, problems_of
+from nondum.wheelhouse.format.signatures import Grant
+from nondum.wheelhouse.payload.gpu import Gpu
+from nondum.wheelhouse.payload.memory import Memory, Promised, free_memory_mb
+from nondum.wheelhouse.store import disk
+
+AT_ONCE = 2
+"""Payloads that are brought in at the same time, from the first byte copied until they are active
+or refused; the others wait."""
+
+COPY_SILENCE_S = 20.0
+"""A drive that gives not a megabyte in this time hangs."""
+
+OWN = "store"
+"""Owner of the children that read nothing but what was checked before."""
+
+STOP_S = 1.5
+"""What workers have to end once their payload is withdrawn; the rest of the two promised seconds
+is for deleting."""
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class InstallOptions:
+    """How payloads are judged and installed on this host."""
+
+    allow_unsigned: bool = False
+    look_s: float = LOOK_S
+    """A drive that cannot be mounted and listed in this time hangs."""
+    method: str = "store"
+    """`store`: links to the store. `pip`: pip itself."""
+    reserve_mb: int = 64
+    """Disk that is left free."""
+    quota_mb: int = 4096
+    """Size that the store is pruned to."""
+    limits: Limits = field(default_factory=Limits)
+    """Of each worker."""
+    trust: TrustOptions = field(default_factory=TrustOptions)
+
+
+class Installation:
+    """Brings payloads to life, and removes them."""
+
+    def __init__(
+        self,
+        host: str,
+        folders: Folders,
+        workers: Workers,
+        children: Children,
+        emit: Emit,
+        options: InstallOptions,
+        trust: PayloadTrust,
+    ) -> None:
+        self._host, self._folders, self._options = host, folders, options
+        self._trust = trust
+        self._grants: dict[str, Grant] = {}
+        self._goals: dict[str, tuple[str, ...]] = {}
+        self._workers, self._children, self._emit = workers, children, emit
+        self._prepared: dict[str, tuple[Prepared, ...]] = {}
+        self._needs: dict[str, Needs] = {}
+        self._promises = Promises(workers.pids_of)
+        self._queue = Queue(AT_ONCE)
+        self._drives: dict[str, str] = {}
+        """Payload → the drive that it was copied from: the owner of the children that read it."""
+        self._store = asyncio.Lock()
+        """One process writes to the store."""
+        self._uncompiled: set[str] = set()
+        """Payloads whose workers would be started sooner if their modules were compiled."""
+
+    async def rebuild(self, state: HostState, at: Moment) -> HostState:
+        """The state, with what is installed for good and is not in it."""
+        notes, payloads = self._folders.notes, self._folders.payloads
+        arguments = self._arguments(notes=str(notes), payloads=str(payloads))
+        return with_found(state, await self._children.run("found", arguments), at)
+
+    async def missing(self, state: HostState) -> frozenset[str]:
+        """Payloads of the state whose files are gone."""
+        return await in_thread(missing, self._folders, state)
+
+    async def prepare(self, state: HostState) -> None:
+        """Clear away what a recovered state does not account for. What cannot be is left."""
+        await in_thread(end_leftovers, self._folders.scratches)
+        await in_thread(sweep, self._folders, state)
+        try:
+            await self._children.run("sweep", self._arguments())
+        except NondumError as error:
+            log.warning("the store is not swept: %s", error)
+
+    async def note(self, effect: effects.NoteInstalled) -> tuple[Event, ...]:
+        """Keep the note that tells what is installed for good."""
+        note = self._folders.note(effect.payload)
+        await in_thread(write_note, note, effect.drive, effect.folder)
+        return ()
+
+    async def copy(self, effect: effects.CopyPayload) -> tuple[Event, ...]:
+        """Copy to a staging folder that is empty at first."""
+        staging = self._folders.staging(effect.payload)
+        self._drives[effect.payload] = effect.drive
+        await self._queue.enter(effect.payload, partial(self._tell_queued, effect.payload))
+        await in_thread(remove, staging)
+        arguments = self._arguments(
+            folder=str(effect.folder),
+            digest=effect.digest,
+            staging=str(staging),
+            room=await self._promises.room(effect.payload, effect.beside),
+        )
+        with telling_stalls(effect.drive, COPY_SILENCE_S):
+            copied = await self._run("copy", effect.payload, arguments, COPY_SILENCE_S)
+        return (PayloadCopied(effect.payload, copied["copied"], copied["known"]),)
+
+    async def verify(self, effect: effects.VerifyPayload) -> tuple[Event, ...]:
+        """Check the staged copy."""
+        arguments = self._arguments(staging=str(self._folders.staging(effect.payload)))
+        said = await self._run("verify", effect.payload, arguments)
+        index = {id: PluginDescription.parse(told, where=id) for id, told in said.items()}
+        return (PayloadVerified(effect.payload, tuple(index), index),)
+
+    async def stage(self, effect: effects.StagePayload) -> tuple[Event, ...]:
+        """Move the checked copy to its lasting place."""
+        staging, lasting = (
+            self._folders.staging(effect.payload),
+            self._folders.payload(effect.payload),
+        )
+        await in_thread(_move, staging, lasting)
+        return (PayloadStaged(effect.payload),)
+
+    async def store(self, effect: effects.StoreWheels) -> tuple[Event, ...]:
+        """Fill the store and make the venvs."""
+        fresh = await self._install(effect.payload, effect.renamed, admit_beside=effect.beside)
+        return (WheelsStored(effect.payload, fresh),)
+
+    async def probe(self, effect: effects.ProbeComponents) -> tuple[Event, ...]:
+        """Start all workers, or none. Raises `WorkerFailed` with what every one did wrong."""
+        key = effect.payload
+        if key not in self._prepared:  # a restart of the daemon, or another try
+            await self._install(key, effect.renamed)
+        self._promises.make(key, self._needs[key])
+        if effect.beside and (reason := await self._promises.why_not_beside(key, effect.beside)):
+            return (BesideRefused(key, reason),)
+        await self._workers.ended(effect.after)
+        specs = [component.spec(key, self._options.limits) for component in self._prepared[key]]
+        standing = Standing.BESIDE if effect.beside else Standing.IN_FORCE
+        started = await asyncio.gather(
+            *(self._workers.start(spec, standing) for spec in specs), return_exceptions=True
+        )
+        failed = [error for error in started if isinstance(error, BaseException)]
+        if failed:
+            await self._stop(key, tuple(component.id for component in self._prepared[key]))
+            known = [error for error in failed if isinstance(error, NondumError)]
+            if len(known) < len(failed):
+                raise next(error for error in failed if not isinstance(error, NondumError))
+            raise WorkerFailed(*problems_of(known))
+        return (ComponentsProbed(key),)
+
+    async def activate(self, effect: effects.ActivatePayload) -> tuple[Event, ...]:
+        """Make the records that the catalogue takes in at once."""
+        prepared = self._prepared[effect.payload]
+        if effect.beside:
+            await asyncio.gather(
+                *(self._workers.watched(component.id, effect.payload) for component in prepared)
+            )
+        self._queue.leave(effect.payload)
+        return (
+            PayloadActivated(
+                effect.payload,
+                tuple(self._record(component, effect.payload) for component in prepared),
+                tuple(pose for component in prepared for pose in component.poses(self._host)),
+                self._grants[effect.payload],
+                self._goals[effect.payload],
+            ),
+        )
+
+    def _record(self, component: Prepared, payload: str) -> ComponentRecord:
+        """A component as the catalogue takes it in, with what has gone wrong since its start."""
+        problems = self._workers.dead_conditions(component.id, payload)
+        return replace(component.record(payload), problems=problems)
+
+    async def compile(self, effect: effects.CompileWheels) -> tuple[Event, ...]:
+        """Byte-compile in the store what it runs, and link that into its venvs.
+
+        What pip installed is left as it is.
+        """
+        if effect.payload in self._uncompiled:
+            arguments = self._arguments(**self._places(effect.payload))
+            async with self._store:
+                await self._children.run_aside("compile", arguments)
+            self._uncompiled.discard(effect.payload)
+        return (WheelsCompiled(effect.payload),)
+
+    async def rest(self, effect: effects.RestPayload) -> tuple[Event, ...]:
+        """Keep all of a payload but its processes."""
+        self._queue.leave(effect.payload)
+        await self._stop(effect.payload, effect.components)
+        self._promises.give_up(effect.payload)
+        await in_thread(end_leftovers, self._folders.scratches_of(effect.payload))
+        return ()
+
+    async def suspend(self, effect: effects.SuspendPayload) -> tuple[Event, ...]:
+        """Keep of a payload only what another try needs."""
+        await self._stop(effect.payload, effect.components)
+        await self._delete(effect, self._folders.venvs(effect.payload))
+        return ()
+
+    async def clear(self, effect: effects.ClearPayload) -> tuple[Event, ...]:
+        """Keep nothing of a payload but its wheels in the store, as far as the quota goes."""
+        await self._stop(effect.payload, effect.components)
+        await self._delete(effect, *self._folders.of(effect.payload))
+        return (PayloadCleared(effect.payload),)
+
+    async def prune(self) -> None:
+        """Bring the store down to its quota."""
+        async with self._store:
+            payloads = [str(folder) for folder in self._folders.all_payloads()]
+            arguments = self._arguments(folders=payloads, quota_mb=self._options.quota_mb)
+            await self._children.run("prune", arguments, owner=OWN)
+
+    async def listing(self) -> list[dict[str, Any]]:
+        """What the store holds: wheel, bytes, used_by (payload keys), sha256."""
+        payloads = [str(folder) for folder in self._folders.all_payloads()]
+        rows: list[dict[str, Any]] = await self._children.run(
+            "listing", self._arguments(folders=payloads), owner=OWN
+        )
+        return rows
+
+    async def room(self, beside: str) -> dict[str, Any]:
+        """What children are told of the memory that there is for a payload that is not here yet,
+        which may take over from a release of it."""
+        return await self._promises.room("", beside)
+
+    async def amounts(self) -> Amounts:
+        """What there is for a payload that is not here yet."""
+        promised = Promised.parse((await self.room(""))["promised"])
+        disk_mb, memory = await in_thread(self._looked_at)
+        gpu_mb = self._promises.gpu_mb - promised.gpu_memory_mb
+        left_mb = Memory(memory, promised=promised).left_mb()
+        return Amounts(disk_mb, left_mb, gpu_mb, time.time() - time.monotonic())
+
+    def _looked_at(self) -> tuple[int, int]:
+        free_mb = shutil.disk_usage(self._folders.root).free // 2**20
+        return free_mb - self._options.reserve_mb, free_memory_mb()
+
+    async def _install(
+        self, key: str, renamed: Mapping[str, str], *, admit_beside: str | None = None
+    ) -> int:
+        """Run the job `install`; says how many wheels the store did not have.
+
+        A payload that is to be let in, beside a release or "", is refused if its memory is
+        promised to others. It is promised some before the next one asks.
+        """
+        arguments = self._arguments(python=str(base_interpreter()), **self._places(key))
+        async with self._store:
+            room = None
+            if admit_beside is not None:
+                room = await self._promises.room(key, admit_beside)
+            told = await self._run("install", key, {**arguments, "room": room})
+            self._needs[key] = Needs.parse(told["needs"])
+            self._promises.make(key, self._needs[key])
+            self._promises.saw_gpu(Gpu(**told["gpu"]) if told["gpu"] else None)
+        if told["uncompiled"]:
+            self._uncompiled.add(key)
+        named = [(said, renamed.get(said["id"], said["id"])) for said in told["components"]]
+        self._prepared[key] = tuple(
+            Prepared.parse(said, name, self._folders.scratch(key, name)) for said, name in named
+        )
+        self._grants[key] = Grant.parse(told["grant"])
+        self._goals[key] = tuple(told["goals"])
+        return int(told["fresh"])
+
+    def _tell_queued(self, payload: str, ahead: int) -> None:
+        self._emit(ProgressMade(payload, "queued" if ahead else "copy", 0, ahead))
+
+    async def _run(
+        self, job: str, payload: str, arguments: dict[str, Any], stall_s: float = STALL_S
+    ) -> Any:
+        def on_progress(phase: str, done: int, total: int) -> None:
+            self._emit(ProgressMade(payload, phase, done, total))
+
+        owner = self._drives.get(payload, payload)
+        return await self._children.run(
+            job, arguments, owner=owner, on_progress=on_progress, stall_s=stall_s
+        )
+
+    async def _stop(self, payload: str, components: tuple[str, ...]) -> None:
+        await asyncio.gather(*(self._workers.stop(id, STOP_S, payload) for id in components))
+
+    async def _delete(
+        self, effect: effects.ClearPayload | effects.SuspendPayload, *folders: Path
+    ) -> None:
+        self._queue.leave(effect.payload)
+        await self._children.release(self._drives.pop(effect.payload, effect.payload))
+        self._prepared.pop(effect.payload, None)
+        self._needs.pop(effect.payload, None)
+        self._promises.give_up(effect.payload)
+        self._grants.pop(effect.payload, None)
+        self._goals.pop(effect.payload, None)
+        self._uncompiled.discard(effect.payload)
+        scratches = self._folders.scratches_of(effect.payload)
+        await in_thread(end_leftovers, scratches)
+        await in_thread(_remove_all, (*folders, scratches))
+
+    def _places(self, key: str) -> dict[str, str]:
+        """Where a payload's metadata and venvs are."""
+        folder, venvs = self._folders.payload(key), self._folders.venvs(key)
+        return {"folder": str(folder), "venvs": str(venvs)}
+
+    def _arguments(self, **more: Any) -> dict[str, Any]:
+        return {
+            "store": str(self._folders.store),
+            "reserve_mb": self._options.reserve_mb,
+            "confinement": str(self._workers.launcher.level),
+            "method": self._options.method,
+            **self._trust.arguments,
+            **more,
+        }
+
+
+def _move(staging: Path, lasting: Path) -> None:
+    """Rename a folder. Whoever says that its payload is stored sees to it that it is on disk."""
+    remove(lasting)
+    disk.make_folder(lasting.parent)
+    staging.rename(lasting)
+
+
+def _remove_all(folders: Iterable[Path]) -> None:
+    for folder in folders:
+        remove(folder)

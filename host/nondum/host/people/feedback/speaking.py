@@ -1,0 +1,58 @@
+"""What is said aloud of a state, by components that speak.
+
+What people are told is spoken anyway, unless it is too long for that: of refusals, then, the short
+form is said here. That a drive may be pulled is told nowhere else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Iterable
+
+from nondum.host.core.feedback_state import Concern, State
+
+
+class Aloud:
+    """Says what nobody else does; satisfies `Output`."""
+
+    def __init__(
+        self,
+        say: Callable[[str], Awaitable[None]],
+        told: Callable[[], Iterable[str]],
+        longest: int,
+    ) -> None:
+        """`told` are the last sentences that people were told; those of up to `longest` characters
+        are spoken without this."""
+        self._say, self._told, self._longest = say, told, longest
+
+    async def show(self, concern: Concern) -> None:
+        """Say it, where there is something to say."""
+        aloud = (text for text in self._told() if len(text) <= self._longest)
+        if (text := spoken(concern, aloud, self._longest)) is not None:
+            await self._say(text)
+
+    async def end(self) -> None:
+        """What was said was said."""
+
+
+def spoken(concern: Concern, aloud: Iterable[str], longest: int) -> str | None:
+    """What is to be said of a state, `aloud` being what is said already; None: nothing."""
+    is_news = concern.state is State.SAFE or (
+        concern.state in (State.REFUSED, State.HELP) and concern.code != ""
+    )
+    subject = concern.payload or concern.drive
+    if not is_news or not subject:
+        return None
+    if any(subject in text and concern.code in text for text in aloud if concern.code):
+        return None
+    return shortened(concern.sentence, longest)
+
+
+def shortened(text: str, longest: int) -> str:
+    """A sentence, cut between two words where it is too long.
+
+    >>> shortened("one two three", 8)
+    'one two…'
+    """
+    if len(text) <= longest:
+        return text
+    return f"{text[:longest].rpartition(' ')[0] or text[: longest - 1]}…"

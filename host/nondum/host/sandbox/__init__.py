@@ -1,0 +1,1 @@
+"""Confinement of workers: levels, mounts, system-call filters, cgroups and the root helper."""

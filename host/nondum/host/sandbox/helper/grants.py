@@ -1,0 +1,30 @@
+"""Devices that a component was granted, where this daemon's user may open them.
+
+Root may open every node itself. Another user has the helper make a node for each grant, so that
+being granted is what counts, and no group of the system's.
+"""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+from nondum.host.sandbox.helper.privileged import privileged
+from nondum.sdk.errors import NondumError
+
+log = logging.getLogger(__name__)
+
+
+def reachable(component: str, need: str, node: str, user: int | None = None) -> str:
+    """The node of a granted device, or one that stands for it, for the daemon's user or that of a
+    worker. Blocks: not for the loop."""
+    try:
+        return str(privileged().put_node(component, need, Path(node), user))
+    except (NondumError, OSError) as error:  # the plugin will be told when it opens it
+        log.warning("%s of %s may not be opened: %s", need, component, error)
+        return node
+
+
+def withdrawn(component: str, need: str) -> None:
+    """Remove what was made for a grant. Blocks: not for the loop."""
+    privileged().take_node(component, need)

@@ -1,0 +1,273 @@
+"""What the helper can be asked, as values and as bytes: a packet of JSON for each. Pure.
+
+No request carries a path: drives are named by kernel name and insertion number, folders of devices
+by component, cages by their own names, and lamps not at all. Everything else is refused before
+anything is done.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, TypeAlias, get_args, get_type_hints
+
+from nondum.host.core.feedback_state import State
+from nondum.host.sandbox.cgroups.limits import NAME as CAGE
+from nondum.host.sandbox.cgroups.limits import CageLimits
+from nondum.sdk.errors import NondumError, Problem
+
+MAX_BYTES = 1024
+"""Of a request."""
+ANSWER_BYTES = 64 * 1024
+
+DEVICE = re.compile(r"[a-z][a-z0-9]{1,31}")
+DRIVE = re.compile(r"[a-z][a-z0-9]{1,31}(-[0-9]{1,19})?")
+USE = re.compile("read|handover")
+COMPONENT = re.compile(r"[a-z0-9][a-z0-9-]{0,62}")
+NEED = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}(\.[A-Za-z0-9][A-Za-z0-9_-]{0,62})?")
+FILESYSTEM = re.compile(r"[a-z0-9]{0,16}")
+STATE = re.compile("|".join(state.value for state in State))
+
+
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """Mount a drive for reading; the answer is where."""
+
+    device: str
+    """Kernel name: `sdb1`."""
+    diskseq: int | None
+    """Insertion number; None: the kernel counts none."""
+    filesystem: str
+    """Empty: as the drive says."""
+    use: str
+    """`read` by this host, or `handover` to another: a drive may be mounted once for each."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unmount:
+    """Unmount a drive."""
+
+    drive: str
+    """Kernel name and insertion number: `sdb1-42`."""
+    use: str
+
+
+@dataclass(frozen=True, slots=True)
+class UnmountAll:
+    """Unmount all drives: what a daemon left that died."""
+
+
+@dataclass(frozen=True, slots=True)
+class PutNode:
+    """Make a node of a character device in a component's folder; the answer is where."""
+
+    component: str
+    need: str
+    major: int
+    minor: int
+    user: int | None
+    """Whose it is: a worker's; None: the daemon's."""
+
+
+@dataclass(frozen=True, slots=True)
+class TakeNode:
+    """Remove a node."""
+
+    component: str
+    need: str
+
+
+@dataclass(frozen=True, slots=True)
+class ClearNodes:
+    """Remove all nodes of a component; empty: of all."""
+
+    component: str
+
+
+@dataclass(frozen=True, slots=True)
+class MapUsers:
+    """Have a user namespace that a process of the daemon's has made know the users of workers."""
+
+    pid: int
+
+
+@dataclass(frozen=True, slots=True)
+class MapFolder:
+    """Have a mount, which comes as a descriptor, show the daemon's files as those of a worker."""
+
+    user: int
+    """The worker's."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShowLamps:
+    """Have the lamps that root's configuration names show a state."""
+
+    state: str
+    """`State` by its value."""
+
+
+@dataclass(frozen=True, slots=True)
+class EndLamps:
+    """Have them show what they showed before."""
+
+
+@dataclass(frozen=True, slots=True)
+class ListCages:
+    """Which kind of cgroups there is, what they limit, and which cages there are."""
+
+
+@dataclass(frozen=True, slots=True)
+class LookAtCage:
+    """What a cage uses, and the processes in it."""
+
+    cage: str
+
+
+@dataclass(frozen=True, slots=True)
+class MakeCage:
+    """Make a cage without limits."""
+
+    cage: str
+
+
+@dataclass(frozen=True, slots=True)
+class LimitCage:
+    """Set a cage's limits."""
+
+    cage: str
+    memory_mb: int
+    tasks: int
+    cpu_weight: int
+    processors: float
+
+    @property
+    def limits(self) -> CageLimits:
+        """The limits. Raises `ValueError`."""
+        return CageLimits(self.memory_mb, self.tasks, self.cpu_weight, self.processors)
+
+
+@dataclass(frozen=True, slots=True)
+class FillCage:
+    """Put a process of the caller's own user into a cage."""
+
+    cage: str
+    pid: int
+
+
+@dataclass(frozen=True, slots=True)
+class KillCage:
+    """SIGKILL all that is in a cage."""
+
+    cage: str
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveCage:
+    """Remove an empty cage; the answer is whether it is gone."""
+
+    cage: str
+
+
+@dataclass(frozen=True, slots=True)
+class ListenToStopKey:
+    """Tell each press of the key that root's configuration names, until the caller hangs up.
+
+    The answer is whether it is `down` already; then a packet with how often it was `pressed` comes
+    each time.
+    """
+
+
+Request: TypeAlias = (
+    Mount
+    | Unmount
+    | UnmountAll
+    | PutNode
+    | TakeNode
+    | ClearNodes
+    | MapUsers
+    | MapFolder
+    | ShowLamps
+    | EndLamps
+    | ListCages
+    | LookAtCage
+    | MakeCage
+    | LimitCage
+    | FillCage
+    | KillCage
+    | RemoveCage
+    | ListenToStopKey
+)
+
+_VERBS: Mapping[str, type[Any]] = {kind.__name__: kind for kind in get_args(Request)}
+_FORMS = {
+    "device": DEVICE,
+    "drive": DRIVE,
+    "use": USE,
+    "component": COMPONENT,
+    "need": NEED,
+    "filesystem": FILESYSTEM,
+    "cage": CAGE,
+    "state": STATE,
+}
+_MOST = 2**63 - 1
+_MOST_OF: Mapping[str, int] = {"pid": 2**31 - 1}
+"""Above it the kernel's calls do not take them."""
+
+
+def encode(request: Request) -> bytes:
+    """A request as it travels.
+
+    >>> encode(Unmount("sdb1-7", "read"))
+    b'{"verb":"Unmount","drive":"sdb1-7","use":"read"}'
+    """
+    body = {"verb": type(request).__name__, **asdict(request)}
+    return json.dumps(body, separators=(",", ":")).encode()
+
+
+def parse(data: bytes) -> Request:
+    """The request in a packet. Raises `NondumError` (HELPER_REFUSED)."""
+    if len(data) > MAX_BYTES:
+        raise refused(f"a request is longer than {MAX_BYTES} bytes")
+    try:
+        body = json.loads(data)
+    except (ValueError, RecursionError):
+        raise refused("a request is not JSON") from None
+    if not isinstance(body, dict) or not isinstance(body.get("verb"), str):
+        raise refused("a request has no verb")
+    kind = _VERBS.get(body.pop("verb"))
+    if kind is None:
+        raise refused("there is no such verb")
+    hints = get_type_hints(kind)
+    if body.keys() != hints.keys():
+        raise refused(f"{kind.__name__} takes {', '.join(hints) or 'nothing'}")
+    request: Request = kind(**{name: _typed(name, hints[name], body[name]) for name in hints})
+    if isinstance(request, LimitCage):
+        try:
+            _ = request.limits
+        except ValueError as error:
+            raise refused(str(error)) from None
+    return request
+
+
+def refused(message: str, where: str = "") -> NondumError:
+    """What the helper answers when it will not."""
+    fix = "this is for nondum's own daemon: report it, if that was the one who asked"
+    return NondumError(Problem("HELPER_REFUSED", message, where=where, fix=fix))
+
+
+def _typed(name: str, hint: Any, value: Any) -> Any:
+    if hint is str:
+        form = _FORMS[name]
+        is_none = name == "component" and value == ""
+        if not isinstance(value, str) or not (is_none or form.fullmatch(value)):
+            raise refused(f"that is no {name}")
+        return value
+    if value is None and hint == (int | None):
+        return None
+    kinds = (int, float) if hint is float else (int,)
+    if type(value) not in kinds or not 0 <= value <= _MOST_OF.get(name, _MOST):
+        raise refused(f"{name} is no number")
+    return float(value) if hint is float else value

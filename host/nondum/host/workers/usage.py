@@ -1,0 +1,62 @@
+"""What a worker uses now, as its cage and proc(5) tell."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from nondum.host.sandbox.cgroups import Cage, Usage
+from nondum.host.sandbox.inside import open_files
+
+TICKS_HZ = os.sysconf("SC_CLK_TCK")
+
+
+class Gauge:
+    """One worker's: of all its processes, where a cage holds them."""
+
+    def __init__(self, first: Callable[[], int], cage: Cage | None) -> None:
+        """`first` tells its first process, as far as that is known by then."""
+        self._first, self._cage = first, cage
+
+    def pids(self) -> tuple[int, ...]:
+        """Its processes, as far as they are known."""
+        held = self._cage.pids() if self._cage is not None else ()
+        return held or (self._first(),)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether these are all of them."""
+        return self._cage is not None and bool(self._cage.pids())
+
+    def usage(self) -> Usage:
+        """What it uses; without a cage, the processor time of its first process only."""
+        if self._cage is not None and self._cage.pids():
+            return self._cage.usage()
+        return Usage(cpu_s=_cpu_s(self._first()))
+
+    def wanted_s(self) -> dict[int, float]:
+        """Thread → seconds that it has run or waited for a processor (sched-stats.rst)."""
+        return {task: wanted_s for pid in self.pids() for task, wanted_s in _wanted_s(pid)}
+
+    def descriptors(self) -> int:
+        """Open files of that process of its which has most, as far as they may be counted."""
+        return open_files.most(self.pids())
+
+
+def _wanted_s(pid: int) -> Iterator[tuple[int, float]]:
+    with contextlib.suppress(OSError):  # it has ended
+        for task in Path(f"/proc/{pid}/task").iterdir():
+            with contextlib.suppress(OSError, ValueError):
+                run_ns, wait_ns, _ = (task / "schedstat").read_text(encoding="ascii").split()
+                yield int(task.name), (int(run_ns) + int(wait_ns)) / 1e9
+
+
+def _cpu_s(pid: int) -> float:
+    try:
+        line = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return 0.0
+    fields = line.rpartition(")")[2].split()  # the name may hold anything
+    return (int(fields[11]) + int(fields[12])) / TICKS_HZ

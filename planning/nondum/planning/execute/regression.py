@@ -1,0 +1,100 @@
+"""How much of a plan is left, seen from its end: the least rest that the world supports.
+
+The rest of a plan is a set of its steps that is closed under "comes after". It is supported when
+every fact that it needs from outside holds now. Of all supported rests the least one is taken: what
+is achieved is skipped, what was undone is done again, and an empty rest means that the goal holds.
+Triangle tables (Fikes, Hart and Nilsson 1972), for partial orders (Muise, McIlraith and Beck 2011).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence, Set
+from dataclasses import dataclass
+
+from nondum.planning.execute.partial_order import (
+    GOAL,
+    CausalLink,
+    PartialOrder,
+    bits,
+    causal_links,
+    partial_order,
+)
+from nondum.planning.execute.step import Step
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """The steps that are still to do; they reach the goal from here."""
+
+    steps: int
+    """Bit mask over the plan's steps; 0: the goal holds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stuck:
+    """No rest of the plan is supported: these facts are needed and no step of it gives them."""
+
+    missing: tuple[CausalLink, ...]
+    steps: int
+    """The steps that would be left if somebody gave them."""
+
+    @property
+    def facts(self) -> frozenset[str]:
+        """The missing facts."""
+        return frozenset(link.fact for link in self.missing)
+
+
+class Regression:
+    """A plan and its goal, asked again and again as the world changes."""
+
+    def __init__(self, steps: Sequence[Step], goal: frozenset[str]) -> None:
+        self.steps = tuple(steps)
+        self.goal = goal
+        self.links: tuple[CausalLink, ...] = causal_links(self.steps, goal)
+        self.order: PartialOrder = partial_order(self.steps, self.links)
+        self._needs_of: dict[int, list[CausalLink]] = {i: [] for i in range(len(self.steps))}
+        self._needs_of[GOAL] = []
+        self._uses_of: dict[int, list[CausalLink]] = {i: [] for i in range(len(self.steps))}
+        for link in self.links:
+            self._needs_of[link.consumer].append(link)
+            if link.provider is not None:
+                self._uses_of[link.provider].append(link)
+
+    def rest(self, facts: Set[str]) -> Rest | Stuck:
+        """The least rest of the plan that `facts` support."""
+        todo = 0
+        missing: list[CausalLink] = []
+        pending = list(self._needs_of[GOAL])
+        while pending:
+            link = pending.pop()
+            if link.fact in facts:
+                continue
+            if link.provider is None:
+                missing.append(link)
+            elif not todo >> link.provider & 1:
+                fresh = (1 << link.provider | self.order.after[link.provider]) & ~todo
+                todo |= fresh
+                for index in bits(fresh):
+                    pending += self._needs_of[index]
+        if missing:
+            missing.sort(key=lambda link: (link.consumer, link.fact))
+            return Stuck(tuple(missing), todo)
+        return Rest(todo)
+
+    def needs(self, todo: int) -> frozenset[str]:
+        """What a rest needs from outside itself."""
+        consumers = (GOAL, *bits(todo))
+        return frozenset(
+            link.fact
+            for consumer in consumers
+            for link in self._needs_of[consumer]
+            if link.provider is None or not todo >> link.provider & 1
+        )
+
+    def needs_of(self, step: int) -> tuple[CausalLink, ...]:
+        """Where each precondition of a step (of the goal for `GOAL`) comes from."""
+        return tuple(self._needs_of[step])
+
+    def uses_of(self, step: int) -> tuple[CausalLink, ...]:
+        """What a step gives that a later one, or the goal, needs."""
+        return tuple(self._uses_of[step])

@@ -1,0 +1,1 @@
+"""From a merged domain, facts and a goal to a ground task."""

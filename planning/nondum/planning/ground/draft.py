@@ -1,0 +1,210 @@
+"""A task whose conditions may still be negative: what an explored domain becomes first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from nondum.planning.ground.bounds import INSTANCES_LIMIT, work_for
+from nondum.planning.ground.expansion import Expander, Standing
+from nondum.planning.ground.instances import Change, Exploration, Instance
+from nondum.planning.ground.reachable_facts import reachable
+from nondum.planning.ground.work_limit import Spending
+from nondum.planning.merge.derivation import strata_of
+from nondum.planning.merge.domain import Merged, bind
+from nondum.planning.merge.goal import GoalExpr
+from nondum.planning.pddl.facts import parts
+from nondum.planning.pddl.literals import Literals
+from nondum.planning.pddl.syntax import Atom, Equal
+
+GOAL = "goal"
+"""What stands for a goal that is a disjunction."""
+
+
+@dataclass(frozen=True, slots=True)
+class DraftChange:
+    """What changes where a condition holds."""
+
+    condition: Literals
+    add: frozenset[int]
+    delete: frozenset[int]
+
+
+@dataclass(frozen=True, slots=True)
+class DraftAction:
+    """A ground action; a disjunctive precondition makes several of one name."""
+
+    name: str
+    condition: Literals
+    add: frozenset[int]
+    delete: frozenset[int]
+    changes: tuple[DraftChange, ...]
+    cost: int
+
+
+@dataclass(frozen=True, slots=True)
+class DraftRule:
+    """A derived fact and one way in which it holds."""
+
+    head: int
+    body: Literals
+    layer: int
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """A task in numbers of facts."""
+
+    actions: tuple[DraftAction, ...]
+    rules: tuple[DraftRule, ...]
+    layers: int
+    """How many layers of rules there are."""
+    goal: Literals
+    believed: frozenset[int]
+
+
+def drafted(
+    merged: Merged, found: Exploration, goal: GoalExpr, *, limit: int = INSTANCES_LIMIT
+) -> Draft:
+    """Write out the quantifiers and disjunctions of everything that can be reached.
+
+    Raises `TooManyBindings` where they speak of too much for a domain with `limit` bound actions.
+    """
+    return _Drafting(merged, found, limit).draft(goal)
+
+
+class _Drafting:
+    def __init__(self, merged: Merged, found: Exploration, limit: int) -> None:
+        self._merged = merged
+        self._found = found
+        self._spending = Spending(work_for(limit))
+        self._expander = Expander(found, merged.is_closed, self._spending.work)
+        self._groups = strata_of(merged.domain.derived).groups
+
+    def draft(self, goal: GoalExpr) -> Draft:
+        rules = list(self._rules())
+        rules += self._stood_for(len(self._groups))
+        actions = [draft for instance in self._found.instances for draft in self._actions(instance)]
+        wanted = self._goal(goal)
+        rules += self._stood_for(len(self._groups))
+        draft = Draft(
+            tuple(actions), tuple(rules), len(self._groups) + 1, wanted, self._found.believed
+        )
+        return reachable(draft) if self._was_expanded(goal) else draft
+
+    def _was_expanded(self, goal: GoalExpr) -> bool:
+        """Whether exploring could not see all conditions."""
+        domain = self._merged.domain
+        conditions = [goal, *(rule.condition for rule in domain.derived)]
+        for action in domain.actions.values():
+            conditions += (action.precondition, *(c.condition for c in action.effect.conditional))
+        return any(condition.further for condition in conditions)
+
+    def _rules(self) -> Iterator[DraftRule]:
+        layer = {name: index for index, group in enumerate(self._groups) for name in group}
+        for derivation in sorted(
+            self._found.derivations, key=lambda d: (d.head, *d.names.values())
+        ):
+            rule = derivation.rule
+            literals = Literals(derivation.positive, derivation.negative)
+            further, names = rule.condition.further, derivation.names
+            with self._spending.by(rule.head.predicate, rule.origins):
+                bodies = self._expander.alternatives(literals, further, names)
+            number = layer[rule.head.predicate]
+            yield from (DraftRule(derivation.head, body, number) for body in bodies)
+            yield from self._stood_for(number)
+
+    def _stood_for(self, layer: int) -> Iterator[DraftRule]:
+        """The rules of the facts that were made since last time."""
+        made: list[Standing] = list(self._expander.standing)
+        self._expander.standing.clear()
+        for standing in made:
+            yield from (DraftRule(standing.fact, body, layer) for body in standing.bodies)
+
+    def _actions(self, instance: Instance) -> Iterator[DraftAction]:
+        cost = self._cost(instance)
+        if cost is None:
+            return
+        action = instance.action
+        with self._spending.by(action.name, action.origins):
+            always, changes = _sorted_out(self._changes(instance.changes))
+            literals = Literals(instance.positive, instance.negative)
+            further = action.precondition.further
+            conditions = self._expander.alternatives(literals, further, instance.names)
+        add = instance.add.union(*(change.add for change in always))
+        delete = instance.delete.union(*(change.delete for change in always)) - add
+        for condition in conditions:
+            yield DraftAction(
+                instance.name, condition, add, delete, tuple(_net(changes, add, delete)), cost
+            )
+
+    def _changes(self, changes: Iterable[Change]) -> Iterator[DraftChange]:
+        for change in changes:
+            literals = Literals(change.positive, change.negative)
+            further = change.condition.further
+            for condition in self._expander.alternatives(literals, further, change.names):
+                yield DraftChange(condition, change.add, change.delete)
+
+    def _cost(self, instance: Instance) -> int | None:
+        """None where a function that it adds has no value: then it cannot be taken (PDDL 2.1)."""
+        cost = instance.action.effect.cost
+        for function in instance.action.effect.cost_functions:
+            value = self._merged.values.get(bind(function, instance.names))
+            if value is None:
+                return None
+            cost += value
+        return cost
+
+    def _goal(self, goal: GoalExpr) -> Literals:
+        """Equal objects that differ, or different ones that do not, ask for what nothing gives."""
+        wrong = [pair for pair in goal.equal if pair.left != pair.right]
+        wrong += [pair for pair in goal.unequal if pair.left == pair.right]
+        literals = Literals(
+            frozenset(map(self._number, goal.positive)) | frozenset(map(self._pair, wrong)),
+            frozenset(map(self._number, goal.negative)),
+        )
+        if not goal.further:
+            return literals
+        with self._spending.by("the goal"):
+            ways = self._expander.alternatives(Literals(), goal.further, {})
+        return literals | self._expander.standing_for(ways, GOAL)
+
+    def _number(self, atom: Atom) -> int:
+        return self._found.table.number(atom.predicate, tuple(term.name for term in atom.terms))
+
+    def _pair(self, pair: Equal) -> int:
+        return self._found.table.number("=", (pair.left.name, pair.right.name))
+
+
+def stands_for_goal(text: str) -> bool:
+    """Whether a fact of a ground task is the one that was made for a disjunctive goal.
+
+    >>> stands_for_goal("goal 0"), stands_for_goal("goal north"), stands_for_goal("goal")
+    (True, False, False)
+    """
+    predicate, arguments = parts(text)
+    return predicate == GOAL and "".join(arguments).isdecimal()
+
+
+def _sorted_out(
+    changes: Iterable[DraftChange],
+) -> tuple[Sequence[DraftChange], Sequence[DraftChange]]:
+    """Those that happen always, and those that happen where a condition holds."""
+    found = list(dict.fromkeys(changes))
+    always = [change for change in found if change.condition == Literals()]
+    return always, [change for change in found if change.condition != Literals()]
+
+
+def _net(
+    changes: Iterable[DraftChange], add: frozenset[int], delete: frozenset[int]
+) -> Iterator[DraftChange]:
+    """What the conditional changes do beside the unconditional ones."""
+    merged: dict[Literals, tuple[frozenset[int], frozenset[int]]] = {}
+    for change in changes:
+        added, deleted = merged.get(change.condition, (frozenset(), frozenset()))
+        merged[change.condition] = added | change.add, deleted | change.delete
+    for condition, (added, deleted) in merged.items():
+        mine = added - add
+        others = deleted - added - add - delete
+        if mine or others:
+            yield DraftChange(condition, mine, others)

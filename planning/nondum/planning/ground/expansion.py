@@ -1,0 +1,271 @@
+"""Conditions over the objects there are now: quantifiers written out, disjunctions split.
+
+What unchanging facts decide is decided first, so that little is left to split.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from nondum.planning.ground.instances import Exploration
+from nondum.planning.ground.join import Domains, Join, Rule, Values, Work
+from nondum.planning.ground.matching import Pattern
+from nondum.planning.ground.members import domains_of
+from nondum.planning.ground.relations import Relations, Row
+from nondum.planning.ground.static import Names, value_of
+from nondum.planning.pddl.literals import Literals
+from nondum.planning.pddl.normal import condition_of, normal
+from nondum.planning.pddl.syntax import (
+    And,
+    Atom,
+    Equal,
+    Formula,
+    Not,
+    Or,
+    Quantified,
+    TypedName,
+    renamed,
+)
+
+DISJUNCTS_LIMIT = 12
+"""A condition with more is given a derived fact that stands for it."""
+_WORK_OF_BINDING = 10
+"""What writing out one binding of a quantifier counts as."""
+
+
+@dataclass(frozen=True, slots=True)
+class Both:
+    """All parts hold; none: it is true."""
+
+    parts: tuple[Tree, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Either:
+    """Some part holds; none: it is false."""
+
+    parts: tuple[Tree, ...]
+
+
+Tree: TypeAlias = Literals | Both | Either
+
+TRUE, FALSE = Literals(), Either(())
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """A derived fact that stands for a disjunction: it holds where one of `bodies` does."""
+
+    fact: int
+    bodies: tuple[Literals, ...]
+
+
+@dataclass(slots=True)
+class Expander:
+    """Expands conditions over one explored domain."""
+
+    found: Exploration
+    is_closed: bool
+    """What is true and cannot change need not be guarded."""
+    work: Work
+    """What writing out quantifiers may take."""
+    standing: list[Standing] = field(default_factory=list)
+    """The derived facts that had to be made so far."""
+    _relations: Relations = field(default_factory=Relations)
+    _joins: dict[tuple[Quantified, Row], tuple[Join, Quantified, Domains]] = field(
+        default_factory=dict
+    )
+    _lasting: frozenset[int] = frozenset()
+
+    def __post_init__(self) -> None:
+        for number in sorted(self.found.reached):
+            self._relations.add(*self.found.table.facts[number])
+        deleted: set[int] = set()
+        for instance in self.found.instances:
+            deleted |= instance.delete
+            for change in instance.changes:
+                deleted |= change.delete
+        self._lasting = self.found.believed - deleted
+
+    def alternatives(
+        self, literals: Literals, further: Sequence[Formula], names: Names
+    ) -> tuple[Literals, ...]:
+        """The ways in which all this can hold; none: it never does. Raises `TooMuchWork`."""
+        plain = self._plain(literals)
+        if plain is None:
+            return ()
+        if not further:
+            return (plain,)
+        tree = _both((plain, *(self._tree(part, names) for part in further)))
+        split = _split(tree)
+        if split is None:
+            place = further[0].place
+            split = _split(self._small(tree, f"or@{place.line}:{place.column}")) or ()
+        return split
+
+    def _plain(self, literals: Literals) -> Literals | None:
+        """The literals that something may make false; None if one never holds."""
+        if not literals.positive <= self.found.reached or literals.negative & self._lasting:
+            return None
+        if not self.is_closed:
+            return literals
+        return Literals(literals.positive - self._lasting, literals.negative & self.found.reached)
+
+    def _tree(self, formula: Formula, names: Names) -> Tree:
+        match formula:
+            case Atom():
+                return self._plain(Literals(positive=self._number(formula, names))) or FALSE
+            case Not(part=Atom() as atom):
+                return self._plain(Literals(negative=self._number(atom, names))) or FALSE
+            case Equal():
+                alike = value_of(formula.left, names) == value_of(formula.right, names)
+                return TRUE if alike else FALSE
+            case Not(part=Equal() as pair):
+                alike = value_of(pair.left, names) == value_of(pair.right, names)
+                return FALSE if alike else TRUE
+            case And():
+                return _both(self._tree(part, names) for part in formula.parts)
+            case Or():
+                return _either(self._tree(part, names) for part in formula.parts)
+            case Quantified(quantifier="forall"):
+                return _both(self._tree(part, n) for part, n in self._bindings(formula, names))
+            case Quantified():
+                return _either(self._tree(part, n) for part, n in self._bindings(formula, names))
+        raise AssertionError(f"not in normal form: {formula}")
+
+    def _number(self, atom: Atom, names: Names) -> frozenset[int]:
+        row = tuple(value_of(term, names) for term in atom.terms)
+        return frozenset((self.found.table.number(atom.predicate, row),))
+
+    def _bindings(self, formula: Quantified, names: Names) -> Iterator[tuple[Formula, Names]]:
+        """The bindings that matter: those that can make `exists` true, or `forall` false."""
+        key = (formula, tuple(names))
+        if key not in self._joins:
+            self._joins[key] = self._join(formula, tuple(names))
+        join, apart, domains = self._joins[key]
+        found: list[Row] = []
+        size = len(names) + len(apart.variables)
+
+        def fire(values: Values) -> None:
+            self.work.spend(_WORK_OF_BINDING)
+            found.append(tuple(values[:size]))
+
+        join.run(self._relations, domains, fire, known=tuple(names.values()), work=self.work)
+        variables = (*names, *(variable.name for variable in apart.variables))
+        for row in sorted(set(found)):
+            yield apart.part, dict(zip(variables, row, strict=True))
+
+    def _join(self, formula: Quantified, names: Row) -> tuple[Join, Quantified, Domains]:
+        fresh = {v.name: f"{v.name}~{len(names)}" for v in formula.variables if v.name in names}
+        variables = tuple(
+            TypedName(fresh.get(v.name, v.name), v.types, v.place) for v in formula.variables
+        )
+        part = renamed(formula.part, fresh)
+        deciding = normal(part, negated=formula.quantifier == "forall")
+        condition = condition_of(deciding)
+        own = {variable.name for variable in variables}
+        # In an open world, what nothing here makes true may still come true, and must be guarded.
+        is_selective = self.is_closed or formula.quantifier == "exists"
+        domains = domains_of(variables, self.found.members)
+        known = dict.fromkeys(names, frozenset[str]())
+        rule = Rule(
+            variables=(*names, *(variable.name for variable in variables)),
+            breadths={name: len(domain) for name, domain in {**known, **domains}.items()},
+            patterns=tuple(
+                Pattern.of(atom)
+                for atom in condition.positive
+                if own & {term.name for term in atom.terms}
+            )
+            if is_selective
+            else (),
+        )
+        apart = Quantified(formula.quantifier, variables, part, formula.place)
+        of_all = (*known.values(), *(domains[variable.name] for variable in variables))
+        return Join(rule, known=names), apart, of_all
+
+    def _small(self, tree: Tree, name: str) -> Tree:
+        """The tree with every disjunction replaced by a fact that stands for it."""
+        match tree:
+            case Both():
+                return _both(self._small(part, name) for part in tree.parts)
+            case Either(parts) if parts:
+                bodies: list[Literals] = []
+                for part in parts:
+                    bodies += _split(self._small(part, name)) or ()
+                fact = self.found.table.number(name, (str(len(self.standing)),))
+                self.standing.append(Standing(fact, tuple(dict.fromkeys(bodies))))
+                return Literals(positive=frozenset((fact,)))
+        return tree
+
+    def standing_for(self, alternatives: Sequence[Literals], name: str) -> Literals:
+        """One conjunction that holds where one of several does."""
+        if len(alternatives) == 1:
+            return alternatives[0]
+        fact = self.found.table.number(name, (str(len(self.standing)),))
+        self.standing.append(Standing(fact, tuple(alternatives)))
+        return Literals(positive=frozenset((fact,)))
+
+
+def _both(parts: Iterable[Tree]) -> Tree:
+    plain = Literals()
+    others: list[Tree] = []
+    for part in parts:
+        match part:
+            case Literals():
+                plain |= part
+            case Both():
+                for inner in part.parts:
+                    if isinstance(inner, Literals):
+                        plain |= inner
+                    else:
+                        others.append(inner)
+            case Either(()):
+                return FALSE
+            case Either():
+                others.append(part)
+    if not plain.is_possible:
+        return FALSE
+    return Both((plain, *others)) if others else plain
+
+
+def _either(parts: Iterable[Tree]) -> Tree:
+    found: list[Tree] = []
+    for part in parts:
+        if part == TRUE:
+            return TRUE
+        found += part.parts if isinstance(part, Either) else (part,)
+    distinct = tuple(dict.fromkeys(found))
+    return distinct[0] if len(distinct) == 1 else Either(distinct)
+
+
+def _split(tree: Tree) -> tuple[Literals, ...] | None:
+    """The tree as a disjunction of conjunctions; None if there are too many of them."""
+    match tree:
+        case Literals():
+            return (tree,)
+        case Either(parts):
+            found: list[Literals] = []
+            for part in parts:
+                split = _split(part)
+                if split is None or len(found) + len(split) > DISJUNCTS_LIMIT:
+                    return None
+                found += split
+            return _least(found)
+        case Both(parts):
+            products = [Literals()]
+            for part in parts:
+                split = _split(part)
+                if split is None or len(products) * len(split) > DISJUNCTS_LIMIT:
+                    return None
+                products = [one | other for one in products for other in split]
+            return _least(one for one in products if one.is_possible)
+
+
+def _least(conjunctions: Iterable[Literals]) -> tuple[Literals, ...]:
+    """Without those that another one follows from."""
+    distinct = list(dict.fromkeys(conjunctions))
+    return tuple(
+        one for one in distinct if not any(other != one and other <= one for other in distinct)
+    )

@@ -1,0 +1,46 @@
+"""From schemas and facts to a ground task: only actions that can be reached and can help.
+
+In an open world static facts stay in preconditions: what the planner may take for granted, the
+running task must still guard.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from nondum.planning.ground.bounds import INSTANCES_LIMIT
+from nondum.planning.ground.displacement import displaced
+from nondum.planning.ground.draft import drafted
+from nondum.planning.ground.exploration import explore
+from nondum.planning.ground.negation import positive_task
+from nondum.planning.ground.relevance import helpful
+from nondum.planning.ground.schema_relevance import concern
+from nondum.planning.merge.domain import Merged, functional_predicates
+from nondum.planning.merge.goal import GoalExpr
+from nondum.planning.pddl.facts import predicate_of
+from nondum.sdk.planner import GroundTask
+
+
+def ground(
+    merged: Merged,
+    facts: Iterable[str],
+    goal: GoalExpr,
+    objects: Mapping[str, tuple[str, ...]] | None = None,
+    *,
+    limit: int = INSTANCES_LIMIT,
+) -> GroundTask:
+    """Make the task of reaching `goal` from where exactly `facts` are true.
+
+    `facts` are all that is believed, those of `merged.init` included where they still hold; facts
+    about objects that are not there are left out. `objects` (name → types) exist beside the merged
+    ones. A fact that must be false somewhere has its twin in the task (`facts.twin`). The same
+    input gives the same task, whatever the order of `facts`. Raises `FragmentRefused` as `explore`
+    does, for more than `limit` bound actions.
+    """
+    part = concern(merged, goal)
+    read = part.read
+    known = (text for text in facts if predicate_of(text) in read)
+    found = explore(part.merged, known, objects, limit=limit, wishes=part.wishes)
+    found = displaced(found, functional_predicates(merged.domain))
+    draft = drafted(part.merged, found, goal, limit=limit)
+    return positive_task(helpful(draft), found.table)

@@ -1,0 +1,90 @@
+"""What can help: everything that gives something asked for, backwards from the goal."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TypeAlias
+
+from nondum.planning.ground.draft import Draft, DraftAction, DraftRule
+from nondum.planning.pddl.literals import Literals
+
+Wish: TypeAlias = tuple[int, bool]
+"""A fact, and whether it is to be true."""
+
+
+def helpful(draft: Draft) -> Draft:
+    """The task without actions and rules that give nothing which anything else asks for.
+
+    An effect that may undo something asked for makes it a wish that its condition does not hold.
+    """
+    givers: defaultdict[Wish, list[int]] = defaultdict(list)
+    for index, action in enumerate(draft.actions):
+        for wish in _given(action):
+            givers[wish].append(index)
+    rules: defaultdict[int, list[DraftRule]] = defaultdict(list)
+    for rule in draft.rules:
+        rules[rule.head].append(rule)
+    waiting = list(_wishes(draft.goal))
+    asked = set(waiting)
+    kept: set[int] = set()
+
+    def ask(wishes: Iterator[Wish]) -> None:
+        for wish in wishes:
+            if wish not in asked:
+                asked.add(wish)
+                waiting.append(wish)
+
+    while waiting:
+        fact, is_true = wish = waiting.pop()
+        for rule in rules.get(fact, ()):
+            ask(_wishes(rule.body if is_true else _opposite(rule.body)))
+        for index in givers.get(wish, ()):
+            action = draft.actions[index]
+            if index not in kept:
+                kept.add(index)
+                ask(_wishes(action.condition))
+            ask(_asked_by_changes(action, wish))
+        for index in givers.get((fact, not is_true), ()):
+            ask(_asked_against(draft.actions[index], (fact, not is_true)))
+    asked_facts = {fact for fact, _ in asked}
+    actions = (draft.actions[index] for index in sorted(kept))
+    return replace(
+        draft,
+        actions=tuple(actions),
+        rules=tuple(rule for rule in draft.rules if rule.head in asked_facts),
+    )
+
+
+def _wishes(literals: Literals) -> Iterator[Wish]:
+    yield from ((fact, True) for fact in literals.positive)
+    yield from ((fact, False) for fact in literals.negative)
+
+
+def _opposite(literals: Literals) -> Literals:
+    return Literals(literals.negative, literals.positive)
+
+
+def _given(action: DraftAction) -> set[Wish]:
+    wishes = {(fact, True) for fact in action.add} | {(fact, False) for fact in action.delete}
+    for change in action.changes:
+        wishes |= {(fact, True) for fact in change.add}
+        wishes |= {(fact, False) for fact in change.delete}
+    return wishes
+
+
+def _asked_by_changes(action: DraftAction, wish: Wish) -> Iterator[Wish]:
+    """What the changes that give a wish ask for."""
+    fact, is_true = wish
+    for change in action.changes:
+        if fact in (change.add if is_true else change.delete):
+            yield from _wishes(change.condition)
+
+
+def _asked_against(action: DraftAction, harm: Wish) -> Iterator[Wish]:
+    """What keeps the changes that would undo something from happening."""
+    fact, is_true = harm
+    for change in action.changes:
+        if fact in (change.add if is_true else change.delete):
+            yield from _wishes(_opposite(change.condition))

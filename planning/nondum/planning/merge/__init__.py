@@ -1,0 +1,1 @@
+"""Fragments and objects of components merged into one domain and problem."""

@@ -1,0 +1,1 @@
+"""PDDL text: its syntax, its parser, conditions and types."""

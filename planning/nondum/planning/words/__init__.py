@@ -1,0 +1,1 @@
+"""Phrases: goals in words, and the words that the host itself understands."""

@@ -1,0 +1,1 @@
+"""Tools for PDDL files that are no fragments."""

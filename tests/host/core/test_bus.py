@@ -1,0 +1,46 @@
+"""Events reach everybody who listens, in order."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+
+from nondum.host.core.bus import Bus
+from nondum.host.core.events import DriveRemoved, Event, PlanMissing
+from nondum.host.lifecycle.advance import RULES
+
+pytestmark = pytest.mark.anyio
+
+
+def faulty(event: Event) -> None:
+    raise RuntimeError("no")
+
+
+async def test_faulty_listener_is_nobody_elses_trouble(caplog: pytest.LogCaptureFixture) -> None:
+    bus, heard = Bus(RULES), list[Event]()
+    bus.subscribe(faulty)
+    bus.subscribe(heard.append)
+    with caplog.at_level(logging.ERROR):
+        bus.emit(PlanMissing("1", ()))
+    assert heard == [PlanMissing("1", ())]
+    assert [record.message for record in caplog.records] == [
+        f"a listener is at fault over {heard[0].name}"
+    ]
+
+
+async def test_what_changes_the_catalogue_waits_for_its_commit() -> None:
+    bus, heard = Bus(RULES), list[Event]()
+    bus.subscribe(heard.append)
+    bus.emit(DriveRemoved("a"))
+    bus.emit(PlanMissing("1", ()))
+    assert heard == [PlanMissing("1", ())]
+    assert [event for event, _ in await bus.batch()] == [DriveRemoved("a"), PlanMissing("1", ())]
+
+
+async def test_who_has_left_hears_no_more() -> None:
+    bus, heard = Bus(RULES), list[Event]()
+    leave = bus.subscribe(heard.append)
+    leave()
+    bus.emit(PlanMissing("1", ()))
+    assert heard == []

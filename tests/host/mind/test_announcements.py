@@ -1,0 +1,62 @@
+"""What people are told is kept, in order, and within bounds whoever it is told of."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from tests.host.lifecycle.states import component
+
+from nondum.host.core.records import Snapshot
+from nondum.host.mind.announcements import (
+    MAX_CHARACTERS,
+    MAX_SENTENCES,
+    People,
+    kept_out,
+    recomposed,
+)
+from nondum.host.mind.composition import compose
+from nondum.sdk.errors import Problem
+
+
+def test_sentences_are_numbered_and_the_last_ones_kept() -> None:
+    people = People(lambda: 5.0)
+    for number in range(MAX_SENTENCES + 3):
+        people.tell(f"sentence {number + 1}")
+    kept = list(people)
+    assert len(kept) == MAX_SENTENCES
+    assert [told.text for told in people.since(people.last_number - 2)] == [
+        f"sentence {MAX_SENTENCES + 2}",
+        f"sentence {MAX_SENTENCES + 3}",
+    ]
+
+
+def test_sentence_without_end_is_cut() -> None:
+    people = People(lambda: 5.0)
+    people.tell("x" * MAX_CHARACTERS)
+    people.tell("y" * 10**6)
+    whole, cut = people
+    assert whole.text == "x" * MAX_CHARACTERS
+    assert cut.text == "y" * MAX_CHARACTERS + "…"
+
+
+def test_component_that_waits_for_its_device_is_not_said_to_be_able_to_do_anything() -> None:
+    waiting = component("eye", need="0403")
+    served = replace(waiting, devices=(replace(waiting.devices[0], device="usb:1-4"),))
+    before, after = (
+        compose(Snapshot("spot", revision, components=(one,)))
+        for revision, one in enumerate((waiting, served))
+    )
+    assert recomposed(None, before) == ["eye waits for its device port"]
+    assert recomposed(before, after) == ["eye is ready"]
+    assert recomposed(after, before) == ["eye waits for its device port"]
+
+
+def test_what_was_told_of_a_component_that_is_kept_out_is_over_when_it_is_not_any_more() -> None:
+    people, wrong, worse = People(lambda: 5.0), Problem("E-UNDECL", "a"), Problem("E-UNDECL", "b")
+    kept_out(people, {}, {"eye": (wrong,), "ear": (wrong,)})
+    kept_out(people, {"eye": (wrong,), "ear": (wrong,)}, {"eye": (worse,), "ear": (wrong,)})
+    assert [told.about for told in people if not told.is_over] == ["kept out ear", "kept out eye"]
+    kept_out(people, {"eye": (worse,), "ear": (wrong,)}, {"eye": (worse,)})
+    assert [told.about for told in people if not told.is_over] == ["kept out eye"]
+    kept_out(people, {"eye": (worse,)}, {})
+    assert all(told.is_over for told in people)

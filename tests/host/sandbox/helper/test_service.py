@@ -1,0 +1,105 @@
+"""What root's end refuses, whoever got past its door."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+from tests.host.sandbox.helper.machines import Machine, machine
+
+from nondum.host.sandbox.cgroups.groups import NoTree
+from nondum.host.sandbox.helper import requests, service
+from nondum.host.sandbox.helper.device_nodes import Nodes
+from nondum.host.sandbox.helper.lamps import Lamps
+from nondum.host.sandbox.helper.requests import Request
+from nondum.host.sandbox.helper.service import Service
+from nondum.host.sandbox.helper.stop_key import PressesOfDevice
+from nondum.sdk.errors import NondumError
+
+pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="making device nodes needs root")
+NOBODY = 65534
+STICK = requests.Mount("sdb1", 7, "ext4", "read")
+
+
+@pytest.fixture
+def stick(tmp_path: Path) -> Machine:
+    return machine(tmp_path)
+
+
+@pytest.fixture
+def root(stick: Machine, tmp_path: Path) -> Service:
+    nodes = Nodes(tmp_path / "nodes", NOBODY, sys=tmp_path / "sys")
+    lamps = Lamps((), tmp_path / "lamps.json")
+    return Service(NOBODY, tmp_path / "mounts", stick.disks, nodes, NoTree(), lambda: lamps, no_key)
+
+
+def no_key() -> PressesOfDevice:
+    raise requests.refused("there is none")
+
+
+def test_lamps_are_those_of_root_alone(stick: Machine, tmp_path: Path) -> None:
+    lamp = tmp_path / "leds/ACT"
+    lamp.mkdir(parents=True)
+    for name, text in (("trigger", "[mmc0] none"), ("brightness", "0"), ("max_brightness", "9")):
+        (lamp / name).write_text(text)
+    names: list[str] = []
+    nodes = Nodes(tmp_path / "nodes", NOBODY, sys=tmp_path / "sys")
+
+    def lamps() -> Lamps:
+        return Lamps(tuple(names), tmp_path / "run/lamps.json", tmp_path / "leds")
+
+    root = Service(NOBODY, tmp_path / "mounts", stick.disks, nodes, NoTree(), lamps, no_key)
+    root.serve(requests.ShowLamps("ready"))
+    assert (lamp / "brightness").read_text() == "0"
+    names.append("ACT")
+    root.serve(requests.ShowLamps("ready"))
+    assert (lamp / "brightness").read_text() == "9"
+    root.serve(requests.EndLamps())
+    assert (lamp / "trigger").read_text() == "mmc0"
+
+
+def refused(root: Service, request: Request) -> str:
+    with pytest.raises(NondumError) as error:
+        root.serve(request)
+    assert error.value.code == "HELPER_REFUSED"
+    return error.value.problems[0].message
+
+
+def test_nodes_of_nobody_are_not_made(root: Service) -> None:
+    assert refused(root, requests.PutNode("", "line", 188, 0, None)) == "a node is some component's"
+
+
+def test_drives_are_mounted_once(root: Service) -> None:
+    (root.mounts / "sdb1-7").mkdir(parents=True)
+    assert "mounted already" in refused(root, STICK)
+    assert (root.mounts / "sdb1-7").is_dir()
+
+
+def test_so_many_drives_are_mounted_and_no_more(root: Service) -> None:
+    for number in range(service.MOST_DRIVES):
+        (root.mounts / str(number)).mkdir(parents=True)
+    assert refused(root, STICK) == f"{service.MOST_DRIVES} drives are mounted already"
+
+
+def test_so_many_cages_are_made_and_no_more(root: Service, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(service, "MOST_CAGES", 0)
+    assert refused(root, requests.MakeCage("a.1")) == "there are 0 cages already"
+
+
+@pytest.mark.parametrize("pid", [0, 1])
+def test_processes_of_the_system_s_own_are_not_caged(root: Service, pid: int) -> None:
+    assert refused(root, requests.FillCage("a.1", pid)) == "that is no process of yours"
+
+
+def test_processes_of_others_are_not_caged(root: Service) -> None:
+    somebody = subprocess.Popen(["sleep", "60"], user=NOBODY - 1)
+    served = subprocess.Popen(["sleep", "60"], user=NOBODY)
+    try:
+        assert "no process of yours" in refused(root, requests.FillCage("a.1", somebody.pid))
+        root.serve(requests.FillCage("a.1", served.pid))
+    finally:
+        for process in (somebody, served):
+            process.kill()
+            process.wait()

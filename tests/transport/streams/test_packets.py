@@ -1,0 +1,93 @@
+"""What bridges say survives the wire, and whatever else comes is refused in words."""
+
+from __future__ import annotations
+
+import contextlib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.wire import pack
+from nondum.transport.streams import packets
+from nondum.transport.streams.packets import (
+    MAX_ASKED,
+    Asked,
+    Claim,
+    Coding,
+    Frame,
+    Handled,
+    Opened,
+    Over,
+    Ping,
+    Pong,
+)
+
+NUMBERS = st.integers(1, 2**53)
+NAMES = st.text(st.characters(codec="ascii"), min_size=1, max_size=64)
+CLOCKS = st.floats(allow_nan=False, allow_infinity=False)
+ASKED = st.one_of(
+    st.builds(Claim, NUMBERS, NAMES), st.builds(Handled, NUMBERS), st.builds(Ping, CLOCKS)
+)
+HEADERS = st.dictionaries(NAMES, st.one_of(st.integers(-100, 100), NAMES), max_size=4)
+FRAMES = st.builds(
+    Frame, NUMBERS, st.sampled_from(Coding), HEADERS, st.one_of(st.none(), st.binary(max_size=64))
+)
+PROBLEMS = st.builds(Problem, NAMES, NAMES)
+TOLD = st.one_of(
+    st.builds(Opened, NAMES), st.builds(Pong, CLOCKS, CLOCKS), st.builds(Over, PROBLEMS)
+)
+ANYTHING = st.recursive(
+    st.one_of(st.none(), st.booleans(), st.integers(-(2**63), 2**64 - 1), st.text(), st.binary()),
+    lambda inner: st.one_of(st.lists(inner), st.dictionaries(st.text(), inner)),
+    max_leaves=8,
+)
+
+
+@given(ASKED)
+def test_what_a_reader_says_survives(message: Asked) -> None:
+    assert packets.read_asked(packets.asked(message)) == message
+
+
+@given(TOLD)
+def test_what_an_owner_says_survives(message: Opened | Pong | Over) -> None:
+    assert packets.read_told([packets.told(message)]) == message
+
+
+@given(FRAMES)
+def test_frame_survives(frame: Frame) -> None:
+    parts = [packets.head(frame)] + ([] if frame.bulk is None else [bytes(frame.bulk)])
+    assert packets.read_told(parts) == frame
+
+
+@given(st.one_of(st.binary(), ANYTHING.map(lambda value: pack(value))))
+def test_anything_else_is_a_violation(data: bytes) -> None:
+    for read in (lambda: packets.read_asked(data), lambda: packets.read_told([data, b"bulk"])):
+        with contextlib.suppress(ProtocolViolation):
+            assert isinstance(read(), Asked | Frame)
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        [],
+        [pack([2, 1, 0, {}]), b"", b""],
+        [pack([1, "image"]), b"bulk"],
+        [pack([2, 1, 7, {}])],
+        [pack([2, 1, True, {}])],
+        [pack([2, 0, 0, {}])],
+        [pack([3, 1, 2])],
+        [b"\x93\x03\xcb?\xf0\0\0\0\0\0\0\xcb\x7f\xf0\0\0\0\0\0\0"],
+        [pack([4, {"code": "X"}])],
+    ],
+    ids=["nothing", "three", "bulk", "coding", "bool", "seq", "clock", "endless", "problem"],
+)
+def test_almost_right_is_wrong(parts: list[bytes]) -> None:
+    with pytest.raises(ProtocolViolation):
+        packets.read_told(parts)
+
+
+def test_reader_is_short() -> None:
+    with pytest.raises(ProtocolViolation, match="PACKET_TOO_LONG"):
+        packets.read_asked(pack([1, 1, "x" * MAX_ASKED]))

@@ -1,0 +1,1 @@
+"""The host's end of worker links, and how much may pass."""

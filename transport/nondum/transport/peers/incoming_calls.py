@@ -1,0 +1,226 @@
+"""Calls that a peer has made to this host and that are being carried out."""
+
+from __future__ import annotations
+
+import asyncio
+import inspect
+import logging
+from collections import deque
+from collections.abc import Awaitable, Callable
+from enum import Enum
+from typing import Any, Protocol, TypeAlias
+
+from nondum.sdk.errors import NondumError, Problem, ProtocolViolation
+from nondum.sdk.wire import Body
+from nondum.transport.peers.call_history import Once, Seen
+from nondum.transport.peers.calls import CREDIT, Send
+from nondum.transport.peers.drained import Sent
+from nondum.transport.peers.events import Loss
+from nondum.transport.peers.messages import Failure, Progress, Reply, Request, encode
+from nondum.transport.peers.trust import Admission
+
+log = logging.getLogger(__name__)
+
+
+class Lease(Enum):
+    """What becomes of an errand whose caller is lost."""
+
+    STOP = "stop"
+    """It is cancelled at once."""
+    HOLD = "hold"
+    """It runs on without its deadline, told by `orphaned`, until it ends by itself or the host
+    ends it."""
+    FINISH = "finish"
+    """It runs to its end, which its deadline still bounds."""
+
+
+class Errand:
+    """One call, as whoever carries it out sees it."""
+
+    def __init__(
+        self, caller: Admission, request: Request, report: Callable[[int, Body], None]
+    ) -> None:
+        self.caller = caller
+        self.number = request.number
+        self.method = request.method
+        self.args = dict(request.args)
+        self.orphaned = asyncio.Event()
+        """Set when the caller is lost and the errand is held or finished."""
+        self.ends_s = asyncio.get_running_loop().time() + request.remaining_ms / 1000
+        """Its deadline, on this host's loop's clock."""
+        self._report = report
+        self.task: asyncio.Task[None] | None = None
+        self.timer: asyncio.TimerHandle | None = None
+        self.is_late = False
+
+    def progress(self, body: Body) -> None:
+        """Tell the caller how far it is; lost when the caller cannot take it now.
+
+        Raises `ProtocolViolation`, `TypeError` when it cannot be sent at all.
+        """
+        self._report(self.number, body)
+
+    def halt(self) -> None:
+        """Cancel it; the caller is told HALTED, or DEADLINE."""
+        if self.task is not None:
+            self.task.cancel()
+
+
+class Handler(Protocol):
+    """What a host does for its peers."""
+
+    def serve(self, errand: Errand) -> Body | Awaitable[Body]:
+        """Carry a call out; what it raises of `NondumError` is the answer then.
+
+        An awaitable runs as a task, is cancelled when the caller asks for it, when the deadline
+        passes, and, as `orphaned` decides, when the caller is lost.
+        """
+
+    def notice(self, caller: Admission, method: str, args: dict[str, Any]) -> None:
+        """A peer tells something."""
+
+    def orphaned(self, errand: Errand, reason: Loss) -> Lease:
+        """The caller of a running errand is lost: decide what becomes of it."""
+
+
+Finished: TypeAlias = Reply | Failure
+
+
+class Errands:
+    """All that run for one peer, and the memory of those that ran."""
+
+    def __init__(self, caller: Admission, once: Once, handler: Handler, send: Send) -> None:
+        self._caller, self._once, self._handler, self._send = caller, once, handler, send
+        self._loop = asyncio.get_running_loop()
+        self._running: dict[int, Errand] = {}
+        self._unsent: deque[int] = deque(maxlen=CREDIT)  # answers beyond are forgotten anyway
+
+    def take(self, request: Request) -> None:
+        """A call came, perhaps again: carry it out at most once."""
+        self._once.settle(request.settled)
+        match self._once.take(request.number):
+            case Seen.NEW if len(self._running) >= CREDIT:
+                self._conclude(_busy(request.number))
+            case Seen.NEW:
+                self._begin(request)
+            case Seen.ANSWERED:
+                self._pass_on(request.number)
+            case Seen.FORGOTTEN:
+                self._send(encode(_forgotten(request.number)))
+
+    def cancel(self, number: int) -> None:
+        """The caller wants a call halted; unknown and finished ones are ignored."""
+        if errand := self._running.get(number):
+            errand.halt()
+
+    def pass_on_waiting(self) -> None:
+        """Try again to send the answers for which there was no room."""
+        for _ in range(len(self._unsent)):
+            self._pass_on(self._unsent.popleft())
+
+    def lose(self, reason: Loss) -> list[Errand]:
+        """The caller is lost: ask what becomes of each errand; those that run on."""
+        kept = []
+        self._send = _nowhere
+        for errand in list(self._running.values()):
+            lease = self._lease(errand, reason)
+            if lease is Lease.STOP:
+                errand.halt()
+                continue
+            if lease is Lease.HOLD and errand.timer is not None:
+                errand.timer.cancel()
+            errand.orphaned.set()
+            kept.append(errand)
+        return kept
+
+    def _lease(self, errand: Errand, reason: Loss) -> Lease:
+        try:
+            return self._handler.orphaned(errand, reason)
+        except Exception:
+            log.exception("nobody could say what becomes of %s: it is stopped", errand.method)
+            return Lease.STOP
+
+    def _begin(self, request: Request) -> None:
+        errand = Errand(self._caller, request, self._progress)
+        try:
+            result = self._handler.serve(errand)
+        except Exception as error:
+            self._conclude(_failure(errand, error))
+            return
+        if not inspect.isawaitable(result):
+            self._conclude(Reply(request.number, result))
+            return
+        self._running[request.number] = errand
+        errand.task = self._loop.create_task(self._work(errand, result))
+        errand.task.add_done_callback(lambda _: self._end(errand, result))
+        errand.timer = self._loop.call_at(errand.ends_s, self._expire, errand)
+
+    async def _work(self, errand: Errand, result: Awaitable[Body]) -> None:
+        try:
+            answer: Finished = Reply(errand.number, await result)
+        except asyncio.CancelledError as error:
+            answer = _failure(errand, error)
+        except Exception as error:
+            answer = _failure(errand, error)
+        self._running.pop(errand.number, None)
+        self._conclude(answer)
+
+    def _end(self, errand: Errand, result: Awaitable[Body]) -> None:
+        if errand.timer is not None:
+            errand.timer.cancel()
+        if self._running.pop(errand.number, None):  # cancelled before its first step
+            if inspect.iscoroutine(result):
+                result.close()
+            self._conclude(_failure(errand, asyncio.CancelledError()))
+
+    def _expire(self, errand: Errand) -> None:
+        errand.is_late = True
+        errand.halt()
+
+    def _conclude(self, answer: Finished) -> None:
+        try:
+            data = encode(answer)
+        except (ProtocolViolation, TypeError) as unsendable:
+            told = f"the answer cannot be sent: {unsendable}"[:1000]
+            data = encode(Failure(answer.number, (Problem("ANSWER_UNSENDABLE", told),)))
+        self._once.answered(answer.number, data)
+        self._pass_on(answer.number)
+
+    def _pass_on(self, number: int) -> None:
+        try:
+            answer = self._once.answer(number)
+        except KeyError:
+            answer = encode(_forgotten(number))
+        if self._send(answer) is Sent.FULL:
+            self._unsent.append(number)
+
+    def _progress(self, number: int, body: Body) -> None:
+        if number in self._running:
+            self._send(encode(Progress(number, body)))
+
+
+def _nowhere(_data: bytes) -> Sent:
+    return Sent.GONE
+
+
+def _failure(errand: Errand, error: BaseException) -> Failure:
+    if isinstance(error, NondumError):
+        return Failure(errand.number, error.problems)
+    if isinstance(error, asyncio.CancelledError):
+        late = Problem("DEADLINE", "it took longer than the caller would wait")
+        return Failure(errand.number, (late if errand.is_late else _HALTED,))
+    log.error("%s failed for %s", errand.method, errand.caller.name, exc_info=error)
+    told = f"{type(error).__name__}: {error}"[:1000]
+    return Failure(errand.number, (Problem("INTERNAL", told),))
+
+
+_HALTED = Problem("HALTED", "halted as asked")
+
+
+def _busy(number: int) -> Failure:
+    return Failure(number, (Problem("PEER_BUSY", f"{CREDIT} calls are being carried out"),))
+
+
+def _forgotten(number: int) -> Failure:
+    told = "the call was carried out, or begun, but its answer is kept no more"
+    return Failure(number, (Problem("ANSWER_FORGOTTEN", told),))

@@ -1,0 +1,1 @@
+"""Payloads and plugin packages made on an author's machine."""

@@ -1,0 +1,1 @@
+"""The files of a payload folder, each parsed strictly."""

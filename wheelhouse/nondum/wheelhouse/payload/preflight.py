@@ -1,0 +1,334 @@
+"""Whether a payload fits this host, from what was parsed, before anything is installed.
+
+Every problem is told at once, with what is needed and what is there.
+"""
+
+from __future__ import annotations
+
+import functools
+import platform
+import shutil
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from types import MappingProxyType
+
+from packaging import markers, tags
+from packaging.markers import UndefinedComparison, UndefinedEnvironmentName
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+from packaging.tags import Tag
+from packaging.utils import canonicalize_name
+from packaging.version import Version
+
+from nondum.sdk.errors import NondumError, PayloadRefused, Problem
+from nondum.wheelhouse.format import lock as locks_module
+from nondum.wheelhouse.format.confinement import Level
+from nondum.wheelhouse.format.lock import Lock, LockedWheel
+from nondum.wheelhouse.format.manifest import Manifest
+from nondum.wheelhouse.format.target import Target
+from nondum.wheelhouse.payload import memory
+from nondum.wheelhouse.payload.gpu import Gpu
+from nondum.wheelhouse.payload.memory import Memory
+from nondum.wheelhouse.wheels import wheel
+from nondum.wheelhouse.wheels.wheel import Layout
+
+GROWTH = 4
+"""Unpacked wheels are at most about so many times their size; measured: 2.8 to 2.9."""
+_MB = 1024 * 1024
+_PLENTY_MB = 2**40
+
+
+@dataclass(frozen=True, slots=True)
+class HostFacts:
+    """What a host is and has."""
+
+    architecture: str
+    """As `uname -m` says."""
+    python: str
+    """Full version of the interpreter that workers run."""
+    environment: Mapping[str, str]
+    """Environment markers (PEP 508)."""
+    tags: tuple[Tag, ...]
+    """Wheel tags that it takes, best first."""
+    free_disk_mb: int
+    """On the store's file system, less the reserve."""
+    memory: Memory
+    confinement: Level
+    """Level at which workers run here."""
+    nondum: str
+    """Version of nondum."""
+    reserve_mb: int = 0
+    """Disk that is left free, whatever comes: `install.reserve_mb`."""
+
+
+def probe(state: Path, *, reserve_mb: int, confinement: Level) -> HostFacts:
+    """Look at this machine. `state` is where the store is, or will be."""
+    there = next(folder for folder in (state, *state.parents) if folder.exists())
+    return HostFacts(
+        architecture=platform.machine(),
+        python=platform.python_version(),
+        environment=_environment(),
+        tags=_tags(),
+        free_disk_mb=max(0, shutil.disk_usage(there).free // _MB - reserve_mb),
+        memory=memory.look(),
+        confinement=confinement,
+        nondum=nondum_version(),
+        reserve_mb=reserve_mb,
+    )
+
+
+def of_target(target: Target) -> HostFacts:
+    """A host of some kind, as payloads are built for; what it has is not known, and enough."""
+    version = tuple(int(part) for part in target.python.split("."))
+    platforms = list(target.platforms())
+    interpreter = "cp" + "".join(map(str, version))
+    return HostFacts(
+        architecture=target.architecture,
+        python=f"{target.python}.0",
+        environment={
+            **_environment(),
+            "implementation_name": "cpython",
+            "implementation_version": f"{target.python}.0",
+            "os_name": "posix",
+            "platform_machine": target.architecture,
+            "platform_python_implementation": "CPython",
+            "platform_system": "Linux",
+            "python_full_version": f"{target.python}.0",
+            "python_version": target.python,
+            "sys_platform": "linux",
+        },
+        tags=(
+            *tags.cpython_tags(version, platforms=platforms),
+            *tags.compatible_tags(version, interpreter, platforms),
+        ),
+        free_disk_mb=_PLENTY_MB,
+        memory=Memory(_PLENTY_MB, Gpu(_PLENTY_MB, _PLENTY_MB)),
+        confinement=Level.SANDBOXED,
+        nondum=nondum_version(),
+    )
+
+
+# What stays as it is while a process lives is looked at once: all of it takes ten milliseconds.
+
+
+@functools.cache
+def _environment() -> Mapping[str, str]:
+    return MappingProxyType({k: str(v) for k, v in markers.default_environment().items()})
+
+
+@functools.cache
+def _tags() -> tuple[Tag, ...]:
+    return tuple(tags.sys_tags())
+
+
+@functools.cache
+def nondum_version() -> str:
+    """The version of nondum that runs here."""
+    return metadata.version("nondum")
+
+
+def select(
+    manifest: Manifest, locks: Mapping[str, Lock], facts: HostFacts
+) -> dict[str, tuple[LockedWheel, ...]]:
+    """The wheels of each component for this host. Raises `PayloadRefused` with all problems."""
+    chosen: dict[str, tuple[LockedWheel, ...]] = {}
+    problems: list[Problem] = []
+    for component in manifest.components:
+        if component.id not in locks:
+            continue
+        try:
+            chosen[component.id] = locks_module.select(
+                locks[component.id], facts.environment, facts.tags
+            )
+        except NondumError as error:
+            problems.extend(error.problems)
+    if problems:
+        raise PayloadRefused(*problems)
+    return chosen
+
+
+def preflight(
+    manifest: Manifest, locks: Mapping[str, Lock], facts: HostFacts, *, minimum_nondum: str = "0"
+) -> tuple[Problem, ...]:
+    """Everything that keeps this payload from running here.
+
+    `minimum_nondum` is what the contents list asks for.
+    """
+    problems = [
+        *_version_problems(manifest, facts, minimum_nondum),
+        *memory.problems(manifest.requires, facts.memory, manifest.id),
+    ]
+    for component in manifest.components:
+        if component.id not in locks:
+            where = locks_module.file_name(component.id)
+            text = f"component {component.id!r} has no lock"
+            problems.append(Problem("LOCK_MISSING", text, where=where))
+    try:
+        chosen = select(manifest, locks, facts)
+    except PayloadRefused as error:
+        return (*problems, *error.problems)
+    problems.extend(_unlocked(manifest, locks, chosen))
+    return (*problems, *_disk_problems(manifest, chosen, facts))
+
+
+def _unlocked(
+    manifest: Manifest, locks: Mapping[str, Lock], chosen: Mapping[str, Sequence[LockedWheel]]
+) -> Iterator[Problem]:
+    """Components whose own plugin is not among their wheels."""
+    for component in manifest.components:
+        if component.id not in locks:
+            continue
+        if component.distribution not in {wheel.name for wheel in chosen[component.id]}:
+            is_for_others = component.distribution in locks[component.id].packages
+            text = "is locked for other hosts only" if is_for_others else "itself is not locked"
+            yield Problem(
+                "LOCK_INCOMPLETE",
+                f"{component.distribution} {text}",
+                where=locks_module.file_name(component.id),
+                fix="build the payload for this architecture and Python",
+            )
+
+
+def unmet(
+    requirements: Mapping[str, Sequence[str]],
+    chosen: Sequence[LockedWheel],
+    facts: HostFacts,
+    where: str,
+) -> Iterator[Problem]:
+    """Dependencies that no chosen wheel meets; `requirements` are distribution → Requires-Dist.
+
+    Extras that one distribution asks of another are followed.
+    """
+    versions = {wheel.name: wheel.version for wheel in chosen}
+    asked = {(distribution, "") for distribution in requirements}
+    pending = sorted(asked)
+    while pending:
+        distribution, extra = pending.pop()
+        for line in requirements.get(distribution, ()):
+            try:
+                wanted = _wanted(line, extra, facts)
+            except (ValueError, RecursionError, UndefinedComparison, UndefinedEnvironmentName):
+                text = f"{distribution} has a dependency that cannot be read: {line[:80]!r}"
+                yield Problem("WHEEL_METADATA", text, where=where)
+                continue
+            if wanted is None:
+                continue
+            name = canonicalize_name(wanted.name)
+            have = versions.get(name)
+            if have is None or not wanted.specifier.contains(have, prereleases=True):
+                yield _missing(distribution, wanted, have, where)
+            more = {(str(name), wanted_extra) for wanted_extra in wanted.extras} - asked
+            asked |= more
+            pending += sorted(more)
+
+
+def misfits(
+    layout: Layout, filename: str, manifest: Manifest, facts: HostFacts
+) -> Iterator[Problem]:
+    """Why a sound wheel is not for this payload or host."""
+    yield from wheel.hook_problems(layout.left_out, filename, manifest.startup_hooks)
+    if layout.problems:  # what it needs is not known then
+        return
+    python = SpecifierSet(layout.needs.python)
+    if not python.contains(facts.python, prereleases=True):
+        yield Problem(
+            "WHEEL_INCOMPATIBLE",
+            "is not for this Python, whatever its name says",
+            where=filename,
+            need=f"Python {python}",
+            have=facts.python,
+            fix="build the payload for this architecture and Python",
+        )
+
+
+def unpacked_problems(layouts: Iterable[Layout], facts: HostFacts, where: str) -> Iterator[Problem]:
+    """When wheels are too much for the disk, by the sizes of all their files."""
+    needed = sum(file.member.size for layout in layouts for file in layout.files) // _MB
+    if needed > facts.free_disk_mb:
+        yield _short(needed, facts, where)
+
+
+def _wanted(line: str, extra: str, facts: HostFacts) -> Requirement | None:
+    """A dependency as far as this host and extra have it."""
+    wanted = Requirement(line)
+    if wanted.marker is None:
+        return wanted if not extra else None
+    needs = wanted.marker.evaluate({**facts.environment, "extra": extra})
+    always = extra and wanted.marker.evaluate({**facts.environment, "extra": ""})
+    return wanted if needs and not always else None
+
+
+def _missing(distribution: str, wanted: Requirement, have: str | None, where: str) -> Problem:
+    return Problem(
+        "LOCK_INCOMPLETE",
+        f"{distribution} needs {wanted.name}",
+        where=where,
+        need=f"{wanted.name}{wanted.specifier}",
+        have=have or "none",
+        fix="build the payload again: every dependency must be locked",
+    )
+
+
+def _version_problems(
+    manifest: Manifest, facts: HostFacts, minimum_nondum: str
+) -> Iterator[Problem]:
+    if Version(facts.nondum) < Version(minimum_nondum):
+        yield Problem(
+            "NONDUM_VERSION",
+            "this nondum is too old",
+            where=manifest.id,
+            need=f">={minimum_nondum}",
+            have=facts.nondum,
+            fix="update the host, or use an older release of the payload",
+        )
+    wanted = SpecifierSet(manifest.requires.python)
+    if not wanted.contains(facts.python, prereleases=True):
+        yield Problem(
+            "PYTHON_VERSION",
+            "this Python does not fit",
+            where=manifest.id,
+            need=str(wanted),
+            have=facts.python,
+            fix="use a payload that was built for this Python",
+        )
+    if manifest.requires.confinement > facts.confinement:
+        yield Problem(
+            "CONFINEMENT",
+            "workers cannot be confined as it demands",
+            where=manifest.id,
+            need=f"level {manifest.requires.confinement}",
+            have=f"level {facts.confinement}",
+            fix="see `nondum doctor` for what confinement lacks on this host, or use another host",
+        )
+
+
+def _disk_problems(
+    manifest: Manifest, chosen: Mapping[str, Sequence[LockedWheel]], facts: HostFacts
+) -> Iterator[Problem]:
+    wheels = {wheel.sha256: wheel.size for group in chosen.values() for wheel in group}
+    needed = max(manifest.requires.disk_mb, GROWTH * sum(wheels.values()) // _MB)
+    if needed > facts.free_disk_mb:
+        yield _short(needed, facts, manifest.id)
+
+
+def free_beside(free_mb: int, reserve_mb: int) -> str:
+    """What there is of a disk, with what is kept of it.
+
+    >>> free_beside(7, 64)
+    '7 MB, beside the 64 MB that `install.reserve_mb` keeps free'
+    """
+    kept = f", beside the {reserve_mb} MB that `install.reserve_mb` keeps free"
+    return f"{free_mb} MB{kept if reserve_mb else ''}"
+
+
+def _short(needed_mb: int, facts: HostFacts, where: str) -> Problem:
+    return Problem(
+        "DISK_FULL",
+        "there is too little disk",
+        where=where,
+        need=f"{needed_mb} MB",
+        have=free_beside(facts.free_disk_mb, facts.reserve_mb),
+        fix="free some disk, or use another host",
+    )

@@ -1,0 +1,1 @@
+"""The store of verified wheels, and the venvs made of it."""

@@ -1,0 +1,1 @@
+"""What is inside a wheel, judged before anything is unpacked."""
