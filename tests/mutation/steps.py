@@ -30,7 +30,9 @@ _TELLS = re.compile(
     r"|^_twice$"
 )
 """What a function or class is called that makes or tells a problem."""
-_CHECKS = re.compile(r"\._?(check|verify|require|raise_if|tell_twice|trial\.run)(_|$)|_if_any$")
+_CHECKS = re.compile(
+    r"\._?(check|verify|require|raise_if|tell_twice|forked_trial\.run)(_|$)|_if_any$"
+)
 """What one is called that raises or tells what is wrong, and returns nothing."""
 _REFUSALS = re.compile(r"\bProblem\b|Refused|Failed|Gone|Violation|Malformed|NoReturn|NondumError")
 """What those return that make or tell one, whatever they are called."""
@@ -54,9 +56,9 @@ TABLES: Mapping[str, tuple[str, ...]] = {
 _INSIDE = "host/nondum/host/sandbox/inside"
 CONFINING = frozenset(
     {
-        *(f"{_INSIDE}/{name}.py" for name in ("bootstrap", "keeper", "kernel", "limits")),
-        *(f"{_INSIDE}/{name}.py" for name in ("look", "room", "walls")),
-        *(f"{_CONFINEMENT}/{name}.py" for name in ("bubblewrap", "landlock", "own_children")),
+        *(f"{_INSIDE}/{name}.py" for name in ("bootstrap", "init", "inspect_self", "kernel")),
+        *(f"{_INSIDE}/{name}.py" for name in ("limits", "mounts", "restrict")),
+        *(f"{_CONFINEMENT}/{name}.py" for name in ("bubblewrap", "landlock", "host_children")),
         "host/nondum/host/peers/streams/process.py",
     }
 )
