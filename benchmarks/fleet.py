@@ -39,7 +39,7 @@ from benchmarks.measuring import Spread
 from nondum.transport.fleet import Fleet, FleetEvent, Mesh, PeerChanged
 from nondum.transport.fleet.zenoh import ZenohFleet
 from nondum.transport.fleet.zenoh_line import RouterAccess
-from nondum.transport.peers import Errand, HostKeys, Identity, Lease, PeerKey, PeerLost, Trust
+from nondum.transport.peers import HostKeys, Identity, IncomingCall, Lease, PeerKey, PeerLost, Trust
 
 CATALOGUE = {f"component/{number}": {"text": "x" * 970} for number in range(10)}
 NEWS = {"component/9": {"text": "y" * 200}}
@@ -59,7 +59,7 @@ _TCP_INFO = struct.Struct("=200xQ")
 class Silent:
     """Serves nothing."""
 
-    def serve(self, errand: Errand) -> Any:
+    def serve(self, errand: IncomingCall) -> Any:
         return {}
 
     def notice(self, *_: Any) -> None: ...

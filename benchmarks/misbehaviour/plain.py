@@ -15,7 +15,7 @@ from pathlib import Path
 from benchmarks.misbehaviour.scene import LIBRARIES, LIMITS
 from benchmarks.misbehaviour.ways import Way
 
-from nondum.host.sandbox.cgroups import Cages
+from nondum.host.sandbox.cgroups import Cgroups
 from nondum.host.workers.spec import base_interpreter
 
 SOURCE = """
@@ -43,20 +43,20 @@ signal.pause()
 
 
 @contextlib.asynccontextmanager
-async def plain(way: Way, folder: Path, cages: Cages) -> AsyncIterator[subprocess.Popen[bytes]]:
+async def plain(way: Way, folder: Path, cgroups: Cgroups) -> AsyncIterator[subprocess.Popen[bytes]]:
     """A process that misbehaves as soon as it reads a line; ended with all its children."""
     await asyncio.to_thread(folder.mkdir)
-    cage = cages.make("plain", LIMITS.of_cage())
+    cgroup = cgroups.make("plain", LIMITS.of_cgroup())
     process = await asyncio.to_thread(_started, way, folder)
     try:
-        await asyncio.to_thread(cage.add, process.pid)
+        await asyncio.to_thread(cgroup.add, process.pid)
         limit = LIMITS.descriptors
         resource.prlimit(process.pid, resource.RLIMIT_NOFILE, (limit, limit))
         assert process.stdout is not None
         await asyncio.to_thread(process.stdout.readline)
         yield process
     finally:
-        await asyncio.to_thread(cage.end)
+        await asyncio.to_thread(cgroup.end)
         await asyncio.to_thread(process.communicate)
         await asyncio.to_thread(shutil.rmtree, folder)
 

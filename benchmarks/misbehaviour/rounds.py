@@ -82,7 +82,7 @@ async def misbehave(made: Scene, way: Way, decisions: Decisions) -> Round:
 
 
 async def _plainly(made: Scene, way: Way, long_s: float) -> Span:
-    async with plain(way, made.folder / "plain", made.cages) as process:
+    async with plain(way, made.folder / "plain", made.cgroups) as process:
         await asyncio.sleep(SETTLED_S)
         begun_s = time.monotonic()
         assert process.stdin is not None

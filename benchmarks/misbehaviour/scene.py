@@ -16,7 +16,7 @@ import pluggy
 from benchmarks.misbehaviour.windows import Call, Frame
 
 from nondum.host.core.events import Event, WorkerExited, WorkerLogged, WorkerStrained
-from nondum.host.sandbox.cgroups import Cages
+from nondum.host.sandbox.cgroups import Cgroups
 from nondum.host.workers.confinements import Confinement
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import Limits, WorkerSpec, base_interpreter
@@ -89,14 +89,14 @@ class Scene:
     """Good workers that are called, and one that is not good."""
 
     folder: Path
-    cages: Cages
+    cgroups: Cgroups
     confinement: Confinement
     events: deque[tuple[float, Event]] = field(default_factory=deque)
     calls: list[Call] = field(default_factory=list)
     _news: asyncio.Event = field(default_factory=asyncio.Event)
 
     def __post_init__(self) -> None:
-        launcher = WorkerLauncher(self.confinement, self.cages)
+        launcher = WorkerLauncher(self.confinement, self.cgroups)
         self.workers = Workers(HOST, self._on_event, launcher=launcher)
 
     def _on_event(self, event: Event) -> None:
@@ -177,8 +177,8 @@ def _code(event: Event, codes: Sequence[str]) -> str:
 async def scene(confinement: Confinement) -> AsyncIterator[Scene]:
     """Two good workers, called all the time, with a stream between them."""
     with tempfile.TemporaryDirectory() as folder:
-        cages = Cages.open(Path(folder))
-        made = Scene(Path(folder), cages, confinement)
+        cgroups = Cgroups.open(Path(folder))
+        made = Scene(Path(folder), cgroups, confinement)
         await made.start("good", "pass", SENDS, (STREAM,), (IMAGES,))
         await made.start("better", "pass", SEES, (WATCH,))
         made.workers.behave(
@@ -195,4 +195,4 @@ async def scene(confinement: Confinement) -> AsyncIterator[Scene]:
                 task.cancel()
             await asyncio.gather(*calling, return_exceptions=True)
             await made.workers.close(1.0)
-            cages.close()
+            cgroups.close()

@@ -19,9 +19,9 @@ from nondum.host.peers.finder import PeerFinder
 from nondum.transport.fleet import FleetEvent, Mesh
 from nondum.transport.peers import (
     Admission,
-    Errand,
     HostKeys,
     Identity,
+    IncomingCall,
     Lease,
     Loss,
     PeerKey,
@@ -36,12 +36,12 @@ HANGING_S = 30.0
 class Silent:
     """Serves nothing."""
 
-    def serve(self, errand: Errand) -> dict[str, Any]:
+    def serve(self, errand: IncomingCall) -> dict[str, Any]:
         return {}
 
     def notice(self, caller: Admission, method: str, args: dict[str, Any]) -> None: ...
 
-    def orphaned(self, errand: Errand, reason: Loss) -> Lease:
+    def orphaned(self, errand: IncomingCall, reason: Loss) -> Lease:
         return Lease.STOP
 
 

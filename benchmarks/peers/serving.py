@@ -21,9 +21,9 @@ from benchmarks.measuring import REPLY
 
 from nondum.transport.peers import (
     Admission,
-    Errand,
     HostKeys,
     Identity,
+    IncomingCall,
     Lease,
     Loss,
     PeerKey,
@@ -41,7 +41,7 @@ Keys = Mapping[str, str]
 class Answering:
     """Serves one thing; at once, or as a task that can be cancelled."""
 
-    def serve(self, errand: Errand) -> dict[str, str] | Awaitable[dict[str, str]]:
+    def serve(self, errand: IncomingCall) -> dict[str, str] | Awaitable[dict[str, str]]:
         return REPLY if errand.method == "now" else self.later()
 
     async def later(self) -> dict[str, str]:
@@ -49,7 +49,7 @@ class Answering:
 
     def notice(self, caller: Admission, method: str, args: dict[str, Any]) -> None: ...
 
-    def orphaned(self, errand: Errand, reason: Loss) -> Lease:
+    def orphaned(self, errand: IncomingCall, reason: Loss) -> Lease:
         return Lease.STOP
 
 

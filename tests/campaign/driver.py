@@ -29,7 +29,7 @@ from tests.campaign import checkout, page
 from tests.campaign.age import ages
 from tests.campaign.page import Last
 from tests.campaign.registry import Campaign
-from tests.campaign.rounds import Tally
+from tests.campaign.rounds import Rounds
 
 FOLDER = Path("build/campaigns")
 ENDS_WITHIN_S = 180.0
@@ -105,12 +105,12 @@ def run(
         changed = checkout.contents(root, campaign.covers) != state.contents
         if changed and not commit.endswith(page.DIRTY):
             commit += page.DIRTY
-        tally = Tally.read(home / "round")
+        rounds = Rounds.read(home / "round")
         outcome = Outcome(
             campaign.name,
-            _result(status, tally, was_interrupted=was_interrupted),
+            _result(status, rounds, was_interrupted=was_interrupted),
             *(took, commit, state.seed, str(home / "round")),
-            failed=tally.failed if tally else (),
+            failed=rounds.failed if rounds else (),
             was_interrupted=was_interrupted,
         )
         _keep(root, outcome, state.minutes + took)
@@ -128,18 +128,18 @@ def _goes_on(root: Path, campaign: Campaign, new: State, *, is_seed_asked: bool)
 
 def _is_over(root: Path, campaign: Campaign) -> bool:
     """Whether the round is whole, and was either counted for this commit or has failed."""
-    tally = Tally.read(root / FOLDER / campaign.name / "round")
-    if tally is None or not tally.is_whole:
+    rounds = Rounds.read(root / FOLDER / campaign.name / "round")
+    if rounds is None or not rounds.is_whole:
         return False
     (age,) = (age for age in ages(root) if age.campaign == campaign.name)
-    return bool(tally.failed) or age.is_current
+    return bool(rounds.failed) or age.is_current
 
 
 def _set_aside(home: Path) -> None:
     """Remove the former round; one in which something failed is kept."""
     former = home / "round"
-    tally = Tally.read(former)
-    if tally is not None and tally.failed:
+    rounds = Rounds.read(former)
+    if rounds is not None and rounds.failed:
         moment = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
         former.rename(home / f"failed-{moment}")
     elif former.exists():
@@ -200,14 +200,14 @@ def _pass_on(lines: Iterable[str], log: TextIO, say: Callable[[str], None]) -> N
         say(line.rstrip("\n"))
 
 
-def _result(status: int, tally: Tally | None, *, was_interrupted: bool) -> str:
-    if tally is not None and tally.failed:
+def _result(status: int, rounds: Rounds | None, *, was_interrupted: bool) -> str:
+    if rounds is not None and rounds.failed:
         return page.FAILED
     if status != 0 and not was_interrupted:
         return page.FAILED
-    if tally is None:
+    if rounds is None:
         return "0 of 1" if was_interrupted else page.PASSED
-    return page.PASSED if tally.is_whole else str(tally)
+    return page.PASSED if rounds.is_whole else str(rounds)
 
 
 def _keep(root: Path, outcome: Outcome, minutes: float) -> None:

@@ -18,7 +18,7 @@ FILE = "round.json"
 
 
 @dataclass(frozen=True, slots=True)
-class Tally:
+class Rounds:
     """How far a round is."""
 
     of: int
@@ -42,7 +42,7 @@ class Tally:
         new.replace(folder / FILE)
 
     @classmethod
-    def read(cls, folder: Path) -> Tally | None:
+    def read(cls, folder: Path) -> Rounds | None:
         """That of a folder; None if nothing was begun there."""
         file = folder / FILE
         if not file.exists():
@@ -99,37 +99,39 @@ class Round:
         self.folder, self.limit = folder, limit
         self.pieces, self._say = pieces, say or _print
         self._lock = threading.Lock()
-        before = Tally.read(folder) or Tally(0)
-        self.tally = Tally(len(pieces), _among(before.done, pieces), _among(before.failed, pieces))
-        self.tally.write(folder)
+        before = Rounds.read(folder) or Rounds(0)
+        self.progress = Rounds(
+            len(pieces), _among(before.done, pieces), _among(before.failed, pieces)
+        )
+        self.progress.write(folder)
 
     def due(self) -> Iterator[str]:
         """The pieces that were not done yet, until the time is over."""
         for piece in self.pieces:
             if self.limit.is_over:
                 return
-            if piece not in self.tally.done:
+            if piece not in self.progress.done:
                 yield piece
 
     def add(self, piece: str, *, passed: bool, note: str = "") -> None:
         """A piece is done: keep that, and say so."""
         with self._lock:
-            others = [one for one in self.tally.done if one != piece]
-            failed = [one for one in self.tally.failed if one != piece]
+            others = [one for one in self.progress.done if one != piece]
+            failed = [one for one in self.progress.failed if one != piece]
             if not passed:
                 failed.append(piece)
-            self.tally = Tally(len(self.pieces), (*others, piece), tuple(failed))
-            self.tally.write(self.folder)
+            self.progress = Rounds(len(self.pieces), (*others, piece), tuple(failed))
+            self.progress.write(self.folder)
             mark = "passed" if passed else "FAILED"
             more = f"  {note}" if note else ""
-            self._say(f"{self.limit} {self.tally}  {mark}  {piece}{more}")
+            self._say(f"{self.limit} {self.progress}  {mark}  {piece}{more}")
 
     def end(self) -> int:
         """Say how far it is; the exit status: 1 if anything has failed."""
-        for piece in self.tally.failed:
+        for piece in self.progress.failed:
             self._say(f"FAILED {piece}")
-        self._say(f"{self.tally} done, {len(self.tally.failed)} failed")
-        return 1 if self.tally.failed else 0
+        self._say(f"{self.progress} done, {len(self.progress.failed)} failed")
+        return 1 if self.progress.failed else 0
 
 
 def work_off(

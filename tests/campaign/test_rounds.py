@@ -6,7 +6,7 @@ import threading
 from pathlib import Path
 
 import pytest
-from tests.campaign.rounds import Limit, Round, Tally, work_off
+from tests.campaign.rounds import Limit, Round, Rounds, work_off
 from tests.kit.until import PATIENCE_S
 
 PIECES = ("one", "two", "three")
@@ -31,7 +31,7 @@ def test_it_goes_on_where_it_stopped(tmp_path: Path) -> None:
     first.add("one", passed=True)
     second = Round(tmp_path, PIECES, Limit(None), quiet)
     assert list(second.due()) == ["two", "three"]
-    assert str(second.tally) == "1 of 3"
+    assert str(second.progress) == "1 of 3"
 
 
 def test_pieces_that_are_there_no_more_do_not_count(tmp_path: Path) -> None:
@@ -39,7 +39,7 @@ def test_pieces_that_are_there_no_more_do_not_count(tmp_path: Path) -> None:
     first.add("one", passed=False)
     first.add("two", passed=True)
     second = Round(tmp_path, ("two", "four"), Limit(None), quiet)
-    assert second.tally == Tally(2, ("two",), ())
+    assert second.progress == Rounds(2, ("two",), ())
     assert list(second.due()) == ["four"]
 
 
@@ -62,14 +62,14 @@ def test_what_failed_is_told_at_the_end(tmp_path: Path) -> None:
     assert work.end() == 1
     assert said[0].endswith("1 of 3  FAILED  one  see there")
     assert said[-2:] == ["FAILED one", "2 of 3 done, 1 failed"]
-    assert Tally.read(tmp_path) == Tally(3, ("one", "two"), ("one",))
+    assert Rounds.read(tmp_path) == Rounds(3, ("one", "two"), ("one",))
 
 
 def test_a_piece_that_is_done_again_counts_once(tmp_path: Path) -> None:
     work = Round(tmp_path, PIECES, Limit(None), quiet)
     work.add("one", passed=False)
     work.add("one", passed=True)
-    assert work.tally == Tally(3, ("one",), ())
+    assert work.progress == Rounds(3, ("one",), ())
     assert work.end() == 0
 
 

@@ -22,9 +22,9 @@ from tests.kit.command_line import Ran, command, nondum, quiet_environment
 from nondum.host.control.arguments import Arguments
 from nondum.host.control.server import ControlServer
 from nondum.host.peers import trust_orders
-from nondum.host.peers.pairing_requests import PairingDesk
-from nondum.host.peers.trust_keeper import TrustKeeper
+from nondum.host.peers.pairing_requests import PairingRequests
 from nondum.host.peers.trust_orders import TrustOrders
+from nondum.host.peers.trust_store import PeerTrustStore
 from nondum.transport.peers import HostKeys, PeerKey, Trust, fingerprint
 from nondum.transport.peers.public_file import parse_host
 
@@ -38,7 +38,7 @@ CODE = re.compile(r"code  (\d{3} \d{3})")
 class Host:
     """What a daemon does of peers, behind a control socket of its own."""
 
-    keeper: TrustKeeper
+    keeper: PeerTrustStore
     control: Path
     known: dict[PeerKey, str]
 
@@ -97,10 +97,10 @@ class Typing:
 @contextlib.asynccontextmanager
 async def host(root: Path, name: str, network: Network) -> AsyncIterator[Host]:
     folder = root / name
-    keeper = await TrustKeeper.open(folder / "peers", name)
-    desk = PairingDesk(keeper, announce=network.tells(keeper), candidates=network.all)
+    keeper = await PeerTrustStore.open(folder / "peers", name)
+    requests = PairingRequests(keeper, announce=network.tells(keeper), candidates=network.all)
     known: dict[PeerKey, str] = {}
-    orders = TrustOrders(keeper, desk, lambda: known)
+    orders = TrustOrders(keeper, requests, lambda: known)
     answering = {n: _parsing(v) for n, v in trust_orders.answering(orders).items()}
     following = {n: _parsing(v) for n, v in trust_orders.following(orders).items()}
     server = ControlServer(folder / "control.sock", answering, following)

@@ -12,9 +12,9 @@ from nondum.sdk.wire import Body
 from nondum.transport.fleet import FleetEvent, Mesh
 from nondum.transport.peers import (
     Call,
-    Errand,
     Handler,
     Identity,
+    IncomingCall,
     Lease,
     Loss,
     PeerKey,
@@ -29,12 +29,12 @@ T = TypeVar("T")
 class _Idle:
     """Does nothing for peers."""
 
-    def serve(self, errand: Errand) -> Body:
+    def serve(self, errand: IncomingCall) -> Body:
         return {}
 
     def notice(self, *_: Any) -> None: ...
 
-    def orphaned(self, errand: Errand, reason: Loss) -> Lease:
+    def orphaned(self, errand: IncomingCall, reason: Loss) -> Lease:
         return Lease.STOP
 
 

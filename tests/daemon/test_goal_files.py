@@ -56,18 +56,18 @@ def host(one_trusting: Shared[list[RunningHost]]) -> Iterator[RunningHost]:
         yield host
 
 
-def errand_name(host: RunningHost) -> str:
+def call_name(host: RunningHost) -> str:
     """Another one for each test: goals that are over stay known by their payload."""
     return f"errand-{host.release}"
 
 
-def errand_id(host: RunningHost) -> str:
-    return f"org.example.{errand_name(host)}"
+def call_id(host: RunningHost) -> str:
+    return f"org.example.{call_name(host)}"
 
 
 def wanted(host: RunningHost, number: int = 1) -> str:
     """The id of a goal of the errand."""
-    return f"{errand_id(host)}/{number}"
+    return f"{call_id(host)}/{number}"
 
 
 def beacon(host: RunningHost) -> None:
@@ -83,7 +83,7 @@ def beacon(host: RunningHost) -> None:
 def errand(host: RunningHost, *goals: str, signer: Key | None = ALICE) -> Path:
     """A drive with goals only."""
     drive = host.work / "drives/errand"
-    folder = goal_payload.write(drive, errand_id(host), goals, release=1)
+    folder = goal_payload.write(drive, call_id(host), goals, release=1)
     if signer is not None:
         sign_payload(folder, signer)
     return drive
@@ -123,9 +123,9 @@ def test_a_drive_that_comes_back_gives_its_goal_again(host: RunningHost) -> None
 
 def test_words_wait_for_the_payload_that_knows_them(host: RunningHost) -> None:
     host.plug(errand(host, "shine"))
-    host.until_step(errand_name(host), "active")
+    host.until_step(call_name(host), "active")
     shown = until_shown(host, "needs-help", "PHRASE_UNKNOWN")
-    assert shown["payload"] == errand_id(host)
+    assert shown["payload"] == call_id(host)
     beacon(host)
     host.until_goal(wanted(host), "holds")
 
@@ -134,7 +134,7 @@ def test_words_that_wait_are_forgotten_with_their_drive(host: RunningHost) -> No
     name = host.plug(errand(host, "shine"))
     until_shown(host, "needs-help", "PHRASE_UNKNOWN")
     host.pull(name)
-    host.until_gone(errand_name(host))
+    host.until_gone(call_name(host))
     beacon(host)
     until_shown(host, "ready")
     assert not host.goals()
@@ -163,17 +163,17 @@ def test_a_goal_that_nobody_signed_is_refused_unread(host: RunningHost) -> None:
 
 def test_a_goal_that_was_changed_after_it_was_signed_is_refused(host: RunningHost) -> None:
     drive = errand(host, "shine")
-    (drive / "nondum" / errand_id(host) / goals.NAME).write_text("smash\n")
+    (drive / "nondum" / call_id(host) / goals.NAME).write_text("smash\n")
     host.plug(drive)
     until_shown(host, "refused", "HASH_MISMATCH")
 
 
 def test_a_goal_file_that_is_none_is_refused_though_it_is_signed(host: RunningHost) -> None:
     drive = errand(host, "shine")
-    folder = drive / "nondum" / errand_id(host)
+    folder = drive / "nondum" / call_id(host)
     (folder / goals.NAME).write_text("\n# nothing\n")
     (folder / "CONTENTS.sig").unlink()
-    seal(folder, payload_id=errand_id(host))
+    seal(folder, payload_id=call_id(host))
     sign_payload(folder, ALICE)
     host.plug(drive)
     until_shown(host, "refused", "GOAL_FILE")
@@ -210,6 +210,6 @@ def test_a_goal_whose_drive_was_pulled_meanwhile_is_not_taken_up(tmp_path: Path)
         host.pull(name)
         host.start()
         host.until_step("beacon", "active")
-        host.until_gone(errand_name(host))
+        host.until_gone(call_name(host))
         until_shown(host, "ready")
         assert not host.goals()

@@ -16,7 +16,7 @@ from tests.kit.running_host import RunningHost
 from tests.kit.shared import Shared
 
 from nondum.sdk.wire import Body
-from nondum.transport.peers import CallFailed, Errand, Lease, Loss
+from nondum.transport.peers import CallFailed, IncomingCall, Lease, Loss
 
 pytestmark = pytest.mark.daemon
 
@@ -45,7 +45,7 @@ class Hands:
             "why": "it likes it better there",
         } | more
 
-    def serve(self, errand: Errand) -> Body:
+    def serve(self, errand: IncomingCall) -> Body:
         if errand.method == "place.want":
             return {}
         path, offset = self._files[errand.args["sha256"]], errand.args["offset"]
@@ -54,7 +54,7 @@ class Hands:
 
     def notice(self, *_: Any) -> None: ...
 
-    def orphaned(self, errand: Errand, reason: Loss) -> Lease:
+    def orphaned(self, errand: IncomingCall, reason: Loss) -> Lease:
         return Lease.STOP
 
 

@@ -25,7 +25,7 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
-from tests.campaign.rounds import Limit, Tally
+from tests.campaign.rounds import Limit, Rounds
 from tests.faults import points, power, table
 from tests.faults.points import Point, Result, clean
 from tests.kit.fork_server import Nursery
@@ -83,12 +83,12 @@ def _run(options: argparse.Namespace) -> None:
         for kind, points in planned.items()
     }
 
-    def kept() -> Tally:
+    def kept() -> Rounds:
         names = [f"{kind} {name}" for kind, name in found]
         wrong = [f"{r.kind} {r.name}" for r in found.values() if r.wrong]
-        tally = Tally(total, tuple(names), tuple(wrong))
-        tally.write(options.folder)
-        return tally
+        counter = Rounds(total, tuple(names), tuple(wrong))
+        counter.write(options.folder)
+        return counter
 
     kept()
     with ProcessPoolExecutor(options.jobs) as pool, results.open("a") as out:

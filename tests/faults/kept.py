@@ -15,9 +15,9 @@ from tests.kit.signing import Key, signed, trust_of
 
 from nondum.host.catalogue.backups import Backups
 from nondum.host.lifecycle import rebuilding
-from nondum.host.manager.crash_loop import Tally
+from nondum.host.manager.crash_loop import CrashCounter
 from nondum.host.manager.state_folders import Folders
-from nondum.host.peers.trust_keeper import KEY_NAME, TRUST_NAME
+from nondum.host.peers.trust_store import KEY_NAME, TRUST_NAME
 from nondum.host.trust import chain
 from nondum.transport.peers import HostKeys, Trust, trust_file
 from nondum.transport.peers.keys import load_or_create
@@ -35,7 +35,7 @@ def keep(folders: Folders, nth: int) -> Iterator[Path]:
     note = folders.note(f"{nth:016x}")
     rebuilding.write_note(note, "a", folders.payloads / note.stem)
     yield note
-    Tally(folders.root).begin()
+    CrashCounter(folders.root).begin()
     yield folders.root / "deaths"
     backups = Backups(folders.catalogue)
     backups.make()

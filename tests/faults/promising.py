@@ -25,10 +25,10 @@ from nondum.host.core.records import Safety
 from nondum.host.jobs import install as install_job
 from nondum.host.lifecycle import rebuilding
 from nondum.host.manager import installation
-from nondum.host.manager.crash_loop import Tally
+from nondum.host.manager.crash_loop import CrashCounter
 from nondum.host.manager.state_folders import Folders
 from nondum.host.peers.placement.pins import Pins
-from nondum.host.peers.trust_keeper import CERTIFICATE_NAME, KEY_NAME, TRUST_NAME, TrustKeeper
+from nondum.host.peers.trust_store import CERTIFICATE_NAME, KEY_NAME, TRUST_NAME, PeerTrustStore
 from nondum.host.trust import anchors, chain
 from nondum.transport.peers import HostKeys, fleet_files
 from nondum.transport.peers.certificate import issue, new_fleet
@@ -102,7 +102,7 @@ def follow_trust(folders: Folders) -> None:
 
 async def keep_peers(folders: Folders) -> None:
     """This host's key and certificate, whom it trusts and whom no more, and what is pinned."""
-    keeper = await TrustKeeper.open(folders.peers, "spot")
+    keeper = await PeerTrustStore.open(folders.peers, "spot")
     promise(Kind.WHOLE, folders.peers / KEY_NAME)
     other = HostKeys.generate().public
     await keeper.pair(other, "rover")
@@ -160,7 +160,7 @@ def _install(folders: Folders, elsewhere: Path, key: str, method: str) -> None:
 
 def count(folders: Folders) -> None:
     """Daemons that died soon."""
-    assert Tally(folders.root).begin()[0] is Safety.OFF
+    assert CrashCounter(folders.root).begin()[0] is Safety.OFF
     promise(Kind.WHOLE, folders.root / "deaths")
 
 

@@ -67,7 +67,7 @@ def _fuzz(chosen: Sequence[Target], options: argparse.Namespace) -> int:
         except KeyboardInterrupt:
             pool.shutdown(wait=False, cancel_futures=True)
             _end()
-    if work.tally.is_whole and not options.targets:
+    if work.progress.is_whole and not options.targets:
         rows = [_read(options.folder, target) for target in chosen]
         PAGE.parent.mkdir(exist_ok=True)
         PAGE.write_text(HEAD + "\n".join(_rows(chosen, rows)) + "\n", encoding="utf-8")

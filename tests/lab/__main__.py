@@ -66,7 +66,7 @@ def _run(labs: list[Lab], known: dict[str, Scenario], due: Round, asked: argpars
             return
         results.append(result)
         due.add(name, passed=not result.failure)
-        _show(result, f"{due.limit} {due.tally}  " if asked.folder else "")
+        _show(result, f"{due.limit} {due.progress}  " if asked.folder else "")
         if asked.keep and result.kept is None:
             print(f"    kept: {keep(name, lab)}")
 
@@ -85,7 +85,7 @@ def _run(labs: list[Lab], known: dict[str, Scenario], due: Round, asked: argpars
     replugs = sum(result.replugs for result in results)
     print(f"\nboots: {boots} s; drives plugged in again because they stalled: {replugs}")
     print(f"{len(results) - failed} passed, {failed} failed")
-    return 1 if due.tally.failed else 0
+    return 1 if due.progress.failed else 0
 
 
 def _show(result: Result, head: str) -> None:

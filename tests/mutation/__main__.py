@@ -78,8 +78,8 @@ def main() -> int:
             told = f"All of them took {minutes} minutes on {len(made)} processors."
             _write(every, guards, told)
     if tried:
-        sys.stdout.write(f"{tried.tally} tried, {len(tried.tally.failed)} without a guard\n")
-        return 1 if tried.tally.failed or broken else 0
+        sys.stdout.write(f"{tried.counter} tried, {len(tried.counter.failed)} without a guard\n")
+        return 1 if tried.counter.failed or broken else 0
     missing = [key for key in due if guards.get(key, page.MISSING) == page.MISSING]
     sys.stdout.write(f"{len(steps)} steps, {len(due)} tried, {len(missing)} without a guard\n")
     return 1 if missing or broken else 0

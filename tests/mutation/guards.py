@@ -234,7 +234,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/peers/goals.py": (f"{_TH}/peers/test_goals.py",),
     f"{_H}/peers/asking.py": (f"{_TH}/peers/test_asking.py",),
     f"{_H}/peers/pairing_requests.py": (f"{_TH}/peers/test_pairing_requests.py",),
-    f"{_H}/peers/trust_keeper.py": (f"{_TH}/peers/test_trust_keeper.py",),
+    f"{_H}/peers/trust_store.py": (f"{_TH}/peers/test_trust_store.py",),
     f"{_H}/peers/placement/fetching.py": (f"{_TH}/peers/placement/test_fetching.py",),
     # Which other hosts are let in, and what they may say.
     f"{_T}/peers/allowance.py": (f"{_TT}/peers/test_allowance.py",),

@@ -8,7 +8,7 @@ import pytest
 from tests.planning.simulation import Robot, Troubles, replanned, task_tree
 from tests.planning.tasks import FOLLOW_LASTING, FOLLOW_PLAN, follow_task, plan_of, survey_task
 
-from nondum.planning.execute.change_filter import Attention
+from nondum.planning.execute.change_filter import ChangeFilter
 from nondum.planning.execute.plan_executive import Phase
 from nondum.planning.execute.task_tree import StepLeaf, TaskTree
 
@@ -50,7 +50,7 @@ def test_decisions_that_are_spared_would_change_nothing(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     thrifty = life(seed)
-    monkeypatch.setattr(Attention, "is_as_before", lambda *_: False)
+    monkeypatch.setattr(ChangeFilter, "is_as_before", lambda *_: False)
     assert life(seed) == thrifty
 
 

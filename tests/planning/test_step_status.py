@@ -15,13 +15,13 @@ from tests.planning.tasks import (
 
 from nondum.planning.execute.partial_order import GOAL
 from nondum.planning.execute.running import RunState
-from nondum.planning.execute.step_status import StepState, Whereabouts
+from nondum.planning.execute.step_status import StepState, StepStatus
 from nondum.planning.execute.task_tree import StepLeaf, TaskTree
 
 CARRY = ("pick ball0 a", "move a b", "drop ball0 b")
 
 
-def where(tree: TaskTree) -> list[Whereabouts]:
+def where(tree: TaskTree) -> list[StepStatus]:
     return [leaf.where() for leaf in tree.children if isinstance(leaf, StepLeaf)]
 
 

@@ -85,15 +85,15 @@ def run(job: Job, *, shown: bool = False) -> Done:
     return done
 
 
-def beside(*lanes: Sequence[Job]) -> list[Done]:
+def beside(*queues: Sequence[Job]) -> list[Done]:
     """Run lanes at the same time, the jobs of each one after the other. The first lane is shown."""
 
-    def ride(number: int, lane: Iterable[Job]) -> list[Done]:
-        return [run(job, shown=number == 0) for job in lane]
+    def ride(number: int, queue: Iterable[Job]) -> list[Done]:
+        return [run(job, shown=number == 0) for job in queue]
 
-    with ThreadPoolExecutor(len(lanes)) as pool:
-        done = pool.map(ride, range(len(lanes)), lanes)
-        return [one for lane in done for one in lane]
+    with ThreadPoolExecutor(len(queues)) as pool:
+        done = pool.map(ride, range(len(queues)), queues)
+        return [one for queue in done for one in queue]
 
 
 def _from_checkout(job: Job, one: Result) -> Result:

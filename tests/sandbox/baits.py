@@ -22,7 +22,7 @@ from tests.kit.workers import WorkersUnderTest
 from tests.sandbox.escape import ATTEMPTS
 
 from nondum.host.core.events import WorkerLogged
-from nondum.host.sandbox.cgroups import Cages
+from nondum.host.sandbox.cgroups import Cgroups
 from nondum.host.sandbox.inside import mounts
 from nondum.host.workers.confinements import Confinement
 from nondum.host.workers.launcher import WorkerLauncher
@@ -55,7 +55,7 @@ class Result:
 
 def unlimited(folder: Path) -> set[str]:
     """What this machine does not limit, at any level."""
-    return set() if "memory" in Cages.open(folder).holds else SHARED_MEMORY
+    return set() if "memory" in Cgroups.open(folder).holds else SHARED_MEMORY
 
 
 @contextmanager
@@ -167,24 +167,24 @@ async def attempted(
     confinement: Confinement,
     attempts: Sequence[str] = (),
     limits: Limits = SMALL,
-    cages: Cages | None = None,
+    cgroups: Cgroups | None = None,
 ) -> dict[str, Result]:
-    """What the hostile plugin can do, or some of it, so confined; `cages` are the machine's, if
+    """What the hostile plugin can do, or some of it, so confined; `cgroups` are the machine's, if
     none are given.
 
     A memory cgroup of Linux 4.19 and later ends the whole worker with an attempt to take memory
     that only it limits: the others are made by the next one.
     """
     left, results = list(attempts or ATTEMPTS), dict[str, Result]()
-    cages = cages or Cages.open(folder)
+    cgroups = cgroups or Cgroups.open(folder)
     try:
         while left:
             place = folder / f"worker-{len(left)}"
-            found = await _attempted(place, bait, confinement, left, limits, cages)
+            found = await _attempted(place, bait, confinement, left, limits, cgroups)
             results |= found
             left = left[len(found) :]
     finally:
-        cages.close()
+        cgroups.close()
     return results
 
 
@@ -194,11 +194,11 @@ async def _attempted(
     confinement: Confinement,
     attempts: Sequence[str],
     limits: Limits,
-    cages: Cages,
+    cgroups: Cgroups,
 ) -> dict[str, Result]:
     """What one worker comes to, until the first attempt that ends it."""
     tested = WorkersUnderTest(folder, confinement=confinement)
-    tested.workers.launcher = WorkerLauncher(confinement, cages)
+    tested.workers.launcher = WorkerLauncher(confinement, cgroups)
     tested.workers.timing = replace(tested.timing, startup_s=120.0)
     source = ESCAPE.read_text(encoding="utf-8")
     summary = source.removeprefix('"""').partition("\n")[0]

@@ -12,7 +12,7 @@ import pytest
 from tests.sandbox.baits import LEFT_WHEN_RESTRICTED, SHARED_MEMORY, attempted, laid, unlimited
 from tests.sandbox.escape import ATTEMPTS
 
-from nondum.host.sandbox.cgroups import Cages
+from nondum.host.sandbox.cgroups import Cgroups
 from nondum.host.sandbox.cgroups.groups import NoTree
 from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined
 
@@ -36,8 +36,8 @@ async def test_without_memory_cgroups_shared_memory_is_not_limited(
 ) -> None:
     """What docs/confinement.md says of such machines is so. Private memory is limited there, too"""
     names = ["take all memory", *sorted(SHARED_MEMORY)]
-    boxed, no_cages = Boxed(shutil.which("bwrap") or "bwrap"), Cages(NoTree())
-    results = await attempted(tmp_path, bait, boxed, names, cages=no_cages)
+    boxed, no_cgroups = Boxed(shutil.which("bwrap") or "bwrap"), Cgroups(NoTree())
+    results = await attempted(tmp_path, bait, boxed, names, cgroups=no_cgroups)
     assert {name for name, result in results.items() if result.could} == SHARED_MEMORY
 
 

@@ -15,7 +15,7 @@ from tests.sandbox.guests import does, guest, parent, status
 
 from nondum.host.sandbox.inside import kernel
 from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined
-from nondum.host.workers.init_link import Keeper
+from nondum.host.workers.init_link import InitLink
 from nondum.host.workers.launcher import parameters
 from nondum.host.workers.spare import ROOM, ROOM_BYTES
 
@@ -55,7 +55,7 @@ async def test_keeper_says_who_it_is_so_that_the_end_of_its_room_is_seen(
         )
         order = json.dumps(parameters(spec, entry, looks=True)).encode()
         socket.send_fds(ours, [order], [far.fileno()])
-        keeper = Keeper(ours)
+        keeper = InitLink(ours)
         assert await process.wait() == 0
     pidfd = keeper.take_pidfd()
     assert keeper.worker is not None

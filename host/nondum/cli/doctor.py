@@ -124,16 +124,16 @@ def limits(session: Session) -> int:
 
     Example: nondum doctor limits
     """
-    from nondum.host.sandbox.cgroups import Cages
+    from nondum.host.sandbox.cgroups import Cgroups
 
-    cages = Cages.open(Path(tempfile.gettempdir()) / f"nondum-doctor-{os.getpid()}")
-    problems = cages.problems()
-    cages.close()
-    rows = [{"limit": name, "held": name in cages.holds} for name in ("memory", "pids", "cpu")]
+    cgroups = Cgroups.open(Path(tempfile.gettempdir()) / f"nondum-doctor-{os.getpid()}")
+    problems = cgroups.problems()
+    cgroups.close()
+    rows = [{"limit": name, "held": name in cgroups.holds} for name in ("memory", "pids", "cpu")]
     if session.as_json:
         told = [problem.to_dict() for problem in problems]
         render.as_json(
-            {"ok": not problems, "cgroups": cages.kind, "limits": rows, "problems": told}
+            {"ok": not problems, "cgroups": cgroups.kind, "limits": rows, "problems": told}
         )
     else:
         table(rows, ["limit", "held"], empty="")

@@ -38,7 +38,7 @@ from nondum.host.lifecycle import crash_attribution, safe_mode
 from nondum.host.lifecycle.advance import RULES
 from nondum.host.manager import automatic_retry, state_lock
 from nondum.host.manager.component_manager import ComponentManager
-from nondum.host.manager.crash_loop import Tally
+from nondum.host.manager.crash_loop import CrashCounter
 from nondum.host.manager.effect_handlers import Executor
 from nondum.host.manager.installation import InstallOptions
 from nondum.host.manager.payload_trust import TrustOptions
@@ -46,7 +46,7 @@ from nondum.host.manager.refusal_retry import TryingAgain
 from nondum.host.manager.state_folders import Folders, let_pass, make_private, remove_temporary
 from nondum.host.mind.frames import mounts_of_all
 from nondum.host.mind.mind import Mind
-from nondum.host.mind.mounts import TellingMounts
+from nondum.host.mind.mounts import MountUpdates
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.system_tree import load_system_tree
 from nondum.host.people.announcements import announced
@@ -58,7 +58,7 @@ from nondum.host.people.goal_files import GoalFiles, of_people
 from nondum.host.people.stop_button.button import StopButton
 from nondum.host.people.stop_button.hook import StopHook
 from nondum.host.people.stopping import Stopped, Stopping, is_stop_for_stranger, said_to
-from nondum.host.sandbox.cgroups import Cages
+from nondum.host.sandbox.cgroups import Cgroups
 from nondum.host.sandbox.helper import privileged
 from nondum.host.service import journal, malloc
 from nondum.host.service.notify import Notifier
@@ -71,7 +71,7 @@ from nondum.host.sources.devices.software import Software
 from nondum.host.sources.devices.source import DeviceSource
 from nondum.host.sources.devices.udev import UdevSource
 from nondum.host.sources.drives.blocks import BlockSource
-from nondum.host.sources.drives.debounce import Steady
+from nondum.host.sources.drives.debounce import Debounced
 from nondum.host.sources.drives.slots import SlotSource
 from nondum.host.sources.drives.source import DriveSource
 from nondum.host.trust.clock import ClockWatch
@@ -122,13 +122,13 @@ async def _run_as(
     try:
         await in_thread(make_private, folders)
         await in_thread(remove_temporary, folders)
-        tally = Tally(folders.root)
-        safety = await in_thread(tally.begin, asked)
+        counter = CrashCounter(folders.root)
+        safety = await in_thread(counter.begin, asked)
         keep = config.journal.keep
         catalogue = await Catalogue.open(folders.catalogue, config.host.name, keep=keep)
         try:
-            await _run(service, config, folders, catalogue, tally, safety, more_drives, stop)
-            await in_thread(tally.clear)
+            await _run(service, config, folders, catalogue, counter, safety, more_drives, stop)
+            await in_thread(counter.clear)
         finally:
             await catalogue.close()
     finally:
@@ -141,14 +141,14 @@ async def _run(
     config: HostConfig,
     folders: Folders,
     catalogue: Catalogue,
-    tally: Tally,
+    counter: CrashCounter,
     safety: tuple[Safety, str],
     more_drives: Sequence[DriveSource],
     stop: asyncio.Event,
 ) -> None:
     bus = Bus(RULES)
     timing = Timing(startup_s=config.workers.startup_s, settle_beats=config.workers.settle_beats)
-    cages = await in_thread(_cages, folders)
+    cgroups = await in_thread(_cgroups, folders)
     standing = await in_thread(
         confinement_choice.standing,
         config.workers.confinement,
@@ -159,7 +159,7 @@ async def _run(
     confinement = confinement_choice.confinement(standing, folders.of_workers)
     if changes_user(confinement):
         await in_thread(let_pass, folders)
-    launcher = WorkerLauncher(confinement, cages, folders.scratches, timing.startup_s)
+    launcher = WorkerLauncher(confinement, cgroups, folders.scratches, timing.startup_s)
     workers = Workers(config.host.name, bus.emit, launcher=launcher, timing=timing)
     executor = Executor(config.host.name, folders, workers, bus.emit, _install_options(config))
     manager = ComponentManager(catalogue, executor, bus)
@@ -199,7 +199,7 @@ async def _run(
     software = Software(catalogue.snapshot, mind.people.tell)
     bus.subscribe(software.on_event)
     bus.subscribe(service.on_event)
-    bus.subscribe(tally.on_event)
+    bus.subscribe(counter.on_event)
     if journal.is_in_use():
         bus.subscribe(Telling(catalogue.snapshot).on_event)
     listing = executor.installation.listing
@@ -211,13 +211,13 @@ async def _run(
             *executor.trust.warnings,
             *map(str, clock.problems),
             *_warnings(catalogue, safety[1]),
-            *tally.warnings(),
+            *counter.warnings(),
             *crash_attribution.counts(catalogue.snapshot()),
             *standing.warnings(),
             *feedback.warnings,
             *stop_hook.warnings,
             *stop_button.warnings,
-            *map(str, cages.problems()),
+            *map(str, cgroups.problems()),
             *map(str, (*slot_problems(drives), *slot_problems(devices))),
             *of_peers,
         )
@@ -303,7 +303,7 @@ async def _run(
             mind.run(),
             backups.keep(catalogue.backups, lambda: catalogue.revision, config.backups.every_s),
             software.run(),
-            tally.outlive(),
+            counter.outlive(),
             service.watched(
                 (
                     Part("the component manager", lambda: bus.taken, lambda: bus.followed),
@@ -320,7 +320,7 @@ async def _run(
             goal_files.run(),
             trying_again.run(),
             clock.run(),
-            automatic_retry.hold(catalogue.snapshot, tally, bus.emit),
+            automatic_retry.hold(catalogue.snapshot, counter, bus.emit),
             *(source.watch(bus.emit) for source in devices),
         )
     finally:
@@ -330,7 +330,7 @@ async def _run(
         if neighbours is not None:
             await neighbours.close()
         await workers.close()
-        await in_thread(cages.close)
+        await in_thread(cgroups.close)
 
 
 async def _neighbours(
@@ -367,16 +367,16 @@ async def _neighbours(
     )
 
 
-def _cages(folders: Folders) -> Cages:
-    """Where workers are caged: by this process, else by the helper. The last daemon's are ended."""
-    cages = Cages.open(folders.root)
-    if not cages.holds:
+def _cgroups(folders: Folders) -> Cgroups:
+    """Cgroups of workers, made by this process or the helper. The last daemon's are ended."""
+    cgroups = Cgroups.open(folders.root)
+    if not cgroups.holds:
         try:
-            cages = Cages(privileged().cages())
+            cgroups = Cgroups(privileged().cgroups())
         except NondumError as error:
             log.warning("%s", error)
-    cages.sweep()
-    return cages
+    cgroups.sweep()
+    return cgroups
 
 
 def _take(neighbours: Neighbourhood | None, mind: Mind, stopping: Stopping) -> Take:
@@ -417,7 +417,7 @@ def drive_sources(config: HostConfig, folders: Folders) -> list[DriveSource]:
     if config.drives.block_devices:
         single_function = config.drives.single_function
         mounts = privileged().mounts(folders.mounts)
-        sources.append(Steady(BlockSource(mounts, single_function=single_function)))
+        sources.append(Debounced(BlockSource(mounts, single_function=single_function)))
     return sources
 
 
@@ -461,7 +461,7 @@ class _Listener:
 
     def __init__(self, catalogue: Catalogue, mind: Mind, workers: Workers) -> None:
         self._catalogue, self._mind, self._workers = catalogue, mind, workers
-        self._mounts = TellingMounts(workers.remount, mind.after_tick)
+        self._mounts = MountUpdates(workers.remount, mind.after_tick)
 
     def on_event(self, event: Event) -> None:
         """A start or a recomposition is a new snapshot; everything else is news."""

@@ -14,7 +14,7 @@ from tests.kit.payloads import Part
 from tests.kit.running_host import DAEMON, READY_S, RunningHost
 from tests.kit.until import until
 
-from nondum.host.peers.trust_keeper import KEY_NAME, TRUST_NAME
+from nondum.host.peers.trust_store import KEY_NAME, TRUST_NAME
 from nondum.transport.peers import Trust, trust_file
 from nondum.transport.peers.keys import load_or_create
 

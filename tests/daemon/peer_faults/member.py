@@ -31,9 +31,9 @@ from nondum.transport.peers import (
     Admission,
     CallFailed,
     DialFailed,
-    Errand,
     HostKeys,
     Identity,
+    IncomingCall,
     Lease,
     Loss,
     PeerKey,
@@ -71,7 +71,7 @@ class Works:
         """Write to a file of this life."""
         self._log = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL)
 
-    def serve(self, errand: Errand) -> Body | Awaitable[Body]:
+    def serve(self, errand: IncomingCall) -> Body | Awaitable[Body]:
         if errand.method == "echo":
             return errand.args
         if errand.method in ENDINGS:
@@ -81,10 +81,10 @@ class Works:
     def notice(self, caller: Admission, method: str, args: dict[str, Any]) -> None:
         self.noticed += 1
 
-    def orphaned(self, errand: Errand, reason: Loss) -> Lease:
+    def orphaned(self, errand: IncomingCall, reason: Loss) -> Lease:
         return ENDINGS.get(errand.method, Lease.STOP)
 
-    async def _work(self, errand: Errand) -> Body:
+    async def _work(self, errand: IncomingCall) -> Body:
         piece = errand.args["piece"]
         self.running.add(piece)
         self.idle.clear()

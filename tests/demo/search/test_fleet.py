@@ -9,15 +9,15 @@ from pathlib import Path
 import pytest
 from demo.search.fleet import Fleet
 
-from nondum.host.peers.trust_keeper import TrustKeeper
+from nondum.host.peers.trust_store import PeerTrustStore
 from nondum.transport.peers import PeerRefused, certificate
 
 
-def opened(name: str, state: Path) -> TrustKeeper:
-    return asyncio.run(TrustKeeper.open(state / "peers", name))
+def opened(name: str, state: Path) -> PeerTrustStore:
+    return asyncio.run(PeerTrustStore.open(state / "peers", name))
 
 
-def admit(host: TrustKeeper, other: TrustKeeper) -> None:
+def admit(host: PeerTrustStore, other: PeerTrustStore) -> None:
     """As a host does with what another one shows it."""
     assert other.certificate is not None
     certificate.verify(other.certificate, host.trust.fleets, datetime.now(UTC))

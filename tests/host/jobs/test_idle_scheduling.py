@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from nondum.host.jobs.idle_scheduling import Quiet
+from nondum.host.jobs.idle_scheduling import IdleScheduler
 
 pytestmark = pytest.mark.anyio
 
@@ -32,12 +32,12 @@ class Work:
 async def test_work_is_done_when_it_is_quiet() -> None:
     work = Work()
     work.go.set()
-    assert await Quiet(settled_s=0.0).run(work) == "done"
+    assert await IdleScheduler(settled_s=0.0).run(work) == "done"
     assert (work.times, work.cancelled) == (1, 0)
 
 
 async def test_work_waits_for_what_is_urgent() -> None:
-    quiet, work = Quiet(settled_s=0.01), Work()
+    quiet, work = IdleScheduler(settled_s=0.01), Work()
     work.go.set()
     with quiet.urgent():
         running = asyncio.create_task(quiet.run(work))
@@ -48,7 +48,7 @@ async def test_work_waits_for_what_is_urgent() -> None:
 
 
 async def test_work_gives_way_and_is_begun_again() -> None:
-    quiet, work = Quiet(settled_s=0.01), Work()
+    quiet, work = IdleScheduler(settled_s=0.01), Work()
     running = asyncio.create_task(quiet.run(work))
     await work.begun.wait()
     work.begun.clear()
@@ -62,7 +62,7 @@ async def test_work_gives_way_and_is_begun_again() -> None:
 
 
 async def test_one_piece_of_work_at_a_time() -> None:
-    quiet, first, second = Quiet(settled_s=0.0), Work(), Work()
+    quiet, first, second = IdleScheduler(settled_s=0.0), Work(), Work()
     running = [asyncio.create_task(quiet.run(work)) for work in (first, second)]
     await first.begun.wait()
     await asyncio.wait(running, timeout=0.05)
@@ -73,7 +73,7 @@ async def test_one_piece_of_work_at_a_time() -> None:
 
 
 async def test_cancelled_work_has_ended() -> None:
-    quiet, work = Quiet(settled_s=0.0), Work()
+    quiet, work = IdleScheduler(settled_s=0.0), Work()
     running = asyncio.create_task(quiet.run(work))
     await work.begun.wait()
     running.cancel()
@@ -84,7 +84,7 @@ async def test_cancelled_work_has_ended() -> None:
 
 
 async def test_work_that_fails_is_not_begun_again() -> None:
-    quiet = Quiet(settled_s=0.0)
+    quiet = IdleScheduler(settled_s=0.0)
     times = 0
 
     async def fail() -> None:

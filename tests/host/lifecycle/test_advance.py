@@ -179,7 +179,7 @@ def test_why_a_worker_ended_stays_with_its_component_until_the_next_one_is_stead
     state, _ = after(ended, again, state=active())
     assert state.components["eye"].state is ComponentState.READY
     assert state.components["eye"].problems == (PROBLEM,)
-    state, _ = after(events.WorkerSteady("eye"), state=state)
+    state, _ = after(events.WorkerStable("eye"), state=state)
     assert state.components["eye"].problems == ()
 
 
@@ -190,7 +190,7 @@ def test_condition_that_has_ended_is_a_problem_of_its_component_while_its_worker
     assert state.components["eye"].problems == (dead,)
     assert state.components["eye"].is_ready
     assert after(told, state=state) == (state, [])
-    assert after(events.WorkerSteady("eye"), state=state) == (state, [])
+    assert after(events.WorkerStable("eye"), state=state) == (state, [])
     state, _ = after(events.WorkerExited("eye", "signal 9"), state=state)
     assert state.components["eye"].problems == ()
 
@@ -316,7 +316,7 @@ HAPPENINGS: list[Event] = [
     *(events.RetryAsked(key) for key in ("k1", "k2", "k3")),
     events.WorkerExited("eye", "test"),
     events.WorkerExited("eye", "test", problem=PROBLEM),
-    events.WorkerSteady("eye"),
+    events.WorkerStable("eye"),
     events.ConditionEnded("eye", "sees", (PROBLEM,)),
     events.WorkerFailed("arm", (PROBLEM,)),
     events.WorkerReady("eye", PluginDescription("eye", "1.0")),

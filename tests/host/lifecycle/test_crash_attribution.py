@@ -82,7 +82,7 @@ def test_drive_that_was_pulled_while_no_daemon_ran_is_forgotten_after_a_while() 
     scanned = on(state, events.DrivesScanned("slot", ()))
     assert scanned.tries == {DRIVE: 1}
     assert died(on(scanned, drive())).tries == {DRIVE: 2}
-    assert not on(scanned, events.HostSteady("spot")).tries
+    assert not on(scanned, events.HostStable("spot")).tries
 
 
 def numbered(number: int, mark: str = "Acme-0042") -> events.DriveInserted:
@@ -116,7 +116,7 @@ def test_payload_is_left_alone_after_the_machine_was_started_anew(is_found_late:
             on(state, numbered(1), found(drive="sda-1"), events.DriveRead("sda-1", ("k1",)))
         )
     state = on(state, numbered(1), found(drive="sda-1"), events.DriveRead("sda-1", ("k1",)))
-    state = on(state, events.HostSteady("spot"))
+    state = on(state, events.HostStable("spot"))
     assert state.payloads["k1"].step is Step.REFUSED
     scanned = events.DrivesScanned("block", () if is_found_late else ("sda-2",))
     news = (scanned, numbered(2)) if is_found_late else (numbered(2), scanned)
@@ -153,18 +153,18 @@ def test_payload_is_refused_after_too_many_deaths_and_retried_when_asked() -> No
 def test_daemon_that_lives_on_clears_what_is_active_for_long_enough() -> None:
     state = died(active())
     back = on(state, drive(), events.DriveRead("a", ("k1",)), *way_to_active()[5:])
-    assert on(back, events.HostSteady("spot")).tries == {"k1": 1}
-    assert not advance(back, events.HostSteady("spot"), LATER).state.tries
+    assert on(back, events.HostStable("spot")).tries == {"k1": 1}
+    assert not advance(back, events.HostStable("spot"), LATER).state.tries
 
 
 @pytest.mark.parametrize(("step", "is_kept"), [(Step.STORED, True), (Step.REFUSED, False)])
 def test_what_is_still_begun_stays_counted(step: Step, is_kept: bool) -> None:
     state = replace(on(at_step(step), events.DriveRead("a", ("k1",))), tries={"k1": 1})
-    assert on(state, events.HostSteady("spot")).tries == ({"k1": 1} if is_kept else {})
+    assert on(state, events.HostStable("spot")).tries == ({"k1": 1} if is_kept else {})
 
 
 def test_nothing_is_cleared_while_a_drive_is_being_read() -> None:
     state = replace(on(HostState("spot"), drive()), tries={"k9": 3})
-    assert on(state, events.HostSteady("spot")).tries == {"k9": 3}
+    assert on(state, events.HostStable("spot")).tries == {"k9": 3}
     read = on(state, events.DriveRead("a", ()))
-    assert not on(read, events.HostSteady("spot")).tries
+    assert not on(read, events.HostStable("spot")).tries

@@ -13,7 +13,7 @@ from tests.kit.host import HOST, LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.core.events import DrivesScanned, Emit, HostSteady, MountSet
+from nondum.host.core.events import DrivesScanned, Emit, HostStable, MountSet
 from nondum.host.core.records import ComponentState, Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle.crash_attribution import STEADY_S
@@ -246,7 +246,7 @@ async def test_daemon_that_lives_on_clears_what_was_counted(
         assert host.catalogue.state.tries
         await clock.advance(STEADY_S * 0.1)
         await host.until(lambda: not host.catalogue.state.tries)
-        assert "HostSteady" in [entry.event for entry in await host.journal()]
+        assert "HostStable" in [entry.event for entry in await host.journal()]
 
 
 async def test_nothing_is_cleared_before_it_is_known_what_is_plugged_in(
@@ -265,7 +265,7 @@ async def test_nothing_is_cleared_before_it_is_known_what_is_plugged_in(
         await clock.advance(STEADY_S)
         await host.until(lambda: not host.catalogue.state.tries)
         order = [type(event) for event in host.heard]
-        assert order[: order.index(HostSteady)].count(DrivesScanned) == len(("slot", "block"))
+        assert order[: order.index(HostStable)].count(DrivesScanned) == len(("slot", "block"))
 
 
 class SlowSource:

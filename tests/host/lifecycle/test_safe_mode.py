@@ -12,7 +12,7 @@ from nondum.host.core.records import DriveState, Safety, Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle import safe_mode
 from nondum.host.lifecycle.recovery import recover
-from nondum.host.manager.crash_loop import Tally
+from nondum.host.manager.crash_loop import CrashCounter
 
 SAFE = (Safety.INITIAL, Safety.NOTHING)
 STARTING = (effects.ProbeComponents, effects.ReadDrive, effects.CopyPayload)
@@ -138,7 +138,7 @@ def test_deaths_that_were_counted_before_are_counted_on_afterwards() -> None:
     state = recover(after(drive())[0], AT).state
     assert state.tries == {"slot:a": 1}
     state, _ = safely(state)
-    state, _ = after(events.HostSteady("spot"), state=state)
+    state, _ = after(events.HostStable("spot"), state=state)
     assert state.tries == {"slot:a": 1}
 
 
@@ -147,7 +147,7 @@ def test_deaths_that_were_counted_before_are_counted_on_afterwards() -> None:
 
 def died(state: Path, times: int) -> None:
     for _ in range(times):
-        Tally(state).begin()
+        CrashCounter(state).begin()
 
 
 @pytest.mark.parametrize(
@@ -163,36 +163,36 @@ def died(state: Path, times: int) -> None:
 )
 def test_so_many_deaths_in_a_row_call_for_it(tmp_path: Path, deaths: int, safety: Safety) -> None:
     died(tmp_path, deaths)
-    found, why = Tally(tmp_path).begin()
+    found, why = CrashCounter(tmp_path).begin()
     assert found is safety
     assert ("daemons in a row died soon" in why) == (safety is not Safety.OFF)
 
 
 def test_daemon_that_lived_long_enough_clears_it(tmp_path: Path) -> None:
     died(tmp_path, safe_mode.DEATHS)
-    Tally(tmp_path).clear()
-    assert Tally(tmp_path).begin()[0] is Safety.OFF
+    CrashCounter(tmp_path).clear()
+    assert CrashCounter(tmp_path).begin()[0] is Safety.OFF
 
 
 @pytest.mark.anyio
 async def test_the_while_begins_once_it_serves(tmp_path: Path) -> None:
     died(tmp_path, safe_mode.DEATHS)
-    tally = Tally(tmp_path, soon_s=0.0)
-    tally.begin()
-    tally.on_event(events.HostStarted("spot"))
-    await tally.outlive()
-    assert Tally(tmp_path).begin()[0] is Safety.OFF
+    counter = CrashCounter(tmp_path, soon_s=0.0)
+    counter.begin()
+    counter.on_event(events.HostStarted("spot"))
+    await counter.outlive()
+    assert CrashCounter(tmp_path).begin()[0] is Safety.OFF
 
 
 def test_people_ask_for_it_by_a_file(tmp_path: Path) -> None:
     (tmp_path / "safe").touch()
-    assert Tally(tmp_path).begin() == (Safety.INITIAL, f"there is {tmp_path}/safe")
+    assert CrashCounter(tmp_path).begin() == (Safety.INITIAL, f"there is {tmp_path}/safe")
     (tmp_path / "safe").write_text("nothing\n", encoding="ascii")
-    assert Tally(tmp_path).begin()[0] is Safety.NOTHING
+    assert CrashCounter(tmp_path).begin()[0] is Safety.NOTHING
 
 
 def test_people_ask_for_it_as_they_start_it(tmp_path: Path) -> None:
-    assert Tally(tmp_path).begin(Safety.NOTHING)[0] is Safety.NOTHING
+    assert CrashCounter(tmp_path).begin(Safety.NOTHING)[0] is Safety.NOTHING
 
 
 @pytest.mark.parametrize(
@@ -212,11 +212,11 @@ def test_people_ask_for_it_on_the_kernels_command_line(words: str, safety: Safet
 def test_folder_that_cannot_be_written_is_no_reason_not_to_start(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    assert Tally(tmp_path / "none").begin()[0] is Safety.OFF
+    assert CrashCounter(tmp_path / "none").begin()[0] is Safety.OFF
     assert "deaths of daemons are not counted" in caplog.text
 
 
 @pytest.mark.parametrize("text", ["", "many", "-3", "\xff", "99999999999999999999"])
 def test_count_that_is_none_is_taken_for_what_it_is_worth(tmp_path: Path, text: str) -> None:
     (tmp_path / "deaths").write_text(text, encoding="latin-1")
-    assert isinstance(Tally(tmp_path).begin()[0], Safety)
+    assert isinstance(CrashCounter(tmp_path).begin()[0], Safety)

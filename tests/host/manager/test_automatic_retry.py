@@ -11,7 +11,7 @@ from tests.host.lifecycle.states import AT, active, after, drive, found, way_to_
 from tests.kit.clock import VirtualClock
 
 from nondum.host.core import effects, events
-from nondum.host.core.events import DriveRetried, Event, HostSteady, RetryAsked, TrialDue
+from nondum.host.core.events import DriveRetried, Event, HostStable, RetryAsked, TrialDue
 from nondum.host.core.records import Moment, Safety, Snapshot, Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle import crash_attribution, safe_mode
@@ -19,7 +19,7 @@ from nondum.host.lifecycle.advance import advance
 from nondum.host.lifecycle.crash_attribution import ATTEMPTS, STEADY_S
 from nondum.host.lifecycle.recovery import recover
 from nondum.host.manager.automatic_retry import AFTER_S, APART_S, hold
-from nondum.host.manager.crash_loop import SOON_S, Tally
+from nondum.host.manager.crash_loop import SOON_S, CrashCounter
 
 DUE = TrialDue("spot")
 LATER = Moment(AT.monotonic_s + STEADY_S, AT.wall_s)
@@ -49,7 +49,7 @@ def test_payload_is_tried_once_and_is_well_if_the_daemon_lives() -> None:
     assert state.payloads["k1"].step is Step.STORED
     assert [type(effect) for effect in done] == [effects.ProbeComponents]
     state = on(state, *way_to_active()[5:])
-    assert not advance(state, HostSteady("spot"), LATER).state.tries
+    assert not advance(state, HostStable("spot"), LATER).state.tries
 
 
 def test_payload_that_kills_its_trial_is_left_to_people() -> None:
@@ -114,9 +114,9 @@ class Daemon:
     """As far as trials go: what it is, and what it emits."""
 
     def __init__(self, state: Path, asked: Safety = Safety.OFF) -> None:
-        self.tally = Tally(state)
-        self.safety, _ = self.tally.begin(asked)
-        self.tally.on_event(events.HostStarted("spot"))
+        self.counter = CrashCounter(state)
+        self.safety, _ = self.counter.begin(asked)
+        self.counter.on_event(events.HostStarted("spot"))
         self.emitted: list[type[Event]] = []
         self.emits = asyncio.Event()
 
@@ -128,13 +128,13 @@ class Daemon:
         def snapshot() -> Snapshot:
             return Snapshot("spot", 1, safety=self.safety)
 
-        holding = hold(snapshot, self.tally, self.emit)
-        return [asyncio.create_task(self.tally.outlive()), asyncio.create_task(holding)]
+        holding = hold(snapshot, self.counter, self.emit)
+        return [asyncio.create_task(self.counter.outlive()), asyncio.create_task(holding)]
 
 
 def deaths(state: Path, times: int) -> None:
     for _ in range(times):
-        Tally(state).begin()
+        CrashCounter(state).begin()
 
 
 @pytest.mark.anyio
@@ -163,7 +163,7 @@ async def test_safe_mode_is_left_after_an_hour_and_the_next_death_leads_back(
     assert daemon.emitted == [events.SafeModeLeft]
     for task in tasks:
         task.cancel()
-    assert Tally(tmp_path).begin()[0] is Safety.INITIAL
+    assert CrashCounter(tmp_path).begin()[0] is Safety.INITIAL
 
 
 @pytest.mark.anyio
@@ -176,7 +176,7 @@ async def test_safe_mode_that_is_survived_is_over(tmp_path: Path, clock: Virtual
         await clock.advance_until(daemon.emits.wait(), step_s=SOON_S)
     for task in tasks:
         task.cancel()
-    assert Tally(tmp_path).begin()[0] is Safety.OFF
+    assert CrashCounter(tmp_path).begin()[0] is Safety.OFF
 
 
 @pytest.mark.anyio
@@ -192,9 +192,9 @@ async def test_safe_mode_that_a_person_wants_stays(tmp_path: Path, clock: Virtua
 
 def test_deaths_before_safe_mode_are_told(tmp_path: Path) -> None:
     deaths(tmp_path, 3)
-    tally = Tally(tmp_path)
-    tally.begin()
-    (told,) = tally.warnings()
+    counter = CrashCounter(tmp_path)
+    counter.begin()
+    (told,) = counter.warnings()
     assert "3 daemons" in told
     assert f"after {safe_mode.DEATHS}" in told
-    assert not Tally(tmp_path / "new").warnings()
+    assert not CrashCounter(tmp_path / "new").warnings()

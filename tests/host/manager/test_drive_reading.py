@@ -32,7 +32,7 @@ from nondum.host.manager.state_folders import Folders
 from nondum.host.sandbox.helper.client import HelperClient
 from nondum.host.sources.drives import debounce
 from nondum.host.sources.drives.blocks import BlockSource
-from nondum.host.sources.drives.debounce import Steady
+from nondum.host.sources.drives.debounce import Debounced
 from nondum.host.sources.drives.source import DriveSource
 from nondum.sdk.errors import NondumError
 
@@ -134,7 +134,7 @@ async def test_bad_cable_is_told_and_read_once_it_holds(
     monkeypatch.setattr(debounce, "MOST_WAIT_S", 0.5)
 
     def sources(folders: Folders) -> Sequence[DriveSource]:
-        return [Steady(BlockSource(folders.mounts, accepts=on(tmp_path)))]
+        return [Debounced(BlockSource(folders.mounts, accepts=on(tmp_path)))]
 
     async with host_in_process(tmp_path, sources=sources) as host:
         with attached(image(tmp_path, Part("lamp", LAMP))) as node:

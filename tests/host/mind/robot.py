@@ -29,7 +29,7 @@ from nondum.host.core.records import (
 )
 from nondum.host.mind.frames import mounts_of_all
 from nondum.host.mind.mind import Mind
-from nondum.host.mind.mounts import TellingMounts
+from nondum.host.mind.mounts import MountUpdates
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.runner import FactValue
 from nondum.host.mind.system_tree import SystemTree, default_tree
@@ -124,7 +124,7 @@ class Robot:
             system_tree=self.system_tree,
             now_s=_clock(),
         )
-        self._mounts = TellingMounts(self._remount, self.mind.after_tick)
+        self._mounts = MountUpdates(self._remount, self.mind.after_tick)
         self.see()
 
     # Calls

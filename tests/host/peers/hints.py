@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
-from nondum.host.peers.trust_keeper import TrustKeeper
+from nondum.host.peers.trust_store import PeerTrustStore
 from nondum.transport.peers import PeerKey
 
 
@@ -28,7 +28,7 @@ class Network:
     def all(self) -> Iterable[Hinted]:
         return list(self.hints.values())
 
-    def tells(self, keeper: TrustKeeper) -> Callable[[int | None], None]:
+    def tells(self, keeper: PeerTrustStore) -> Callable[[int | None], None]:
         def announce(port: int | None) -> None:
             at = ("tcp://127.0.0.1:7410", "tcp://[::1]:7410")
             self.hints[keeper.key] = Hinted(keeper.key, keeper.host.name, at, port)

@@ -9,11 +9,11 @@ from typing import Any, cast
 import pytest
 
 from nondum.host.peers.asking import METHOD, Asking
-from nondum.host.peers.dispatch import Desk
+from nondum.host.peers.dispatch import Dispatcher
 from nondum.host.peers.goals import MAX_WORDS
 from nondum.sdk.errors import GoalRefused, HostUnreachable, Problem
 from nondum.sdk.wire import Body
-from nondum.transport.peers import Admission, Call, CallFailed, Errand, PeerKey
+from nondum.transport.peers import Admission, Call, CallFailed, IncomingCall, PeerKey
 from nondum.transport.peers.messages import Request
 
 pytestmark = pytest.mark.anyio
@@ -25,13 +25,13 @@ class OnePeer:
     """Reaches a peer with a desk of its own."""
 
     def __init__(self, serves: dict[str, Any]) -> None:
-        self.desk = Desk()
+        self.requests = Dispatcher()
         for method, serve in serves.items():
-            self.desk.add(method, serve)
+            self.requests.add(method, serve)
 
     def call(self, host: str, method: str, args: Body, *, deadline_s: float) -> Call:
         async def called() -> Body:
-            answer = self.desk.serve(errand(method, args))
+            answer = self.requests.serve(incoming(method, args))
             return answer if isinstance(answer, Mapping) else await answer
 
         return cast(Call, asyncio.ensure_future(called()))
@@ -40,9 +40,9 @@ class OnePeer:
         raise AssertionError(f"{host} is told {method}")
 
 
-def errand(method: str, args: Body) -> Errand:
+def incoming(method: str, args: Body) -> IncomingCall:
     admission = Admission(PeerKey("rover"), "rover", "pairing")
-    return Errand(admission, Request(1, 1, 60_000, method, args), lambda _, __: None)
+    return IncomingCall(admission, Request(1, 1, 60_000, method, args), lambda _, __: None)
 
 
 async def able(words: str) -> str | None:
@@ -77,7 +77,7 @@ async def test_older_peer_is_said_to_be_one() -> None:
 
 
 async def test_peer_that_is_not_reached_is_told() -> None:
-    def unreachable(_: Errand) -> Body:
+    def unreachable(_: IncomingCall) -> Body:
         raise HostUnreachable(Problem("PEER_GONE", "made up"))
 
     with pytest.raises(GoalRefused, match="PEER_GONE"):
@@ -104,4 +104,4 @@ async def test_answer_that_is_none_is_refused() -> None:
 )
 async def test_what_is_no_question_is_not_answered(words: Any) -> None:
     with pytest.raises(CallFailed, match="CALL_MALFORMED"):
-        await asking(OnePeer({})).serve(errand(METHOD, {"words": words}))
+        await asking(OnePeer({})).serve(incoming(METHOD, {"words": words}))

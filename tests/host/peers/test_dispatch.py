@@ -10,15 +10,15 @@ from tests.host.peers.watcher import component, no_claims, snapshot
 from tests.transport.fleet.fleets import mesh_member
 
 from nondum.host.jobs.children import Children
-from nondum.host.peers.dispatch import Desk
+from nondum.host.peers.dispatch import Dispatcher
 from nondum.host.peers.offered_entries import Policy
 from nondum.host.peers.peering import Peering
-from nondum.host.peers.stream_requests import StreamDesk
+from nondum.host.peers.stream_requests import StreamRequests
 from nondum.host.peers.streams.bridge import Bridge
 from nondum.host.workers.streams import Streams
 from nondum.sdk.errors import NondumError
 from nondum.sdk.wire import Body
-from nondum.transport.peers import Admission, CallFailed, Errand, HostKeys, PeerKey, Trust
+from nondum.transport.peers import Admission, CallFailed, HostKeys, IncomingCall, PeerKey, Trust
 from nondum.transport.peers.messages import Request
 
 pytestmark = pytest.mark.anyio
@@ -26,17 +26,17 @@ pytestmark = pytest.mark.anyio
 BRIDGE = HostKeys.generate().public
 
 
-def errand(method: str, args: Body) -> Errand:
+def incoming(method: str, args: Body) -> IncomingCall:
     admission = Admission(PeerKey("rover"), "rover", "pairing")
-    return Errand(admission, Request(1, 1, 60_000, method, args), lambda _, __: None)
+    return IncomingCall(admission, Request(1, 1, 60_000, method, args), lambda _, __: None)
 
 
 async def test_call_that_is_not_known_is_refused() -> None:
-    desk = Desk()
-    desk.add("echo", lambda asked: asked.args)
-    assert desk.serve(errand("echo", {"a": 1})) == {"a": 1}
+    requests = Dispatcher()
+    requests.add("echo", lambda asked: asked.args)
+    assert requests.serve(incoming("echo", {"a": 1})) == {"a": 1}
     with pytest.raises(CallFailed, match="METHOD_UNKNOWN"):
-        desk.serve(errand("fly", {}))
+        requests.serve(incoming("fly", {}))
 
 
 @pytest.mark.parametrize(
@@ -61,11 +61,11 @@ async def test_only_streams_that_are_offered_are_opened(stream: str | None, code
         taken=dict,
         about={},
     )
-    children, desk = Children(), Desk()
+    children, requests = Children(), Dispatcher()
     bridge = Bridge(children.forks, ("tcp://127.0.0.1:0",))
-    streams = StreamDesk(bridge, Streams("mule"), peering, fleet, lambda: ())
-    streams.serve(desk)
-    answer = desk.serve(errand("stream.open", {"stream": stream, "bridge": BRIDGE}))
+    streams = StreamRequests(bridge, Streams("mule"), peering, fleet, lambda: ())
+    streams.serve(requests)
+    answer = requests.serve(incoming("stream.open", {"stream": stream, "bridge": BRIDGE}))
     assert inspect.isawaitable(answer)
     with pytest.raises(NondumError) as refused:
         await asyncio.ensure_future(answer)

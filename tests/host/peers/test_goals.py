@@ -11,7 +11,7 @@ from nondum.host.peers.forwarded_goals import MOST_KEPT
 from nondum.host.peers.goals import MAX_WORDS, Goals
 from nondum.host.people.stopping import Stopped
 from nondum.sdk.wire import Body
-from nondum.transport.peers import Admission, Call, CallFailed, Errand, PeerKey
+from nondum.transport.peers import Admission, Call, CallFailed, IncomingCall, PeerKey
 from nondum.transport.peers.messages import Request
 
 pytestmark = pytest.mark.anyio
@@ -35,10 +35,10 @@ def no_stop() -> Stopped:
     raise AssertionError("it is stopped")
 
 
-def asked(words: object) -> Errand:
+def asked(words: object) -> IncomingCall:
     admission = Admission(PeerKey("rover"), "rover", "pairing")
     request = Request(1, 1, 60_000, "goal.give", {"words": words})
-    return Errand(admission, request, lambda _, __: None)
+    return IncomingCall(admission, request, lambda _, __: None)
 
 
 @pytest.mark.parametrize(
@@ -66,10 +66,10 @@ async def test_words_that_are_not_taken_become_no_goal(
 @pytest.mark.parametrize("priority", [1001, -1001, True, "1", 1.5])
 async def test_goal_of_no_priority_that_there_is_is_refused(priority: Any) -> None:
     goals = Goals("mule", no_mind, Nobody(), lambda: (), no_stop, accepts=True)
-    errand = asked("blink")
-    errand.args["priority"] = priority
+    incoming = asked("blink")
+    incoming.args["priority"] = priority
     with pytest.raises(CallFailed, match="CALL_MALFORMED"):
-        goals.serve_give(errand)
+        goals.serve_give(incoming)
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ async def test_goal_of_no_priority_that_there_is_is_refused(priority: Any) -> No
 )
 async def test_peer_that_is_back_asks_after_goals_by_id(goals: Any) -> None:
     goals_here = Goals("mule", no_mind, Nobody(), lambda: (), no_stop, accepts=True)
-    errand = asked("blink")
-    errand.args["goals"] = goals
+    incoming = asked("blink")
+    incoming.args["goals"] = goals
     with pytest.raises(CallFailed, match="CALL_MALFORMED"):
-        await goals_here.serve_again(errand)
+        await goals_here.serve_again(incoming)

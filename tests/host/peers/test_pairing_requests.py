@@ -14,8 +14,8 @@ import zmq
 from tests.host.peers.hints import Hinted, Network
 from tests.kit.clock import VirtualClock
 
-from nondum.host.peers.pairing_requests import LOOK_S, PairingDesk
-from nondum.host.peers.trust_keeper import TRUST_NAME, TrustKeeper
+from nondum.host.peers.pairing_requests import LOOK_S, PairingRequests
+from nondum.host.peers.trust_store import TRUST_NAME, PeerTrustStore
 from nondum.transport.peers import HostKeys, PeerKey, PeerRefused, fingerprint
 from nondum.transport.peers.pairing import Ask, Commit, Nonce
 from nondum.transport.peers.pairing_messages import Beat, Said, decode, encode
@@ -30,15 +30,15 @@ Row = dict[str, Any]
 class Host:
     """A host with a desk, and what the person at it sees."""
 
-    keeper: TrustKeeper
-    desk: PairingDesk
+    keeper: PeerTrustStore
+    requests: PairingRequests
     rows: list[Row] = field(default_factory=list)
     news: asyncio.Event = field(default_factory=asyncio.Event)
     window: asyncio.Task[None] | None = None
 
     def begins(self, wanted: str | None = None) -> None:
         async def window() -> None:
-            async with contextlib.aclosing(self.desk.pair(wanted)) as rows:
+            async with contextlib.aclosing(self.requests.pair(wanted)) as rows:
                 async for row in rows:
                     self.rows.append(row)
                     self.news.set()
@@ -63,9 +63,9 @@ class Host:
 
 @contextlib.asynccontextmanager
 async def host(folder: Path, network: Network, name: str) -> AsyncIterator[Host]:
-    keeper = await TrustKeeper.open(folder / name / "peers", name)
-    desk = PairingDesk(keeper, announce=network.tells(keeper), candidates=network.all)
-    found = Host(keeper, desk)
+    keeper = await PeerTrustStore.open(folder / name / "peers", name)
+    requests = PairingRequests(keeper, announce=network.tells(keeper), candidates=network.all)
+    found = Host(keeper, requests)
     try:
         yield found
     finally:
@@ -88,14 +88,14 @@ async def test_people_who_say_yes_make_hosts_trust_each_other(pair: tuple[Host, 
     assert here["code"] == there["code"]
     assert (here["name"], here["fingerprint"]) == ("base", fingerprint(base.keeper.key))
     assert (there["name"], there["fingerprint"]) == ("rover", fingerprint(rover.keeper.key))
-    rover.desk.confirm(here["code"])
+    rover.requests.confirm(here["code"])
     await rover.sees("confirmed")
     assert rover.keeper.trust.paired == {}
-    base.desk.confirm(there["code"])
+    base.requests.confirm(there["code"])
     assert (await rover.sees("agreed"))["name"] == "base"
     await base.sees("agreed")
     for one, other in ((rover, base), (base, rover)):
-        again = await TrustKeeper.open(one.keeper.folder, one.keeper.host.name)
+        again = await PeerTrustStore.open(one.keeper.folder, one.keeper.host.name)
         assert again.trust.paired == {other.keeper.key: other.keeper.host.name}
 
 
@@ -181,7 +181,7 @@ async def test_window_is_announced_while_it_is_open(tmp_path: Path) -> None:
         assert network.hints[rover.keeper.key].pairing_port
         await rover.leaves()
         assert network.hints[rover.keeper.key].pairing_port is None
-        assert rover.desk.row() is None
+        assert rover.requests.row() is None
 
 
 async def test_no_of_one_person_is_told_to_both(pair: tuple[Host, Host]) -> None:
@@ -190,7 +190,7 @@ async def test_no_of_one_person_is_told_to_both(pair: tuple[Host, Host]) -> None
     base.begins()
     await rover.sees("comparing")
     await base.sees("comparing")
-    base.desk.refuse()
+    base.requests.refuse()
     for one in pair:
         assert (await one.sees("failed"))["problem"]["code"] == "PAIRING_REFUSED"
         assert one.keeper.trust.paired == {}
@@ -272,16 +272,16 @@ async def test_second_window_is_refused(pair: tuple[Host, Host]) -> None:
     rover.begins()
     await rover.sees("waiting")
     with pytest.raises(PeerRefused, match="PAIRING_OPEN"):
-        await anext(rover.desk.pair())
-    assert rover.desk.row() is not None
+        await anext(rover.requests.pair())
+    assert rover.requests.row() is not None
 
 
 async def test_nothing_is_said_where_no_window_is_open(pair: tuple[Host, Host]) -> None:
     rover, _ = pair
     with pytest.raises(PeerRefused, match="PAIRING_ORDER"):
-        rover.desk.confirm("123 456")
+        rover.requests.confirm("123 456")
     with pytest.raises(PeerRefused, match="PAIRING_ORDER"):
-        rover.desk.refuse()
+        rover.requests.refuse()
 
 
 async def test_host_that_cannot_be_kept_is_not_paired(pair: tuple[Host, Host]) -> None:
@@ -291,8 +291,8 @@ async def test_host_that_cannot_be_kept_is_not_paired(pair: tuple[Host, Host]) -
     base.begins()
     code = (await rover.sees("comparing"))["code"]
     await base.sees("comparing")
-    base.desk.confirm(code)
-    rover.desk.confirm(code)
+    base.requests.confirm(code)
+    rover.requests.confirm(code)
     assert (await rover.sees("failed"))["problem"]["code"] == "PEERS_FOLDER"
     assert rover.keeper.trust.paired == {}
 
@@ -311,8 +311,10 @@ async def test_hints_without_sense_hurt_nobody(tmp_path: Path) -> None:
 
 
 async def test_development_is_refused(tmp_path: Path) -> None:
-    keeper = await TrustKeeper.open(tmp_path, "rover")
-    desk = PairingDesk(keeper, announce=lambda _: None, candidates=lambda: (), is_development=True)
+    keeper = await PeerTrustStore.open(tmp_path, "rover")
+    requests = PairingRequests(
+        keeper, announce=lambda _: None, candidates=lambda: (), is_development=True
+    )
     with pytest.raises(PeerRefused, match="PAIRING_DEVELOPMENT"):
-        await anext(desk.pair())
-    assert desk.row() is None
+        await anext(requests.pair())
+    assert requests.row() is None

@@ -17,7 +17,7 @@ from nondum.host.peers.serving import FactValue, Serving
 from nondum.host.workers.call import Call
 from nondum.planning.execute.running import RunState
 from nondum.sdk.wire import Body
-from nondum.transport.peers import Admission, CallFailed, Errand, PeerKey
+from nondum.transport.peers import Admission, CallFailed, IncomingCall, PeerKey
 from nondum.transport.peers.messages import Request
 
 pytestmark = pytest.mark.anyio
@@ -75,33 +75,33 @@ async def test_what_is_in_use_here_is_not_taken() -> None:
     workers = Behaving()
     served = composed(workers, own=("idle mule__watcher__eye",))
     with pytest.raises(CallFailed, match="UNIT_TAKEN"):
-        await served.behave(errand(LOOK))
+        await served.behave(incoming(LOOK))
     assert workers.calls == []
 
 
 async def test_what_a_peer_uses_is_told_and_not_taken_by_another() -> None:
     workers = Behaving()
     served = composed(workers)
-    first = asyncio.create_task(served.behave(errand(LOOK)))
+    first = asyncio.create_task(served.behave(incoming(LOOK)))
     await workers.begun.wait()
     taken = {"idle mule__watcher__eye": "rover", "free mule__watcher__image": "rover"}
     assert served.taken == taken
     with pytest.raises(CallFailed, match="UNIT_TAKEN"):
-        await served.behave(errand(LOOK, "mule-2"))
+        await served.behave(incoming(LOOK, "mule-2"))
     workers.calls[0].end(RunState.SUCCEEDED)
     await first
     assert served.taken == {}
 
 
-def errand(args: Body, caller: str = "rover") -> Errand:
+def incoming(args: Body, caller: str = "rover") -> IncomingCall:
     admission = Admission(PeerKey(caller), caller, "pairing")
-    return Errand(admission, Request(1, 1, 60_000, "behave", args), lambda _, __: None)
+    return IncomingCall(admission, Request(1, 1, 60_000, "behave", args), lambda _, __: None)
 
 
 async def refused(args: Body, policy: Policy = ALL) -> str:
     workers = Behaving()
     with pytest.raises(CallFailed) as failed:
-        await serving(workers, policy).behave(errand(args))
+        await serving(workers, policy).behave(incoming(args))
     assert workers.calls == []
     return failed.value.code
 
@@ -110,7 +110,7 @@ async def refused(args: Body, policy: Policy = ALL) -> str:
 async def test_what_is_offered_is_carried_out(args: Body) -> None:
     workers = Behaving()
     served = serving(workers)
-    running = asyncio.create_task(served.behave(errand(args)))
+    running = asyncio.create_task(served.behave(incoming(args)))
     await workers.begun.wait()
     assert [one.caller for one in served] == ["rover"]
     workers.calls[0].end(RunState.SUCCEEDED)
@@ -163,14 +163,14 @@ async def test_actuator_is_withheld_unless_it_is_offered() -> None:
 async def test_unit_serves_as_many_as_it_says() -> None:
     workers = Behaving()
     served = serving(workers)
-    first = asyncio.create_task(served.behave(errand(TURN)))
+    first = asyncio.create_task(served.behave(incoming(TURN)))
     await workers.begun.wait()
     with pytest.raises(CallFailed, match="UNIT_TAKEN"):
-        await served.behave(errand(TURN, "mule-2"))
+        await served.behave(incoming(TURN, "mule-2"))
     workers.calls[0].end(RunState.SUCCEEDED)
     await first
     workers.begun.clear()
-    second = asyncio.create_task(served.behave(errand(TURN, "mule-2")))
+    second = asyncio.create_task(served.behave(incoming(TURN, "mule-2")))
     await workers.begun.wait()
     workers.calls[1].end(RunState.SUCCEEDED)
     await second
@@ -179,7 +179,7 @@ async def test_unit_serves_as_many_as_it_says() -> None:
 async def test_values_are_passed_on_to_what_runs_for_their_caller_only() -> None:
     workers = Behaving()
     served = serving(workers)
-    running = asyncio.create_task(served.behave(errand(TURN)))
+    running = asyncio.create_task(served.behave(incoming(TURN)))
     await workers.begun.wait()
     values = {"component": "watcher", "values": [["seen", ["a"], None]]}
     served.values("another", values)

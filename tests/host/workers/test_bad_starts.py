@@ -15,7 +15,7 @@ from tests.kit.watches import watches_left
 from tests.kit.workers import WorkersUnderTest
 
 from nondum.host.core.events import WorkerLogged, WorkerReady
-from nondum.host.sandbox.cgroups.groups import Cages
+from nondum.host.sandbox.cgroups.groups import Cgroups
 from nondum.host.workers.confinements import Unconfined
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import WorkerSpec
@@ -219,7 +219,7 @@ async def test_worker_that_cannot_be_watched_leaves_nothing(
     tested: WorkersUnderTest, watched: int
 ) -> None:
     tree = CountedTree()
-    launcher = WorkerLauncher(Unconfined(), Cages(tree))
+    launcher = WorkerLauncher(Unconfined(), Cgroups(tree))
     tested.workers.launcher = launcher
     await tested.workers.keep_spare()
     spare = launcher.spare_pid

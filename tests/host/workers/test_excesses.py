@@ -15,7 +15,7 @@ from tests.kit.processes import is_alive
 from tests.kit.workers import WorkersUnderTest
 
 from nondum.host.core.events import WorkerExited, WorkerLogged
-from nondum.host.sandbox.cgroups import Cages
+from nondum.host.sandbox.cgroups import Cgroups
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import Limits
 from nondum.planning.execute.running import RunState
@@ -26,12 +26,12 @@ SMALL = Limits(memory_mb=128, tasks=24, descriptors=64, scratch_mb=8)
 
 
 @pytest.fixture
-async def caged(tmp_path: Path, clock: VirtualClock) -> AsyncIterator[WorkersUnderTest]:
+async def in_cgroup(tmp_path: Path, clock: VirtualClock) -> AsyncIterator[WorkersUnderTest]:
     """Workers in control groups; another one is there before and after."""
-    cages = Cages.open(tmp_path)
-    assert cages.holds == {"memory", "pids", "cpu"}, "tests run as root, with cgroups"
+    cgroups = Cgroups.open(tmp_path)
+    assert cgroups.holds == {"memory", "pids", "cpu"}, "tests run as root, with cgroups"
     tested = WorkersUnderTest(tmp_path, WATCHED)
-    tested.workers.launcher = WorkerLauncher(cages=cages)
+    tested.workers.launcher = WorkerLauncher(cgroups=cgroups)
     await begin(tested, "other", "pass")
     pid = tested.workers.pids()["other"]
     yield tested
@@ -39,8 +39,8 @@ async def caged(tmp_path: Path, clock: VirtualClock) -> AsyncIterator[WorkersUnd
     assert tested.workers.pids()["other"] == pid
     assert is_alive(pid)
     await clock.advance_until(tested.workers.close())
-    assert cages.sweep() == 0, "cages are left"
-    cages.close()
+    assert cgroups.sweep() == 0, "cgroups are left"
+    cgroups.close()
 
 
 async def begin(tested: WorkersUnderTest, name: str, body: str) -> None:
@@ -98,46 +98,46 @@ CHILD = "b = []\nwhile True: b.append(bytearray(1 << 20))"
     ],
 )
 async def test_too_much_ends_that_worker_alone(
-    caged: WorkersUnderTest, clock: VirtualClock, body: str, code: str
+    in_cgroup: WorkersUnderTest, clock: VirtualClock, body: str, code: str
 ) -> None:
-    await begin(caged, "guest", body)
-    call = do(caged)
+    await begin(in_cgroup, "guest", body)
+    call = do(in_cgroup)
     if body == FORK:
-        exited = await exited_by_forking(caged, clock)
+        exited = await exited_by_forking(in_cgroup, clock)
     else:
-        exited = await clock.advance_until(caged.until(WorkerExited))
+        exited = await clock.advance_until(in_cgroup.until(WorkerExited))
     assert exited.component == "guest"
     assert exited.reason.startswith(code), exited.reason
     assert "→" in exited.reason, "it is told what to do"
     assert await call.ended() is RunState.FAILED
-    await caged.until_ready(3)
+    await in_cgroup.until_ready(3)
     if code == "SCRATCH_FULL":
-        assert os.listdir(caged.folder / "guest/scratch") == []  # noqa: PTH208
+        assert os.listdir(in_cgroup.folder / "guest/scratch") == []  # noqa: PTH208
 
 
 async def test_what_cannot_be_deleted_is_told_and_holds_nothing_up(
-    caged: WorkersUnderTest, clock: VirtualClock
+    in_cgroup: WorkersUnderTest, clock: VirtualClock
 ) -> None:
-    held = caged.folder / "guest/scratch/held"
+    held = in_cgroup.folder / "guest/scratch/held"
     body = (
         "os.mkdir('held'); subprocess.run(['mount', '-t', 'tmpfs', 'tmpfs', 'held'], check=True)\n"
         "with open('zeros', 'wb') as file:\n    file.write(bytes(9 << 20))\n"
         "await asyncio.sleep(60)"
     )
-    await begin(caged, "guest", body)
-    do(caged)
+    await begin(in_cgroup, "guest", body)
+    do(in_cgroup)
     try:
-        exited = await clock.advance_until(caged.until(WorkerExited))
+        exited = await clock.advance_until(in_cgroup.until(WorkerExited))
         assert exited.reason.startswith("SCRATCH_FULL"), exited.reason
-        told = [line.message for line in caged.told(WorkerLogged) if line.level == "error"]
+        told = [line.message for line in in_cgroup.told(WorkerLogged) if line.level == "error"]
         assert [line for line in told if "not all that it left could be cleared away" in line]
-        await caged.until_ready(3)
+        await in_cgroup.until_ready(3)
         assert [each.name for each in held.parent.iterdir()] == ["held"], "all else is deleted"
     finally:
         await anyio.run_process(["umount", str(held)])
 
 
-async def test_worker_that_ends_by_its_limit_of_tasks_says_so(caged: WorkersUnderTest) -> None:
+async def test_worker_that_ends_by_its_limit_of_tasks_says_so(in_cgroup: WorkersUnderTest) -> None:
     body = (
         "threading.stack_size(1 << 18)  # memory is not to end first\n"
         "try:\n"
@@ -147,27 +147,27 @@ async def test_worker_that_ends_by_its_limit_of_tasks_says_so(caged: WorkersUnde
         "    print(f'RuntimeError: {refused}', file=sys.stderr, flush=True)\n"
         "    os._exit(1)"
     )
-    await begin(caged, "guest", body)
-    do(caged)
-    exited = await caged.until(WorkerExited)
+    await begin(in_cgroup, "guest", body)
+    do(in_cgroup)
+    exited = await in_cgroup.until(WorkerExited)
     assert exited.reason.startswith("WORKER_TASKS"), exited.reason
-    await caged.until_ready(3)
+    await in_cgroup.until_ready(3)
 
 
 async def test_worker_that_nobody_asks_and_spins_is_told_once(
-    caged: WorkersUnderTest, clock: VirtualClock
+    in_cgroup: WorkersUnderTest, clock: VirtualClock
 ) -> None:
     spin = "def spin():\n    while True:\n        pass\n"
-    await begin(caged, "guest", f"{spin}threading.Thread(target=spin, daemon=True).start()")
-    assert await done(caged, "guest") is RunState.SUCCEEDED
-    strained = await strained_by_spinning(caged, clock)
+    await begin(in_cgroup, "guest", f"{spin}threading.Thread(target=spin, daemon=True).start()")
+    assert await done(in_cgroup, "guest") is RunState.SUCCEEDED
+    strained = await strained_by_spinning(in_cgroup, clock)
     assert strained.component == "guest"
     assert [problem.code for problem in strained.problems] == ["WORKER_CPU"]
-    assert not caged.told(WorkerExited)
+    assert not in_cgroup.told(WorkerExited)
 
 
-async def test_what_left_the_group_and_cleared_its_marks_ends_with_the_cage(
-    caged: WorkersUnderTest,
+async def test_what_left_the_group_and_cleared_its_marks_ends_with_the_cgroup(
+    in_cgroup: WorkersUnderTest,
 ) -> None:
     child = "import os,time; print('child', os.getpid(), flush=True); time.sleep(3600)"
     body = (
@@ -178,10 +178,10 @@ async def test_what_left_the_group_and_cleared_its_marks_ends_with_the_cage(
         "    os._exit(0)\n"
         "await asyncio.Event().wait()"
     )
-    await begin(caged, "guest", body)
-    do(caged)
-    said = await caged.until(WorkerLogged, lambda line: line.message.startswith("child"))
+    await begin(in_cgroup, "guest", body)
+    do(in_cgroup)
+    said = await in_cgroup.until(WorkerLogged, lambda line: line.message.startswith("child"))
     pid = int(said.message.split()[1])
     assert is_alive(pid)
-    await caged.workers.stop("guest")
+    await in_cgroup.workers.stop("guest")
     assert not is_alive(pid)

@@ -15,7 +15,7 @@ from tests.host.workers.streaming import sees
 from tests.kit.workers import LIBRARIES, SDK, TIMING, WorkersUnderTest, level, standing
 
 from nondum.host.core.events import WorkerExited, WorkerReady
-from nondum.host.sandbox.cgroups import Cages
+from nondum.host.sandbox.cgroups import Cgroups
 from nondum.host.workers import confinement_choice
 from nondum.host.workers.in_flight import culprit, sent
 from nondum.host.workers.launcher import WorkerLauncher
@@ -34,16 +34,16 @@ async def tested(tmp_path: Path) -> AsyncIterator[WorkersUnderTest]:
         replace(standing(), findings=()), (tmp_path, SDK, LIBRARIES)
     )
     tested = WorkersUnderTest(tmp_path, confinement=shared)
-    cages = Cages.open(tmp_path)
-    tested.workers.launcher = WorkerLauncher(tested.confinement, cages)
+    cgroups = Cgroups.open(tmp_path)
+    tested.workers.launcher = WorkerLauncher(tested.confinement, cgroups)
     yield tested
     await tested.workers.close(grace_s=1.0)
-    cages.close()
+    cgroups.close()
 
 
 def ways() -> list[str]:
-    """What waits in sockets that are under way is seen in a room, and in a cage."""
-    hidden = level() is Level.SANDBOXED and bool(Cages.open(Path("/nowhere")).holds)
+    """What waits in sockets that are under way is seen in a room, and in a cgroup."""
+    hidden = level() is Level.SANDBOXED and bool(Cgroups.open(Path("/nowhere")).holds)
     return ["openly", "by_a_child", *(["in_sockets_that_are_under_way"] if hidden else [])]
 
 

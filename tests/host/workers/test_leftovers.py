@@ -12,7 +12,7 @@ from tests.kit.processes import is_alive, until_gone
 from tests.kit.workers import WorkersUnderTest
 
 from nondum.host.core.events import WorkerLogged
-from nondum.host.sandbox.cgroups.groups import Cages
+from nondum.host.sandbox.cgroups.groups import Cgroups
 from nondum.host.workers.confinements import Unconfined
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.leftovers import clear_away
@@ -26,9 +26,9 @@ RUNAWAY = (
 )
 
 
-async def test_runaway_is_ended_where_the_cage_cannot_be(tmp_path: Path) -> None:
+async def test_runaway_is_ended_where_the_cgroup_cannot_be(tmp_path: Path) -> None:
     tested = WorkersUnderTest(tmp_path, confinement=Unconfined())
-    tested.workers.launcher = WorkerLauncher(Unconfined(), Cages(StuckTree()))
+    tested.workers.launcher = WorkerLauncher(Unconfined(), Cgroups(StuckTree()))
     try:
         spec = await tested.start("cam", RUNAWAY)
         runaway = int((spec.scratch / "child").read_text(encoding="ascii"))
@@ -51,6 +51,6 @@ def test_every_step_is_taken_before_a_failure_is_told() -> None:
 
     with pytest.raises(OSError, match="bad processes"):
         clear_away(
-            lambda: take("bad cage"), lambda: take("bad processes"), lambda: take("good nodes")
+            lambda: take("bad cgroup"), lambda: take("bad processes"), lambda: take("good nodes")
         )
-    assert taken == ["bad cage", "bad processes", "good nodes"]
+    assert taken == ["bad cgroup", "bad processes", "good nodes"]

@@ -22,7 +22,7 @@ from nondum.host.core.events import (
     WorkerFaulted,
     WorkerLogged,
     WorkerReady,
-    WorkerSteady,
+    WorkerStable,
 )
 from nondum.host.workers.call import Call
 from nondum.host.workers.spec import Limits
@@ -187,9 +187,9 @@ async def test_what_ended_a_worker_is_past_once_the_next_one_has_lived_for_a_whi
     os.kill(tested.workers.pids()["guest"], signal.SIGKILL)
     await tested.until_ready(2)
     await clock.advance(WINDOW_S * 0.9)
-    assert not tested.told(WorkerSteady)
+    assert not tested.told(WorkerStable)
     await clock.advance(WINDOW_S * 0.2)
-    await tested.until(WorkerSteady)
+    await tested.until(WorkerStable)
 
 
 async def test_worker_that_shows_signs_of_life_does_not_hang(

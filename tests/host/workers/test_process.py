@@ -15,7 +15,7 @@ from tests.kit.descriptors import descriptors_left, open_descriptors
 from tests.kit.processes import is_alive
 from tests.kit.watches import watches_left
 
-from nondum.host.workers.init_link import Keeper
+from nondum.host.workers.init_link import InitLink
 from nondum.host.workers.process import WorkerProcess
 
 pytestmark = pytest.mark.anyio
@@ -32,13 +32,13 @@ def sleeper() -> Iterator[subprocess.Popen[bytes]]:
 
 
 @contextmanager
-def keeper_that_has_said_who_it_is() -> Iterator[Keeper]:
+def keeper_that_has_said_who_it_is() -> Iterator[InitLink]:
     """One that is this very process, and never ends before the worker."""
     orders, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     orders.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
     with theirs:
         theirs.send(json.dumps({"is": "keeper"}).encode())
-        keeper = Keeper(orders)
+        keeper = InitLink(orders)
         try:
             yield keeper
         finally:

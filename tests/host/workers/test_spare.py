@@ -20,7 +20,7 @@ from tests.kit.processes import is_alive, until_gone
 from tests.kit.until import PATIENCE_S
 from tests.kit.workers import SDK, WorkersUnderTest
 
-from nondum.host.sandbox.cgroups.groups import Cages, NoTree
+from nondum.host.sandbox.cgroups.groups import Cgroups, NoTree
 from nondum.host.sandbox.inside.bootstrap import PRELOADED
 from nondum.host.sandbox.levels.bubblewrap import Ground
 from nondum.host.workers.confinements import Entry, Unconfined
@@ -218,7 +218,7 @@ async def test_others_go_on_while_a_process_is_put_into_a_control_group(
     tested: WorkersUnderTest,
 ) -> None:
     tree = SlowTree()
-    tested.workers.launcher = WorkerLauncher(tested.confinement, Cages(tree))
+    tested.workers.launcher = WorkerLauncher(tested.confinement, Cgroups(tree))
     starting = asyncio.create_task(tested.start("cam", QUIET))
     await asyncio.to_thread(tree.is_asked.wait, PATIENCE_S)
     assert not starting.done()
@@ -231,7 +231,7 @@ async def test_start_that_is_not_wanted_any_more_leaves_no_process(
     tested: WorkersUnderTest,
 ) -> None:
     tree = SlowTree()
-    launcher = WorkerLauncher(tested.confinement, Cages(tree), tested.folder)
+    launcher = WorkerLauncher(tested.confinement, Cgroups(tree), tested.folder)
     warming = asyncio.create_task(launcher.warm())
     await asyncio.to_thread(tree.is_asked.wait, PATIENCE_S)
     processes = spares(tested.folder)
@@ -268,7 +268,7 @@ async def test_launch_that_is_not_wanted_any_more_while_it_waits_for_a_mount_lea
     tested: WorkersUnderTest,
 ) -> None:
     tree = CountedTree()
-    launcher = WorkerLauncher(Showing(), Cages(tree), startup_s=PATIENCE_S)
+    launcher = WorkerLauncher(Showing(), Cgroups(tree), startup_s=PATIENCE_S)
     await launcher.warm()
     spare = launcher.spare_pid
     assert spare is not None

@@ -1,4 +1,4 @@
-"""Cages that hold nobody, and fail as those of a host that has run short of something."""
+"""Cgroups that hold nobody, and fail as those of a host that has run short of something."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import os
 import threading
 
 from nondum.host.sandbox.cgroups.groups import NoTree
-from nondum.host.sandbox.cgroups.limits import CageLimits
+from nondum.host.sandbox.cgroups.limits import CgroupLimits
 
 
 class CountedTree(NoTree):
-    """Knows which cages there are, and tells when one is limited."""
+    """Knows which cgroups there are, and tells when one is limited."""
 
     def __init__(self) -> None:
         self._names: set[str] = set()
@@ -21,7 +21,7 @@ class CountedTree(NoTree):
         """Make one."""
         self._names.add(name)
 
-    def limit(self, name: str, limits: CageLimits) -> None:
+    def limit(self, name: str, limits: CgroupLimits) -> None:
         """Tell that it is asked for."""
         self.is_limited.set()
 

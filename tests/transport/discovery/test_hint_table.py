@@ -11,14 +11,14 @@ from tests.kit.examples import a_share
 
 from nondum.transport.discovery import Hint, Source
 from nondum.transport.discovery.hint import MAX_ADDRESSES
-from nondum.transport.discovery.hint_table import MAX_PEERS, Change, HintBook
+from nondum.transport.discovery.hint_table import MAX_PEERS, Change, HintTable
 from nondum.transport.peers.keys import PeerKey
 
 OWN = PeerKey("own")
 
 
-def book(*preferred: str) -> HintBook:
-    return HintBook(OWN, 1, lambda key: key in preferred, 0.0)
+def book(*preferred: str) -> HintTable:
+    return HintTable(OWN, 1, lambda key: key in preferred, 0.0)
 
 
 def hint(key: str, *addresses: str, source: Source = Source.MULTICAST, epoch: int = 1) -> Hint:
@@ -71,7 +71,7 @@ def test_the_own_echo_is_nothing_and_another_life_under_the_own_key_is_a_problem
 
 def test_without_keys_another_host_of_the_own_name_is_told_as_that() -> None:
     own = PeerKey("development:rover")
-    here = HintBook(own, 1, lambda _: False, 0.0)
+    here = HintTable(own, 1, lambda _: False, 0.0)
     here.add(Hint(own, "rover", 2, ("tcp://127.0.0.1:7411",), Source.STATIC), 0.0)
     problem = here.problem()
     assert problem is not None
@@ -110,7 +110,7 @@ def test_a_stranger_gets_in_once_the_flood_is_over() -> None:
 
 
 def test_where_everybody_matters_the_last_to_come_stays_out() -> None:
-    here = HintBook(OWN, 1, lambda _: True, 0.0)
+    here = HintTable(OWN, 1, lambda _: True, 0.0)
     for number in range(MAX_PEERS):
         here.add(hint(f"friend-{number}"), 0.0)
     assert here.add(hint("late"), 0.0) == Change()

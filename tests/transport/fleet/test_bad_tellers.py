@@ -19,8 +19,8 @@ from nondum.transport.fleet.ledger import Ledger
 from nondum.transport.peers import (
     Admission,
     CallFailed,
-    Errand,
     Identity,
+    IncomingCall,
     Lease,
     Loss,
     PeerKey,
@@ -46,7 +46,7 @@ class Teller:
     is_mute: bool = False
     asked: asyncio.Event = field(default_factory=asyncio.Event)
 
-    def serve(self, errand: Errand) -> Body | Awaitable[Body]:
+    def serve(self, errand: IncomingCall) -> Body | Awaitable[Body]:
         assert errand.method == READ
         self.asked.set()
         if self.is_mute:
@@ -56,7 +56,7 @@ class Teller:
 
     def notice(self, caller: Admission, method: str, args: dict[str, Any]) -> None: ...
 
-    def orphaned(self, errand: Errand, reason: Loss) -> Lease:
+    def orphaned(self, errand: IncomingCall, reason: Loss) -> Lease:
         return Lease.STOP
 
     async def _never(self) -> Body:

@@ -160,7 +160,7 @@ async def test_call_is_cancelled_and_has_a_deadline(world: World) -> None:
 @pytest.mark.parametrize(
     ("lease", "outcome"), [(Lease.STOP, "cancelled"), (Lease.FINISH, "finished")], ids=str
 )
-async def test_errand_of_a_lost_caller_follows_its_lease(
+async def test_call_of_a_lost_caller_follows_its_lease(
     world: World, lease: Lease, outcome: str
 ) -> None:
     async with world.member("rover") as rover:

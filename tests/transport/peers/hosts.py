@@ -24,9 +24,9 @@ from nondum.sdk.wire import Body
 from nondum.transport.peers import (
     Admission,
     CallFailed,
-    Errand,
     HostKeys,
     Identity,
+    IncomingCall,
     Lease,
     Loss,
     PeerEvent,
@@ -60,34 +60,34 @@ class Servant:
     lease: Lease = Lease.STOP
     served: list[str] = field(default_factory=list)
     notices: asyncio.Queue[dict[str, Any]] = field(default_factory=asyncio.Queue)
-    running: asyncio.Queue[Errand] = field(default_factory=asyncio.Queue)
+    running: asyncio.Queue[IncomingCall] = field(default_factory=asyncio.Queue)
     ended: asyncio.Queue[str] = field(default_factory=asyncio.Queue)
     lost: asyncio.Queue[Loss] = field(default_factory=asyncio.Queue)
     gate: asyncio.Event = field(default_factory=asyncio.Event)
 
-    def serve(self, errand: Errand) -> Body | Awaitable[Body]:
-        self.served.append(str(errand.args.get("tag", errand.method)))
-        match errand.method:
+    def serve(self, incoming: IncomingCall) -> Body | Awaitable[Body]:
+        self.served.append(str(incoming.args.get("tag", incoming.method)))
+        match incoming.method:
             case "echo":
-                return errand.args
+                return incoming.args
             case "wait":
-                return self.wait(errand)
+                return self.wait(incoming)
             case "count":
-                return self.count(errand)
+                return self.count(incoming)
             case "hang":
-                time.sleep(errand.args["seconds"])
+                time.sleep(incoming.args["seconds"])
                 return {}
             case "long":
                 return {"text": "x" * 1_000_000}
             case "break":
                 raise ValueError("broken")
-        raise CallFailed(Problem("NO_METHOD", f"nobody serves {errand.method}"))
+        raise CallFailed(Problem("NO_METHOD", f"nobody serves {incoming.method}"))
 
-    async def wait(self, errand: Errand) -> Body:
-        self.running.put_nowait(errand)
+    async def wait(self, incoming: IncomingCall) -> Body:
+        self.running.put_nowait(incoming)
         try:
             opened = asyncio.ensure_future(self.gate.wait())
-            orphaned = asyncio.ensure_future(errand.orphaned.wait())
+            orphaned = asyncio.ensure_future(incoming.orphaned.wait())
             await asyncio.wait({opened, orphaned}, return_when=asyncio.FIRST_COMPLETED)
             orphaned.cancel()
             await opened
@@ -97,16 +97,16 @@ class Servant:
         self.ended.put_nowait("finished")
         return {"waited": True}
 
-    async def count(self, errand: Errand) -> Body:
-        for number in range(errand.args["to"]):
-            errand.progress({"number": number})
+    async def count(self, incoming: IncomingCall) -> Body:
+        for number in range(incoming.args["to"]):
+            incoming.progress({"number": number})
             await asyncio.sleep(0)
-        return {"counted": errand.args["to"]}
+        return {"counted": incoming.args["to"]}
 
     def notice(self, caller: Admission, method: str, args: dict[str, Any]) -> None:
         self.notices.put_nowait({"from": caller.name, "method": method, **args})
 
-    def orphaned(self, errand: Errand, reason: Loss) -> Lease:
+    def orphaned(self, incoming: IncomingCall, reason: Loss) -> Lease:
         self.lost.put_nowait(reason)
         return self.lease
 

@@ -40,7 +40,7 @@ from nondum.transport.peers.certificate import issue, new_fleet
 from nondum.transport.peers.listener import listening
 from nondum.transport.peers.messages import MAX_MESSAGE
 from nondum.transport.peers.proof import prove_enforced
-from nondum.transport.peers.zap import Entry, Knock, ZapHandler
+from nondum.transport.peers.zap import ConnectionAttempt, Entry, ZapHandler
 
 pytestmark = pytest.mark.anyio
 
@@ -326,9 +326,9 @@ async def test_second_authenticator_of_a_context_is_refused() -> None:
 async def test_judge_that_fails_turns_away_and_goes_on(caplog: pytest.LogCaptureFixture) -> None:
     """An exception must not leave later handshakes hanging."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-    asked: list[Knock] = []
+    asked: list[ConnectionAttempt] = []
 
-    def judge(knock: Knock) -> Entry:
+    def judge(knock: ConnectionAttempt) -> Entry:
         asked.append(knock)
         raise RuntimeError("no judge today")
 

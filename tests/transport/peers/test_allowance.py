@@ -139,7 +139,7 @@ async def test_answers_are_free(narrow: tuple[Host, Host]) -> None:
 
 async def test_answers_that_nobody_waits_for_are_not_free(narrow: tuple[Host, Host]) -> None:
     rover, base = narrow
-    session = rover.node._roster.session(base.key)
+    session = rover.node._peer_table.session(base.key)
     for number in range(1, 251):
         session.send(encode(Reply(number, {})))
     assert (await base.told(PeerLost)).reason is Loss.VIOLATED
@@ -150,9 +150,9 @@ async def test_answers_to_other_pings_than_the_one_in_doubt_are_not_free(
     narrow: tuple[Host, Host],
 ) -> None:
     rover, base = narrow
-    asked = base.node._roster.session(rover.key)
+    asked = base.node._peer_table.session(rover.key)
     asked.doubt = Doubt(ping=1_000, since_s=asyncio.get_running_loop().time())
-    session = rover.node._roster.session(base.key)
+    session = rover.node._peer_table.session(base.key)
     for _ in range(250):
         session.send(encode(Pong(1)))
     await base.counted(Reason.FLOODING)

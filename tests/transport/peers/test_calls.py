@@ -115,8 +115,8 @@ async def test_halted_call_says_so() -> None:
 async def test_deadline_travels_and_ends_both_ends(clock: VirtualClock) -> None:
     async with two_hosts() as (rover, base):
         call = rover.node.call(base.key, "wait", {}, deadline_s=0.2)
-        errand = await base.servant.running.get()
-        assert errand.ends_s <= clock.time() + 0.2
+        incoming = await base.servant.running.get()
+        assert incoming.ends_s <= clock.time() + 0.2
         await clock.advance(0.2)
         assert await raises(lambda: call) == ["DEADLINE"]
         assert await asyncio.wait_for(base.servant.ended.get(), 30) == "cancelled"

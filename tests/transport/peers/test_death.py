@@ -109,7 +109,7 @@ async def test_restarted_peer_has_a_new_epoch() -> None:
     [(Lease.STOP, "cancelled"), (Lease.HOLD, "finished"), (Lease.FINISH, "finished")],
     ids=lambda value: str(value),
 )
-async def test_errand_of_a_lost_caller_follows_its_lease(lease: Lease, outcome: str) -> None:
+async def test_call_of_a_lost_caller_follows_its_lease(lease: Lease, outcome: str) -> None:
     rover, base = identity("rover"), identity("base")
     async with host(base, trusting(rover)) as there:
         there.servant.lease = lease
@@ -117,10 +117,10 @@ async def test_errand_of_a_lost_caller_follows_its_lease(lease: Lease, outcome: 
             here.node.dial(there.key, [there.address])
             await up(here, there)
             here.node.call(there.key, "wait", {}, deadline_s=600)
-            errand = await there.servant.running.get()
+            incoming = await there.servant.running.get()
         assert await asyncio.wait_for(there.servant.lost.get(), PATIENCE_S) is Loss.DEPARTED
         if lease is not Lease.STOP:
-            await asyncio.wait_for(errand.orphaned.wait(), PATIENCE_S)
+            await asyncio.wait_for(incoming.orphaned.wait(), PATIENCE_S)
             there.servant.gate.set()
         assert await asyncio.wait_for(there.servant.ended.get(), PATIENCE_S) == outcome
 
@@ -134,8 +134,8 @@ async def test_only_a_held_errand_outlives_its_deadline(lease: Lease, clock: Vir
             here.node.dial(there.key, [there.address])
             await up(here, there)
             here.node.call(there.key, "wait", {}, deadline_s=1)
-            errand = await there.servant.running.get()
-        await asyncio.wait_for(errand.orphaned.wait(), PATIENCE_S)
+            incoming = await there.servant.running.get()
+        await asyncio.wait_for(incoming.orphaned.wait(), PATIENCE_S)
         await clock.advance(10.0)
         if lease is Lease.FINISH:
             assert there.servant.ended.get_nowait() == "cancelled"

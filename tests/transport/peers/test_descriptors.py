@@ -24,7 +24,7 @@ from nondum.transport.peers.events import DialFailed
 from nondum.transport.peers.listener import Context, dialling, listening
 from nondum.transport.peers.local_sockets import LOOK_S
 from nondum.transport.peers.monitor import Watch
-from nondum.transport.peers.pairing_listener import Door
+from nondum.transport.peers.pairing_listener import PairingListener
 from nondum.transport.peers.refusals import Refusals
 from nondum.transport.peers.routes import DialledRoute
 from nondum.transport.peers.zap import Entry, ZapHandler
@@ -116,7 +116,7 @@ async def test_watch_without_descriptors_leaves_nothing_open(context: Context, l
 async def test_door_without_descriptors_leaves_nothing_open(context: Context, left: int) -> None:
     refusals = Refusals(lambda _: None)
     with descriptors_left(left), pytest.raises(zmq.ZMQError, match="Too many open files"):
-        Door(context, KEYS, scarcity.ADDRESS, lambda *_: None, refusals)
+        PairingListener(context, KEYS, scarcity.ADDRESS, lambda *_: None, refusals)
 
 
 @pytest.mark.parametrize("left", range(3))
@@ -125,7 +125,7 @@ async def test_door_that_the_loop_does_not_watch_leaves_nothing_open(
 ) -> None:
     refusals = Refusals(lambda _: None)
     with watches_left(left), pytest.raises(OSError, match="No space left"):
-        Door(context, KEYS, scarcity.ADDRESS, lambda *_: None, refusals)
+        PairingListener(context, KEYS, scarcity.ADDRESS, lambda *_: None, refusals)
 
 
 @pytest.mark.parametrize("left", range(2))

@@ -28,21 +28,23 @@ from nondum.transport.peers import (
 from nondum.transport.peers.certificate import new_fleet
 from nondum.transport.peers.gate import Acquaintance, Gate, TurnedAway, judge
 from nondum.transport.peers.messages import Hello, Notice, Ping, encode
-from nondum.transport.peers.zap import DOMAIN, Knock, parse
+from nondum.transport.peers.zap import DOMAIN, ConnectionAttempt, parse
 
 ME, PAIRED, REVOKED, OTHER = (HostKeys.generate() for _ in range(4))
 TRUST = Trust(paired={PAIRED.public: "rover"}).with_revoked(REVOKED.public, "stolen")
 FLEET, _ = new_fleet()
 
 
-def judged(knock: Knock, trust: Trust = TRUST, keys: HostKeys | None = ME) -> Reason | None:
+def judged(
+    knock: ConnectionAttempt, trust: Trust = TRUST, keys: HostKeys | None = ME
+) -> Reason | None:
     return judge(knock, Identity("base", keys), trust)
 
 
 def knock(
     key: PeerKey | str, *, domain: bytes = DOMAIN, mechanism: str = "CURVE", at: str = "10.0.0.7"
-) -> Knock:
-    return Knock(at, domain, mechanism, key)
+) -> ConnectionAttempt:
+    return ConnectionAttempt(at, domain, mechanism, key)
 
 
 @pytest.mark.parametrize(
@@ -59,7 +61,7 @@ def knock(
     ],
 )
 def test_handshake_is_judged_by_domain_mechanism_and_key(
-    asked: Knock, reason: Reason | None
+    asked: ConnectionAttempt, reason: Reason | None
 ) -> None:
     assert judged(asked) is reason
 
@@ -82,7 +84,9 @@ def test_unknown_key_may_greet_a_host_of_a_fleet() -> None:
         (knock("", mechanism="NULL", at="127.0.0.1", domain=b""), Reason.WRONG_DOMAIN),
     ],
 )
-def test_host_without_keys_is_met_on_this_machine_only(asked: Knock, reason: Reason | None) -> None:
+def test_host_without_keys_is_met_on_this_machine_only(
+    asked: ConnectionAttempt, reason: Reason | None
+) -> None:
     assert judged(asked, keys=None) is reason
 
 

@@ -52,7 +52,7 @@ async def test_answer_from_before_another_stall_does_not_show_that_the_link_last
 ) -> None:
     """The peer may have given the link up after it had answered."""
     async with two_hosts() as (rover, base):
-        real = rover.node._roster.session(base.key)
+        real = rover.node._peer_table.session(base.key)
         session = Session(real.admission, real.known, rover.servant, Pulse(), lambda _: None)
         link = Link(Wire(), base.key, clock.time(), dialled=True)
         session.join(link)
@@ -349,4 +349,4 @@ def lost(one: Host) -> list[PeerLost]:
 
 def say(teller: Host, hearer: Host, message: Ask) -> None:
     """Send a message as it is, as a hostile host might."""
-    teller.node._roster.session(hearer.key).send(encode(message))
+    teller.node._peer_table.session(hearer.key).send(encode(message))

@@ -22,7 +22,7 @@ SOON_MS = 50
 """When ZeroMQ gives up a handshake that nobody judges, where a test waits for that."""
 
 
-class Doorman:
+class ConnectionFilter:
     """Answers for a context's connections, when it is told to. Source: RFC 27/ZAP."""
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]]) -> None:
@@ -45,7 +45,7 @@ class Proving:
 
     def __init__(self, handshake_ms: int | None = None) -> None:
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self.doorman = Doorman(self._context)
+        self.connection_filter = ConnectionFilter(self._context)
         self._keys = HostKeys.generate()
         self._socket = listening(self._context, self._keys)
         if handshake_ms is not None:
@@ -58,7 +58,7 @@ class Proving:
         self.proof.cancel()
         await asyncio.gather(self.proof, return_exceptions=True)
         self._socket.close(0)
-        self.doorman.socket.close()
+        self.connection_filter.socket.close()
         self._context.term()
 
 
@@ -89,7 +89,7 @@ async def test_socket_that_lets_strangers_in_is_never_bound(fault: str) -> None:
 
 async def test_socket_for_which_nobody_answers_is_never_bound(clock: VirtualClock) -> None:
     async with proving() as host:
-        assert DOMAIN in await host.doorman.asked.get()
+        assert DOMAIN in await host.connection_filter.asked.get()
         await clock.advance(ANSWERED_S - TICK_S)
         assert not host.proof.done()
         await clock.advance(2 * TICK_S)
@@ -101,10 +101,10 @@ async def test_time_in_which_the_own_loop_stands_still_is_none_to_answer_in(
     clock: VirtualClock,
 ) -> None:
     async with proving() as host:
-        request = await host.doorman.asked.get()
+        request = await host.connection_filter.asked.get()
         for _ in range(5):
             await clock.stand_still(10 * ANSWERED_S)
-        host.doorman.turn_away(request)
+        host.connection_filter.turn_away(request)
         await host.proof
 
 
@@ -113,8 +113,8 @@ async def test_probe_whose_connection_has_ended_unanswered_is_sent_anew(
 ) -> None:
     """A host that stands still for longer than a handshake may take has done nothing wrong."""
     async with proving(handshake_ms=SOON_MS) as host:
-        await host.doorman.asked.get()
-        host.doorman.turn_away(await host.doorman.asked.get())
+        await host.connection_filter.asked.get()
+        host.connection_filter.turn_away(await host.connection_filter.asked.get())
         await host.proof
         assert len(set(host.probes)) == 2
 

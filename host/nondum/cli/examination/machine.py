@@ -1,4 +1,4 @@
-"""The machine: its kernel's cages, udev, USB and sound."""
+"""The machine: its kernel's cgroups, udev, USB and sound."""
 
 from __future__ import annotations
 

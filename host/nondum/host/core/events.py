@@ -493,7 +493,7 @@ class DriveRetried(Event):
 
 
 @dataclass(frozen=True, slots=True)
-class HostSteady(Event):
+class HostStable(Event):
     """The daemon has lived for a while beside what others had died of."""
 
     host: str
@@ -580,7 +580,7 @@ class WorkerExited(Event):
 
 
 @dataclass(frozen=True, slots=True)
-class WorkerSteady(Event):
+class WorkerStable(Event):
     """A worker that was started again has lived for a while: what was wrong is past."""
 
     component: str

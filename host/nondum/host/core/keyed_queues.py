@@ -10,7 +10,7 @@ _R = TypeVar("_R")
 Work = Callable[[], Awaitable[None]]
 
 
-class Lanes:
+class KeyedQueues:
     """Work in progress by key."""
 
     def __init__(self) -> None:
@@ -28,7 +28,7 @@ class Lanes:
 
     async def close(self) -> None:
         """Give up everything, and wait until it has ended."""
-        tasks = [task for lane in self._tasks.values() for task in lane]
+        tasks = [task for queue in self._tasks.values() for task in queue]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)

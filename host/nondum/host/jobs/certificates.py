@@ -3,8 +3,8 @@
     <drive>/nondum-peers/certificate           one host's
     <drive>/nondum-peers/<any>.certificate     many hosts': each takes its own
 
-A drive may bring a host what lets it in elsewhere (see `TrustKeeper.offer`). Whom a host lets in,
-a person says: `nondum peers trust-fleet <drive>/nondum-peers/fleet.pub`.
+A drive may bring a host what lets it in elsewhere (see `PeerTrustStore.offer`). Which hosts a host
+lets in, a person says: `nondum peers trust-fleet <drive>/nondum-peers/fleet.pub`.
 """
 
 from __future__ import annotations

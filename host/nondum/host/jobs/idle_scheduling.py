@@ -13,7 +13,7 @@ SETTLED_S = 1.0
 """How long nothing must have happened before work is begun that can wait."""
 
 
-class Quiet:
+class IdleScheduler:
     """Knows whether anything urgent is being done. One piece of other work at a time."""
 
     def __init__(self, *, settled_s: float = SETTLED_S) -> None:

@@ -18,7 +18,7 @@ from nondum.host.core.events import (
     WorkerExited,
     WorkerFailed,
     WorkerReady,
-    WorkerSteady,
+    WorkerStable,
 )
 from nondum.host.core.records import ComponentRecord, ComponentState, DeviceRecord, MountPose, Step
 from nondum.host.core.transitions import COMPONENT_TRANSITIONS
@@ -59,7 +59,7 @@ def _problems(
     return component.problems
 
 
-def on_worker_steady(turn: Turn, event: WorkerSteady) -> None:
+def on_worker_stable(turn: Turn, event: WorkerStable) -> None:
     """Forget why the worker before this one ended; what its own conditions ended with stays."""
     component = turn.state.components.get(event.component)
     if component is None or event.payload not in ("", component.payload):

@@ -14,7 +14,7 @@ from nondum.host.core.events import (
     DriveRetried,
     DriveUnreadable,
     Event,
-    HostSteady,
+    HostStable,
     PayloadFound,
     RetryAsked,
 )
@@ -145,7 +145,7 @@ def _clear(turn: Turn, *subjects: str) -> None:
         turn.change(tries=kept)
 
 
-def on_host_steady(turn: Turn, event: HostSteady) -> None:
+def on_host_stable(turn: Turn, event: HostStable) -> None:
     """Clear what has been lived with for a while, and what did not come again.
 
     What is left alone stays so for as long as it is there. A machine that has just been started may

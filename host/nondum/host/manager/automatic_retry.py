@@ -8,7 +8,7 @@ from collections.abc import Callable
 from nondum.host.core.events import Emit, SafeModeLeft, TrialDue
 from nondum.host.core.records import Safety, Snapshot
 from nondum.host.lifecycle.crash_attribution import STEADY_S
-from nondum.host.manager.crash_loop import Tally
+from nondum.host.manager.crash_loop import CrashCounter
 
 AFTER_S = 3600.0
 """So long a daemon lives before it tries."""
@@ -16,14 +16,14 @@ APART_S = 12 * STEADY_S
 """Between two trials: if a daemon dies, it is known of which."""
 
 
-async def hold(snapshot: Callable[[], Snapshot], tally: Tally, emit: Emit) -> None:
+async def hold(snapshot: Callable[[], Snapshot], counter: CrashCounter, emit: Emit) -> None:
     """Leave safe mode, if daemons that died are all that it is for, then have what was left alone
     tried, one after the other, until cancelled. By the time of the event loop."""
     await asyncio.sleep(AFTER_S)
     host = snapshot().host
-    if snapshot().safety is not Safety.OFF and await tally.tries_again():
+    if snapshot().safety is not Safety.OFF and await counter.tries_again():
         emit(SafeModeLeft(host, "it has lasted for an hour"))
-        await tally.outlive()
+        await counter.outlive()
     while True:
         emit(TrialDue(host))
         await asyncio.sleep(APART_S)

@@ -22,7 +22,7 @@ from nondum.host.core.events import (
     CatalogueUnwritten,
     CatalogueWritten,
     DrivesScanned,
-    HostSteady,
+    HostStable,
     HostStopped,
 )
 from nondum.host.core.journal_entry import entries_of
@@ -219,7 +219,7 @@ class ComponentManager:
 
     def _tried(self) -> None:
         self._trial = None
-        self._bus.emit(HostSteady(self._catalogue.state.host))
+        self._bus.emit(HostStable(self._catalogue.state.host))
         self._try(self._catalogue.state)
 
 

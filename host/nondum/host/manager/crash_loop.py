@@ -21,7 +21,7 @@ COMMAND_LINE = Path("/proc/cmdline")
 log = logging.getLogger(__name__)
 
 
-class Tally:
+class CrashCounter:
     """Counts one host's daemons. Methods but `on_event` and `outlive` block."""
 
     def __init__(self, state: Path, *, soon_s: float = SOON_S) -> None:

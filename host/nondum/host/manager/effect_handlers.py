@@ -24,11 +24,11 @@ from nondum.host.core.events import (
     PayloadFailed,
     PayloadRefused,
 )
-from nondum.host.core.keyed_queues import Lanes
+from nondum.host.core.keyed_queues import KeyedQueues
 from nondum.host.core.records import Moment
 from nondum.host.core.state import HostState
 from nondum.host.jobs.children import Children
-from nondum.host.jobs.idle_scheduling import Quiet
+from nondum.host.jobs.idle_scheduling import IdleScheduler
 from nondum.host.lifecycle import payload_rules
 from nondum.host.manager.drive_reading import DriveReading
 from nondum.host.manager.installation import Installation, InstallOptions
@@ -69,8 +69,8 @@ class Executor:
         self.trust = PayloadTrust(
             host, folders, self.children, options.trust, allow_unsigned=options.allow_unsigned
         )
-        self._lanes = Lanes()
-        self._quiet = Quiet()
+        self._queues = KeyedQueues()
+        self._quiet = IdleScheduler()
         self._is_prune_waiting = False
         self._drives = DriveReading(self.children, emit, self.trust, options.look_s)
         self.installation = Installation(
@@ -124,13 +124,13 @@ class Executor:
     def start(self, effect: Effect) -> None:
         """Set an effect going."""
         instead = isinstance(effect, _INSTEAD)
-        self._lanes.add(_lane(effect), partial(self._carry_out, effect), instead=instead)
+        self._queues.add(_queue_of(effect), partial(self._carry_out, effect), instead=instead)
         if isinstance(effect, effects.ClearPayload):
             self._want_prune()
 
     async def close(self) -> None:
         """Give up what is being done, unmount drives, end children. Workers are their owner's."""
-        await self._lanes.close()
+        await self._queues.close()
         await self._drives.close()
         await self.children.close()
 
@@ -157,7 +157,7 @@ class Executor:
         """Have the store pruned; one that is to come serves all who have asked till then."""
         if not self._is_prune_waiting:
             self._is_prune_waiting = True
-            self._lanes.add("store", self._prune)
+            self._queues.add("store", self._prune)
 
     async def _prune(self) -> None:
         self._is_prune_waiting = False
@@ -191,7 +191,7 @@ def _translated(effect: Effect, error: Exception) -> NondumError:
     return NondumError(Problem("INTERNAL", f"{what}: {error!r}", fix=fix))
 
 
-def _lane(effect: Effect) -> str:
+def _queue_of(effect: Effect) -> str:
     match effect:
         case effects.PayloadEffect():
             return f"payload {effect.payload}"

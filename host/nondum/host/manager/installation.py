@@ -40,7 +40,7 @@ from nondum.host.lifecycle.rebuilding import with_found, write_note
 from nondum.host.lifecycle.retry_causes import Amounts
 from nondum.host.manager.drive_reading import LOOK_S, telling_stalls
 from nondum.host.manager.headroom import Needs
-from nondum.host.manager.memory_reservations import Promises
+from nondum.host.manager.memory_reservations import MemoryReservations
 from nondum.host.manager.payload_trust import PayloadTrust, TrustOptions
 from nondum.host.manager.state_folders import Folders, missing, remove, sweep
 from nondum.host.workers.leftovers import end_leftovers
@@ -109,7 +109,7 @@ class Installation:
         self._workers, self._children, self._emit = workers, children, emit
         self._prepared: dict[str, tuple[Prepared, ...]] = {}
         self._needs: dict[str, Needs] = {}
-        self._promises = Promises(workers.pids_of)
+        self._reservations = MemoryReservations(workers.pids_of)
         self._queue = Queue(AT_ONCE)
         self._drives: dict[str, str] = {}
         """Payload → the drive that it was copied from: the owner of the children that read it."""
@@ -153,7 +153,7 @@ class Installation:
             folder=str(effect.folder),
             digest=effect.digest,
             staging=str(staging),
-            room=await self._promises.room(effect.payload, effect.beside),
+            room=await self._reservations.room(effect.payload, effect.beside),
         )
         with telling_stalls(effect.drive, COPY_SILENCE_S):
             copied = await self._run("copy", effect.payload, arguments, COPY_SILENCE_S)
@@ -185,8 +185,10 @@ class Installation:
         key = effect.payload
         if key not in self._prepared:  # a restart of the daemon, or another try
             await self._install(key, effect.renamed)
-        self._promises.make(key, self._needs[key])
-        if effect.beside and (reason := await self._promises.why_not_beside(key, effect.beside)):
+        self._reservations.make(key, self._needs[key])
+        if effect.beside and (
+            reason := await self._reservations.why_not_beside(key, effect.beside)
+        ):
             return (BesideRefused(key, reason),)
         await self._workers.ended(effect.after)
         specs = [component.spec(key, self._options.limits) for component in self._prepared[key]]
@@ -242,7 +244,7 @@ class Installation:
         """Keep all of a payload but its processes."""
         self._queue.leave(effect.payload)
         await self._stop(effect.payload, effect.components)
-        self._promises.give_up(effect.payload)
+        self._reservations.give_up(effect.payload)
         await in_thread(end_leftovers, self._folders.scratches_of(effect.payload))
         return ()
 
@@ -276,13 +278,13 @@ class Installation:
     async def room(self, beside: str) -> dict[str, Any]:
         """What children are told of the memory that there is for a payload that is not here yet,
         which may take over from a release of it."""
-        return await self._promises.room("", beside)
+        return await self._reservations.room("", beside)
 
     async def amounts(self) -> Amounts:
         """What there is for a payload that is not here yet."""
         promised = Promised.parse((await self.room(""))["promised"])
         disk_mb, memory = await in_thread(self._looked_at)
-        gpu_mb = self._promises.gpu_mb - promised.gpu_memory_mb
+        gpu_mb = self._reservations.gpu_mb - promised.gpu_memory_mb
         left_mb = Memory(memory, promised=promised).left_mb()
         return Amounts(disk_mb, left_mb, gpu_mb, time.time() - time.monotonic())
 
@@ -302,11 +304,11 @@ class Installation:
         async with self._store:
             room = None
             if admit_beside is not None:
-                room = await self._promises.room(key, admit_beside)
+                room = await self._reservations.room(key, admit_beside)
             told = await self._run("install", key, {**arguments, "room": room})
             self._needs[key] = Needs.parse(told["needs"])
-            self._promises.make(key, self._needs[key])
-            self._promises.saw_gpu(Gpu(**told["gpu"]) if told["gpu"] else None)
+            self._reservations.make(key, self._needs[key])
+            self._reservations.saw_gpu(Gpu(**told["gpu"]) if told["gpu"] else None)
         if told["uncompiled"]:
             self._uncompiled.add(key)
         named = [(said, renamed.get(said["id"], said["id"])) for said in told["components"]]
@@ -341,7 +343,7 @@ class Installation:
         await self._children.release(self._drives.pop(effect.payload, effect.payload))
         self._prepared.pop(effect.payload, None)
         self._needs.pop(effect.payload, None)
-        self._promises.give_up(effect.payload)
+        self._reservations.give_up(effect.payload)
         self._grants.pop(effect.payload, None)
         self._goals.pop(effect.payload, None)
         self._uncompiled.discard(effect.payload)

@@ -18,7 +18,7 @@ from nondum.wheelhouse.payload.memory import Memory, Promised, free_memory_mb
 NOTHING = Needs()
 
 
-class Promises:
+class MemoryReservations:
     """Payload key → what it was promised; `pids_of` tells which processes are a payload's."""
 
     def __init__(self, pids_of: Callable[[str], Collection[int]]) -> None:

@@ -9,7 +9,7 @@ Mounts: TypeAlias = Mapping[str, Any]
 """As `frames.mounts_of_all` makes them: frame → its parent and pose."""
 
 
-class TellingMounts:
+class MountUpdates:
     """Tells workers of new mounts at once, and of those that are gone only after a tick.
 
     A behaviour that uses the place of a unit which is gone has been asked to halt by then: it is

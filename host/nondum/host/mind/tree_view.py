@@ -19,7 +19,7 @@ from nondum.host.mind.pursuit import Pursuit
 from nondum.host.mind.runner import BehaviourRunner
 from nondum.planning.execute.choice import Alternatives
 from nondum.planning.execute.partial_order import GOAL, CausalLink
-from nondum.planning.execute.step_status import Whereabouts
+from nondum.planning.execute.step_status import StepStatus
 from nondum.planning.execute.task_tree import StepLeaf, TaskTree
 from nondum.planning.pddl.facts import parts
 from nondum.sdk.planner import GroundAction
@@ -127,7 +127,7 @@ class TreeView:
         found = composition.merged.objects.get(unit) if composition else None
         return (found.component or None) if found else None
 
-    def _times(self, where: Whereabouts) -> Row:
+    def _times(self, where: StepStatus) -> Row:
         """When it was started, and ended if it has; and for how long it has run."""
         if where.started_s is None:
             return {"started": None, "ended": None, "runs_s": None}
@@ -139,7 +139,7 @@ class TreeView:
             "runs_s": end_s - where.started_s,
         }
 
-    def _waits_for(self, leaf: StepLeaf, where: Whereabouts) -> list[Row]:
+    def _waits_for(self, leaf: StepLeaf, where: StepStatus) -> list[Row]:
         """Facts that earlier steps are to give, then earlier steps that are to be over."""
         steps = leaf.control.regression.steps
         rows: list[Row] = [
@@ -161,7 +161,7 @@ class TreeView:
         name = leaf.control.regression.steps[link.consumer].name
         return {"fact": link.fact, **_step_named(name, link.consumer)}
 
-    def _locks(self, leaf: StepLeaf, where: Whereabouts) -> Row:
+    def _locks(self, leaf: StepLeaf, where: StepStatus) -> Row:
         """What nobody else has meanwhile: a unit that serves one behaviour, and facts."""
         unit = leaf.step.actor if where.exclusive else None
         return {"unit": unit, "takes": list(where.takes)}

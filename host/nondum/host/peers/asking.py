@@ -11,7 +11,7 @@ from nondum.planning.words.addressee import addressed_to
 from nondum.planning.words.asking import question_in
 from nondum.sdk.errors import GoalRefused, NondumError, Problem
 from nondum.sdk.wire import Body
-from nondum.transport.peers import CallFailed, Errand
+from nondum.transport.peers import CallFailed, IncomingCall
 
 METHOD = "question.ask"
 
@@ -48,9 +48,9 @@ class Asking:
             raise GoalRefused(Problem("CALL_MALFORMED", wrong, fix="ask it there"))
         return f"{peer}: {printable(text[:MAX_WORDS])}"
 
-    async def serve(self, errand: Errand) -> Body:
+    async def serve(self, incoming: IncomingCall) -> Body:
         """Answer a question that a peer's person asks: `answer`. Raises `CallFailed`."""
-        words = errand.args.get("words")
+        words = incoming.args.get("words")
         is_asked = isinstance(words, str) and len(words) <= MAX_WORDS
         answer = await self._answer(str(words)) if is_asked else None
         if answer is None:

@@ -24,7 +24,7 @@ from nondum.host.people.stopping import Stopped, is_stop_for_stranger, said_to
 from nondum.planning.words.stop_words import STOPS, is_stop
 from nondum.sdk.errors import GoalRefused, NondumError, Problem
 from nondum.sdk.wire import Body
-from nondum.transport.peers import CallFailed, Errand
+from nondum.transport.peers import CallFailed, IncomingCall
 
 ASK_S = 2.0
 """How long a peer has to say whether it can."""
@@ -155,42 +155,42 @@ class Goals:
 
     # What peers heard
 
-    async def serve_ask(self, errand: Errand) -> Body:
+    async def serve_ask(self, incoming: IncomingCall) -> Body:
         """Whether a peer's person can have that here: `now`, see `offers`. Raises `CallFailed`."""
-        return {"now": await self._prospect(self._words(errand))}
+        return {"now": await self._prospect(self._words(incoming))}
 
-    def serve_give(self, errand: Errand) -> Body:
+    def serve_give(self, incoming: IncomingCall) -> Body:
         """Take a goal that a peer heard: its `goal` id. Raises `GoalRefused`, `CallFailed`.
 
         Whether or not goals are taken: words that stop this host do.
         """
-        said = errand.args.get("words")
+        said = incoming.args.get("words")
         if isinstance(said, str) and len(said) <= MAX_WORDS and is_stop(said):
             stopped = self._stop()
-            self._mind().people.tell(f"{errand.caller.name} heard {said!r}: {stopped}")
+            self._mind().people.tell(f"{incoming.caller.name} heard {said!r}: {stopped}")
             return {"stopped": True}
-        words = self._words(errand)
-        priority = _priority(errand)
+        words = self._words(incoming)
+        priority = _priority(incoming)
         given = self._mind().give(words=words, priority=priority)
-        self._is_of(given.id, errand.caller.name)
-        self._mind().people.tell(f"{errand.caller.name} heard {words!r}: that is goal {given.id}")
+        self._is_of(given.id, incoming.caller.name)
+        self._mind().people.tell(f"{incoming.caller.name} heard {words!r}: that is goal {given.id}")
         told = {"goal": given.id, "text": given.text, "pddl": given.pddl, "kind": given.kind}
         return told | {"replaces": replaced(self._mind().views.goal(given))}
 
-    async def serve_again(self, errand: Errand) -> Body:
+    async def serve_again(self, incoming: IncomingCall) -> Body:
         """How goals stand that a peer gave before one of the two was gone: `standings`. It is told
         of them again from now on. Raises `CallFailed`.
 
         A host that has just started waits for a moment until it knows its goals.
         """
-        asked = _goals_asked(errand)
+        asked = _goals_asked(incoming)
         version = -1
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(RECALL_S):
                 while not asked.items() <= {(goal.id, goal.text) for goal in self._mind().queue}:
                     version = await self._mind().changed(version)
         rows = [row for row in self._mind().views.given() if asked.get(row["id"]) == row["text"]]
-        caller = errand.caller.name
+        caller = incoming.caller.name
         rows = [row for row in rows if self._givers.get(row["id"], caller) == caller]
         for row in rows:
             if not self._mind().queue[row["id"]].state.is_final:
@@ -273,8 +273,8 @@ class Goals:
             for row in rows:
                 self._reach.notify(giver, "goal.standing", standing(row))
 
-    def _words(self, errand: Errand) -> str:
-        words = errand.args.get("words")
+    def _words(self, incoming: IncomingCall) -> str:
+        words = incoming.args.get("words")
         if not isinstance(words, str) or not 0 < len(words) <= MAX_WORDS:
             raise CallFailed(Problem("CALL_MALFORMED", "a goal is given in words"))
         if not self._accepts:
@@ -295,18 +295,18 @@ class Goals:
         return await asyncio.to_thread(prospect, composition, world.facts, world.bare_facts, goal)
 
 
-def _goals_asked(errand: Errand) -> Mapping[str, str]:
+def _goals_asked(incoming: IncomingCall) -> Mapping[str, str]:
     """Id → words of goals that a peer asks after. Raises `CallFailed` (CALL_MALFORMED)."""
-    goals = errand.args.get("goals")
+    goals = incoming.args.get("goals")
     if not isinstance(goals, dict) or not 0 < len(goals) <= MOST_KEPT:
         told = f"at most {MOST_KEPT} goals are asked after, by id"
         raise CallFailed(Problem("CALL_MALFORMED", told))
     return {str(id): str(text) for id, text in goals.items()}
 
 
-def _priority(errand: Errand) -> int:
+def _priority(incoming: IncomingCall) -> int:
     """That of a goal that is given. Raises `CallFailed` (CALL_MALFORMED)."""
-    priority = errand.args.get("priority", 0)
+    priority = incoming.args.get("priority", 0)
     if type(priority) is not int or abs(priority) > HIGHEST_PRIORITY:
         most = HIGHEST_PRIORITY
         raise CallFailed(Problem("CALL_MALFORMED", f"a priority is from -{most} to {most}"))

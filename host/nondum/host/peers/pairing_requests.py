@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from nondum.host.core.plain import Row
-from nondum.host.peers.trust_keeper import TrustKeeper
+from nondum.host.peers.trust_store import PeerTrustStore
 from nondum.sdk.errors import Problem
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import PeerKey, fingerprint
@@ -58,12 +58,12 @@ class Candidate:
     addresses: tuple[str, ...]
 
 
-class PairingDesk:
+class PairingRequests:
     """Opens the window, finds the other host, and hands whom it agreed with to the trust keeper."""
 
     def __init__(
         self,
-        keeper: TrustKeeper,
+        keeper: PeerTrustStore,
         *,
         announce: Callable[[int | None], None],
         candidates: Callable[[], Iterable[Hint]],
@@ -152,7 +152,7 @@ class _Window:
 
     def __init__(
         self,
-        keeper: TrustKeeper,
+        keeper: PeerTrustStore,
         wanted: str | None,
         known: Callable[[], Mapping[PeerKey, str]],
         *,

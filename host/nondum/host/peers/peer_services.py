@@ -19,23 +19,23 @@ from nondum.host.mind.mind import Mind
 from nondum.host.peers import asking, trust_orders
 from nondum.host.peers.asking import Asking
 from nondum.host.peers.compute import Compute, probed
-from nondum.host.peers.dispatch import Desk
+from nondum.host.peers.dispatch import Dispatcher
 from nondum.host.peers.finder import PeerFinder
 from nondum.host.peers.fleet_transport import fleet_of, listens, own_hosts
 from nondum.host.peers.goals import Goals
 from nondum.host.peers.name_conflicts import Namesakes
 from nondum.host.peers.offered_entries import Policy, policy_of
-from nondum.host.peers.pairing_requests import PairingDesk
+from nondum.host.peers.pairing_requests import PairingRequests
 from nondum.host.peers.peering import Peering
 from nondum.host.peers.placement.pins import Pins
 from nondum.host.peers.placement.placement import Placement
 from nondum.host.peers.rejected_hosts import Strangers
 from nondum.host.peers.remote_calls import AllCalls, RemoteCalls
 from nondum.host.peers.serving import Serving
-from nondum.host.peers.stream_requests import StreamDesk
+from nondum.host.peers.stream_requests import StreamRequests
 from nondum.host.peers.streams.bridge import Bridge, with_port
-from nondum.host.peers.trust_keeper import TrustKeeper
 from nondum.host.peers.trust_orders import TrustOrders
+from nondum.host.peers.trust_store import PeerTrustStore
 from nondum.host.peers.uses import uses_of
 from nondum.host.peers.view import PeersView
 from nondum.host.people.conversation import Reply
@@ -62,7 +62,7 @@ class Neighbourhood:
     def __init__(
         self,
         config: HostConfig,
-        keeper: TrustKeeper,
+        keeper: PeerTrustStore,
         workers: Workers,
         catalogue: Catalogue,
         emit: Emit,
@@ -93,15 +93,15 @@ class Neighbourhood:
         clock = asyncio.get_running_loop().time
         self._strangers = Strangers(emit, clock)
         self._namesakes = Namesakes(host, clock, self._hints)
-        self.desk = Desk()
-        self.desk.add("behave", self.serving.behave, self.serving.orphaned)
-        self.desk.hear("values", self.serving.values)
+        self.requests = Dispatcher()
+        self.requests.add("behave", self.serving.behave, self.serving.orphaned)
+        self.requests.hear("values", self.serving.values)
         self.finder: PeerFinder | None = None
         self.fleet = fleet_of(
             config,
             keeper.identity(development=config.peers.development),
             keeper.trust,
-            self.desk,
+            self.requests,
             on_event=self._on_fleet,
             find=lambda mesh: self._find(mesh, config.peers),
         )
@@ -125,11 +125,13 @@ class Neighbourhood:
             refusals=self.fleet.refusals,
             links_pid=lambda: self.fleet.links_pid if isinstance(self.fleet, Mesh) else None,
         )
-        self._streams = StreamDesk(bridge, workers.streams, self.peering, self.fleet, self._hints)
-        self._streams.serve(self.desk)
+        self._streams = StreamRequests(
+            bridge, workers.streams, self.peering, self.fleet, self._hints
+        )
+        self._streams.serve(self.requests)
         self.trust = TrustOrders(
             keeper,
-            PairingDesk(
+            PairingRequests(
                 keeper,
                 announce=self._announce_pairing,
                 candidates=self._hints,
@@ -147,14 +149,14 @@ class Neighbourhood:
             accepts=config.peers.accept_goals,
         )
         self.asking = Asking(self.peering, self.peering.names, answer)
-        self.desk.add(asking.METHOD, self.asking.serve)
-        self.desk.add("goal.ask", self.goals.serve_ask)
-        self.desk.add("goal.give", self.goals.serve_give)
-        self.desk.add("goal.again", self.goals.serve_again)
-        self.desk.hear("goal.news", self.goals.hear_news)
-        self.desk.hear("goal.standing", self.goals.hear_standing)
+        self.requests.add(asking.METHOD, self.asking.serve)
+        self.requests.add("goal.ask", self.goals.serve_ask)
+        self.requests.add("goal.give", self.goals.serve_give)
+        self.requests.add("goal.again", self.goals.serve_again)
+        self.requests.hear("goal.news", self.goals.hear_news)
+        self.requests.hear("goal.standing", self.goals.hear_standing)
         self.placement = placement
-        placement.serve(self.desk)
+        placement.serve(self.requests)
         self._remote = RemoteCalls(self.peering, emit, self.peering.claims)
         self.calls = AllCalls(workers, self._remote)
 
@@ -174,7 +176,7 @@ class Neighbourhood:
     ) -> Neighbourhood:
         """Read keys and trust, and look at this machine; `judged_by` is what payloads are judged by
         now. Raises `PeerRefused`."""
-        keeper = await TrustKeeper.open(
+        keeper = await PeerTrustStore.open(
             folders.peers,
             config.host.name,
             on_change=lambda trust: made._on_trust(trust),

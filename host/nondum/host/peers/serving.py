@@ -22,7 +22,7 @@ from nondum.sdk.errors import MessageInvalid, Problem
 from nondum.sdk.messages import value_from_wire
 from nondum.sdk.signature import parse_signature
 from nondum.sdk.wire import Body
-from nondum.transport.peers import CallFailed, Errand, Lease, Loss
+from nondum.transport.peers import CallFailed, IncomingCall, Lease, Loss
 
 SIGN_S = 1.0
 """Time between two signs of life of a behaviour: reports may be lost on the way, so how it is told
@@ -76,7 +76,7 @@ class Asked:
 class Served:
     """One behaviour that runs for a peer."""
 
-    errand: Errand
+    incoming: IncomingCall
     asked: Asked
     unit: str
     """The actor."""
@@ -88,7 +88,7 @@ class Served:
     @property
     def caller(self) -> str:
         """The name of the peer."""
-        return self.errand.caller.name
+        return self.incoming.caller.name
 
 
 class Serving:
@@ -131,20 +131,20 @@ class Serving:
                 if served := self._served.get((component, call_id)):
                     served.news.set()
 
-    async def behave(self, errand: Errand) -> Body:
+    async def behave(self, incoming: IncomingCall) -> Body:
         """Carry out a behaviour for a peer: `outcome` and `reason`.
 
         Progress has `established` and, once told, `progress`. Raises `CallFailed` (CALL_MALFORMED,
         NOT_OFFERED, UNIT_TAKEN) and what the workers raise.
         """
-        asked = Asked.parse(errand.args)
+        asked = Asked.parse(incoming.args)
         plugin, unit = self._check_offered(asked)
         taken = self._uses(plugin, asked)
-        await self._supersede(errand, taken)
+        await self._supersede(incoming, taken)
         self._check_untaken(taken)
         self._check_users(asked.component, unit)
         call = self._workers.behave(asked.component, asked.behaviour, asked.arguments, asked.values)
-        served = Served(errand, asked, unit, call, taken)
+        served = Served(incoming, asked, unit, call, taken)
         self._served[call.component, call.id] = served
         self._on_change()
         try:
@@ -165,9 +165,9 @@ class Serving:
             ):
                 self._workers.tell_values(component, tuple(map(_value, values)))
 
-    def orphaned(self, errand: Errand, reason: Loss) -> Lease:
+    def orphaned(self, incoming: IncomingCall, reason: Loss) -> Lease:
         """What becomes of a behaviour whose caller is lost: as its author declared."""
-        served = next((one for one in self if one.errand is errand), None)
+        served = next((one for one in self if one.incoming is incoming), None)
         described = self._described(served.asked) if served else None
         if described is None or reason in (Loss.REVOKED, Loss.EXPIRED, Loss.VIOLATED):
             return Lease.STOP
@@ -187,7 +187,7 @@ class Serving:
         return names
 
     async def _follow(self, served: Served) -> Body:
-        call, errand = served.call, served.errand
+        call, incoming = served.call, served.incoming
         ending = asyncio.ensure_future(call.ended())
         try:
             while not call.state.has_ended:
@@ -195,7 +195,7 @@ class Serving:
                 report: dict[str, Any] = {"established": call.state is RunState.ESTABLISHED}
                 if served.progress is not None:
                     report["progress"] = list(served.progress)
-                errand.progress(report)
+                incoming.progress(report)
                 news = asyncio.ensure_future(served.news.wait())
                 await asyncio.wait(
                     {ending, news}, timeout=SIGN_S, return_when=asyncio.FIRST_COMPLETED
@@ -205,13 +205,13 @@ class Serving:
             ending.cancel()
         return {"outcome": call.state.name, "reason": call.reason}
 
-    async def _supersede(self, errand: Errand, taken: frozenset[str]) -> None:
+    async def _supersede(self, incoming: IncomingCall, taken: frozenset[str]) -> None:
         """End what the same host had asked of the same units: it has lost that, or it would not ask
         again. What is being halted already is waited for."""
         earlier = [
             served
             for served in self
-            if served.caller == errand.caller.name and served.taken & taken
+            if served.caller == incoming.caller.name and served.taken & taken
         ]
         for served in earlier:
             served.call.halt()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterable
 
-from nondum.host.peers.dispatch import Desk
+from nondum.host.peers.dispatch import Dispatcher
 from nondum.host.peers.peer_entries import reach_of
 from nondum.host.peers.peering import Peering
 from nondum.host.peers.streams.bridge import Bridge
@@ -16,13 +16,13 @@ from nondum.sdk.errors import Problem
 from nondum.sdk.wire import Body
 from nondum.transport.discovery import Hint
 from nondum.transport.fleet import Fleet
-from nondum.transport.peers import CallFailed, Errand, PeerKey
+from nondum.transport.peers import CallFailed, IncomingCall, PeerKey
 
 OPEN_S = 10.0
 """What a peer has to open a stream."""
 
 
-class StreamDesk:
+class StreamRequests:
     """Ties this host's streams and its bridge to its peers. `close` it before the fleet."""
 
     def __init__(
@@ -39,10 +39,10 @@ class StreamDesk:
         self._parting: set[asyncio.Task[None]] = set()
         streams.reach(self._remote)
 
-    def serve(self, desk: Desk) -> None:
+    def serve(self, requests: Dispatcher) -> None:
         """Have peers' calls about streams carried out."""
-        desk.add("stream.open", self._open)
-        desk.add("stream.close", self._close)
+        requests.add("stream.open", self._open)
+        requests.add("stream.close", self._close)
 
     async def expect(self) -> None:
         """A peer is here: streams may cross soon."""
@@ -59,14 +59,14 @@ class StreamDesk:
         await self._remote.close()
         await self._bridge.close()
 
-    async def _open(self, errand: Errand) -> Body:
+    async def _open(self, incoming: IncomingCall) -> Body:
         """Let a peer read a stream of an offered unit. Raises `CallFailed` (NOT_OFFERED)."""
-        if errand.args.get("stream") not in self._peering.offered_streams():
+        if incoming.args.get("stream") not in self._peering.offered_streams():
             raise CallFailed(Problem("NOT_OFFERED", "no such stream is offered to peers"))
-        return await self._shared.serve_open(errand.caller.key, errand.args)
+        return await self._shared.serve_open(incoming.caller.key, incoming.args)
 
-    async def _close(self, errand: Errand) -> Body:
-        return await self._shared.serve_close(errand.caller.key, errand.args)
+    async def _close(self, incoming: IncomingCall) -> Body:
+        return await self._shared.serve_close(incoming.caller.key, incoming.args)
 
     async def _ask(self, host: str, method: str, args: Body) -> Body:
         return await self._peering.call(host, method, args, deadline_s=OPEN_S)

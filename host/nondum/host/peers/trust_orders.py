@@ -13,8 +13,8 @@ from typing import Any
 
 from nondum.host.control.arguments import Arguments
 from nondum.host.core.plain import Row
-from nondum.host.peers.pairing_requests import PairingDesk
-from nondum.host.peers.trust_keeper import TrustKeeper
+from nondum.host.peers.pairing_requests import PairingRequests
+from nondum.host.peers.trust_store import PeerTrustStore
 from nondum.sdk.errors import NondumError, Problem
 from nondum.transport.peers.certificate import check_name
 from nondum.transport.peers.failures import PeerRefused
@@ -29,8 +29,8 @@ MOST_WORDS = 200
 class TrustOrders:
     """Each method is a verb."""
 
-    keeper: TrustKeeper
-    desk: PairingDesk
+    keeper: PeerTrustStore
+    requests: PairingRequests
     known: Callable[[], Mapping[PeerKey, str]]
     """Hosts that are here or were, paired or certified: key → name. So that people can name whom
     a fleet has let in."""
@@ -53,20 +53,20 @@ class TrustOrders:
         return {"name": host.name, **_row(host.key), "public": host.to_text()}
 
     def pair(self, arguments: Arguments) -> AsyncIterator[Row]:
-        """Open the window, to any host or to the one named `host`: see `PairingDesk.pair`."""
-        return self.desk.pair(arguments.optional_text("host"))
+        """Open the window, to any host or to the one named `host`: see `PairingRequests.pair`."""
+        return self.requests.pair(arguments.optional_text("host"))
 
     async def confirm(self, arguments: Arguments) -> Row:
         """Both hosts show this `code`: how the window stands now, or with `wait`, at its end.
 
         Raises `PeerRefused` (PAIRING_ORDER, PAIRING_CODE).
         """
-        self.desk.confirm(arguments.text("code"))
-        return await self.desk.ended() if arguments.flag("wait") else self.desk.row() or {}
+        self.requests.confirm(arguments.text("code"))
+        return await self.requests.ended() if arguments.flag("wait") else self.requests.row() or {}
 
     async def refuse(self, arguments: Arguments) -> Row:
         """Close the window. Raises `PeerRefused` (PAIRING_ORDER)."""
-        self.desk.refuse()
+        self.requests.refuse()
         return {}
 
     async def revoke(self, arguments: Arguments) -> Row:

@@ -13,7 +13,7 @@ Granted: TypeAlias = dict[str, dict[str, Any]]
 """Declared need → node and properties of the device that serves it, and all its `nodes`."""
 
 
-class Others:
+class ExtraWorkers:
     """Knows them, and which devices those that are being stopped still have."""
 
     def __init__(self) -> None:

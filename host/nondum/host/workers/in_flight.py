@@ -145,7 +145,9 @@ def _counted(workers: Collection[Worker], senders: Mapping[int, str]) -> Counter
     counted: Counter[str] = Counter()
     for worker in workers:
         pids = set(worker.pids())
-        if not worker.is_caged:  # what it has started is found as far as it kept its environment
+        if (
+            not worker.is_in_cgroup
+        ):  # what it has started is found as far as it kept its environment
             pids.update(marked(worker.spec.scratch))
-        counted += sent(pids, worker.spec.component, senders, is_whole=worker.is_caged)
+        counted += sent(pids, worker.spec.component, senders, is_whole=worker.is_in_cgroup)
     return counted

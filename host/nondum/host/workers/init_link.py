@@ -38,7 +38,7 @@ class OpenFiles:
     """In files of its disk that were deleted."""
 
 
-class Keeper:
+class InitLink:
     """One worker's. Make it on the loop; `close` it once its process has ended."""
 
     def __init__(self, orders: socket.socket) -> None:

@@ -15,7 +15,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Protocol
 
-from nondum.host.sandbox.cgroups import Cages
+from nondum.host.sandbox.cgroups import Cgroups
 from nondum.host.sandbox.levels.bubblewrap import Ground
 from nondum.host.workers import problems, scratch
 from nondum.host.workers.confinements import Confinement, Entry, Unconfined
@@ -61,14 +61,14 @@ class WorkerLauncher:
     def __init__(
         self,
         confinement: Confinement | None = None,
-        cages: Cages | None = None,
+        cgroups: Cgroups | None = None,
         scratches: Path | None = None,
         startup_s: float = Timing().startup_s,
     ) -> None:
         """`scratches`, where all scratch folders are, lets the next daemon find what is left;
         `startup_s` is how long an interpreter may take until it can become a worker."""
         self._confinement = confinement or Unconfined()
-        self._cages = cages
+        self._cgroups = cgroups
         self._owner = owner_mark(scratches) if scratches is not None else ""
         self._startup_s = startup_s
         self._spare: Spare | None = None
@@ -129,8 +129,8 @@ class WorkerLauncher:
             await spare.end()
 
     async def _started(self, ground: Ground) -> Spare:
-        return await Spare.caged(
-            self._confinement, ground, self._cages, self._owner, self._startup_s
+        return await Spare.in_cgroup(
+            self._confinement, ground, self._cgroups, self._owner, self._startup_s
         )
 
     def _taken(self) -> Spare | None:

@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
-from nondum.host.sandbox.cgroups import Cage
-from nondum.host.workers.init_link import Keeper, OpenFiles, node_of
+from nondum.host.sandbox.cgroups import Cgroup
+from nondum.host.workers.init_link import InitLink, OpenFiles, node_of
 
 DETACH_S = 2.0
 """How long a process that was killed is waited for; one in the kernel's hands may never end."""
@@ -24,8 +24,8 @@ class WorkerProcess:
     def __init__(
         self,
         popen: subprocess.Popen[bytes],
-        cage: Cage | None = None,
-        keeper: Keeper | None = None,
+        cgroup: Cgroup | None = None,
+        keeper: InitLink | None = None,
         user: int | None = None,
     ) -> None:
         """`keeper`, which it takes over, is that of a worker in a room of its own.
@@ -36,8 +36,8 @@ class WorkerProcess:
         """The user of the machine that it is, if not the host's."""
         self._popen = popen
         self._keeper = keeper
-        self.cage = cage
-        """What holds it and all that it starts; whoever ends the process ends the cage."""
+        self.cgroup = cgroup
+        """What holds it and all that it starts; whoever ends the process ends the cgroup."""
         self.exited: asyncio.Future[int] = asyncio.get_running_loop().create_future()
         """Its exit status, negative for the signal that ended it."""
         self._pidfd = os.pidfd_open(popen.pid)

@@ -20,12 +20,12 @@ from typing import IO, Any
 
 from nondum.host.core.printable import printable
 from nondum.host.core.shielded import until_done
-from nondum.host.sandbox.cgroups import Cage, CageLimits, Cages
+from nondum.host.sandbox.cgroups import Cgroup, CgroupLimits, Cgroups
 from nondum.host.sandbox.helper import privileged
 from nondum.host.sandbox.levels.bubblewrap import Ground
 from nondum.host.sandbox.levels.users import NewNamespace
 from nondum.host.workers.confinements import Confinement
-from nondum.host.workers.init_link import CREDENTIALS, Keeper
+from nondum.host.workers.init_link import CREDENTIALS, InitLink
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spec import Limits
 
@@ -49,7 +49,7 @@ class Spare:
     ) -> None:
         """Start it; `owner`, if any, tells whose it is. Raises `OSError`."""
         self.ground = ground
-        self.cage: Cage | None = None
+        self.cgroup: Cgroup | None = None
         self.said = ""
         """The last line that it said before it ended without having become a worker."""
         self._has_keeper = confinement.has_keeper
@@ -69,21 +69,21 @@ class Spare:
             raise
 
     @classmethod
-    async def caged(
+    async def in_cgroup(
         cls,
         confinement: Confinement,
         ground: Ground,
-        cages: Cages | None,
+        cgroups: Cgroups | None,
         owner: str,
         startup_s: float,
     ) -> Spare:
-        """Start one in a cage of its own, if there are cages, see `settle`. Raises `OSError`.
+        """Start one in a cgroup of its own, if there are cgroups, see `settle`. Raises `OSError`.
 
         The kernel takes some 20 ms to put a process into a control group: a thread waits for it.
         """
         spare = cls(confinement, ground, owner)
-        if cages is not None or confinement.has_users:
-            settling = asyncio.create_task(asyncio.to_thread(spare.settle, startup_s, cages))
+        if cgroups is not None or confinement.has_users:
+            settling = asyncio.create_task(asyncio.to_thread(spare.settle, startup_s, cgroups))
             try:
                 await until_done(settling)
                 settling.result()
@@ -92,15 +92,15 @@ class Spare:
                 raise
         return spare
 
-    def settle(self, startup_s: float, cages: Cages | None = None) -> None:
-        """Give it a cage, and the users that its room has, if it is to have any: then it has been
+    def settle(self, startup_s: float, cgroups: Cgroups | None = None) -> None:
+        """Give it a cgroup, and the users that its room has, if it is to have any: then it has been
         started. Blocks.
 
         Call it once. Raises `OSError`; `TimeoutError` if it has not been after `startup_s`.
         """
-        if cages is not None:
-            self.cage = cages.make("worker", CageLimits())
-            self.cage.add(self.popen.pid)
+        if cgroups is not None:
+            self.cgroup = cgroups.make("worker", CgroupLimits())
+            self.cgroup.add(self.popen.pid)
         if self._namespace is not None:
             namespace, self._namespace = self._namespace, None
             namespace.map_users(startup_s)
@@ -111,8 +111,8 @@ class Spare:
 
     def limit(self, limits: Limits) -> None:
         """Set what it may use, before it becomes a worker. Raises `OSError`."""
-        if self.cage is not None:
-            self.cage.limit(limits.of_cage())
+        if self.cgroup is not None:
+            self.cgroup.limit(limits.of_cgroup())
 
     def become(
         self, parameters: Mapping[str, Any], link: socket.socket, ruleset: int | None
@@ -175,14 +175,14 @@ class Spare:
         Call it once, on the loop. Raises `OSError`; then it is still to be closed.
         """
         if self._has_keeper:
-            keeper = Keeper(self._orders)
+            keeper = InitLink(self._orders)
             try:
-                return WorkerProcess(self.popen, self.cage, keeper, user)
+                return WorkerProcess(self.popen, self.cgroup, keeper, user)
             except OSError:
                 keeper.close()
                 raise
         self._orders.close()
-        return WorkerProcess(self.popen, self.cage, user=user)
+        return WorkerProcess(self.popen, self.cgroup, user=user)
 
     async def end(self) -> None:
         """`close` it without holding up the loop, whoever is cancelled meanwhile."""
@@ -199,8 +199,8 @@ class Spare:
         for pipe in (self.popen.stdout, self.popen.stderr):
             if pipe is not None:
                 pipe.close()
-        if self.cage is not None:
-            self.cage.end()
+        if self.cgroup is not None:
+            self.cgroup.end()
 
     def _kill(self) -> None:
         """SIGKILL all of it: its room may not be finished."""

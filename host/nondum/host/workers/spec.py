@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from nondum.host.sandbox.cgroups import CageLimits
+from nondum.host.sandbox.cgroups import CgroupLimits
 from nondum.planning.merge.contribution import object_name
 from nondum.sdk.description import PluginDescription
 
@@ -35,9 +35,9 @@ class Limits:
     scratch_mb: int = 256
     """Size of its scratch folder."""
 
-    def of_cage(self) -> CageLimits:
+    def of_cgroup(self) -> CgroupLimits:
         """What all its processes may use together."""
-        return CageLimits(self.memory_mb, self.tasks, processors=self.processors)
+        return CgroupLimits(self.memory_mb, self.tasks, processors=self.processors)
 
 
 @dataclass(frozen=True, slots=True)

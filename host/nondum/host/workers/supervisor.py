@@ -157,7 +157,7 @@ class Supervisor:
             async with asyncio.timeout(supervision.WINDOW_S):
                 return await asyncio.shield(worker.gone)
         except TimeoutError:
-            self._emit(events.WorkerSteady(self.spec.component, self.spec.payload))
+            self._emit(events.WorkerStable(self.spec.component, self.spec.payload))
             return await asyncio.shield(worker.gone)
 
     async def _restart(self, problem: Problem) -> bool:

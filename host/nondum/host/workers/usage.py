@@ -1,4 +1,4 @@
-"""What a worker uses now, as its cage and proc(5) tell."""
+"""What a worker uses now, as its cgroup and proc(5) tell."""
 
 from __future__ import annotations
 
@@ -7,33 +7,33 @@ import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from nondum.host.sandbox.cgroups import Cage, Usage
+from nondum.host.sandbox.cgroups import Cgroup, Usage
 from nondum.host.sandbox.inside import open_files
 
 TICKS_HZ = os.sysconf("SC_CLK_TCK")
 
 
 class Gauge:
-    """One worker's: of all its processes, where a cage holds them."""
+    """One worker's: of all its processes, where a cgroup holds them."""
 
-    def __init__(self, first: Callable[[], int], cage: Cage | None) -> None:
+    def __init__(self, first: Callable[[], int], cgroup: Cgroup | None) -> None:
         """`first` tells its first process, as far as that is known by then."""
-        self._first, self._cage = first, cage
+        self._first, self._cgroup = first, cgroup
 
     def pids(self) -> tuple[int, ...]:
         """Its processes, as far as they are known."""
-        held = self._cage.pids() if self._cage is not None else ()
+        held = self._cgroup.pids() if self._cgroup is not None else ()
         return held or (self._first(),)
 
     @property
     def is_whole(self) -> bool:
         """Whether these are all of them."""
-        return self._cage is not None and bool(self._cage.pids())
+        return self._cgroup is not None and bool(self._cgroup.pids())
 
     def usage(self) -> Usage:
-        """What it uses; without a cage, the processor time of its first process only."""
-        if self._cage is not None and self._cage.pids():
-            return self._cage.usage()
+        """What it uses; without a cgroup, the processor time of its first process only."""
+        if self._cgroup is not None and self._cgroup.pids():
+            return self._cgroup.usage()
         return Usage(cpu_s=_cpu_s(self._first()))
 
     def wanted_s(self) -> dict[int, float]:

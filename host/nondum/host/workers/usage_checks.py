@@ -15,7 +15,7 @@ FLOOD_BYTES = 64 * 1024 * 1024
 """Room that goes between two rounds before the next one begins at once."""
 
 
-class Rounds:
+class UsageChecks:
     """Looks at workers. `run` it."""
 
     def __init__(

@@ -121,7 +121,7 @@ class Worker:
         self._log_valve = Valve(self._loop.time)
         self._watch = Watch(spec.component, spec.limits, timing.spin_s)
         self._process = process
-        self._gauge = Gauge(lambda: self.pid, self._process.cage)
+        self._gauge = Gauge(lambda: self.pid, self._process.cgroup)
         self._outputs: list[Output] = []
         with contextlib.ExitStack() as failed:
             failed.callback(self._close_outputs)
@@ -147,7 +147,7 @@ class Worker:
         return self._gauge.pids()
 
     @property
-    def is_caged(self) -> bool:
+    def is_in_cgroup(self) -> bool:
         """Whether all its processes are known."""
         return self._gauge.is_whole
 
@@ -350,8 +350,8 @@ class Worker:
         return await asyncio.to_thread(read)  # hundreds of its threads are as many files to read
 
     def _why_exited(self, status: int) -> Problem:
-        cage, said = self._process.cage, tuple(self._tail)
-        usage = cage.usage() if cage is not None else Usage()
+        cgroup, said = self._process.cgroup, tuple(self._tail)
+        usage = cgroup.usage() if cgroup is not None else Usage()
         exhausted = problems.exhausted(self.spec.component, self.spec.limits, usage, status, said)
         return exhausted or problems.exited(self.spec.component, status, said)
 
@@ -548,8 +548,8 @@ async def _end_unread(process: WorkerProcess, spec: WorkerSpec) -> None:
 
 def _ends_of_all(process: WorkerProcess, spec: WorkerSpec) -> list[Callable[[], object]]:
     """What ends all that a process has started; each may block, and raise `OSError`."""
-    by_cage = [] if process.cage is None else [process.cage.end]
-    return [*by_cage, partial(end_leftovers, spec.scratch)]
+    by_cgroup = [] if process.cgroup is None else [process.cgroup.end]
+    return [*by_cgroup, partial(end_leftovers, spec.scratch)]
 
 
 async def _process(

@@ -23,7 +23,7 @@ from nondum.host.core.events import (
 from nondum.host.core.records import Moment
 from nondum.host.workers import problems
 from nondum.host.workers.call import Call
-from nondum.host.workers.extra_workers import Granted, Others
+from nondum.host.workers.extra_workers import ExtraWorkers, Granted
 from nondum.host.workers.in_flight import Search
 from nondum.host.workers.launcher import Launcher, WorkerLauncher
 from nondum.host.workers.logs import LogLine, Logs
@@ -33,7 +33,7 @@ from nondum.host.workers.role import Standing
 from nondum.host.workers.spec import Timing, WorkerSpec
 from nondum.host.workers.streams import Streams
 from nondum.host.workers.supervisor import Supervisor
-from nondum.host.workers.usage_checks import Rounds
+from nondum.host.workers.usage_checks import UsageChecks
 from nondum.host.workers.worker import Worker
 from nondum.planning.execute.running import RunState
 from nondum.planning.merge.core import core_value_types
@@ -67,7 +67,7 @@ class Workers:
     ) -> None:
         self.launcher = launcher or WorkerLauncher()
         self.timing = timing or Timing()
-        self._rounds = Rounds(self._running, self.emit, self.timing.look_s)
+        self._rounds = UsageChecks(self._running, self.emit, self.timing.look_s)
         self._going_round: asyncio.Task[None] | None = None
         self.streams = Streams(host, self._on_ambiguous)
         self.search = Search(self.streams.senders, self.streams.ends)
@@ -75,7 +75,7 @@ class Workers:
         self._host, self._emit = host, emit
         self._manager = plugin_manager()
         self._supervisors: dict[str, Supervisor] = {}
-        self._others = Others()
+        self._others = ExtraWorkers()
         self._devices: dict[str, Granted] = {}
         self._mounts: Mapping[str, Any] = {}
         core_value_types()  # read now: a worker may be started when there is little memory

@@ -31,7 +31,7 @@ class Narrow:
         return self.matter & self.world.facts_without(ended)
 
 
-class Attention:
+class ChangeFilter:
     """Remembers what the world was like where it matters."""
 
     def __init__(self, steps: Iterable[Step], goal: frozenset[str]) -> None:

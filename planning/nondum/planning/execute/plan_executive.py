@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from nondum.planning.execute.attempts import Attempts, Patience, Setbacks
-from nondum.planning.execute.change_filter import Attention
+from nondum.planning.execute.change_filter import ChangeFilter
 from nondum.planning.execute.guards import Footing, facts_after, footing, twins_in
 from nondum.planning.execute.partial_order import GOAL
 from nondum.planning.execute.regression import Regression, Rest, Stuck
@@ -86,7 +86,7 @@ class TaskControl:
         self._waiting: dict[int, str] = {}
         self._twins = twins_in(regression.goal, *(s.precondition | s.add for s in regression.steps))
         taken_over = (run.step for run in self.runs.values())
-        self._attention = Attention((*regression.steps, *taken_over), regression.goal)
+        self._attention = ChangeFilter((*regression.steps, *taken_over), regression.goal)
         self._is_supported = False
 
     def decide(self, world: World, now_s: float) -> Phase:

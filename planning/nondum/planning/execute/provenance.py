@@ -118,7 +118,7 @@ class Evidence:
         return min((source.at_s for source in self.pros), default=None)
 
 
-class Testimony:
+class Provenance:
     """Every word on every fact. A voice says one thing of a fact: what it said last."""
 
     __test__ = False  # its name looks like one of a test's

@@ -36,7 +36,7 @@ class StepState(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Whereabouts:
+class StepStatus:
     """Where a step is, and why."""
 
     state: StepState
@@ -57,7 +57,7 @@ class Whereabouts:
     """Of its last run; None while it runs."""
 
 
-def whereabouts(control: TaskControl, index: int) -> Whereabouts:
+def step_status(control: TaskControl, index: int) -> StepStatus:
     """Look at one step of a task. Times are those that the task was ticked with."""
     step = control.regression.steps[index]
     state = _state(control, index)
@@ -66,7 +66,7 @@ def whereabouts(control: TaskControl, index: int) -> Whereabouts:
     is_left = bool(left >> index & 1) and run is None
     needs = control.regression.needs_of(index) if is_left else ()
     earlier = control.regression.order.before[index] & left if is_left else 0
-    return Whereabouts(
+    return StepStatus(
         state,
         _why(control, index, state),
         lacks=tuple(n for n in needs if n.provider is not None and left >> n.provider & 1),

@@ -21,7 +21,7 @@ from nondum.planning.execute.plan_executive import Phase, TaskControl
 from nondum.planning.execute.regression import Regression
 from nondum.planning.execute.running import Run, Runner, World
 from nondum.planning.execute.step import steps_of, words
-from nondum.planning.execute.step_status import Whereabouts, whereabouts
+from nondum.planning.execute.step_status import StepStatus, step_status
 from nondum.planning.merge.goal import GoalKind
 from nondum.sdk.planner import GroundTask, Plan
 
@@ -59,9 +59,9 @@ class StepLeaf(Behaviour):
         """Why the step is where it is, in one sentence."""
         return self.where().why
 
-    def where(self) -> Whereabouts:
+    def where(self) -> StepStatus:
         """Where the step is, and why, as data."""
-        return whereabouts(self.control, self.index)
+        return step_status(self.control, self.index)
 
 
 class TaskTree(Composite):

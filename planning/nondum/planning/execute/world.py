@@ -15,9 +15,9 @@ from typing import Any
 from nondum.planning.execute.provenance import (
     Evidence,
     Overlay,
+    Provenance,
     Source,
     SourceKind,
-    Testimony,
     Voice,
     stands,
     weight,
@@ -36,7 +36,7 @@ class WorldModel:
     def __init__(self) -> None:
         self.revision = 0
         """Rises with every change."""
-        self._testimony = Testimony()
+        self._testimony = Provenance()
         self._overlays: dict[str, Overlay] = {}
         self._seeded: dict[str, frozenset[str]] = {}
         self._denied: dict[str, dict[str, None]] = {}

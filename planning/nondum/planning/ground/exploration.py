@@ -121,7 +121,7 @@ class Fixpoint:
     def run(self) -> Exploration:
         heads = list(self._heads())
         joins = [(j, trigger, h) for h in heads if not h.is_bound for trigger, j in h.joins]
-        tally = _Tally(head for head in heads if head.is_bound)
+        counter = _Tally(head for head in heads if head.is_bound)
         relations = Relations()
         triggered: defaultdict[str, list[tuple[Join, Head]]] = defaultdict(list)
         for join, trigger, head in joins:
@@ -133,15 +133,15 @@ class Fixpoint:
                 self._waiting.append(number)
             else:
                 relations.add(predicate, row)
-                tally.take(number)
-        self._fire(tally)  # first: changes find the instance that they belong to
+                counter.take(number)
+        self._fire(counter)  # first: changes find the instance that they belong to
         for join, trigger, head in joins:
             if not trigger:
                 self._join(join, head, relations)
         while self._waiting:
             number = self._waiting.pop()
-            tally.take(number)
-            self._fire(tally)
+            counter.take(number)
+            self._fire(counter)
             predicate, row = self.table.facts[number]
             relations.add(predicate, row)
             for join, head in triggered.get(predicate, ()):
@@ -172,9 +172,9 @@ class Fixpoint:
             raise self._exhausted_by(head, before) from None
         self._spent[head] += before - self.work.left
 
-    def _fire(self, tally: _Tally) -> None:
-        while tally.complete:
-            head, before = tally.complete.popleft(), self.work.left
+    def _fire(self, counter: _Tally) -> None:
+        while counter.complete:
+            head, before = counter.complete.popleft(), self.work.left
             try:
                 head.fire([])
             except TooMuchWork:

@@ -17,7 +17,7 @@ from nondum.sdk.description import Behaviour, Fragment, PluginDescription
 MARK = "--"
 """Before the payload's id. No manifest's id of a component, or distribution, has two hyphens."""
 LONGEST = 63
-"""As long as a component's id may be: folders, cages and the helper take no longer ones."""
+"""As long as a component's id may be: folders, cgroups and the helper take no longer ones."""
 _DIGITS = range(8, LONGEST - len(MARK))
 """Of the hash in a name that was cut: as many as are needed."""
 

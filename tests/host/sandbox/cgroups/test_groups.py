@@ -1,5 +1,5 @@
-"""Cages: limits on all of a worker's processes together, and their sure end, on this machine; and,
-on trees of files that look like other machines', what is found and written there."""
+"""Cgroups: limits on all of a worker's processes together, and their sure end, on this machine; on
+trees of files that look like other machines', what is found and written there."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 from tests.kit.descriptors import descriptors_left
 
-from nondum.host.sandbox.cgroups import CageLimits, Cages
-from nondum.host.sandbox.cgroups.groups import Cage, NoTree, known, problems_of, tree
+from nondum.host.sandbox.cgroups import CgroupLimits, Cgroups
+from nondum.host.sandbox.cgroups.groups import Cgroup, NoTree, known, problems_of, tree
 from nondum.host.sandbox.cgroups.hierarchies import Mounted, mounted
 from nondum.host.sandbox.cgroups.version1 import Legacy
 from nondum.host.sandbox.cgroups.version2 import Unified
@@ -27,9 +27,9 @@ HOG += "    held.append(mmap.mmap(-1,1<<20)); held[-1].write(bytes(1<<20))"
 
 
 @pytest.fixture
-def cages(tmp_path: Path) -> Iterator[Cages]:
+def cgroups(tmp_path: Path) -> Iterator[Cgroups]:
     """This machine's."""
-    made = Cages.open(tmp_path)
+    made = Cgroups.open(tmp_path)
     assert made.holds == {"memory", "pids", "cpu"}
     assert made.problems() == ()
     yield made
@@ -48,76 +48,76 @@ def let_go(process: subprocess.Popen[bytes]) -> None:
 
 
 @REAL
-def test_fork_bomb_stays_small_and_ends_whole(cages: Cages) -> None:
-    cage = cages.make("bomb", CageLimits(tasks=20))
+def test_fork_bomb_stays_small_and_ends_whole(cgroups: Cgroups) -> None:
+    cgroup = cgroups.make("bomb", CgroupLimits(tasks=20))
     process = begin(BOMB)
-    cage.add(process.pid)
+    cgroup.add(process.pid)
     let_go(process)
-    while cage.usage().refused_tasks < 100:
+    while cgroup.usage().refused_tasks < 100:
         pass
-    assert cage.usage().tasks <= 20
-    held = cage.pids()
+    assert cgroup.usage().tasks <= 20
+    held = cgroup.pids()
     assert process.pid in held
-    assert cage.end()
+    assert cgroup.end()
     assert process.wait() == -signal.SIGKILL
-    assert cage.pids() == ()
-    assert cages.sweep() == 0
+    assert cgroup.pids() == ()
+    assert cgroups.sweep() == 0
 
 
 @REAL
-def test_hog_is_killed_and_counted(cages: Cages) -> None:
-    cage = cages.make("hog", CageLimits(memory_mb=64))
+def test_hog_is_killed_and_counted(cgroups: Cgroups) -> None:
+    cgroup = cgroups.make("hog", CgroupLimits(memory_mb=64))
     process = begin(HOG)
-    cage.add(process.pid)
+    cgroup.add(process.pid)
     let_go(process)
     assert process.wait() == -signal.SIGKILL
-    assert cage.usage().oom_kills == 1
-    assert cage.end()
+    assert cgroup.usage().oom_kills == 1
+    assert cgroup.end()
 
 
 @REAL
-def test_children_that_were_there_before_come_along(cages: Cages) -> None:
+def test_children_that_were_there_before_come_along(cgroups: Cgroups) -> None:
     code = "import subprocess,sys\np=subprocess.Popen(['sleep','60'])\nprint(p.pid,flush=True)\n"
     process = subprocess.Popen(
         [sys.executable, "-c", f"{code}p.wait()"], stdout=subprocess.PIPE, text=True
     )
     assert process.stdout is not None
     child = int(process.stdout.readline())
-    cage = cages.make("parent", CageLimits())
-    cage.add(process.pid)
-    assert {process.pid, child} <= set(cage.pids())
-    assert cage.end()
+    cgroup = cgroups.make("parent", CgroupLimits())
+    cgroup.add(process.pid)
+    assert {process.pid, child} <= set(cgroup.pids())
+    assert cgroup.end()
     process.wait()
     process.stdout.close()
 
 
 @REAL
-def test_sweep_ends_what_an_earlier_daemon_left(tmp_path: Path, cages: Cages) -> None:
+def test_sweep_ends_what_an_earlier_daemon_left(tmp_path: Path, cgroups: Cgroups) -> None:
     process = begin("input()")
-    cages.make("left", CageLimits()).add(process.pid)
-    kept = cages.make("kept", CageLimits())
-    again = Cages.open(tmp_path)
+    cgroups.make("left", CgroupLimits()).add(process.pid)
+    kept = cgroups.make("kept", CgroupLimits())
+    again = Cgroups.open(tmp_path)
     assert again.sweep(keep=[kept.name]) == 1
     assert process.wait() == -signal.SIGKILL
     assert process.stdin is not None
     process.stdin.close()
-    assert again.make("left", CageLimits()).name not in ("left.1", kept.name)
+    assert again.make("left", CgroupLimits()).name not in ("left.1", kept.name)
     again.sweep()
 
 
 @REAL
-def test_other_daemon_s_cages_are_its_own(tmp_path: Path, cages: Cages) -> None:
-    cages.make("mine", CageLimits())
-    other = Cages.open(tmp_path / "other")
+def test_other_daemon_s_cgroups_are_left_alone(tmp_path: Path, cgroups: Cgroups) -> None:
+    cgroups.make("mine", CgroupLimits())
+    other = Cgroups.open(tmp_path / "other")
     assert other.sweep() == 0
     other.close()
-    assert cages.sweep() == 1
+    assert cgroups.sweep() == 1
 
 
 def test_limits_that_are_none_are_refused() -> None:
     for wrong in ({"memory_mb": 0}, {"tasks": -1}, {"cpu_weight": 0}, {"processors": -0.1}):
         with pytest.raises(ValueError, match="no "):
-            CageLimits(**wrong)
+            CgroupLimits(**wrong)
 
 
 def unified(top: Path, controllers: str) -> Path:
@@ -136,12 +136,12 @@ def test_lent_part_of_version_2_is_limited_in_all(tmp_path: Path) -> None:
     made = Unified.open(own, tmp_path, "nondum-x")
     assert made is not None
     assert made.controllers == {"memory", "pids", "cpu"}
-    cage = own / "nondum-x/lamp.1"
+    cgroup = own / "nondum-x/lamp.1"
     made.make("lamp.1")
     for name in ("memory.max", "memory.oom.group", "pids.max", "cpu.weight", "cpu.max"):
-        (cage / name).write_text("")
-    made.limit("lamp.1", CageLimits(memory_mb=64, tasks=9, cpu_weight=50, processors=0.5))
-    assert {file.name: file.read_text() for file in cage.iterdir()} == {
+        (cgroup / name).write_text("")
+    made.limit("lamp.1", CgroupLimits(memory_mb=64, tasks=9, cpu_weight=50, processors=0.5))
+    assert {file.name: file.read_text() for file in cgroup.iterdir()} == {
         "memory.max": str(64 << 20),
         "memory.oom.group": "1",
         "pids.max": "9",
@@ -164,12 +164,12 @@ def test_version_2_without_memory_says_what_to_write_where(tmp_path: Path) -> No
 def test_where_nothing_may_be_made_it_is_said(tmp_path: Path) -> None:
     found = tree([], "nondum-x")
     assert isinstance(found, NoTree)
-    cages = Cages(found)
-    assert not cages.holds
-    cage = cages.make("lamp", CageLimits())
-    cage.add(os.getpid())
-    assert cage.end()
-    assert "CGROUPS_WITHHELD" in [problem.code for problem in cages.problems()]
+    cgroups = Cgroups(found)
+    assert not cgroups.holds
+    cgroup = cgroups.make("lamp", CgroupLimits())
+    cgroup.add(os.getpid())
+    assert cgroup.end()
+    assert "CGROUPS_WITHHELD" in [problem.code for problem in cgroups.problems()]
 
 
 def test_version_1_is_taken_controller_by_controller(tmp_path: Path) -> None:
@@ -182,17 +182,17 @@ def test_version_1_is_taken_controller_by_controller(tmp_path: Path) -> None:
     made.make("lamp.1")
     (tmp_path / "memory/nondum-x/lamp.1/memory.limit_in_bytes").write_text("")
     (tmp_path / "cpu,cpuacct/nondum-x/lamp.1/cpu.shares").write_text("")
-    made.limit("lamp.1", CageLimits(memory_mb=1, cpu_weight=200))
+    made.limit("lamp.1", CgroupLimits(memory_mb=1, cpu_weight=200))
     read = (tmp_path / "memory/nondum-x/lamp.1/memory.limit_in_bytes").read_text()
     assert read == str(1 << 20)
     assert (tmp_path / "cpu,cpuacct/nondum-x/lamp.1/cpu.shares").read_text() == "2048"
     assert made.usage("gone.1").tasks == 0
 
 
-def test_cage_that_cannot_be_limited_is_not_left(tmp_path: Path) -> None:
-    cages = Cages(found := Unified(tmp_path, frozenset({"memory"})))
+def test_cgroup_that_cannot_be_limited_is_not_left(tmp_path: Path) -> None:
+    cgroups = Cgroups(found := Unified(tmp_path, frozenset({"memory"})))
     with descriptors_left(0), pytest.raises(OSError) as failed:
-        cages.make("lamp", CageLimits())
+        cgroups.make("lamp", CgroupLimits())
     assert failed.value.errno == errno.EMFILE
     assert found.names() == ()
 
@@ -212,21 +212,21 @@ class Unkillable(NoTree):
         return self._is_empty
 
 
-def test_empty_cage_is_removed_though_nobody_can_be_killed() -> None:
-    assert Cage(Unkillable(is_empty=True), "lamp.1").end()
+def test_empty_cgroup_is_removed_although_no_process_can_be_killed() -> None:
+    assert Cgroup(Unkillable(is_empty=True), "lamp.1").end()
 
 
-def test_cage_in_which_nobody_can_be_killed_says_why_it_is_left() -> None:
+def test_cgroup_in_which_no_process_can_be_killed_says_why_it_is_left() -> None:
     with pytest.raises(OSError) as failed:
-        Cage(Unkillable(is_empty=False), "lamp.1").end()
+        Cgroup(Unkillable(is_empty=False), "lamp.1").end()
     assert failed.value.errno == errno.EMFILE
 
 
-def test_cage_of_version_1_that_is_made_in_part_is_not_left(tmp_path: Path) -> None:
+def test_cgroup_of_version_1_that_is_made_in_part_is_not_left(tmp_path: Path) -> None:
     found = Legacy({"memory": tmp_path / "memory", "pids": tmp_path / "pids"})
     (tmp_path / "memory").mkdir()
     with pytest.raises(FileNotFoundError, match="pids"):
-        Cages(found).make("lamp", CageLimits())
+        Cgroups(found).make("lamp", CgroupLimits())
     assert found.names() == ()
 
 

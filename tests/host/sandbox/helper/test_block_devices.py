@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="making device nodes n
 
 
 @dataclass
-class Desk:
+class Computer:
     """A machine's folders: a fixed disk with the system, and a USB disk of two partitions."""
 
     root: Path
@@ -58,41 +58,41 @@ class Desk:
 
 
 @pytest.fixture
-def desk(tmp_path: Path) -> Desk:
-    desk = Desk(tmp_path)
-    desk.add(SATA, (8, 0))
-    desk.add(USB, (8, 16))
-    desk.add(f"{USB}/sdb1", (8, 17), is_partition=True)
-    desk.add(f"{USB}/sdb2", (8, 18), is_partition=True)
-    desk.write("proc/self/mountinfo", "22 1 8:0 / / rw - ext4 /dev/sda rw\n")
-    return desk
+def computer(tmp_path: Path) -> Computer:
+    computer = Computer(tmp_path)
+    computer.add(SATA, (8, 0))
+    computer.add(USB, (8, 16))
+    computer.add(f"{USB}/sdb1", (8, 17), is_partition=True)
+    computer.add(f"{USB}/sdb2", (8, 18), is_partition=True)
+    computer.write("proc/self/mountinfo", "22 1 8:0 / / rw - ext4 /dev/sda rw\n")
+    return computer
 
 
-def test_disk_that_nobody_needs_has_drives_for_partitions(desk: Desk) -> None:
-    assert desk.machine.uses(OURS).keys() == {"sda"}
+def test_disk_that_nobody_needs_has_drives_for_partitions(computer: Computer) -> None:
+    assert computer.machine.uses(OURS).keys() == {"sda"}
     owners = {"sda": "host", "sdb": "", "sdb1": "drive", "sdb2": "drive"}
-    assert desk.whose() == owners
+    assert computer.whose() == owners
 
 
-def test_usb_disk_that_the_machine_boots_from_is_its_own(desk: Desk) -> None:
+def test_usb_disk_that_the_machine_boots_from_is_its_own(computer: Computer) -> None:
     """Its root may be hidden beneath another file system: the kernel's command line tells."""
-    desk.write("proc/cmdline", "root=/dev/sdb2 ro\n")
-    assert desk.whose() == dict.fromkeys(("sda", "sdb", "sdb1", "sdb2"), "host")
+    computer.write("proc/cmdline", "root=/dev/sdb2 ro\n")
+    assert computer.whose() == dict.fromkeys(("sda", "sdb", "sdb1", "sdb2"), "host")
 
 
-def test_file_system_of_several_devices_is_known_by_what_was_mounted(desk: Desk) -> None:
+def test_file_system_of_several_devices_is_known_by_what_was_mounted(computer: Computer) -> None:
     """Its number in mountinfo is no block device's."""
-    with (desk.root / "proc/self/mountinfo").open("a") as mountinfo:
+    with (computer.root / "proc/self/mountinfo").open("a") as mountinfo:
         mountinfo.write("23 22 0:41 /@ /var rw - btrfs /dev/sdb1 rw\n")
-    assert desk.machine.uses(OURS)["sdb1"].why == "it is mounted on /var"
+    assert computer.machine.uses(OURS)["sdb1"].why == "it is mounted on /var"
 
 
-def test_mounted_by_a_person_is_somebody_s_until_fstab_says_so_too(desk: Desk) -> None:
-    desk.write("proc/self/mountinfo", "23 22 8:17 / /media/ann/X rw - vfat /dev/sdb1 rw\n")
-    assert desk.whose()["sdb1"] == Owner.SOMEBODY.value
-    assert desk.whose()["sdb2"] == Owner.DRIVE.value
-    desk.write("etc/fstab", "/dev/sdb1 /media/ann/X vfat noauto,user\n")
-    assert desk.whose()["sdb1"] == desk.whose()["sdb2"] == Owner.HOST.value
+def test_mounted_by_a_person_is_somebody_s_until_fstab_says_so_too(computer: Computer) -> None:
+    computer.write("proc/self/mountinfo", "23 22 8:17 / /media/ann/X rw - vfat /dev/sdb1 rw\n")
+    assert computer.whose()["sdb1"] == Owner.SOMEBODY.value
+    assert computer.whose()["sdb2"] == Owner.DRIVE.value
+    computer.write("etc/fstab", "/dev/sdb1 /media/ann/X vfat noauto,user\n")
+    assert computer.whose()["sdb1"] == computer.whose()["sdb2"] == Owner.HOST.value
 
 
 @pytest.mark.parametrize(
@@ -105,39 +105,41 @@ def test_mounted_by_a_person_is_somebody_s_until_fstab_says_so_too(desk: Desk) -
 )
 @pytest.mark.parametrize("folder", ["vendor", "site"])
 def test_named_by_a_unit_is_the_machine_s_own_mounted_or_not(
-    desk: Desk, folder: str, file: str, text: str, why: str
+    computer: Computer, folder: str, file: str, text: str, why: str
 ) -> None:
-    desk.write(f"{folder}/{file}", text)
+    computer.write(f"{folder}/{file}", text)
     unit = file.partition(".d/")[0]
-    assert desk.machine.uses(OURS)["sdb1"].why == f"the machine {why} ({unit})"
-    assert desk.whose() == dict.fromkeys(("sda", "sdb", "sdb1", "sdb2"), "host")
+    assert computer.machine.uses(OURS)["sdb1"].why == f"the machine {why} ({unit})"
+    assert computer.whose() == dict.fromkeys(("sda", "sdb", "sdb1", "sdb2"), "host")
 
 
-def test_units_that_mount_nothing_of_a_disk_or_are_masked_say_nothing(desk: Desk) -> None:
-    desk.write("vendor/tmp.mount", "[Mount]\nWhat=tmpfs\nWhere=/tmp\n")
-    desk.write("vendor/disk.service", "[Mount]\nWhat=/dev/sdb1\n")
-    desk.write("vendor/old.mount", "[Mount]\n#What=/dev/sdb1\nWhere=/dev/sdb1\n")
-    (desk.root / "vendor/gone.mount").symlink_to("/dev/null")
-    assert desk.whose()["sdb1"] == Owner.DRIVE.value
+def test_units_that_mount_nothing_of_a_disk_or_are_masked_say_nothing(computer: Computer) -> None:
+    computer.write("vendor/tmp.mount", "[Mount]\nWhat=tmpfs\nWhere=/tmp\n")
+    computer.write("vendor/disk.service", "[Mount]\nWhat=/dev/sdb1\n")
+    computer.write("vendor/old.mount", "[Mount]\n#What=/dev/sdb1\nWhere=/dev/sdb1\n")
+    (computer.root / "vendor/gone.mount").symlink_to("/dev/null")
+    assert computer.whose()["sdb1"] == Owner.DRIVE.value
 
 
-def test_mounted_by_this_host_to_be_read_is_still_a_drive(desk: Desk) -> None:
-    desk.write("proc/self/mountinfo", f"23 22 8:17 / {OURS}/sdb1-7 ro - vfat /dev/sdb1 ro\n")
-    assert desk.whose()["sdb1"] == Owner.DRIVE.value
+def test_mounted_by_this_host_to_be_read_is_still_a_drive(computer: Computer) -> None:
+    computer.write("proc/self/mountinfo", f"23 22 8:17 / {OURS}/sdb1-7 ro - vfat /dev/sdb1 ro\n")
+    assert computer.whose()["sdb1"] == Owner.DRIVE.value
 
 
-def test_decrypted_and_swapped_to_are_the_machine_s_own(desk: Desk) -> None:
-    desk.write("etc/crypttab", "data /dev/sdb1 none\n")
-    assert "decrypts" in desk.machine.uses(OURS)["sdb1"].why
-    desk.write("proc/swaps", "Filename Type\n/dev/sdb2 partition 1 0 -2\n")
-    assert "swaps" in desk.machine.uses(OURS)["sdb2"].why
+def test_decrypted_and_swapped_to_are_the_machine_s_own(computer: Computer) -> None:
+    computer.write("etc/crypttab", "data /dev/sdb1 none\n")
+    assert "decrypts" in computer.machine.uses(OURS)["sdb1"].why
+    computer.write("proc/swaps", "Filename Type\n/dev/sdb2 partition 1 0 -2\n")
+    assert "swaps" in computer.machine.uses(OURS)["sdb2"].why
 
 
-def test_what_is_not_there_and_what_goes_meanwhile_says_nothing(desk: Desk, tmp_path: Path) -> None:
+def test_what_is_not_there_and_what_goes_meanwhile_says_nothing(
+    computer: Computer, tmp_path: Path
+) -> None:
     nothing = tmp_path / "nothing"
     assert Machine(nothing, nothing, nothing, nothing, (nothing,)).uses(OURS) == {}
-    (desk.root / "sys" / USB / "sdb1/dev").unlink()
-    assert [block.name for block in desk.machine.blocks()] == ["sda", "sdb", "sdb2"]
+    (computer.root / "sys" / USB / "sdb1/dev").unlink()
+    assert [block.name for block in computer.machine.blocks()] == ["sda", "sdb", "sdb2"]
 
 
 def test_this_machine_s_disks_can_be_looked_at() -> None:

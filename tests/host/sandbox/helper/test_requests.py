@@ -14,8 +14,8 @@ from nondum.host.sandbox.cgroups.limits import NAME
 from nondum.host.sandbox.helper import requests
 from nondum.host.sandbox.helper.requests import (
     MAX_BYTES,
-    FillCage,
-    LimitCage,
+    FillCgroup,
+    LimitCgroup,
     MapUsers,
     Mount,
     PutNode,
@@ -37,7 +37,7 @@ WORDS: dict[str, st.SearchStrategy[Any]] = {
     "drive": DRIVES,
     "component": st.from_regex(requests.COMPONENT, fullmatch=True),
     "need": st.from_regex(requests.NEED, fullmatch=True),
-    "cage": st.from_regex(NAME, fullmatch=True),
+    "cgroup": st.from_regex(NAME, fullmatch=True),
     "memory_mb": st.integers(1, 2**30),
     "tasks": st.integers(1, 2**22),
     "cpu_weight": st.integers(1, 10_000),
@@ -87,8 +87,8 @@ def test_no_field_takes_another_kind_of_value(request: Request, data: st.DataObj
 MOUNT = Mount("sdb1", 1, "vfat", "read")
 UNMOUNT = Unmount("sdb1-1", "read")
 NODE = PutNode("a", "x", 1, 1, None)
-FILL = FillCage("a.1", 1)
-LIMIT = LimitCage("a.1", 1, 1, 1, 0.0)
+FILL = FillCgroup("a.1", 1)
+LIMIT = LimitCgroup("a.1", 1, 1, 1, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -105,7 +105,7 @@ LIMIT = LimitCage("a.1", 1, 1, 1, 0.0)
         (NODE, {"need": ".."}),
         (NODE, {"major": -1}),
         (NODE, {"user": "0"}),
-        (FILL, {"cage": "../x.1"}),
+        (FILL, {"cgroup": "../x.1"}),
         (FILL, {"pid": 1.0}),
         (FILL, {"pid": 2**31}),
         (MapUsers(1), {"pid": 2**31}),
@@ -142,7 +142,9 @@ def assert_refused(body: dict[str, Any]) -> None:
         pytest.param(b"[" * (MAX_BYTES - 1), id="too deep"),
         pytest.param(b"[]", id="a list"),
         pytest.param(b'{"verb": 1}', id="no word"),
-        pytest.param(b'{"verb": "FillCage", "cage": "a.1", "pid": 9223372036854775808}', id="huge"),
+        pytest.param(
+            b'{"verb": "FillCgroup", "cgroup": "a.1", "pid": 9223372036854775808}', id="huge"
+        ),
     ],
 )
 def test_packets_that_hold_no_request_are_refused(data: bytes) -> None:

@@ -24,7 +24,7 @@ from tests.kit.disk_images import make_ext4
 from tests.kit.loop_devices import attached
 from tests.kit.until import until
 
-from nondum.host.sandbox.cgroups import CageLimits, Cages
+from nondum.host.sandbox.cgroups import CgroupLimits, Cgroups
 from nondum.host.sandbox.cgroups.groups import NoTree
 from nondum.host.sandbox.helper import HelperClient, drive_nodes, removals, requests
 from nondum.host.sandbox.helper.client import PressesOfHelper
@@ -64,7 +64,7 @@ class Helper:
 
     def is_well(self) -> bool:
         """Whether it still answers the one whom it serves."""
-        return isinstance(served(lambda: self.client.ask(requests.ListCages())), dict)
+        return isinstance(served(lambda: self.client.ask(requests.ListCgroups())), dict)
 
 
 @pytest.fixture
@@ -155,7 +155,7 @@ def code(answer: dict[str, Any]) -> str:
 
 def test_strangers_are_not_served(helper: Helper) -> None:
     with pytest.raises(NondumError) as refused:
-        as_user(STRANGER.pw_uid, lambda: helper.client.ask(requests.ListCages()))
+        as_user(STRANGER.pw_uid, lambda: helper.client.ask(requests.ListCgroups()))
     assert refused.value.code == "HELPER_REFUSED"
 
 
@@ -175,7 +175,7 @@ def test_nonsense_is_refused_in_words(helper: Helper, packet: bytes) -> None:
 
 def test_descriptors_are_refused_and_not_kept(helper: Helper) -> None:
     read, write = os.pipe()
-    answer = raw(helper, requests.encode(requests.ListCages()), fds=(write,))
+    answer = raw(helper, requests.encode(requests.ListCgroups()), fds=(write,))
     assert code(answer) == "HELPER_REFUSED"
     os.close(write)
     assert os.read(read, 1) == b"", "the helper holds no copy"
@@ -201,7 +201,7 @@ def test_so_much_is_done_at_once_and_no_more(helper: Helper) -> None:
         for one in silent:
             one.connect(str(helper.socket))
         try:
-            helper.client.ask(requests.ListCages())
+            helper.client.ask(requests.ListCgroups())
         except NondumError as error:
             return error.code
         finally:
@@ -227,7 +227,7 @@ def test_flood_is_answered_or_turned_away(helper: Helper) -> None:
         said = []
         for one in asked:
             try:
-                one.send(requests.encode(requests.ListCages()))
+                one.send(requests.encode(requests.ListCgroups()))
                 said.append(code(json.loads(one.recv(requests.ANSWER_BYTES))))
             except OSError:
                 said.append("hung up")
@@ -281,7 +281,7 @@ def test_helper_that_gets_no_more_processes_says_so_and_goes_on(place: Path) -> 
     )
     for _ in range(2):
         with pytest.raises(NondumError) as refused:
-            served(lambda: helper.client.ask(requests.ListCages()))
+            served(lambda: helper.client.ask(requests.ListCgroups()))
         assert refused.value.code == "HELPER_BUSY"
     helper.process.terminate()
     assert helper.process.wait() == 0
@@ -348,14 +348,14 @@ def test_folder_that_became_a_link_is_not_followed(helper: Helper, drive: Path) 
     assert not elsewhere.is_mount()
 
 
-def test_cages_hold_processes_of_the_served_user_only(helper: Helper) -> None:
+def test_cgroups_hold_processes_of_the_served_user_only(helper: Helper) -> None:
     sleeper = subprocess.Popen(["sleep", "60"], user=SERVED.pw_uid)
     somebody = subprocess.Popen(["sleep", "60"], user=STRANGER.pw_uid)
 
-    def cage() -> tuple[int, ...]:
-        cages = Cages(helper.client.cages())
-        assert cages.holds
-        made = cages.make("lamp", CageLimits(memory_mb=64, tasks=8))
+    def cgroup() -> tuple[int, ...]:
+        cgroups = Cgroups(helper.client.cgroups())
+        assert cgroups.holds
+        made = cgroups.make("lamp", CgroupLimits(memory_mb=64, tasks=8))
         made.add(sleeper.pid)
         for pid in (somebody.pid, os.getppid(), 1):
             with pytest.raises(OSError, match="HELPER_REFUSED"):
@@ -363,10 +363,10 @@ def test_cages_hold_processes_of_the_served_user_only(helper: Helper) -> None:
         held = made.pids()
         assert made.usage().tasks in (0, 1)
         assert made.end()
-        cages.sweep()
+        cgroups.sweep()
         return held
 
-    assert served(cage) == (sleeper.pid,)
+    assert served(cgroup) == (sleeper.pid,)
     assert sleeper.wait(5) == -signal.SIGKILL
     assert somebody.poll() is None
     somebody.kill()
@@ -486,7 +486,7 @@ def test_helper_is_started_by_its_socket_only() -> None:
 
 def test_missing_helper_is_told(tmp_path: Path) -> None:
     with pytest.raises(NondumError) as silent:
-        HelperClient(tmp_path / "none").ask(requests.ListCages())
+        HelperClient(tmp_path / "none").ask(requests.ListCgroups())
     assert silent.value.code == "HELPER_SILENT"
     assert "systemctl" in silent.value.problems[0].fix
 
@@ -495,7 +495,7 @@ def test_helper_that_cannot_be_asked_for_want_of_a_descriptor_is_told(tmp_path: 
     client = HelperClient(tmp_path / "none")
     with descriptors_left(0):
         with pytest.raises(NondumError) as silent:
-            client.ask(requests.ListCages())
+            client.ask(requests.ListCgroups())
         client.unmount(tmp_path, "sda1-3", "read")
     assert silent.value.code == "HELPER_SILENT"
 
@@ -507,6 +507,6 @@ def test_helper_that_hangs_up_is_told(tmp_path: Path) -> None:
         hanging_up = threading.Thread(target=lambda: listening.accept()[0].close())
         hanging_up.start()
         with pytest.raises(NondumError) as silent:
-            HelperClient(tmp_path / "s").ask(requests.ListCages())
+            HelperClient(tmp_path / "s").ask(requests.ListCgroups())
         hanging_up.join()
     assert silent.value.code == "HELPER_SILENT"

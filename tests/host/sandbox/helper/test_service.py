@@ -83,22 +83,24 @@ def test_so_many_drives_are_mounted_and_no_more(root: Service) -> None:
     assert refused(root, STICK) == f"{service.MOST_DRIVES} drives are mounted already"
 
 
-def test_so_many_cages_are_made_and_no_more(root: Service, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_a_limited_number_of_cgroups_is_made(
+    root: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(service, "MOST_CAGES", 0)
-    assert refused(root, requests.MakeCage("a.1")) == "there are 0 cages already"
+    assert refused(root, requests.MakeCgroup("a.1")) == "there are 0 cgroups already"
 
 
 @pytest.mark.parametrize("pid", [0, 1])
-def test_processes_of_the_system_s_own_are_not_caged(root: Service, pid: int) -> None:
-    assert refused(root, requests.FillCage("a.1", pid)) == "that is no process of yours"
+def test_processes_of_the_system_are_put_into_no_cgroup(root: Service, pid: int) -> None:
+    assert refused(root, requests.FillCgroup("a.1", pid)) == "that is no process of yours"
 
 
-def test_processes_of_others_are_not_caged(root: Service) -> None:
+def test_processes_of_others_are_put_into_no_cgroup(root: Service) -> None:
     somebody = subprocess.Popen(["sleep", "60"], user=NOBODY - 1)
     served = subprocess.Popen(["sleep", "60"], user=NOBODY)
     try:
-        assert "no process of yours" in refused(root, requests.FillCage("a.1", somebody.pid))
-        root.serve(requests.FillCage("a.1", served.pid))
+        assert "no process of yours" in refused(root, requests.FillCgroup("a.1", somebody.pid))
+        root.serve(requests.FillCgroup("a.1", served.pid))
     finally:
         for process in (somebody, served):
             process.kill()

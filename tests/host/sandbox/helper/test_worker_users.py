@@ -244,7 +244,7 @@ def test_one_descriptor_comes_with_a_folder_and_none_with_anything_else(root: Se
     read, write = os.pipe()
     cases: list[tuple[Request, int]] = [
         (requests.MapFolder(WORKER), 0),
-        (requests.ListCages(), 1),
+        (requests.ListCgroups(), 1),
         (requests.MapUsers(os.getpid()), 1),
     ]
     for request, count in cases:

@@ -18,7 +18,7 @@ from nondum.host.core.events import (
     Event,
 )
 from nondum.host.sources.drives import debounce
-from nondum.host.sources.drives.debounce import FREE_FLAPS, SHORT_STAY_S, Steady
+from nondum.host.sources.drives.debounce import FREE_FLAPS, SHORT_STAY_S, Debounced
 
 pytestmark = pytest.mark.anyio
 
@@ -70,7 +70,7 @@ class Told(list[Event]):
 @contextlib.asynccontextmanager
 async def watched(cable: Cable) -> AsyncIterator[Told]:
     told = Told()
-    task = asyncio.create_task(Steady(cable, lambda: cable.now_s).watch(told.tell))
+    task = asyncio.create_task(Debounced(cable, lambda: cable.now_s).watch(told.tell))
     await asyncio.sleep(0)
     try:
         yield told

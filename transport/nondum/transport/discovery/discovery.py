@@ -14,7 +14,7 @@ from nondum.sdk.errors import Problem
 from nondum.transport.discovery import interfaces as network
 from nondum.transport.discovery.announcement import Announcement
 from nondum.transport.discovery.hint import Hint, Source, host_of
-from nondum.transport.discovery.hint_table import Change, HintBook
+from nondum.transport.discovery.hint_table import Change, HintTable
 from nondum.transport.discovery.interfaces import Interface
 from nondum.transport.discovery.reach import worth_trying
 from nondum.transport.discovery.responder import Responder
@@ -62,7 +62,7 @@ class Discovery:
         self._on_hint, self._on_gone = on_hint, on_gone
         self._wants_multicast = multicast
         self._loop = asyncio.get_running_loop()
-        self._book = HintBook(announcement.key, announcement.epoch, prefers, self._loop.time())
+        self._book = HintTable(announcement.key, announcement.epoch, prefers, self._loop.time())
         self._responder = Responder(announcement)
         self._asker = Asker(
             [StaticHost.parse(host) for host in static],

@@ -23,7 +23,7 @@ from nondum.transport.discovery.interfaces import (
     memberships,
     read,
 )
-from nondum.transport.discovery.loopback_test import PORT, Air
+from nondum.transport.discovery.loopback_test import PORT, LoopbackTest
 
 PATIENCE_S = 0.5
 
@@ -117,9 +117,9 @@ def hear_echo(interface: Interface) -> Iterator[Finding]:
     fours = [host for host in interface.hosts if ":" not in host]
     sixes = [host for host in interface.hosts if ":" in host]
     if fours:
-        yield _echo(interface, Air("224.0.0.251", socket.inet_aton(fours[0])))
+        yield _echo(interface, LoopbackTest("224.0.0.251", socket.inet_aton(fours[0])))
     if sixes and has_ipv6() and Flags.LOOPBACK not in interface.flags:
-        yield _echo(interface, Air("ff02::fb", struct.pack("@I", interface.index)))
+        yield _echo(interface, LoopbackTest("ff02::fb", struct.pack("@I", interface.index)))
 
 
 def try_tcp(port: int) -> Finding:
@@ -167,7 +167,7 @@ def _who_answers(port: int) -> str:
     return answer.txt.get("id", "") if answer.nonce == nonce else ""
 
 
-def _echo(interface: Interface, air: Air) -> Finding:
+def _echo(interface: Interface, air: LoopbackTest) -> Finding:
     try:
         is_heard = air.has_echo()
     except OSError as error:

@@ -39,7 +39,7 @@ class Change:
     """A peer that nothing hints at any more, or that was pushed out."""
 
 
-class HintBook:
+class HintTable:
     """Hints by peer, one of each source."""
 
     def __init__(

@@ -15,7 +15,7 @@ PATIENCE_S = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Air:
+class LoopbackTest:
     """A multicast group, on one interface."""
 
     group: str

@@ -26,7 +26,7 @@ MAX_NAMES = 1024
 """Instance names whose owners are remembered, so that their goodbyes can be told."""
 
 
-class Ears(RecordUpdateListener):
+class MdnsListener(RecordUpdateListener):
     """Makes hints of records. It hears every announcement, not only those with something new."""
 
     def __init__(

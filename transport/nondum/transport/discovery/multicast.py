@@ -26,7 +26,7 @@ from nondum.sdk.errors import Problem
 from nondum.transport.discovery.announcement import Announcement
 from nondum.transport.discovery.hint import MAX_ADDRESSES, SERVICE, Hint, instance, to_txt
 from nondum.transport.discovery.interfaces import Flags, Interface, has_ipv6, memberships
-from nondum.transport.discovery.mdns_listener import Ears
+from nondum.transport.discovery.mdns_listener import MdnsListener
 from nondum.transport.peers.identity import Security
 from nondum.transport.peers.keys import PeerKey, fingerprint
 
@@ -50,7 +50,7 @@ class Multicast:
         on_refused: Callable[[Problem], None],
     ) -> None:
         """Only hosts that are secured alike are told of."""
-        self._ears = Ears(security, on_hint, on_gone, on_refused)
+        self._ears = MdnsListener(security, on_hint, on_gone, on_refused)
         self._loop = asyncio.get_running_loop()
         self._zeroconf: AsyncZeroconf | None = None
         self._info: AsyncServiceInfo | None = None

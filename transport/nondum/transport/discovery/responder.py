@@ -36,7 +36,7 @@ class Responder:
         try:
             for host in hosts:
                 transport, _ = await self._loop.create_datagram_endpoint(
-                    lambda: _Ear(self._answer), sock=udp.bound(host, here.port)
+                    lambda: _Receiver(self._answer), sock=udp.bound(host, here.port)
                 )
                 self._transports.append(transport)
         except OSError as error:
@@ -61,7 +61,7 @@ class Responder:
         return packets.answer(nonce, self.announcement)
 
 
-class _Ear(asyncio.DatagramProtocol):
+class _Receiver(asyncio.DatagramProtocol):
     """One socket."""
 
     def __init__(self, answer: Callable[[bytes], bytes | None]) -> None:

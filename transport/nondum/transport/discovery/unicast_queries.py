@@ -79,7 +79,7 @@ class Asker:
         sock = udp.bound("127.0.0.1" if loopback else udp.ANYWHERE, 0)
         self._family = sock.family
         self._transport, _ = await self._loop.create_datagram_endpoint(
-            lambda: _Ear(self._hear), sock=sock
+            lambda: _Receiver(self._hear), sock=sock
         )
         self._tasks = [self._loop.create_task(self._keep_asking(one)) for one in self._asked]
 
@@ -188,7 +188,7 @@ class Asker:
         answers.put_nowait(hint)
 
 
-class _Ear(asyncio.DatagramProtocol):
+class _Receiver(asyncio.DatagramProtocol):
     def __init__(self, hear: Callable[[bytes], None]) -> None:
         self._hear = hear
 

@@ -22,7 +22,7 @@ from nondum.transport.link.token_bucket import TokenBucket
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.events import Loss, PeerEvent, PeerLost, PeerUp
 from nondum.transport.peers.failures import CallFailed, PeerUnreachable
-from nondum.transport.peers.incoming_calls import Errand, Handler, Lease
+from nondum.transport.peers.incoming_calls import Handler, IncomingCall, Lease
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.pulse import State
 from nondum.transport.peers.trust import Admission
@@ -140,13 +140,13 @@ class Catalogues:
             case _:
                 self._on_event(event)
 
-    def serve(self, errand: Errand) -> Body | Awaitable[Body]:
+    def serve(self, incoming: IncomingCall) -> Body | Awaitable[Body]:
         """Carry out what is the seam's own, and pass the rest on."""
-        if errand.method == READ:
-            return self._answer(errand)
-        if errand.method.startswith(OWN_METHODS):
-            raise CallFailed(Problem("NO_METHOD", f"hosts do not serve {errand.method}"))
-        return self._handler.serve(errand)
+        if incoming.method == READ:
+            return self._answer(incoming)
+        if incoming.method.startswith(OWN_METHODS):
+            raise CallFailed(Problem("NO_METHOD", f"hosts do not serve {incoming.method}"))
+        return self._handler.serve(incoming)
 
     def notice(self, caller: Admission, method: str, args: dict[str, Any]) -> None:
         """Take in what is the seam's own, and pass the rest on. Raises `ProtocolViolation`."""
@@ -158,11 +158,11 @@ class Catalogues:
         elif not method.startswith(OWN_METHODS):
             self._handler.notice(caller, method, args)
 
-    def orphaned(self, errand: Errand, reason: Loss) -> Lease:
+    def orphaned(self, incoming: IncomingCall, reason: Loss) -> Lease:
         """Nobody needs an answer about catalogues any more; of the rest the handler decides."""
-        if errand.method.startswith(OWN_METHODS):
+        if incoming.method.startswith(OWN_METHODS):
             return Lease.STOP
-        return self._handler.orphaned(errand, reason)
+        return self._handler.orphaned(incoming, reason)
 
     def close(self) -> None:
         """Tell and read no more."""
@@ -210,16 +210,18 @@ class Catalogues:
         else:  # more than fits a message is read by each when it can
             self.tell_state()
 
-    def _answer(self, errand: Errand) -> Body | Awaitable[Body]:
-        epoch, since = errand.args.get("epoch"), errand.args.get("revision")
+    def _answer(self, incoming: IncomingCall) -> Body | Awaitable[Body]:
+        epoch, since = incoming.args.get("epoch"), incoming.args.get("revision")
         if type(epoch) is not int or type(since) is not int:
             raise CallFailed(Problem("PACKET_FIELDS", "epoch and revision are whole numbers"))
         *first, last = self._ledger.read(epoch, since)
-        return self._answer_in_parts(errand, first, last) if first else last.to_body()
+        return self._answer_in_parts(incoming, first, last) if first else last.to_body()
 
-    async def _answer_in_parts(self, errand: Errand, first: list[Chunk], last: Chunk) -> Body:
+    async def _answer_in_parts(
+        self, incoming: IncomingCall, first: list[Chunk], last: Chunk
+    ) -> Body:
         for chunk in first:
-            errand.progress(chunk.to_body())
+            incoming.progress(chunk.to_body())
             await asyncio.sleep(0)
         return last.to_body()
 

@@ -112,7 +112,7 @@ class RouterAccess:
 
 
 @dataclass(frozen=True, slots=True)
-class Ears:
+class Listeners:
     """Who is told of what comes; on the loop."""
 
     present: Callable[[Place, bool], None]
@@ -134,7 +134,7 @@ class _Arrived(NamedTuple):
 class Line:
     """The session, which is opened again and again until there is a router."""
 
-    def __init__(self, access: RouterAccess, me: Place, ears: Ears) -> None:
+    def __init__(self, access: RouterAccess, me: Place, ears: Listeners) -> None:
         """Made on the running loop. Raises `PeerRefused` as `RouterAccess.to_config`."""
         access.check()
         self._config, self._root, self._me = access.to_config(), f"nondum/{access.fleet}", me

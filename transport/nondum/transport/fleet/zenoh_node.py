@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 
 from nondum.sdk.errors import Problem
 from nondum.sdk.wire import Body
-from nondum.transport.fleet.zenoh_line import Ears, Line, Place, RouterAccess
+from nondum.transport.fleet.zenoh_line import Line, Listeners, Place, RouterAccess
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.dial import FIRST_WAIT_S, LONGEST_WAIT_S
 from nondum.transport.peers.drained import Sent
@@ -27,7 +27,7 @@ from nondum.transport.peers.incoming_calls import Handler
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.link import Link
 from nondum.transport.peers.messages import Notice, encode
-from nondum.transport.peers.peer_table import Roster
+from nondum.transport.peers.peer_table import PeerTable
 from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.refusals import Reason, Refusals
 from nondum.transport.peers.suspicion import Terms
@@ -49,7 +49,7 @@ DOORS = 1024
 
 
 @dataclass(slots=True)
-class _Door:
+class _Listener:
     """What is between this host and one life of another."""
 
     number: int = 0
@@ -107,7 +107,7 @@ class ZenohNode:
         self._endpoints = ", ".join(access.endpoints)
         self._on_event = on_event
         self._gate = Gate(identity, trust, clock)
-        self._roster = Roster(
+        self._peer_table = PeerTable(
             self._gate,
             epoch,
             handler,
@@ -117,10 +117,10 @@ class ZenohNode:
             terms=TERMS,
         )
         self._loop = asyncio.get_running_loop()
-        ears = Ears(self._on_present, self._on_message, self._on_to_all, self._on_trouble)
+        ears = Listeners(self._on_present, self._on_message, self._on_to_all, self._on_trouble)
         self._line = Line(access, self._me, ears)
         self._present: set[Place] = set()
-        self._doors: dict[Place, _Door] = {}
+        self._listeners: dict[Place, _Listener] = {}
         self._told: dict[PeerKey, str] = {}
         self._tending: asyncio.TimerHandle | None = None
         self._is_closed = False
@@ -128,7 +128,7 @@ class ZenohNode:
     @property
     def peers(self) -> Mapping[PeerKey, Admission]:
         """Who can be called now."""
-        return {key: session.admission for key, session in self._roster.sessions.items()}
+        return {key: session.admission for key, session in self._peer_table.sessions.items()}
 
     def round_trip_s(self, peer: PeerKey) -> float | None:
         """Not measured: nobody is pinged."""
@@ -146,11 +146,11 @@ class ZenohNode:
 
     def call(self, peer: PeerKey, method: str, args: Body, *, deadline_s: float) -> Call:
         """Call a peer. Raises `PeerUnreachable` and more, as `PeerNode.call`."""
-        return self._roster.session(peer).calls.begin(method, args, deadline_s)
+        return self._peer_table.session(peer).calls.begin(method, args, deadline_s)
 
     def notify(self, peer: PeerKey, method: str, args: Body) -> None:
         """Tell a peer something. Raises as `call` does."""
-        if self._roster.session(peer).notify(Notice(method, args)) is Sent.FULL:
+        if self._peer_table.session(peer).notify(Notice(method, args)) is Sent.FULL:
             raise PeerUnreachable(Problem("PEER_BUSY", "as many messages wait for it as may"))
 
     def notify_all(self, method: str, args: Body) -> None:
@@ -159,13 +159,13 @@ class ZenohNode:
 
     def turn_away(self, peer: PeerKey, problem: Problem) -> None:
         """Cut a peer that breaks the rules. Raises `PeerUnreachable`."""
-        for link in list(self._roster.session(peer).links):
-            self._roster.turn_away(link, Reason.GARBAGE, problem)
+        for link in list(self._peer_table.session(peer).links):
+            self._peer_table.turn_away(link, Reason.GARBAGE, problem)
 
     def set_trust(self, trust: Trust) -> None:
         """Exchange the trust: peers that it does not let in any more are cut at once."""
         self._gate.trust = trust
-        self._roster.check_trust()
+        self._peer_table.check_trust()
         for place in self._present:
             self._greet_in(place, 0)
 
@@ -174,8 +174,8 @@ class ZenohNode:
         self._is_closed = True
         if self._tending is not None:
             self._tending.cancel()
-        self._roster.close()
-        for door in self._doors.values():
+        self._peer_table.close()
+        for door in self._listeners.values():
             if door.timer is not None:
                 door.timer.cancel()
         await self._line.close()
@@ -191,31 +191,31 @@ class ZenohNode:
         self._loop.call_later(OVERTAKEN_S, self._on_gone, place)
 
     def _on_gone(self, place: Place) -> None:
-        door = self._doors.get(place)
+        door = self._listeners.get(place)
         if place not in self._present and door is not None and door.link is not None:
-            self._roster.break_link(door.link, Loss.DISCONNECTED)
+            self._peer_table.break_link(door.link, Loss.DISCONNECTED)
 
     def _on_message(self, place: Place, number: int, data: bytes) -> None:
         if self._is_closed or place.key == self._me.key:
             return
-        door = self._door(place)
+        door = self._listener(place)
         if data == _OVER:
             if door.link is not None and number == door.number:
-                self._roster.break_link(door.link, Loss.DISCONNECTED)
+                self._peer_table.break_link(door.link, Loss.DISCONNECTED)
             return
         if number > door.number and not self._is_greeter(place):
             self._open(door, place, number, dialled=False)
         if number == door.number and door.link is not None:
-            self._roster.receive(door.link, data)
+            self._peer_table.receive(door.link, data)
 
     def _on_to_all(self, place: Place, data: bytes) -> None:
-        door = self._doors.get(place)
+        door = self._listeners.get(place)
         if door is None:
             return
         if door.link is None:
             self._line.send(place, door.number, _OVER)  # if it has not heard so yet
         elif door.link.session is not None:
-            self._roster.receive(door.link, data)
+            self._peer_table.receive(door.link, data)
 
     def _on_trouble(self, problem: Problem) -> None:
         self._tell(PeerKey(""), problem)
@@ -229,19 +229,21 @@ class ZenohNode:
             return True
         return self._gate.trust.standing(key) in (Standing.ADMITTED, Standing.MUST_CERTIFY)
 
-    def _door(self, place: Place) -> _Door:
-        if place not in self._doors and len(self._doors) >= DOORS:
-            self._forget_door()
-        return self._doors.setdefault(place, _Door())
+    def _listener(self, place: Place) -> _Listener:
+        if place not in self._listeners and len(self._listeners) >= DOORS:
+            self._forget_listener()
+        return self._listeners.setdefault(place, _Listener())
 
-    def _forget_door(self) -> None:
-        unused = (at for at, door in self._doors.items() if door.link is None and not door.timer)
-        others = (at for at, door in self._doors.items() if _is_stranger(door))
+    def _forget_listener(self) -> None:
+        unused = (
+            at for at, door in self._listeners.items() if door.link is None and not door.timer
+        )
+        others = (at for at, door in self._listeners.items() if _is_stranger(door))
         gone = next(unused, None) or next(others, None)
         if gone is not None:
-            del self._doors[gone]
+            del self._listeners[gone]
 
-    def _open(self, door: _Door, place: Place, number: int, *, dialled: bool) -> Link:
+    def _open(self, door: _Listener, place: Place, number: int, *, dialled: bool) -> Link:
         replaced, door.link = door.link, None
         if replaced is not None:
             replaced.cut()
@@ -255,11 +257,11 @@ class ZenohNode:
     def _greet_in(self, place: Place, wait_s: float) -> None:
         if not self._is_greeter(place):
             return
-        door = self._door(place)
+        door = self._listener(place)
         if door.timer is None:
             door.timer = self._loop.call_later(wait_s, self._greet, place, door)
 
-    def _greet(self, place: Place, door: _Door) -> None:
+    def _greet(self, place: Place, door: _Listener) -> None:
         door.timer = None
         if place not in self._present or door.link is not None or not self._is_welcome(place.key):
             return
@@ -267,9 +269,9 @@ class ZenohNode:
         link = self._open(door, place, number, dialled=True)
         link.on_refused = functools.partial(self._on_refused, link, place)
         door.timer = self._loop.call_later(ANSWER_S, self._expect, place, door, link)
-        self._roster.greet(link, place.key)
+        self._peer_table.greet(link, place.key)
 
-    def _expect(self, place: Place, door: _Door, link: Link) -> None:
+    def _expect(self, place: Place, door: _Listener, link: Link) -> None:
         """The greeting should have been answered by now."""
         door.timer = None
         if link.session is None and not link.is_over:
@@ -283,7 +285,7 @@ class ZenohNode:
 
     def _on_cut(self, place: Place, number: int) -> None:
         """A link is over: greet again, if the other is still there."""
-        door = self._doors.get(place)
+        door = self._listeners.get(place)
         if door is None or door.number != number or door.link is None:
             return
         link, door.link = door.link, None
@@ -304,14 +306,14 @@ class ZenohNode:
 
     def _tend(self) -> None:
         self._tending = self._loop.call_later(TEND_S, self._tend)
-        self._roster.tend()
+        self._peer_table.tend()
         now_s = self._loop.time()
-        for door in list(self._doors.values()):
+        for door in list(self._listeners.values()):
             if _is_stranger(door) and door.link and now_s - door.link.heard_s > SILENCE_S:
                 door.link.cut()
 
 
-def _is_stranger(door: _Door) -> bool:
+def _is_stranger(door: _Listener) -> bool:
     return door.link is None or door.link.session is None
 
 

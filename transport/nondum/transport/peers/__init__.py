@@ -4,7 +4,7 @@ from nondum.transport.peers.calls import Call
 from nondum.transport.peers.events import DialFailed, LinksFailed, Loss, PeerEvent, PeerLost, PeerUp
 from nondum.transport.peers.failures import CallFailed, PeerRefused, PeerUnreachable
 from nondum.transport.peers.identity import Identity, Security
-from nondum.transport.peers.incoming_calls import Errand, Handler, Lease
+from nondum.transport.peers.incoming_calls import Handler, IncomingCall, Lease
 from nondum.transport.peers.keys import HostKeys, PeerKey, fingerprint, load_or_create
 from nondum.transport.peers.local_sockets import SocketsHere
 from nondum.transport.peers.node import PeerNode
@@ -16,10 +16,10 @@ __all__ = [
     "Call",
     "CallFailed",
     "DialFailed",
-    "Errand",
     "Handler",
     "HostKeys",
     "Identity",
+    "IncomingCall",
     "Lease",
     "LinksFailed",
     "Loss",

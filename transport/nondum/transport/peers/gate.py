@@ -18,7 +18,7 @@ from nondum.transport.peers.keys import PeerKey, fingerprint
 from nondum.transport.peers.messages import Hello, agreed_version
 from nondum.transport.peers.refusals import Reason
 from nondum.transport.peers.trust import Admission, Standing, Trust
-from nondum.transport.peers.zap import DOMAIN, Entry, Knock
+from nondum.transport.peers.zap import DOMAIN, ConnectionAttempt, Entry
 
 PAST_EPOCHS = 8
 """Lives of a peer that are remembered as over."""
@@ -117,7 +117,7 @@ class Gate:
 _REASONS = {"KEY_REVOKED": Reason.REVOKED, "KEY_UNKNOWN": Reason.UNKNOWN_KEY}
 
 
-def judge(knock: Knock, me: Identity, trust: Trust) -> Reason | None:
+def judge(knock: ConnectionAttempt, me: Identity, trust: Trust) -> Reason | None:
     """Whether a connection to a host may go on to greet: None, or why not."""
     if knock.domain != DOMAIN:
         return Reason.WRONG_DOMAIN

@@ -34,7 +34,7 @@ class Lease(Enum):
     """It runs to its end, which its deadline still bounds."""
 
 
-class Errand:
+class IncomingCall:
     """One call, as whoever carries it out sees it."""
 
     def __init__(
@@ -69,7 +69,7 @@ class Errand:
 class Handler(Protocol):
     """What a host does for its peers."""
 
-    def serve(self, errand: Errand) -> Body | Awaitable[Body]:
+    def serve(self, incoming: IncomingCall) -> Body | Awaitable[Body]:
         """Carry a call out; what it raises of `NondumError` is the answer then.
 
         An awaitable runs as a task, is cancelled when the caller asks for it, when the deadline
@@ -79,20 +79,20 @@ class Handler(Protocol):
     def notice(self, caller: Admission, method: str, args: dict[str, Any]) -> None:
         """A peer tells something."""
 
-    def orphaned(self, errand: Errand, reason: Loss) -> Lease:
+    def orphaned(self, incoming: IncomingCall, reason: Loss) -> Lease:
         """The caller of a running errand is lost: decide what becomes of it."""
 
 
 Finished: TypeAlias = Reply | Failure
 
 
-class Errands:
+class IncomingCalls:
     """All that run for one peer, and the memory of those that ran."""
 
     def __init__(self, caller: Admission, once: Once, handler: Handler, send: Send) -> None:
         self._caller, self._once, self._handler, self._send = caller, once, handler, send
         self._loop = asyncio.get_running_loop()
-        self._running: dict[int, Errand] = {}
+        self._running: dict[int, IncomingCall] = {}
         self._unsent: deque[int] = deque(maxlen=CREDIT)  # answers beyond are forgotten anyway
 
     def take(self, request: Request) -> None:
@@ -110,72 +110,72 @@ class Errands:
 
     def cancel(self, number: int) -> None:
         """The caller wants a call halted; unknown and finished ones are ignored."""
-        if errand := self._running.get(number):
-            errand.halt()
+        if incoming := self._running.get(number):
+            incoming.halt()
 
     def pass_on_waiting(self) -> None:
         """Try again to send the answers for which there was no room."""
         for _ in range(len(self._unsent)):
             self._pass_on(self._unsent.popleft())
 
-    def lose(self, reason: Loss) -> list[Errand]:
+    def lose(self, reason: Loss) -> list[IncomingCall]:
         """The caller is lost: ask what becomes of each errand; those that run on."""
         kept = []
         self._send = _nowhere
-        for errand in list(self._running.values()):
-            lease = self._lease(errand, reason)
+        for incoming in list(self._running.values()):
+            lease = self._lease(incoming, reason)
             if lease is Lease.STOP:
-                errand.halt()
+                incoming.halt()
                 continue
-            if lease is Lease.HOLD and errand.timer is not None:
-                errand.timer.cancel()
-            errand.orphaned.set()
-            kept.append(errand)
+            if lease is Lease.HOLD and incoming.timer is not None:
+                incoming.timer.cancel()
+            incoming.orphaned.set()
+            kept.append(incoming)
         return kept
 
-    def _lease(self, errand: Errand, reason: Loss) -> Lease:
+    def _lease(self, incoming: IncomingCall, reason: Loss) -> Lease:
         try:
-            return self._handler.orphaned(errand, reason)
+            return self._handler.orphaned(incoming, reason)
         except Exception:
-            log.exception("nobody could say what becomes of %s: it is stopped", errand.method)
+            log.exception("nobody could say what becomes of %s: it is stopped", incoming.method)
             return Lease.STOP
 
     def _begin(self, request: Request) -> None:
-        errand = Errand(self._caller, request, self._progress)
+        incoming = IncomingCall(self._caller, request, self._progress)
         try:
-            result = self._handler.serve(errand)
+            result = self._handler.serve(incoming)
         except Exception as error:
-            self._conclude(_failure(errand, error))
+            self._conclude(_failure(incoming, error))
             return
         if not inspect.isawaitable(result):
             self._conclude(Reply(request.number, result))
             return
-        self._running[request.number] = errand
-        errand.task = self._loop.create_task(self._work(errand, result))
-        errand.task.add_done_callback(lambda _: self._end(errand, result))
-        errand.timer = self._loop.call_at(errand.ends_s, self._expire, errand)
+        self._running[request.number] = incoming
+        incoming.task = self._loop.create_task(self._work(incoming, result))
+        incoming.task.add_done_callback(lambda _: self._end(incoming, result))
+        incoming.timer = self._loop.call_at(incoming.ends_s, self._expire, incoming)
 
-    async def _work(self, errand: Errand, result: Awaitable[Body]) -> None:
+    async def _work(self, incoming: IncomingCall, result: Awaitable[Body]) -> None:
         try:
-            answer: Finished = Reply(errand.number, await result)
+            answer: Finished = Reply(incoming.number, await result)
         except asyncio.CancelledError as error:
-            answer = _failure(errand, error)
+            answer = _failure(incoming, error)
         except Exception as error:
-            answer = _failure(errand, error)
-        self._running.pop(errand.number, None)
+            answer = _failure(incoming, error)
+        self._running.pop(incoming.number, None)
         self._conclude(answer)
 
-    def _end(self, errand: Errand, result: Awaitable[Body]) -> None:
-        if errand.timer is not None:
-            errand.timer.cancel()
-        if self._running.pop(errand.number, None):  # cancelled before its first step
+    def _end(self, incoming: IncomingCall, result: Awaitable[Body]) -> None:
+        if incoming.timer is not None:
+            incoming.timer.cancel()
+        if self._running.pop(incoming.number, None):  # cancelled before its first step
             if inspect.iscoroutine(result):
                 result.close()
-            self._conclude(_failure(errand, asyncio.CancelledError()))
+            self._conclude(_failure(incoming, asyncio.CancelledError()))
 
-    def _expire(self, errand: Errand) -> None:
-        errand.is_late = True
-        errand.halt()
+    def _expire(self, incoming: IncomingCall) -> None:
+        incoming.is_late = True
+        incoming.halt()
 
     def _conclude(self, answer: Finished) -> None:
         try:
@@ -203,15 +203,15 @@ def _nowhere(_data: bytes) -> Sent:
     return Sent.GONE
 
 
-def _failure(errand: Errand, error: BaseException) -> Failure:
+def _failure(incoming: IncomingCall, error: BaseException) -> Failure:
     if isinstance(error, NondumError):
-        return Failure(errand.number, error.problems)
+        return Failure(incoming.number, error.problems)
     if isinstance(error, asyncio.CancelledError):
         late = Problem("DEADLINE", "it took longer than the caller would wait")
-        return Failure(errand.number, (late if errand.is_late else _HALTED,))
-    log.error("%s failed for %s", errand.method, errand.caller.name, exc_info=error)
+        return Failure(incoming.number, (late if incoming.is_late else _HALTED,))
+    log.error("%s failed for %s", incoming.method, incoming.caller.name, exc_info=error)
     told = f"{type(error).__name__}: {error}"[:1000]
-    return Failure(errand.number, (Problem("INTERNAL", told),))
+    return Failure(incoming.number, (Problem("INTERNAL", told),))
 
 
 _HALTED = Problem("HALTED", "halted as asked")

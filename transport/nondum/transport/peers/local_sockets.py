@@ -32,7 +32,7 @@ from nondum.transport.peers.refusals import Reason, Refusal
 from nondum.transport.peers.routes import AcceptedRoute, DialledRoute
 from nondum.transport.peers.sockets import Owner, Receiver
 from nondum.transport.peers.trust import Trust
-from nondum.transport.peers.zap import Entry, Knock, ZapHandler
+from nondum.transport.peers.zap import ConnectionAttempt, Entry, ZapHandler
 
 SECOND_LOOK_S = 0.02
 """ZeroMQ tells of a broken connection a little before sending over it fails."""
@@ -186,7 +186,7 @@ class SocketsHere:
             route.receiver = self._owner.on_accepted(route, proved)
         return route
 
-    def _judge(self, knock: Knock) -> Entry:
+    def _judge(self, knock: ConnectionAttempt) -> Entry:
         reason = judge(knock, self._me, self._trust)
         if reason is not None:
             now_s, told = self._loop.time(), "turned away at the handshake"

@@ -26,7 +26,7 @@ from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.link import Link, Route
 from nondum.transport.peers.local_sockets import SocketsHere
 from nondum.transport.peers.messages import Notice, encode
-from nondum.transport.peers.peer_table import Roster
+from nondum.transport.peers.peer_table import PeerTable
 from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.refusals import Reason, Refusals
 from nondum.transport.peers.sockets import Accepted, MakeSockets, Owner, Receiver
@@ -72,7 +72,7 @@ class PeerNode:
         self.refusals = Refusals(on_event)
         self._gate = Gate(identity, trust, clock)
         self._on_event = on_event
-        self._roster = Roster(
+        self._peer_table = PeerTable(
             self._gate,
             self.epoch,
             handler,
@@ -85,7 +85,7 @@ class PeerNode:
             self._on_accepted,
             self.refusals.add,
             lambda problem: on_event(LinksFailed(problem)),
-            self._roster.awake_s,
+            self._peer_table.awake_s,
         )
         self._sockets = sockets(identity, trust, owner)
         self._loop = asyncio.get_running_loop()
@@ -99,7 +99,7 @@ class PeerNode:
     @property
     def peers(self) -> Mapping[PeerKey, Admission]:
         """Who can be called now."""
-        return {key: session.admission for key, session in self._roster.sessions.items()}
+        return {key: session.admission for key, session in self._peer_table.sessions.items()}
 
     @property
     def links_pid(self) -> int | None:
@@ -114,16 +114,16 @@ class PeerNode:
     @property
     def accepted(self) -> tuple[Route, ...]:
         """The connections that peers made to this host."""
-        return tuple(link.route for link in self._roster.links if not link.dialled)
+        return tuple(link.route for link in self._peer_table.links if not link.dialled)
 
     @property
     def dialled(self) -> tuple[Route, ...]:
         """The connections that this host made to peers."""
-        return tuple(link.route for link in self._roster.links if link.dialled)
+        return tuple(link.route for link in self._peer_table.links if link.dialled)
 
     def round_trip_s(self, peer: PeerKey) -> float | None:
         """The last ping's time there and back; None before one was answered."""
-        session = self._roster.sessions.get(peer)
+        session = self._peer_table.sessions.get(peer)
         return session.links[-1].round_trip_s if session and session.links else None
 
     async def start(self, addresses: Sequence[str]) -> tuple[str, ...]:
@@ -148,21 +148,21 @@ class PeerNode:
         for address in addresses:
             self.identity.check_address(address)
         self.hang_up(peer)
-        self._roster.dials[peer] = Dial(
+        self._peer_table.dials[peer] = Dial(
             peer,
             addresses,
             connect=self._sockets.dial,
-            is_wanted=self._roster.is_unlinked,
+            is_wanted=self._peer_table.is_unlinked,
             on_won=self._on_won,
             on_over=self._on_attempt_over,
-            on_data=self._roster.receive,
+            on_data=self._peer_table.receive,
             on_misused=self._on_misused,
             on_event=self._on_event,
         )
 
     def hang_up(self, peer: PeerKey) -> None:
         """Dial a peer no more; a link that exists stays until it breaks."""
-        if dial := self._roster.dials.pop(peer, None):
+        if dial := self._peer_table.dials.pop(peer, None):
             dial.close()
 
     def call(self, peer: PeerKey, method: str, args: Body, *, deadline_s: float) -> Call:
@@ -171,14 +171,14 @@ class PeerNode:
         Raises `PeerUnreachable` (PEER_DOWN, PEER_BUSY), and `ProtocolViolation` or `TypeError` for
         what cannot be sent.
         """
-        return self._roster.session(peer).calls.begin(method, args, deadline_s)
+        return self._peer_table.session(peer).calls.begin(method, args, deadline_s)
 
     def notify(self, peer: PeerKey, method: str, args: Body) -> None:
         """Tell a peer something; at most once, and not at all when the link breaks.
 
         Raises as `call` does.
         """
-        if self._roster.session(peer).notify(Notice(method, args)) is Sent.FULL:
+        if self._peer_table.session(peer).notify(Notice(method, args)) is Sent.FULL:
             raise PeerUnreachable(Problem("PEER_BUSY", "as many messages wait for it as may"))
 
     def notify_all(self, method: str, args: Body) -> None:
@@ -187,19 +187,19 @@ class PeerNode:
         Raises `ProtocolViolation`, `TypeError` for what cannot be sent.
         """
         data = encode(Notice(method, args))
-        for session in list(self._roster.sessions.values()):
+        for session in list(self._peer_table.sessions.values()):
             session.send(data)
 
     def turn_away(self, peer: PeerKey, problem: Problem) -> None:
         """Cut a peer that breaks the rules in what it answers; counted, and it is told why."""
-        for link in list(self._roster.session(peer).links):
-            self._roster.turn_away(link, Reason.GARBAGE, problem)
+        for link in list(self._peer_table.session(peer).links):
+            self._peer_table.turn_away(link, Reason.GARBAGE, problem)
 
     def set_trust(self, trust: Trust) -> None:
         """Exchange the trust: peers that it does not let in any more are cut at once."""
         self._gate.trust = trust
         self._sockets.set_trust(trust)
-        self._roster.check_trust()
+        self._peer_table.check_trust()
 
     def show_certificate(self, certificate: bytes) -> None:
         """Show another certificate from now on; links that exist stay as they are."""
@@ -210,53 +210,53 @@ class PeerNode:
         """Say goodbye and let go of everything; what runs for peers is cancelled."""
         if self._beating is not None:
             self._beating.cancel()
-        self._roster.close()
+        self._peer_table.close()
         await self._sockets.close()
 
     def _on_accepted(self, route: Accepted, proved: PeerKey | None) -> Receiver:
         link = Link(route, proved, self._loop.time(), dialled=False)
         link.on_peer = route.became_peer
-        return _AcceptedLink(link, self._roster, self._on_misused)
+        return _AcceptedLink(link, self._peer_table, self._on_misused)
 
     def _on_misused(self, link: Link, reason: Reason) -> None:
         """What came over a link is no message of a host's."""
         match reason:
             case Reason.ENDLESS:
-                self._roster.bar(link, reason, _endless(link), linger_ms=ENDLESS_LINGER_MS)
+                self._peer_table.bar(link, reason, _endless(link), linger_ms=ENDLESS_LINGER_MS)
             case Reason.NOT_PROVED:
-                self._roster.turn_away(link, reason, _OTHER_KEY)
+                self._peer_table.turn_away(link, reason, _OTHER_KEY)
             case _:
-                self._roster.turn_away(link, reason, _PARTS)
+                self._peer_table.turn_away(link, reason, _PARTS)
 
     def _on_won(self, attempt: Attempt) -> None:
         proved = attempt.dial.key if self.security is Security.CURVE else None
         attempt.link = Link(attempt, proved, self._loop.time(), dialled=True)
         attempt.link.on_refused = functools.partial(attempt.dial.over, attempt)
-        self._roster.greet(attempt.link, attempt.dial.key)
+        self._peer_table.greet(attempt.link, attempt.dial.key)
 
     def _on_attempt_over(self, attempt: Attempt) -> None:
         if attempt.link is not None:
-            self._roster.break_link(attempt.link, Loss.DISCONNECTED)
+            self._peer_table.break_link(attempt.link, Loss.DISCONNECTED)
 
     def _beat(self) -> None:
         self._beating = self._loop.call_later(BEAT_S, self._beat)
-        self._roster.beat(beat_s(max(len(self._roster.sessions), self.expected)))
+        self._peer_table.beat(beat_s(max(len(self._peer_table.sessions), self.expected)))
 
 
 class _AcceptedLink:
     """What is told of a connection that another host made (see `Receiver`)."""
 
     def __init__(
-        self, link: Link, roster: Roster, on_misused: Callable[[Link, Reason], None]
+        self, link: Link, peer_table: PeerTable, on_misused: Callable[[Link, Reason], None]
     ) -> None:
-        self._link, self._roster, self._on_misused = link, roster, on_misused
+        self._link, self._peer_table, self._on_misused = link, peer_table, on_misused
 
     def connected(self) -> None:
         """It begins so."""
 
     def received(self, data: bytes) -> None:
         """A message came."""
-        self._roster.receive(self._link, data)
+        self._peer_table.receive(self._link, data)
 
     def misused(self, reason: Reason) -> None:
         """What came is no message of a host's."""
@@ -264,11 +264,11 @@ class _AcceptedLink:
 
     def doubtful(self) -> None:
         """Its connection may be over."""
-        self._roster.try_link(self._link)
+        self._peer_table.try_link(self._link)
 
     def over(self, _problem: Problem | None) -> None:
         """Its connection is over."""
-        self._roster.break_link(self._link, Loss.DISCONNECTED)
+        self._peer_table.break_link(self._link, Loss.DISCONNECTED)
 
 
 _PARTS = Problem("PACKET_KIND", "a message has one part")

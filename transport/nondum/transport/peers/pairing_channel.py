@@ -34,7 +34,7 @@ from nondum.transport.peers.pairing import (
     Role,
     Step,
 )
-from nondum.transport.peers.pairing_listener import MOST_SENT, Asker, Door
+from nondum.transport.peers.pairing_listener import MOST_SENT, Asker, PairingListener
 from nondum.transport.peers.pairing_messages import MAX_BYTES, Beat, Ended, Ending, decode, encode
 from nondum.transport.peers.pairing_state import (
     Agreed,
@@ -95,7 +95,7 @@ class PairingHost:
         self._loop = asyncio.get_running_loop()
         self._context: Context | None = None
         self._window = PairingWindow(0.0)
-        self._door: Door | None = None
+        self._listener: PairingListener | None = None
         self._dial: Dial | None = None
         self._try: Try | None = None
         self._confirmed: PeerKey | None = None
@@ -124,7 +124,9 @@ class PairingHost:
         try:
             descriptors.see_that_there_are()
             self._context = zmq.Context()
-            self._door = Door(self._context, self._keys, address, self._on_asked, self.refusals)
+            self._listener = PairingListener(
+                self._context, self._keys, address, self._on_asked, self.refusals
+            )
         except (OSError, zmq.ZMQError) as error:
             told = f"this host cannot be asked there: {error.strerror}"
             fix = descriptors.remedy(error)
@@ -137,14 +139,14 @@ class PairingHost:
             self._loop.call_later(BEAT_S, self._beat),
         ]
         self._become(self._waiting(None))
-        return self._door.port
+        return self._listener.port
 
     def ask(self, key: PeerKey, addresses: Sequence[str]) -> None:
         """Ask the host that may be at one of these addresses, until it answers.
 
         Asking another one gives up the last. Nothing happens once the window is closed.
         """
-        assert self._door is not None, "the window is opened first"
+        assert self._listener is not None, "the window is opened first"
         if self._is_over:
             return
         if self._dial is not None:
@@ -202,7 +204,7 @@ class PairingHost:
     # Being asked
 
     def _on_asked(self, asker: Asker, data: bytes) -> None:
-        if self._door is None or self._is_over:
+        if self._listener is None or self._is_over:
             return
         current = self._try.asker if self._try else None
         if current is not None and current.id == asker.id:
@@ -211,12 +213,12 @@ class PairingHost:
         try:
             message = decode(data)
         except NondumError as error:
-            self._door.turn_away(asker, str(error))
+            self._listener.turn_away(asker, str(error))
             return
         if isinstance(message, Ask):
-            self._on_ask(asker, self._door.link(asker), data, message.name)
+            self._on_ask(asker, self._listener.link(asker), data, message.name)
         else:
-            self._door.turn_away(asker, "nothing was asked for yet")
+            self._listener.turn_away(asker, "nothing was asked for yet")
 
     def _on_ask(self, asker: Asker, link: Link, data: bytes, name: str) -> None:
         if self._try is not None:
@@ -385,8 +387,8 @@ class PairingHost:
             current.link.cut(LINGER_MS)
         if self._dial is not None:
             self._dial.close()  # after the link, of which it would leave nothing
-        if self._door is not None:
-            self._door.close(LINGER_MS)
+        if self._listener is not None:
+            self._listener.close(LINGER_MS)
         self._become(state)
 
     def _time_is_over(self) -> None:
@@ -406,8 +408,8 @@ class PairingHost:
     def _beat(self) -> None:
         """Look after what nobody tells of."""
         self._timers[-1] = self._loop.call_later(BEAT_S, self._beat)
-        assert self._door is not None
-        self._door.cut_overdue()
+        assert self._listener is not None
+        self._listener.cut_overdue()
         if self._try is None:
             return
         is_slow = self._loop.time() - self._try.begun_s > ANSWER_S

@@ -22,7 +22,7 @@ from nondum.transport.peers.monitor import Watch
 from nondum.transport.peers.pairing_messages import MAX_BYTES
 from nondum.transport.peers.refusals import Reason, Refusal, Refusals
 from nondum.transport.peers.routes import AcceptedRoute
-from nondum.transport.peers.zap import DOMAIN, Entry, Knock, ZapHandler
+from nondum.transport.peers.zap import DOMAIN, ConnectionAttempt, Entry, ZapHandler
 
 MOST_SENT = 64 * 1024
 """Bytes that a whole try may take, the handshake included; three times what it needs. The signs of
@@ -39,7 +39,7 @@ class Asker:
     descriptor: int
 
 
-class Door:
+class PairingListener:
     """Listens while it is open. `close` it."""
 
     def __init__(
@@ -95,7 +95,7 @@ class Door:
         self._listener.close(linger_ms)
         self._zap.close()
 
-    def _judge(self, knock: Knock) -> Entry:
+    def _judge(self, knock: ConnectionAttempt) -> Entry:
         is_let_in = (
             knock.domain == DOMAIN and knock.mechanism == "CURVE" and knock.key != self._own_key
         )

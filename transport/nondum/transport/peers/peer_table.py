@@ -12,7 +12,7 @@ from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.events import Loss, PeerEvent, PeerLost, PeerUp
 from nondum.transport.peers.failures import PeerUnreachable
 from nondum.transport.peers.gate import Acquaintance, Gate, TurnedAway
-from nondum.transport.peers.incoming_calls import Errand, Handler
+from nondum.transport.peers.incoming_calls import Handler, IncomingCall
 from nondum.transport.peers.keys import PeerKey, fingerprint
 from nondum.transport.peers.link import LINGER_MS, Link
 from nondum.transport.peers.messages import (
@@ -43,7 +43,7 @@ UNREAD_S = 0.02
 """Until it is looked again whether all is read that came over a connection that is gone."""
 
 
-class Roster:
+class PeerTable:
     """The sessions of one host, and the wishes to dial."""
 
     def __init__(
@@ -65,7 +65,7 @@ class Roster:
         self._on_event, self._pulse = on_event, pulse
         self._sessions: dict[PeerKey, Session] = {}
         self._known: dict[PeerKey, Acquaintance] = {}
-        self._orphans: set[Errand] = set()
+        self._orphans: set[IncomingCall] = set()
         self._loop = asyncio.get_running_loop()
         self._beats, self._beat_s = 1, 0.0
         self._ping = encode(Ping(self._beats))
@@ -202,8 +202,8 @@ class Roster:
             session.known.term += 1
         for link in list(session.links):
             link.cut(linger_ms)
-        for errand in session.end(reason):
-            self._keep(errand)
+        for incoming in session.end(reason):
+            self._keep(incoming)
         self._on_event(PeerLost(key, session.admission.name, reason))
         if dial := self.dials.get(key):
             dial.again()
@@ -233,7 +233,7 @@ class Roster:
             if self.gate.has_expired(session.admission):
                 self._part(session, Refused(_EXPIRED), Loss.EXPIRED)
                 continue
-            session.errands.pass_on_waiting()
+            session.incoming_calls.pass_on_waiting()
         self._presence.tick()
 
     def try_link(self, link: Link) -> None:
@@ -272,8 +272,8 @@ class Roster:
             dial.close()
         for session in list(self._sessions.values()):
             self._part(session, Bye("closed"), Loss.CLOSED)
-        for errand in list(self._orphans):
-            errand.halt()
+        for incoming in list(self._orphans):
+            incoming.halt()
 
     def _greeted(self, link: Link, message: Message) -> None:
         """The first message of a link. Raises `TurnedAway`, `OutOfPlace`."""
@@ -364,11 +364,11 @@ class Roster:
             link.tell(last)
         self.lose(session, reason)
 
-    def _keep(self, errand: Errand) -> None:
+    def _keep(self, incoming: IncomingCall) -> None:
         """Remember an errand that outlives its caller, until it ends."""
-        assert errand.task is not None
-        self._orphans.add(errand)
-        errand.task.add_done_callback(lambda _: self._orphans.discard(errand))
+        assert incoming.task is not None
+        self._orphans.add(incoming)
+        incoming.task.add_done_callback(lambda _: self._orphans.discard(incoming))
 
 
 _OURS = frozenset({Loss.SILENT, Loss.DISCONNECTED, Loss.VIOLATED, Loss.REVOKED, Loss.EXPIRED})

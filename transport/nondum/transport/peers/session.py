@@ -18,7 +18,7 @@ from nondum.transport.peers.calls import Calls
 from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.events import Loss
 from nondum.transport.peers.gate import Acquaintance
-from nondum.transport.peers.incoming_calls import Errand, Errands, Handler
+from nondum.transport.peers.incoming_calls import Handler, IncomingCall, IncomingCalls
 from nondum.transport.peers.link import Link
 from nondum.transport.peers.messages import (
     Ask,
@@ -90,7 +90,7 @@ class Session:
         self.doubt: Doubt | None = None
         """Set while it is not known whether the peer has given this host up: what comes waits."""
         self.calls = Calls(admission.name, self.send, known.next_number)
-        self.errands = Errands(admission, known.once, handler, self.send)
+        self.incoming_calls = IncomingCalls(admission, known.once, handler, self.send)
         self._handler, self._pulse = handler, pulse
         self._loop = asyncio.get_running_loop()
 
@@ -118,7 +118,7 @@ class Session:
             self.missing = None
         if not is_first:
             self.calls.repeat()
-            self.errands.pass_on_waiting()
+            self.incoming_calls.pass_on_waiting()
         return replaced
 
     def leave(self, link: Link) -> bool:
@@ -148,7 +148,7 @@ class Session:
         """
         match message:
             case Request():
-                self.errands.take(message)
+                self.incoming_calls.take(message)
             case Reply(number, body):
                 self.calls.succeed(number, dict(body))
             case Ping(number, beat_ms, state):
@@ -166,7 +166,7 @@ class Session:
             case Progress(number, body):
                 self.calls.report(number, dict(body))
             case Cancel(number):
-                self.errands.cancel(number)
+                self.incoming_calls.cancel(number)
             case Notice(method, args):
                 self._notice(method, dict(args))
             case Bye():
@@ -186,7 +186,7 @@ class Session:
         except Exception:
             log.exception("a notice of %s could not be taken in", self.admission.name)
 
-    def end(self, reason: Loss) -> list[Errand]:
+    def end(self, reason: Loss) -> list[IncomingCall]:
         """The peer is lost: fail the calls to it; its errands that run on."""
         if self.missing is not None:
             self.missing.cancel()
@@ -194,4 +194,4 @@ class Session:
         self.known.next_number = self.calls.next_number
         told = f"the peer was lost while a call ran: {reason.value}"
         self.calls.lose(Problem("PEER_LOST", told, where=self.admission.name))
-        return self.errands.lose(reason)
+        return self.incoming_calls.lose(reason)

@@ -35,7 +35,7 @@ class Entry(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Knock:
+class ConnectionAttempt:
     """Somebody wants to connect."""
 
     address: str
@@ -46,10 +46,10 @@ class Knock:
     """The CURVE key that the other end has proved to hold, in Z85; empty without CURVE."""
 
 
-Judge: TypeAlias = Callable[[Knock], Entry]
+Judge: TypeAlias = Callable[[ConnectionAttempt], Entry]
 
 
-def parse(frames: list[bytes]) -> Knock:
+def parse(frames: list[bytes]) -> ConnectionAttempt:
     """Read a request. Raises `ValueError` for one that ZeroMQ did not make."""
     version, _, domain, address, _, mechanism, *credentials = frames  # the fifth is our own id
     if version != b"1.0":
@@ -58,7 +58,7 @@ def parse(frames: list[bytes]) -> Knock:
     if mechanism == b"CURVE":
         (raw,) = credentials
         key = z85.encode(raw).decode("ascii")
-    return Knock(address.decode("ascii"), domain, mechanism.decode("ascii"), key)
+    return ConnectionAttempt(address.decode("ascii"), domain, mechanism.decode("ascii"), key)
 
 
 class ZapHandler:
@@ -102,7 +102,7 @@ class ZapHandler:
         user = key.encode("ascii") if entry is Entry.LET_IN else b""
         self._replies.send([b"1.0", number, entry.value, entry.name.encode("ascii"), user, b""])
 
-    def _judged(self, knock: Knock) -> Entry:
+    def _judged(self, knock: ConnectionAttempt) -> Entry:
         if knock.key in self._probes:
             self._probes.discard(knock.key)
             return Entry.TURNED_AWAY

@@ -21,7 +21,7 @@ from nondum.transport.peers.keys import HostKeys, PeerKey
 from nondum.transport.peers.monitor import Watch
 from nondum.transport.peers.proof import prove_enforced
 from nondum.transport.peers.refusals import Refusals
-from nondum.transport.peers.zap import Entry, Knock, ZapHandler
+from nondum.transport.peers.zap import ConnectionAttempt, Entry, ZapHandler
 from nondum.transport.streams import packets, sockets
 from nondum.transport.streams.outgoing import Outgoing
 from nondum.transport.streams.packets import VERSION, Claim, Over
@@ -98,7 +98,7 @@ class Exporter:
         if self._zap is not None:
             self._zap.close()
 
-    def _judge(self, knock: Knock) -> Entry:
+    def _judge(self, knock: ConnectionAttempt) -> Entry:
         is_awaited = any(
             granted.reader == knock.key and granted.way is None and not granted.is_over
             for granted in self._grants.values()

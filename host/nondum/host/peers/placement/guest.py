@@ -11,7 +11,7 @@ from typing import Any
 
 from nondum.host.core.printable import printable
 from nondum.sdk.errors import Problem
-from nondum.transport.peers import CallFailed, Errand
+from nondum.transport.peers import CallFailed, IncomingCall
 from nondum.wheelhouse.format import contents, names
 from nondum.wheelhouse.format.signatures import MAX_SIGNATURE_BYTES
 
@@ -58,7 +58,7 @@ class Guest:
     """A payload of a peer."""
 
     offer: Offer
-    errand: Errand
+    incoming: IncomingCall
     drive: str
     """Name of the drive that stands for it."""
     root: Path
@@ -81,7 +81,7 @@ class Guest:
         """Report how far it is."""
         self.step = step
         self._told_s = _now_s()
-        self.errand.progress({"step": step, "done": self.done, "total": self.total})
+        self.incoming.progress({"step": step, "done": self.done, "total": self.total})
 
     def add(self, count: int) -> None:
         """More bytes are here."""

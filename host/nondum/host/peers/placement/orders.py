@@ -123,7 +123,7 @@ def _guest_row(guest: Guest, host: str) -> Row:
         "version": guest.version,
         "state": guest.step,
         "host": host,
-        "for": guest.errand.caller.name,
+        "for": guest.incoming.caller.name,
         "pinned": "",
         "why": offer.why,
         "progress": progress.to_dict() if progress else None,

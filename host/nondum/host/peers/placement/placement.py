@@ -12,7 +12,7 @@ from nondum.host.control.arguments import Arguments
 from nondum.host.core.events import Emit, Event
 from nondum.host.jobs.children import Children
 from nondum.host.manager.state_folders import Folders
-from nondum.host.peers.dispatch import Desk
+from nondum.host.peers.dispatch import Dispatcher
 from nondum.host.peers.placement.decide import Compute
 from nondum.host.peers.placement.orders import PlaceOrders
 from nondum.host.peers.placement.pins import Pins
@@ -75,11 +75,11 @@ class Placement:
         )
         self._orders = PlaceOrders(catalogue, self.placing, self.taking, pins, emit, known)
 
-    def serve(self, desk: Desk) -> None:
+    def serve(self, requests: Dispatcher) -> None:
         """Have peers' calls carried out."""
-        desk.add("place.take", self.taking.take)
-        desk.add("place.want", self.placing.want)
-        desk.add("place.read", self.placing.read)
+        requests.add("place.take", self.taking.take)
+        requests.add("place.want", self.placing.want)
+        requests.add("place.read", self.placing.read)
 
     def answering(self) -> dict[str, Callable[[Arguments], Awaitable[Any]]]:
         """Verbs that answer once."""

@@ -43,7 +43,7 @@ from nondum.host.peers.placement.pins import Pins
 from nondum.sdk.errors import NondumError, Problem
 from nondum.sdk.wire import Body
 from nondum.transport.fleet.fleet import Fleet
-from nondum.transport.peers import CallFailed, Errand, PeerKey, PeerUnreachable
+from nondum.transport.peers import CallFailed, IncomingCall, PeerKey, PeerUnreachable
 
 TAKE_S = 30 * 86400.0
 """Deadline of the call that lasts as long as the payload is there; then it is made anew."""
@@ -104,27 +104,27 @@ class Placing:
 
     # What peers ask of it
 
-    async def want(self, errand: Errand) -> Body:
+    async def want(self, incoming: IncomingCall) -> Body:
         """Have files ready for the peer that takes a payload. Raises `CallFailed` (NOT_OFFERED)
         and what reading the drive does."""
-        match errand.args:
+        match incoming.args:
             case {"digest": str(digest), "wanted": list(wanted)} if all(
                 isinstance(sha256, str) for sha256 in wanted
             ):
-                await self._handover_to(errand, digest).want(wanted)
+                await self._handover_to(incoming, digest).want(wanted)
                 return {}
         raise CallFailed(_malformed("digest and wanted"))
 
-    async def read(self, errand: Errand) -> Body:
+    async def read(self, incoming: IncomingCall) -> Body:
         """A piece of a file: `data`. Raises `CallFailed` (NOT_OFFERED)."""
-        match errand.args:
+        match incoming.args:
             case {
                 "digest": str(digest),
                 "sha256": str(sha256),
                 "offset": int(offset),
                 "length": int(length),
             } if 0 <= offset < 2**53 and 0 < length <= LARGEST:
-                handover = self._handover_to(errand, digest)
+                handover = self._handover_to(incoming, digest)
                 return {"data": await handover.read(sha256, offset, length)}
         raise CallFailed(_malformed("digest, sha256, offset and length"))
 
@@ -136,11 +136,11 @@ class Placing:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    def _handover_to(self, errand: Errand, digest: str) -> Handover:
+    def _handover_to(self, incoming: IncomingCall, digest: str) -> Handover:
         for case in self:
             candidate, handover = case.candidate, case.handover
             is_it = case.parcel.digest == digest and handover is not None
-            if is_it and candidate is not None and candidate.key == errand.caller.key:
+            if is_it and candidate is not None and candidate.key == incoming.caller.key:
                 assert handover is not None
                 return handover
         told = "no such payload is handed over to this host"

@@ -34,7 +34,7 @@ from nondum.host.peers.placement.guest import Guest, Offer
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
 from nondum.sdk.wire import Body
 from nondum.transport.fleet.fleet import Fleet
-from nondum.transport.peers import Call, CallFailed, Errand, PeerKey
+from nondum.transport.peers import Call, CallFailed, IncomingCall, PeerKey
 from nondum.wheelhouse.format import contents
 from nondum.wheelhouse.format.signatures import Grant
 
@@ -90,17 +90,17 @@ class Taking:
             for guest in self:
                 guest.news.set()
 
-    async def take(self, errand: Errand) -> Body:
+    async def take(self, incoming: IncomingCall) -> Body:
         """Run a peer's payload here until the peer ends the call. Progress has `step`, `done` and
         `total`. Raises `CallFailed` and `PayloadRefused` with what keeps it from running here."""
-        offer = Offer.parse(errand.args)
+        offer = Offer.parse(incoming.args)
         self._check_open()
-        guest = self._guest(offer, errand)
+        guest = self._guest(offer, incoming)
         self._guests[guest.drive] = guest
         is_inserted = False
         try:
             await self._started.wait()
-            async with self._turns.setdefault(errand.caller.key, asyncio.Semaphore(AT_ONCE)):
+            async with self._turns.setdefault(incoming.caller.key, asyncio.Semaphore(AT_ONCE)):
                 await self._fetch(guest)
             is_inserted = True
             self._emit(DriveInserted(guest.drive, guest.root, PLACED))
@@ -119,11 +119,11 @@ class Taking:
             told = f"this host has {MOST} payloads of others already"
             raise CallFailed(Problem("PLACE_FULL", told))
 
-    def _guest(self, offer: Offer, errand: Errand) -> Guest:
+    def _guest(self, offer: Offer, incoming: IncomingCall) -> Guest:
         number = next(self._numbers)
-        drive = f"{PLACED}/{errand.caller.name}/{number}"
+        drive = f"{PLACED}/{incoming.caller.name}/{number}"
         root = self._folders.placed / str(number)
-        return Guest(offer, errand, drive, root, self._state().key_of(offer.digest))
+        return Guest(offer, incoming, drive, root, self._state().key_of(offer.digest))
 
     # Fetching
 
@@ -202,7 +202,7 @@ class Taking:
         return self._call(guest, "place.read", args, READ_S)
 
     def _call(self, guest: Guest, method: str, args: Body, deadline_s: float) -> Call:
-        return self._fleet().call(guest.errand.caller.key, method, args, deadline_s=deadline_s)
+        return self._fleet().call(guest.incoming.caller.key, method, args, deadline_s=deadline_s)
 
     # Once it is here
 
@@ -229,7 +229,7 @@ class Taking:
             raise PayloadRefused(*payload.problems)
         if payload.step is Step.ACTIVE and guest.step != "active":
             await in_thread(remove, guest.folder / "wheels")  # the store has them now
-            self._emit(PayloadTaken(guest.key, guest.errand.caller.name, guest.offer.why))
+            self._emit(PayloadTaken(guest.key, guest.incoming.caller.name, guest.offer.why))
         guest.tell("active" if payload.step is Step.ACTIVE else "installing")
 
 

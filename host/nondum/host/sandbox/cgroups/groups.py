@@ -1,7 +1,7 @@
-"""The cages of a daemon's workers: limits on all processes of one together, and their sure end.
+"""The cgroups of a daemon's workers: limits on all processes of one together, and their sure end.
 
 Version 2 is used where there is any, version 1 where that has the controllers; where there is
-neither, or the daemon may not use them, cages hold nobody and say so.
+neither, or the daemon may not use them, cgroups hold nobody and say so.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 
 from nondum.host.sandbox.cgroups import hierarchies
 from nondum.host.sandbox.cgroups.hierarchies import Mounted
-from nondum.host.sandbox.cgroups.limits import CageLimits, Tree, Usage
+from nondum.host.sandbox.cgroups.limits import CgroupLimits, Tree, Usage
 from nondum.host.sandbox.cgroups.version1 import Legacy
 from nondum.host.sandbox.cgroups.version2 import Unified
 from nondum.sdk.errors import Problem
@@ -28,14 +28,14 @@ GENERATIONS = 2
 """How often the children of a process that is put in are looked for: they may fork meanwhile."""
 
 
-class Cage:
+class Cgroup:
     """One worker's. Its methods block for microseconds, but for `end`."""
 
     def __init__(self, tree: Tree, name: str) -> None:
         self._tree = tree
         self.name = name
 
-    def limit(self, limits: CageLimits) -> None:
+    def limit(self, limits: CgroupLimits) -> None:
         """Change its limits: a spare interpreter is put in before it is known whose it will be.
 
         Raises `OSError`.
@@ -93,8 +93,8 @@ class Cage:
         return None
 
 
-class Cages:
-    """Makes cages. `sweep` away those of an earlier life first."""
+class Cgroups:
+    """Makes cgroups. `sweep` away those of an earlier life first."""
 
     def __init__(self, tree: Tree) -> None:
         self._tree = tree
@@ -102,8 +102,8 @@ class Cages:
         self._numbers = itertools.count(max(taken, default=0) + 1)
 
     @classmethod
-    def open(cls, state: Path) -> Cages:
-        """Look for what this machine has. One daemon's cages are apart from others', by the
+    def open(cls, state: Path) -> Cgroups:
+        """Look for what this machine has. One daemon's cgroups are apart from others', by the
         `state` folder that it has claimed.
         """
         return cls(tree(hierarchies.here(), owner(state)))
@@ -118,30 +118,30 @@ class Cages:
         """What is really limited: of `memory`, `pids`, `cpu`."""
         return self._tree.controllers
 
-    def make(self, component: str, limits: CageLimits) -> Cage:
-        """Make a cage for a new worker of a component. Raises `OSError`; then there is none."""
-        cage = Cage(self._tree, f"{component}.{next(self._numbers)}")
+    def make(self, component: str, limits: CgroupLimits) -> Cgroup:
+        """Make a cgroup for a new worker of a component. Raises `OSError`; then there is none."""
+        cgroup = Cgroup(self._tree, f"{component}.{next(self._numbers)}")
         try:
-            self._tree.make(cage.name)  # of version 1 it may be made in part
-            cage.limit(limits)
+            self._tree.make(cgroup.name)  # of version 1 it may be made in part
+            cgroup.limit(limits)
         except OSError:
             with contextlib.suppress(OSError):  # the first failure is the one to report
-                cage.remove()
+                cgroup.remove()
             raise
-        return cage
+        return cgroup
 
     def sweep(self, keep: Collection[str] = ()) -> int:
-        """End all cages but those named: what a daemon left that died. Returns how many there were.
+        """End all cgroups but those named: what a dead daemon left. Returns how many there were.
 
         Blocks up to a second for each: not for the loop.
         """
         left = [name for name in self._tree.names() if name not in keep]
         for name in left:
-            Cage(self._tree, name).end()
+            Cgroup(self._tree, name).end()
         return len(left)
 
     def close(self) -> None:
-        """Let go of the place where cages are; call it once all have ended."""
+        """Let go of the place where cgroups are; call it once all have ended."""
         self._tree.close()
 
     def problems(self) -> tuple[Problem, ...]:
@@ -151,7 +151,7 @@ class Cages:
 
 
 class NoTree:
-    """Where there are no cgroups that this daemon may use: cages that hold nobody."""
+    """Where there are no cgroups that this daemon may use: cgroups that hold nobody."""
 
     kind = ""
     controllers: frozenset[str] = frozenset()
@@ -159,7 +159,7 @@ class NoTree:
     def make(self, name: str) -> None:
         """Do nothing."""
 
-    def limit(self, name: str, limits: CageLimits) -> None:
+    def limit(self, name: str, limits: CgroupLimits) -> None:
         """Do nothing."""
 
     def add(self, name: str, pid: int) -> None:

@@ -1,4 +1,4 @@
-"""What a worker's cage allows, and what has been used of it.
+"""What a worker's cgroup allows, and what has been used of it.
 
 Sources: kernel.org, Documentation/admin-guide/cgroup-v2.rst and cgroup-v1/{memory,pids}.rst.
 """
@@ -11,13 +11,13 @@ from typing import Protocol
 
 MEGABYTE = 1024 * 1024
 NAME = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,62})\.[0-9]{1,9}")
-"""A cage's name: a component and a number, since an upgrade has two workers for a while."""
+"""A cgroup's name: a component and a number, since an upgrade has two workers for a while."""
 WEIGHT = 100
 """Processor weight of what has none of its own (cpu.weight)."""
 
 
 @dataclass(frozen=True, slots=True)
-class CageLimits:
+class CgroupLimits:
     """What all processes of one worker may use together."""
 
     memory_mb: int = 2048
@@ -30,7 +30,7 @@ class CageLimits:
     """Processor seconds in a second; 0: no limit but the weight."""
 
     def __post_init__(self) -> None:
-        """Raise `ValueError` for what no cage can be held to: the helper takes a stranger's."""
+        """Raise `ValueError` for what no cgroup can be held to: the helper takes a stranger's."""
         if not 1 <= self.memory_mb <= 2**30:
             raise ValueError(f"{self.memory_mb} megabytes are no limit of memory")
         if not 1 <= self.tasks <= 2**22:
@@ -43,12 +43,12 @@ class CageLimits:
 
 @dataclass(frozen=True, slots=True)
 class Usage:
-    """What the processes of a cage use, and how often they met its limits. 0: not known."""
+    """What the processes of a cgroup use, and how often they met its limits. 0: not known."""
 
     memory_bytes: int = 0
     tasks: int = 0
     cpu_s: float = 0.0
-    """Processor seconds since the cage was made."""
+    """Processor seconds since the cgroup was made."""
     oom_kills: int = 0
     """Processes that were killed since the memory was used up."""
     refused_tasks: int = 0
@@ -58,7 +58,7 @@ class Usage:
 
 
 class Tree(Protocol):
-    """Where cages are: the cgroups of one daemon. Names are of the form of `NAME`."""
+    """Where cgroups are: the cgroups of one daemon. Names are of the form of `NAME`."""
 
     kind: str
     """`v2`, `v1`, or empty where there are none."""
@@ -66,11 +66,11 @@ class Tree(Protocol):
     """What can be limited: of `memory`, `pids`, `cpu`."""
 
     def make(self, name: str) -> None:
-        """Make a cage. Raises `OSError`."""
+        """Make a cgroup. Raises `OSError`."""
         ...
 
-    def limit(self, name: str, limits: CageLimits) -> None:
-        """Set a cage's limits. Raises `OSError`."""
+    def limit(self, name: str, limits: CgroupLimits) -> None:
+        """Set a cgroup's limits. Raises `OSError`."""
         ...
 
     def add(self, name: str, pid: int) -> None:
@@ -78,11 +78,11 @@ class Tree(Protocol):
         ...
 
     def kill(self, name: str) -> None:
-        """SIGKILL all that is in it, however much it forks; a cage that is gone is fine."""
+        """SIGKILL all that is in it, however much it forks; a cgroup that is gone is fine."""
         ...
 
     def remove(self, name: str) -> bool:
-        """Remove an empty cage; answer whether it is gone."""
+        """Remove an empty cgroup; answer whether it is gone."""
         ...
 
     def pids(self, name: str) -> tuple[int, ...]:
@@ -94,9 +94,9 @@ class Tree(Protocol):
         ...
 
     def names(self) -> tuple[str, ...]:
-        """All cages of this daemon, and of its earlier lives."""
+        """All cgroups of this daemon, and of its earlier lives."""
         ...
 
     def close(self) -> None:
-        """Remove the place of the cages if all of them are gone. Raises nothing."""
+        """Remove the place of the cgroups if all of them are gone. Raises nothing."""
         ...

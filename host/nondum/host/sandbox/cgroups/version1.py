@@ -1,4 +1,4 @@
-"""Cages of version 1: a hierarchy for each controller (cgroup-v1/memory.rst, pids.rst,
+"""Cgroups of version 1: a hierarchy for each controller (cgroup-v1/memory.rst, pids.rst,
 freezer-subsystem.rst). Needs root, or the helper.
 """
 
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from nondum.host.sandbox.cgroups import files
 from nondum.host.sandbox.cgroups.hierarchies import Mounted
-from nondum.host.sandbox.cgroups.limits import MEGABYTE, WEIGHT, CageLimits, Usage
+from nondum.host.sandbox.cgroups.limits import MEGABYTE, WEIGHT, CgroupLimits, Usage
 
 USED = ("memory", "pids", "cpu", "cpuacct", "freezer")
 LIMITING = frozenset({"memory", "pids", "cpu"})
@@ -21,18 +21,18 @@ SHARES = 1024
 
 
 class Legacy:
-    """The cages below a folder in each of several hierarchies."""
+    """The cgroups below a folder in each of several hierarchies."""
 
     kind = "v1"
 
     def __init__(self, bases: Mapping[str, Path]) -> None:
         self._bases = bases
-        """Controller → folder of the cages."""
+        """Controller → folder of the cgroups."""
         self.controllers = LIMITING & bases.keys()
 
     @classmethod
     def open(cls, hierarchies: Iterable[Mounted], owner: str) -> Legacy | None:
-        """Make room for cages wherever a controller is mounted. None where there is no such."""
+        """Make room for cgroups wherever a controller is mounted. None where there is no such."""
         bases: dict[str, Path] = {}
         for hierarchy in hierarchies:
             for controller in hierarchy.controllers & set(USED):
@@ -41,11 +41,11 @@ class Legacy:
         return cls(bases) if LIMITING & bases.keys() else None
 
     def make(self, name: str) -> None:
-        """Make a cage (see `Tree`)."""
+        """Make a cgroup (see `Tree`)."""
         for folder in self._folders(name):
             folder.mkdir(exist_ok=True)
 
-    def limit(self, name: str, limits: CageLimits) -> None:
+    def limit(self, name: str, limits: CgroupLimits) -> None:
         """Set its limits (see `Tree`)."""
         for controller, file, value in _settings(limits):
             if controller in self._bases:
@@ -64,7 +64,7 @@ class Legacy:
             files.kill_all(folder, freezer / "freezer.state", "FROZEN", "THAWED")
 
     def remove(self, name: str) -> bool:
-        """Remove an empty cage."""
+        """Remove an empty cgroup."""
         return all([files.remove(folder) for folder in self._folders(name)])
 
     def pids(self, name: str) -> tuple[int, ...]:
@@ -83,12 +83,12 @@ class Legacy:
         )
 
     def names(self) -> tuple[str, ...]:
-        """All cages."""
+        """All cgroups."""
         found = {name for base in self._bases.values() for name in files.inside(base)}
         return tuple(sorted(found))
 
     def close(self) -> None:
-        """Remove the folders of the cages if they are gone (see `Tree`)."""
+        """Remove the folders of the cgroups if they are gone (see `Tree`)."""
         for base in self._bases.values():
             files.remove(base)
 
@@ -103,7 +103,7 @@ class Legacy:
 
 
 def _made(hierarchy: Mounted, owner: str) -> Path | None:
-    """The folder for cages in this process's own cgroup, or below the topmost."""
+    """The folder for cgroups in this process's own cgroup, or below the topmost."""
     for part in (hierarchy.own, hierarchy.top):
         if os.access(part, os.W_OK):
             with contextlib.suppress(OSError):
@@ -112,7 +112,7 @@ def _made(hierarchy: Mounted, owner: str) -> Path | None:
     return None
 
 
-def _settings(limits: CageLimits) -> Iterator[tuple[str, str, int]]:
+def _settings(limits: CgroupLimits) -> Iterator[tuple[str, str, int]]:
     size = limits.memory_mb * MEGABYTE
     # The sum of memory and swap may never be below the memory, so what it was before matters.
     yield "memory", "memory.limit_in_bytes", size

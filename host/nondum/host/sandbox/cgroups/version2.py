@@ -1,4 +1,4 @@
-"""Cages of version 2: one hierarchy, of which this daemon has a part (cgroup-v2.rst).
+"""Cgroups of version 2: one hierarchy, of which this daemon has a part (cgroup-v2.rst).
 
 A service that systemd lends its own part (`Delegate=yes`) needs no privilege. Where limits are to
 be set for the cgroups inside one, no process may be in that one itself ("no internal processes"),
@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from nondum.host.sandbox.cgroups import files
-from nondum.host.sandbox.cgroups.limits import MEGABYTE, CageLimits, Usage
+from nondum.host.sandbox.cgroups.limits import MEGABYTE, CgroupLimits, Usage
 
 WANTED = frozenset({"memory", "pids", "cpu"})
 LEAF = "daemon"
@@ -21,7 +21,7 @@ PERIOD_US = 100_000
 
 
 class Unified:
-    """The cages below a folder of a version 2 hierarchy."""
+    """The cgroups below a folder of a version 2 hierarchy."""
 
     kind = "v2"
 
@@ -31,7 +31,7 @@ class Unified:
 
     @classmethod
     def open(cls, own: Path, top: Path, owner: str) -> Unified | None:
-        """Make room for cages in this process's own cgroup, or below the top one.
+        """Make room for cgroups in this process's own cgroup, or below the top one.
 
         None where neither can be written.
         """
@@ -58,10 +58,10 @@ class Unified:
         return cls(part / owner, _enable(part / owner))
 
     def make(self, name: str) -> None:
-        """Make a cage (see `Tree`)."""
+        """Make a cgroup (see `Tree`)."""
         (self._base / name).mkdir(exist_ok=True)
 
-    def limit(self, name: str, limits: CageLimits) -> None:
+    def limit(self, name: str, limits: CgroupLimits) -> None:
         """Set its limits (see `Tree`)."""
         for file, value in _settings(limits, self.controllers):
             with contextlib.suppress(FileNotFoundError):  # memory.swap.max: a kernel without swap
@@ -81,7 +81,7 @@ class Unified:
         files.kill_all(folder, folder / "cgroup.freeze", "1", "0")
 
     def remove(self, name: str) -> bool:
-        """Remove an empty cage."""
+        """Remove an empty cgroup."""
         return files.remove(self._base / name)
 
     def pids(self, name: str) -> tuple[int, ...]:
@@ -106,15 +106,15 @@ class Unified:
         )
 
     def names(self) -> tuple[str, ...]:
-        """All cages."""
+        """All cgroups."""
         return files.inside(self._base)
 
     def close(self) -> None:
-        """Remove the folder of the cages if they are gone (see `Tree`)."""
+        """Remove the folder of the cgroups if they are gone (see `Tree`)."""
         files.remove(self._base)
 
 
-def _settings(limits: CageLimits, controllers: frozenset[str]) -> Iterator[tuple[str, str]]:
+def _settings(limits: CgroupLimits, controllers: frozenset[str]) -> Iterator[tuple[str, str]]:
     if "memory" in controllers:
         yield "memory.max", str(limits.memory_mb * MEGABYTE)
         yield "memory.swap.max", "0"

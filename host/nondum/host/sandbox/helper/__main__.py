@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _tree(owner: str) -> Tree:
-    """Cages outlive the helper, so they are not below its own cgroup, which ends with it."""
+    """Cgroups outlive the helper, so they are not below its own cgroup, which ends with it."""
     return tree([replace(hierarchy, own=hierarchy.top) for hierarchy in hierarchies.here()], owner)
 
 

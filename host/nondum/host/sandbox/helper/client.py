@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.core.feedback_state import State
-from nondum.host.sandbox.cgroups.limits import CageLimits, Usage
+from nondum.host.sandbox.cgroups.limits import CgroupLimits, Usage
 from nondum.host.sandbox.helper import requests, worker_users
 from nondum.host.sandbox.helper.requests import Request
 from nondum.sdk import errors
@@ -92,7 +92,7 @@ class HelperClient:
         """Have them show what they showed before."""
         self._ask(requests.EndLamps())
 
-    def cages(self) -> HelperTree:
+    def cgroups(self) -> HelperTree:
         """The cgroups of the helper's making. Raises `NondumError`."""
         return HelperTree(self)
 
@@ -172,55 +172,55 @@ class PressesOfHelper:
 
 
 class HelperTree:
-    """Satisfies `Tree`: cages that the helper makes; their use is read directly where it can be."""
+    """Satisfies `Tree`: cgroups that the helper makes; their use is read directly."""
 
     def __init__(self, helper: HelperClient) -> None:
         self._helper = helper
-        listed = helper.ask(requests.ListCages())
+        listed = helper.ask(requests.ListCgroups())
         self.kind: str = listed["kind"]
         self.controllers = frozenset(listed["controllers"])
 
     def make(self, name: str) -> None:
-        """Make a cage."""
-        self._told(requests.MakeCage(name))
+        """Make a cgroup."""
+        self._told(requests.MakeCgroup(name))
 
-    def limit(self, name: str, limits: CageLimits) -> None:
+    def limit(self, name: str, limits: CgroupLimits) -> None:
         """Set its limits."""
         self._told(
-            requests.LimitCage(
+            requests.LimitCgroup(
                 name, limits.memory_mb, limits.tasks, limits.cpu_weight, limits.processors
             )
         )
 
     def add(self, name: str, pid: int) -> None:
         """Put one process in."""
-        self._told(requests.FillCage(name, pid))
+        self._told(requests.FillCgroup(name, pid))
 
     def kill(self, name: str) -> None:
         """SIGKILL all that is in it."""
-        self._told(requests.KillCage(name))
+        self._told(requests.KillCgroup(name))
 
     def remove(self, name: str) -> bool:
         """Remove it if it is empty."""
-        return bool(self._told(requests.RemoveCage(name))["gone"])
+        return bool(self._told(requests.RemoveCgroup(name))["gone"])
 
     def pids(self, name: str) -> tuple[int, ...]:
         """The processes in it."""
-        return tuple(self._told(requests.LookAtCage(name))["pids"])
+        return tuple(self._told(requests.ReadCgroup(name))["pids"])
 
     def usage(self, name: str) -> Usage:
         """What it uses."""
-        return Usage(**self._told(requests.LookAtCage(name))["usage"])
+        return Usage(**self._told(requests.ReadCgroup(name))["usage"])
 
     def names(self) -> tuple[str, ...]:
-        """All cages."""
-        return tuple(self._told(requests.ListCages())["cages"])
+        """All cgroups."""
+        return tuple(self._told(requests.ListCgroups())["cgroups"])
 
     def close(self) -> None:
-        """The place of the cages stays the helper's."""
+        """The place of the cgroups stays the helper's."""
 
     def _told(self, request: Request) -> dict[str, Any]:
-        """Ask; what fails is an `OSError`, as it is with one's own cages."""
+        """Ask; what fails is an `OSError`, as it is with one's own cgroups."""
         with _as_os_error():
             return self._helper.ask(request)
 

@@ -76,8 +76,8 @@ class Privileged(Protocol):
         """Have lamps show what they showed before."""
         ...
 
-    def cages(self) -> Tree:
-        """Where cages are that this process may not make itself."""
+    def cgroups(self) -> Tree:
+        """Where cgroups are that this process may not make itself."""
         ...
 
     def stop_key(self, device: Path, code: int) -> Presses:
@@ -141,7 +141,7 @@ class InProcess:
         """Set them back."""
         Lamps(names, kept).end()
 
-    def cages(self) -> Tree:
+    def cgroups(self) -> Tree:
         """None but its own."""
         return NoTree()
 

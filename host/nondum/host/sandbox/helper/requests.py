@@ -1,7 +1,7 @@
 """What the helper can be asked, as values and as bytes: a packet of JSON for each. Pure.
 
 No request carries a path: drives are named by kernel name and insertion number, folders of devices
-by component, cages by their own names, and lamps not at all. Everything else is refused before
+by component, cgroups by their own names, and lamps not at all. Everything else is refused before
 anything is done.
 """
 
@@ -15,7 +15,7 @@ from typing import Any, TypeAlias, get_args, get_type_hints
 
 from nondum.host.core.feedback_state import State
 from nondum.host.sandbox.cgroups.limits import NAME as CAGE
-from nondum.host.sandbox.cgroups.limits import CageLimits
+from nondum.host.sandbox.cgroups.limits import CgroupLimits
 from nondum.sdk.errors import NondumError, Problem
 
 MAX_BYTES = 1024
@@ -115,60 +115,60 @@ class EndLamps:
 
 
 @dataclass(frozen=True, slots=True)
-class ListCages:
-    """Which kind of cgroups there is, what they limit, and which cages there are."""
+class ListCgroups:
+    """Which kind of cgroups there is, what they limit, and which cgroups there are."""
 
 
 @dataclass(frozen=True, slots=True)
-class LookAtCage:
-    """What a cage uses, and the processes in it."""
+class ReadCgroup:
+    """What a cgroup uses, and the processes in it."""
 
-    cage: str
-
-
-@dataclass(frozen=True, slots=True)
-class MakeCage:
-    """Make a cage without limits."""
-
-    cage: str
+    cgroup: str
 
 
 @dataclass(frozen=True, slots=True)
-class LimitCage:
-    """Set a cage's limits."""
+class MakeCgroup:
+    """Make a cgroup without limits."""
 
-    cage: str
+    cgroup: str
+
+
+@dataclass(frozen=True, slots=True)
+class LimitCgroup:
+    """Set a cgroup's limits."""
+
+    cgroup: str
     memory_mb: int
     tasks: int
     cpu_weight: int
     processors: float
 
     @property
-    def limits(self) -> CageLimits:
+    def limits(self) -> CgroupLimits:
         """The limits. Raises `ValueError`."""
-        return CageLimits(self.memory_mb, self.tasks, self.cpu_weight, self.processors)
+        return CgroupLimits(self.memory_mb, self.tasks, self.cpu_weight, self.processors)
 
 
 @dataclass(frozen=True, slots=True)
-class FillCage:
-    """Put a process of the caller's own user into a cage."""
+class FillCgroup:
+    """Put a process of the caller's own user into a cgroup."""
 
-    cage: str
+    cgroup: str
     pid: int
 
 
 @dataclass(frozen=True, slots=True)
-class KillCage:
-    """SIGKILL all that is in a cage."""
+class KillCgroup:
+    """SIGKILL all that is in a cgroup."""
 
-    cage: str
+    cgroup: str
 
 
 @dataclass(frozen=True, slots=True)
-class RemoveCage:
-    """Remove an empty cage; the answer is whether it is gone."""
+class RemoveCgroup:
+    """Remove an empty cgroup; the answer is whether it is gone."""
 
-    cage: str
+    cgroup: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,13 +191,13 @@ Request: TypeAlias = (
     | MapFolder
     | ShowLamps
     | EndLamps
-    | ListCages
-    | LookAtCage
-    | MakeCage
-    | LimitCage
-    | FillCage
-    | KillCage
-    | RemoveCage
+    | ListCgroups
+    | ReadCgroup
+    | MakeCgroup
+    | LimitCgroup
+    | FillCgroup
+    | KillCgroup
+    | RemoveCgroup
     | ListenToStopKey
 )
 
@@ -209,7 +209,7 @@ _FORMS = {
     "component": COMPONENT,
     "need": NEED,
     "filesystem": FILESYSTEM,
-    "cage": CAGE,
+    "cgroup": CAGE,
     "state": STATE,
 }
 _MOST = 2**63 - 1
@@ -244,7 +244,7 @@ def parse(data: bytes) -> Request:
     if body.keys() != hints.keys():
         raise refused(f"{kind.__name__} takes {', '.join(hints) or 'nothing'}")
     request: Request = kind(**{name: _typed(name, hints[name], body[name]) for name in hints})
-    if isinstance(request, LimitCage):
+    if isinstance(request, LimitCgroup):
         try:
             _ = request.limits
         except ValueError as error:

@@ -31,7 +31,7 @@ class Service:
     """Root's end."""
 
     uid: int
-    """The only user who is served; processes of no other are put into cages."""
+    """The only user who is served; processes of no other are put into cgroups."""
     mounts: Path
     disks: Disks
     nodes: Nodes
@@ -74,7 +74,7 @@ class Service:
             case requests.EndLamps():
                 self.lamps().end()
             case _:
-                return self._serve_cage(request)
+                return self._serve_cgroup(request)
         return {}
 
     def _mount(self, request: requests.Mount) -> Path:
@@ -112,27 +112,27 @@ class Service:
             raise refused("that is no folder of yours")
         worker_users.map_folder(mount, (self.uid, self.gid), user)
 
-    def _serve_cage(self, request: Request) -> dict[str, Any]:
+    def _serve_cgroup(self, request: Request) -> dict[str, Any]:
         tree = self.tree
         match request:
-            case requests.ListCages():
+            case requests.ListCgroups():
                 controllers = sorted(tree.controllers)
-                return {"kind": tree.kind, "controllers": controllers, "cages": tree.names()}
-            case requests.LookAtCage(cage):
-                return {"pids": tree.pids(cage)[:4096], "usage": asdict(tree.usage(cage))}
-            case requests.MakeCage(cage):
+                return {"kind": tree.kind, "controllers": controllers, "cgroups": tree.names()}
+            case requests.ReadCgroup(cgroup):
+                return {"pids": tree.pids(cgroup)[:4096], "usage": asdict(tree.usage(cgroup))}
+            case requests.MakeCgroup(cgroup):
                 if len(tree.names()) >= MOST_CAGES:
-                    raise refused(f"there are {MOST_CAGES} cages already")
-                tree.make(cage)
-            case requests.LimitCage(cage):
-                tree.limit(cage, request.limits)
-            case requests.FillCage(cage, pid):
+                    raise refused(f"there are {MOST_CAGES} cgroups already")
+                tree.make(cgroup)
+            case requests.LimitCgroup(cgroup):
+                tree.limit(cgroup, request.limits)
+            case requests.FillCgroup(cgroup, pid):
                 with self._held(pid):
-                    tree.add(cage, pid)
-            case requests.KillCage(cage):
-                tree.kill(cage)
-            case requests.RemoveCage(cage):
-                return {"gone": tree.remove(cage)}
+                    tree.add(cgroup, pid)
+            case requests.KillCgroup(cgroup):
+                tree.kill(cgroup)
+            case requests.RemoveCgroup(cgroup):
+                return {"gone": tree.remove(cgroup)}
         return {}
 
     @contextmanager

@@ -48,7 +48,7 @@ def keep(orders: socket.socket, given: Mapping[str, Any], links: Sequence[int]) 
         return
     for link in links:
         os.close(link)
-    os._exit(_Keeper(orders, given, worker).run())
+    os._exit(_Init(orders, given, worker).run())
 
 
 def _close_all_but(needed: Collection[int]) -> None:
@@ -70,7 +70,7 @@ def _say_who(orders: socket.socket, who: str) -> None:
     orders.send(json.dumps({"is": who}).encode())
 
 
-class _Keeper:
+class _Init:
     def __init__(self, orders: socket.socket, given: Mapping[str, Any], worker: int) -> None:
         self._orders, self._given, self._worker = orders, given, worker
         self._poll = select.poll()

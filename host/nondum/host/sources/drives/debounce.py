@@ -44,7 +44,7 @@ class _Held:
     timer: asyncio.TimerHandle
 
 
-class Steady:
+class Debounced:
     """Stands before another source. `now_s` is a clock that never goes back."""
 
     def __init__(self, source: DriveSource, now_s: Callable[[], float] = time.monotonic) -> None:

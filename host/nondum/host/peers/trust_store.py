@@ -27,7 +27,7 @@ from nondum.transport.peers.trust import Trust
 KEY_NAME, TRUST_NAME, CERTIFICATE_NAME = "host.key", "trust.json", "certificate"
 
 
-class TrustKeeper:
+class PeerTrustStore:
     """A host's keys, certificate and trust. Its methods run on the loop, the disk does not."""
 
     def __init__(
@@ -60,7 +60,7 @@ class TrustKeeper:
         on_change: Callable[[Trust], None] = lambda _: None,
         on_certificate: Callable[[bytes], None] = lambda _: None,
         clock: Callable[[], datetime] = lambda: datetime.now(UTC),
-    ) -> TrustKeeper:
+    ) -> PeerTrustStore:
         """Read the files of the host `name` in `<state>/peers`, and make a key at the first start.
 
         `on_change` is told of every new trust, `on_certificate` of a certificate to show from now

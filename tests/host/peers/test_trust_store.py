@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from nondum.host.jobs.certificates import certificates_on
-from nondum.host.peers.trust_keeper import CERTIFICATE_NAME, KEY_NAME, TRUST_NAME, TrustKeeper
+from nondum.host.peers.trust_store import CERTIFICATE_NAME, KEY_NAME, TRUST_NAME, PeerTrustStore
 from nondum.transport.peers import HostKeys, PeerKey, PeerRefused, Security, Trust, private_file
 from nondum.transport.peers.certificate import issue, new_fleet
 from nondum.transport.peers.public_file import FleetPublic
@@ -33,9 +33,9 @@ class Told:
     certificates: list[bytes] = field(default_factory=list)
 
 
-async def keeper(folder: Path, told: Told | None = None, name: str = "base") -> TrustKeeper:
+async def keeper(folder: Path, told: Told | None = None, name: str = "base") -> PeerTrustStore:
     told = told or Told()
-    return await TrustKeeper.open(
+    return await PeerTrustStore.open(
         folder / "peers",
         name,
         on_change=told.trusts.append,
@@ -250,7 +250,7 @@ async def test_certificate_that_ended_is_warned_of_and_shown(tmp_path: Path) -> 
     """The clock of a host without a battery may be set later."""
     kept = await keeper(tmp_path)
     await kept.certify(signed(kept.key))
-    late = await TrustKeeper.open(
+    late = await PeerTrustStore.open(
         tmp_path / "peers", "base", clock=lambda: NOW + timedelta(days=99)
     )
     assert [problem.code for problem in late.warnings] == ["CERTIFICATE_TIME"]
