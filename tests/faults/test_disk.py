@@ -20,7 +20,7 @@ from nondum.host.core.records import Step
 from nondum.host.manager import state_lock
 from nondum.host.manager.initial_components import install, uninstall
 from nondum.host.manager.installation import InstallOptions
-from nondum.host.manager.refusal_retry import TryingAgain
+from nondum.host.manager.refusal_retry import RefusalRetry
 from nondum.sdk.errors import ConfigRefused
 
 pytestmark = pytest.mark.anyio
@@ -112,7 +112,7 @@ async def test_full_disk_does_not_keep_the_catalogue_from_being_written(
         assert host.catalogue.unwritten is None
         assert (await host.journal())[-1].event == "PayloadRefused"
         amounts = host.executor.installation.amounts
-        trying_again = TryingAgain(host.catalogue.snapshot, amounts, host.bus.emit)
+        trying_again = RefusalRetry(host.catalogue.snapshot, amounts, host.bus.emit)
         async with asyncio.TaskGroup() as tasks:
             looking = tasks.create_task(trying_again.run())
             filler.unlink()

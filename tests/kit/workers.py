@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import pluggy
 from tests.kit.until import PATIENCE_S, arrived
 
-from nondum.host.config.confinement_level import Standing, parse_wanted
+from nondum.host.config.confinement_level import ConfinementState, parse_wanted
 from nondum.host.core.events import BehaviourEnded, Event, WorkerExited, WorkerReady
 from nondum.host.workers import confinement_choice
 from nondum.host.workers.call import Call
@@ -39,7 +39,7 @@ _E = TypeVar("_E", bound=Event)
 
 
 @functools.cache
-def standing() -> Standing:
+def standing() -> ConfinementState:
     """How workers are tested."""
     return confinement_choice.standing(parse_wanted(LEVEL), Level.NONE)
 

@@ -77,7 +77,7 @@ def reader(match: Mapping[str, str]) -> Part:
     return Part("gauge", PLUGIN.replace("MATCH", repr(dict(match))), manifest=need)
 
 
-class Gauge:
+class UsageReader:
     """The instrument, switched on."""
 
     def __init__(self, path: Path) -> None:
@@ -104,9 +104,9 @@ class Gauge:
 
 
 @contextmanager
-def switched_on(path: Path) -> Iterator[Gauge]:
+def switched_on(path: Path) -> Iterator[UsageReader]:
     """A gauge at a socket."""
-    gauge = Gauge(path)
+    gauge = UsageReader(path)
     try:
         yield gauge
     finally:

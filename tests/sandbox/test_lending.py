@@ -15,7 +15,7 @@ from tests.sandbox.guests import does, guest, owner
 
 from nondum.host.sandbox.levels.users import FIRST_USER, is_workers
 from nondum.host.workers import confinements
-from nondum.host.workers.device_ownership import Lending
+from nondum.host.workers.device_ownership import DeviceOwnership
 
 pytestmark = [
     pytest.mark.anyio,
@@ -56,21 +56,21 @@ async def test_device_is_the_workers_for_as_long_as_it_has_it(
 
 
 def test_device_that_everybody_may_open_stays_whose_it_is() -> None:
-    lending = Lending(FIRST_USER)
+    lending = DeviceOwnership(FIRST_USER)
     lending.lend("it", "/dev/full")
     assert owner(Path("/dev/full")) == 0
 
 
 def test_device_that_a_daemon_which_died_has_lent_is_roots_again(line: str) -> None:
     os.chown(line, FIRST_USER + 1, -1)
-    lending = Lending(FIRST_USER)
+    lending = DeviceOwnership(FIRST_USER)
     lending.lend("it", line)
     lending.take_back("it")
     assert owner(Path(line)) == 0
 
 
 def test_node_that_is_another_device_by_now_is_left_alone(line: str) -> None:
-    lending = Lending(FIRST_USER)
+    lending = DeviceOwnership(FIRST_USER)
     lending.lend("it", line)
     os.chown(line, 1, -1)
     lending.take_back("it")

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from nondum.host.config import confinement_level
-from nondum.host.config.confinement_level import Finding, Standing
+from nondum.host.config.confinement_level import ConfinementState, Finding
 from nondum.host.sandbox.levels import landlock, visibility
 from nondum.host.sandbox.levels.users import FIRST_USER
 from nondum.host.workers import confinement_choice, confinement_probe
@@ -120,8 +120,8 @@ def test_room_whose_workers_share_a_user_says_why() -> None:
     assert visibility.sharing(visibility.MISSING, "of anything") == visibility.MISSING
     own = visibility.judged(Level.SANDBOXED, {**HELD, "user": FIRST_USER})
     assert own.has_users
-    assert Standing(Level.SANDBOXED, (own,)).has_users
-    assert not Standing(Level.RESTRICTED, (own,)).has_users
+    assert ConfinementState(Level.SANDBOXED, (own,)).has_users
+    assert not ConfinementState(Level.RESTRICTED, (own,)).has_users
 
 
 def test_what_is_not_told_counts_as_a_hole() -> None:
@@ -203,7 +203,7 @@ def test_standing_tells_only_what_is_above_it() -> None:
         Finding(Level.SANDBOXED, is_available=False, reason="no bwrap"),
         Finding(Level.RESTRICTED, is_available=True),
     )
-    assert Standing(Level.RESTRICTED, findings).to_dict() == {
+    assert ConfinementState(Level.RESTRICTED, findings).to_dict() == {
         "level": "restricted",
         "mechanism": "Landlock and filtered system calls",
         "users": False,

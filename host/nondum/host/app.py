@@ -42,7 +42,7 @@ from nondum.host.manager.crash_loop import CrashCounter
 from nondum.host.manager.effect_handlers import Executor
 from nondum.host.manager.installation import InstallOptions
 from nondum.host.manager.payload_trust import TrustOptions
-from nondum.host.manager.refusal_retry import TryingAgain
+from nondum.host.manager.refusal_retry import RefusalRetry
 from nondum.host.manager.state_folders import Folders, let_pass, make_private, remove_temporary
 from nondum.host.mind.frames import mounts_of_all
 from nondum.host.mind.mind import Mind
@@ -85,7 +85,7 @@ from nondum.planning.words.stop_words import is_stop
 from nondum.sdk.errors import ConfigRefused, NondumError, Problem
 
 if TYPE_CHECKING:
-    from nondum.host.peers.peer_services import Neighbourhood
+    from nondum.host.peers.peer_services import PeerServices
 
 log = logging.getLogger(__name__)
 
@@ -225,7 +225,7 @@ async def _run(
     elsewhere = neighbours.goals if neighbours else None
     places = neighbours.placement.places if neighbours else dict
     amounts = executor.installation.amounts
-    trying_again = TryingAgain(catalogue.snapshot, amounts, bus.emit, places)
+    trying_again = RefusalRetry(catalogue.snapshot, amounts, bus.emit, places)
     vouched = executor.trust.vouched
     take = _take(neighbours, mind, stopping)
     answering = Answering(
@@ -343,7 +343,7 @@ async def _neighbours(
     stop: Callable[[], Stopped],
     answer: Reply,
     executor: Executor,
-) -> Neighbourhood | None:
+) -> PeerServices | None:
     """What this host has to do with others; None where it is to have nothing. Imported only where
     it is wanted: it needs some ten megabytes.
 
@@ -351,9 +351,9 @@ async def _neighbours(
     """
     if not config.peers.enabled:
         return None
-    from nondum.host.peers.peer_services import Neighbourhood
+    from nondum.host.peers.peer_services import PeerServices
 
-    return await Neighbourhood.open(
+    return await PeerServices.open(
         config,
         folders,
         workers,
@@ -379,7 +379,7 @@ def _cgroups(folders: Folders) -> Cgroups:
     return cgroups
 
 
-def _take(neighbours: Neighbourhood | None, mind: Mind, stopping: Stopping) -> Take:
+def _take(neighbours: PeerServices | None, mind: Mind, stopping: Stopping) -> Take:
     """What becomes of words that are heard."""
     if neighbours is not None:
         return neighbours.goals.take
@@ -398,7 +398,7 @@ async def _pressed(mind: Mind, stop_all: Callable[[], Awaitable[Stopped]]) -> No
 
 
 def _stop_all(
-    neighbours: Neighbourhood | None, stopping: Stopping
+    neighbours: PeerServices | None, stopping: Stopping
 ) -> Callable[[], Awaitable[Stopped]]:
     if neighbours is not None:
         return neighbours.goals.stop_all

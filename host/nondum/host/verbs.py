@@ -14,7 +14,7 @@ from nondum.host.core.plain import Row
 from nondum.sdk.errors import ConfigRefused, Problem
 
 if TYPE_CHECKING:  # its import costs ten megabytes, which hosts without peers need not pay
-    from nondum.host.peers.peer_services import Neighbourhood
+    from nondum.host.peers.peer_services import PeerServices
 
 PEER_VERBS = (
     "peers",
@@ -34,7 +34,7 @@ PEER_VERBS = (
 
 
 def answering(
-    questions: Questions, orders: Orders, trust: TrustOrders, neighbours: Neighbourhood | None
+    questions: Questions, orders: Orders, trust: TrustOrders, neighbours: PeerServices | None
 ) -> dict[str, Verb]:
     """Verbs that answer once."""
     verbs: dict[str, Callable[[Arguments], Awaitable[Any]]] = {
@@ -77,7 +77,7 @@ def answering(
 
 
 def following(
-    questions: Questions, orders: Orders, neighbours: Neighbourhood | None
+    questions: Questions, orders: Orders, neighbours: PeerServices | None
 ) -> dict[str, Follow]:
     """Verbs that go on answering."""
     verbs: dict[str, Callable[[Arguments], AsyncIterator[Any]]] = {

@@ -17,7 +17,7 @@ from nondum.host.core.events import Event, RetryAsked
 from nondum.host.core.records import ComponentState, DeviceClaim, Snapshot, Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle.retry_causes import FIRST_S, LONGEST_S, Amounts
-from nondum.host.manager.refusal_retry import LOOK_S, TryingAgain
+from nondum.host.manager.refusal_retry import LOOK_S, RefusalRetry
 from nondum.host.people.announcements import announced
 from nondum.host.sources.devices.hardware import devices
 from nondum.sdk.errors import Problem
@@ -44,7 +44,7 @@ class Host:
 
     @contextlib.asynccontextmanager
     async def watched(self) -> AsyncIterator[None]:
-        looking = TryingAgain(
+        looking = RefusalRetry(
             lambda: Snapshot("spot", 1, payloads=tuple(self.state.payloads.values())),
             self._amounts,
             self.asked.append,

@@ -12,7 +12,7 @@ from nondum.host.peers.forwarded_goals import (
     MOST_KEPT,
     MOST_PROBLEMS,
     MOST_REPLACED,
-    GivenAway,
+    ForwardedGoals,
     standing,
 )
 from nondum.sdk.errors import GoalRefused
@@ -22,8 +22,8 @@ pytestmark = pytest.mark.anyio
 ANSWER = {"goal": "7", "text": "blink", "pddl": "(seen rover)", "kind": "achieve"}
 
 
-def given() -> GivenAway:
-    away = GivenAway()
+def given() -> ForwardedGoals:
+    away = ForwardedGoals()
     away.add("rover", "blink", 0, ANSWER)
     return away
 
@@ -85,7 +85,7 @@ async def test_peer_tells_nothing_of_goals_that_it_was_not_given(peer: str, goal
 
 
 async def test_peer_tells_which_goal_the_new_one_replaces() -> None:
-    away, older = GivenAway(), {"id": "6", "text": "shine", "is_over": False}
+    away, older = ForwardedGoals(), {"id": "6", "text": "shine", "is_over": False}
     row = away.add("rover", "blink", 0, {**ANSWER, "replaces": [older]})
     assert row["replaces"] == [older]
     away.hear("rover", told(replaces=[{**older, "is_over": True}]))

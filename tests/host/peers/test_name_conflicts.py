@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nondum.host.peers.name_conflicts import RECENT_S, Namesakes
+from nondum.host.peers.name_conflicts import RECENT_S, NameConflicts
 from nondum.sdk.errors import Problem
 from nondum.transport.discovery import Hint, Source
 from nondum.transport.peers import DialFailed, HostKeys, PeerKey, PeerUp, Reason, Refusal
@@ -17,7 +17,7 @@ class Look:
     def __init__(self) -> None:
         self.now_s, self.hinted = 0.0, set[PeerKey]()
         self.called = "base"
-        self.namesakes = Namesakes("rover", lambda: self.now_s, self.hints)
+        self.namesakes = NameConflicts("rover", lambda: self.now_s, self.hints)
 
     def hints(self) -> list[Hint]:
         at = ("tcp://10.77.0.9:7410",)

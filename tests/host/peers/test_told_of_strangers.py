@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from nondum.host.core.events import Event, PeerTurnedAway
-from nondum.host.peers.rejected_hosts import Strangers
+from nondum.host.peers.rejected_hosts import RejectedHosts
 from nondum.transport.peers import HostKeys, PeerKey, Reason, Refusal
 
 KEY = HostKeys.generate().public
@@ -20,7 +20,7 @@ def refusal(reason: Reason, key: PeerKey = KEY) -> Refusal:
 )
 def test_who_is_turned_away_again_and_again_is_told_of_once(reason: Reason) -> None:
     events: list[Event] = []
-    strangers = Strangers(events.append, lambda: 0.0)
+    strangers = RejectedHosts(events.append, lambda: 0.0)
     for _ in range(10):
         strangers.turned_away(refusal(reason))
     (event,) = events
@@ -31,13 +31,13 @@ def test_who_is_turned_away_again_and_again_is_told_of_once(reason: Reason) -> N
 @pytest.mark.parametrize("reason", [Reason.GARBAGE, Reason.SILENT, Reason.CROWDED])
 def test_noise_is_counted_and_not_told(reason: Reason) -> None:
     events: list[Event] = []
-    Strangers(events.append, lambda: 0.0).turned_away(refusal(reason))
+    RejectedHosts(events.append, lambda: 0.0).turned_away(refusal(reason))
     assert not events
 
 
 def test_crowd_of_strangers_is_not_told_of_one_by_one() -> None:
     events: list[Event] = []
-    strangers = Strangers(events.append, lambda: 0.0)
+    strangers = RejectedHosts(events.append, lambda: 0.0)
     for _ in range(100):
         strangers.turned_away(refusal(Reason.UNKNOWN_KEY, HostKeys.generate().public))
     assert 0 < len(events) < 10

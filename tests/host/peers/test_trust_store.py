@@ -16,7 +16,7 @@ from nondum.host.peers.trust_store import CERTIFICATE_NAME, KEY_NAME, TRUST_NAME
 from nondum.transport.peers import HostKeys, PeerKey, PeerRefused, Security, Trust, private_file
 from nondum.transport.peers.certificate import issue, new_fleet
 from nondum.transport.peers.public_file import FleetPublic
-from nondum.transport.peers.trust import Standing
+from nondum.transport.peers.trust import TrustState
 
 pytestmark = pytest.mark.anyio
 
@@ -96,7 +96,7 @@ async def test_host_is_let_in_once_that_is_kept(tmp_path: Path) -> None:
     (tmp_path / "peers" / TRUST_NAME).mkdir()  # nothing can be put in its place
     with pytest.raises(PeerRefused, match=f"PEERS_FOLDER .*{TRUST_NAME}"):
         await kept.pair(ROVER, "rover")
-    assert kept.trust.standing(ROVER) is Standing.UNKNOWN
+    assert kept.trust.standing(ROVER) is TrustState.UNKNOWN
     assert told.trusts == []
 
 
@@ -106,7 +106,7 @@ async def test_host_is_kept_out_even_if_that_cannot_be_kept(tmp_path: Path) -> N
     (tmp_path / "peers" / TRUST_NAME).mkdir()
     with pytest.raises(PeerRefused, match="PEERS_FOLDER"):
         await kept.revoke(ROVER, "stolen")
-    assert kept.trust.standing(ROVER) is told.trusts[-1].standing(ROVER) is Standing.REVOKED
+    assert kept.trust.standing(ROVER) is told.trusts[-1].standing(ROVER) is TrustState.REVOKED
 
 
 async def test_revoking_beats_a_pairing_that_is_being_kept(
@@ -126,7 +126,7 @@ async def test_revoking_beats_a_pairing_that_is_being_kept(
     await writes.wait()
     revoking = asyncio.ensure_future(kept.revoke(ROVER, "stolen"))
     await asyncio.sleep(0)
-    assert kept.trust.standing(ROVER) is Standing.REVOKED  # before anything is on disk
+    assert kept.trust.standing(ROVER) is TrustState.REVOKED  # before anything is on disk
     revoked.set()
     with pytest.raises(PeerRefused, match="KEY_REVOKED"):
         await pairing

@@ -10,7 +10,7 @@ from tests.kit.until import until_async
 from tests.kit.workers import TIMING, WorkersUnderTest
 
 from nondum.host.core.events import WorkerExited, WorkerStrained
-from nondum.host.workers.usage import Gauge
+from nondum.host.workers.usage import UsageReader
 
 FORK = "while True:\n    try:\n        os.fork()\n    except OSError:\n        pass"
 WATCHED = replace(TIMING, look_s=0.1, spin_s=0.5, missed=1_000_000)
@@ -19,7 +19,7 @@ WATCHED = replace(TIMING, look_s=0.1, spin_s=0.5, missed=1_000_000)
 
 async def strained_by_spinning(tested: WorkersUnderTest, clock: VirtualClock) -> WorkerStrained:
     """Let time pass as fast as the worker `guest` computes, until it is told that it spins."""
-    gauge = Gauge(lambda: tested.workers.pids()["guest"], None)
+    gauge = UsageReader(lambda: tested.workers.pids()["guest"], None)
 
     enough_s = 0.0
 
@@ -37,7 +37,7 @@ async def exited_by_forking(tested: WorkersUnderTest, clock: VirtualClock) -> Wo
     """Let time pass as fast as the worker `guest` computes, which runs `FORK`, until it has ended:
     it is refused processes between any two looks at it, however slowly it comes to run."""
     pid = tested.workers.pids()["guest"]
-    gauge = Gauge(lambda: pid, None)
+    gauge = UsageReader(lambda: pid, None)
     enough_s = 0.0
 
     def is_enough() -> bool:

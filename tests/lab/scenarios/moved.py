@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from tests.lab.gauge import Gauge, reader, switched_on
+from tests.lab.gauge import UsageReader, reader, switched_on
 from tests.lab.installed import Installed
 from tests.lab.lab import Lab
 
@@ -47,7 +47,7 @@ def run(lab: Lab) -> str:
     return f"nodes {', '.join(nodes)}"
 
 
-def _read(host: Installed, gauge: Gauge) -> str:
+def _read(host: Installed, gauge: UsageReader) -> str:
     """What the gauge counts now is heard, which nobody could know who does not read its line;
     answers its node."""
     before = gauge.count

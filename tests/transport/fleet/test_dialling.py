@@ -11,7 +11,7 @@ from tests.transport.fleet.fleets import Member, mesh_member, refusals
 
 from nondum.sdk.wire import Body
 from nondum.transport.fleet import Mesh, PeerChanged
-from nondum.transport.fleet.dialling import ADDRESSES, AT_ONCE, WISHES, Meeting
+from nondum.transport.fleet.dialling import ADDRESSES, AT_ONCE, WISHES, DialPolicy
 from nondum.transport.peers import (
     DialFailed,
     HostKeys,
@@ -231,7 +231,7 @@ class Dialled:
 
 async def test_strangers_hints_are_bounded() -> None:
     dialled = Dialled()
-    meeting = Meeting(PeerKey("a"), dialled, lambda key: True)
+    meeting = DialPolicy(PeerKey("a"), dialled, lambda key: True)
     for number in range(3 * WISHES):
         many = [f"tcp://10.0.{number % 200}.{last}:1" for last in range(100)]
         meeting.hinted(PeerKey(f"b{number}"), many)
@@ -246,7 +246,7 @@ async def test_strangers_hints_are_bounded() -> None:
 async def test_nobody_is_dialled_once_it_is_closed() -> None:
     """A finder may hint at hosts until it has ended, too."""
     dialled = Dialled()
-    meeting = Meeting(PeerKey("a"), dialled, lambda key: True)
+    meeting = DialPolicy(PeerKey("a"), dialled, lambda key: True)
     meeting.close()
     meeting.hinted(PeerKey("b"), ["tcp://10.0.0.1:1"])
     assert not dialled.dials
@@ -255,7 +255,7 @@ async def test_nobody_is_dialled_once_it_is_closed() -> None:
 
 async def test_host_that_was_met_keeps_its_place_among_strangers() -> None:
     dialled = Dialled()
-    meeting = Meeting(PeerKey("a"), dialled, lambda key: True)
+    meeting = DialPolicy(PeerKey("a"), dialled, lambda key: True)
     met = PeerKey("base")
     meeting.hinted(met, ["tcp://10.0.0.1:1"])
     meeting.up(PeerUp(met, "base", 1, "tcp://10.0.0.1:1", "pairing"))

@@ -38,18 +38,18 @@ from nondum.transport.peers import (
     Refusal,
     Trust,
 )
-from nondum.transport.peers.local_sockets import SocketsHere
-from nondum.transport.peers.socket_process.sockets import SocketsApart
+from nondum.transport.peers.local_sockets import LocalSockets
+from nondum.transport.peers.socket_process.sockets import SocketProcess
 from nondum.transport.peers.sockets import MakeSockets
 
 ROOT = Path(__file__).parents[3]
 PATIENCE_S = 60.0
 E = TypeVar("E", bound=PeerEvent)
 KINDS: Mapping[str, MakeSockets] = {
-    "in the daemon": SocketsHere,
-    "apart": functools.partial(SocketsApart, start=LinksProcess),
+    "in the daemon": LocalSockets,
+    "apart": functools.partial(SocketProcess, start=LinksProcess),
 }
-SOCKETS: MakeSockets = SocketsHere
+SOCKETS: MakeSockets = LocalSockets
 """Of each `host`; the fixture `each_kind_of_sockets` exchanges it."""
 
 

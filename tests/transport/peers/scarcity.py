@@ -14,7 +14,7 @@ from tests.kit.descriptors import descriptors_left
 from tests.transport.peers.hosts import identity
 
 from nondum.transport.peers import PeerRefused, Trust
-from nondum.transport.peers.local_sockets import SocketsHere
+from nondum.transport.peers.local_sockets import LocalSockets
 from nondum.transport.peers.pairing_channel import PairingHost
 from nondum.transport.peers.sockets import Owner
 
@@ -45,7 +45,7 @@ async def links(left: int) -> str:
     """The sockets of a host's links."""
     owner = Owner(_nobody_comes, lambda _: None, lambda _: None, lambda: 0.0)
     with descriptors_left(left):
-        sockets = SocketsHere(identity("rover"), Trust(), owner)
+        sockets = LocalSockets(identity("rover"), Trust(), owner)
         try:
             await sockets.listen([ADDRESS])
             told = OPENED

@@ -56,7 +56,7 @@ from nondum.transport.peers.messages import MAX_MESSAGE, Notice, encode
 from nondum.transport.peers.socket_process import sockets
 from nondum.transport.peers.socket_process.pipe import WINDOW
 from nondum.transport.peers.socket_process.service import MOST_WAITING
-from nondum.transport.peers.socket_process.sockets import LONGEST_WAIT_S, SocketsApart
+from nondum.transport.peers.socket_process.sockets import LONGEST_WAIT_S, SocketProcess
 
 pytestmark = pytest.mark.anyio
 
@@ -119,7 +119,7 @@ async def test_process_over_its_memory_limit_ends_and_the_daemon_does_not(
 ) -> None:
     """The daemon stands still, so that nobody takes in what comes."""
     start = functools.partial(LinksProcess, memory=LITTLE_BYTES)
-    monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketsApart, start=start))
+    monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketProcess, start=start))
     base, rover = identity("base"), identity("rover")
     async with host(base, trusting(rover)) as there, asyncio.timeout(PATIENCE_S):
         with bad_dealer(there.address, rover, there) as bad:
@@ -235,7 +235,7 @@ async def test_process_ends_with_its_host_and_by_itself(monkeypatch: pytest.Monk
             how.append(await super().ended(grace_s))
             return how[-1]
 
-    monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketsApart, start=Watched))
+    monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketProcess, start=Watched))
     async with host(identity("base")) as there:
         pid = pid_of(there)
     assert not is_alive(pid)
@@ -330,7 +330,7 @@ async def test_process_that_does_not_start_is_told(
 ) -> None:
     """At once: no time passes that others would be given."""
     for start in (functools.partial(LinksProcess, memory=1024**2), no_process):
-        monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketsApart, start=start))
+        monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketProcess, start=start))
         with pytest.raises(PeerRefused, match="LINKS_START"):
             async with host(identity("base")):
                 pass
@@ -346,7 +346,7 @@ async def test_process_whose_pipe_cannot_be_watched_is_told_and_ended(
         started.append(process.pid)
         return process
 
-    monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketsApart, start=start))
+    monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketProcess, start=start))
     with watches_left(1), pytest.raises(PeerRefused, match="LINKS_START"):  # for its end alone
         async with host(identity("base")):
             pass
@@ -375,7 +375,7 @@ async def test_process_that_is_none_is_replaced(
     packet: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     puppets = Puppets()
-    monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketsApart, start=puppets))
+    monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketProcess, start=puppets))
     async with host(identity("base"), address=ADDRESS) as there, asyncio.timeout(PATIENCE_S):
         (puppet,) = puppets.started
         puppet.say("accepted", 2, "there", KEY)
@@ -386,7 +386,7 @@ async def test_process_that_is_none_is_replaced(
 
 async def test_connections_of_the_process_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     puppets = Puppets()
-    monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketsApart, start=puppets))
+    monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketProcess, start=puppets))
     monkeypatch.setattr(sockets, "MOST_CONNECTIONS", 3)
     async with host(Identity("base", None), address=ADDRESS) as there:
         for number in (2, 4, 6, 8):
@@ -399,7 +399,7 @@ async def test_news_of_a_connection_that_was_cut_is_late_and_no_violation(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     puppets = Puppets()
-    monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketsApart, start=puppets))
+    monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketProcess, start=puppets))
     async with host(identity("base"), address=ADDRESS) as there:
         (puppet,) = puppets.started
         puppet.say("connected", 1)

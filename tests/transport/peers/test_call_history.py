@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from nondum.transport.peers.call_history import Bounds, Once, Seen
+from nondum.transport.peers.call_history import Bounds, CallHistory, Seen
 
 BOUNDS = Bounds(answers=5, size=100)
 
@@ -15,7 +15,7 @@ class Caller(RuleBasedStateMachine):
 
     def __init__(self) -> None:
         super().__init__()
-        self.once = Once(BOUNDS)
+        self.once = CallHistory(BOUNDS)
         self.next = 1
         self.begun: set[int] = set()
         self.running: set[int] = set()
@@ -62,7 +62,7 @@ TestCaller = Caller.TestCase
 
 
 def test_settled_answers_are_forgotten() -> None:
-    once = Once()
+    once = CallHistory()
     for number in (1, 2, 3):
         once.take(number)
         once.answered(number, b"yes")

@@ -36,7 +36,7 @@ from nondum.transport.peers.certificate import (
     verify,
 )
 from nondum.transport.peers.keys import PeerKey, parse_key
-from nondum.transport.peers.trust import Standing
+from nondum.transport.peers.trust import TrustState
 
 NOW = datetime(2026, 6, 1, tzinfo=UTC)
 FLEET, SECRET = new_fleet()
@@ -276,7 +276,7 @@ def test_certificate_of_another_key_lets_nobody_in() -> None:
 def test_revoked_key_is_out_however_it_came_in() -> None:
     trust = Trust().with_fleet(FLEET, "survey").with_paired(KEYS.public, "rover")
     revoked = trust.with_revoked(KEYS.public, "stolen")
-    assert revoked.standing(KEYS.public) is Standing.REVOKED
+    assert revoked.standing(KEYS.public) is TrustState.REVOKED
     with pytest.raises(PeerRefused, match="stolen"):
         revoked.admit(KEYS.public, issued().to_bytes(), NOW)
     with pytest.raises(PeerRefused, match="KEY_REVOKED"):

@@ -64,7 +64,7 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class ConfinementState:
     """At which level this host's workers run, and why not at a higher one."""
 
     level: Level
@@ -99,7 +99,7 @@ class Standing:
             )
 
 
-def chosen(findings: tuple[Finding, ...], wanted: Wanted) -> Standing:
+def chosen(findings: tuple[Finding, ...], wanted: Wanted) -> ConfinementState:
     """The highest level that is available, or the one that was asked for if it is.
 
     >>> missing = Finding(Level.SANDBOXED, is_available=False, reason="no bwrap")
@@ -110,7 +110,7 @@ def chosen(findings: tuple[Finding, ...], wanted: Wanted) -> Standing:
     if wanted != "auto":
         usable = [level for level in usable if level == wanted]
     level = max(usable, default=Level.NONE)
-    return Standing(level, findings)
+    return ConfinementState(level, findings)
 
 
 def refusals(findings: tuple[Finding, ...], wanted: Wanted, minimum: Level) -> Iterator[Problem]:
@@ -123,7 +123,9 @@ def refusals(findings: tuple[Finding, ...], wanted: Wanted, minimum: Level) -> I
         yield _too_low(findings, minimum, where, standing)
 
 
-def _too_low(findings: tuple[Finding, ...], need: Level, where: str, standing: Standing) -> Problem:
+def _too_low(
+    findings: tuple[Finding, ...], need: Level, where: str, state: ConfinementState
+) -> Problem:
     about = [f for f in findings if f.level >= need and not f.is_available]
     reasons = "; ".join(f"{f.level}: {f.reason}" for f in about)
     fixes = [f.fix for f in about if f.fix]
@@ -132,6 +134,6 @@ def _too_low(findings: tuple[Finding, ...], need: Level, where: str, standing: S
         f"workers cannot be confined as configured ({reasons or 'no such level here'})",
         where=where,
         need=f"level {need}",
-        have=f"level {standing.level}",
+        have=f"level {state.level}",
         fix="; or: ".join([*fixes, "ask for less, if plugins here can be trusted"]),
     )

@@ -11,7 +11,7 @@ from typing import TypeVar, cast
 
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.journal import Since
-from nondum.host.config.confinement_level import Standing
+from nondum.host.config.confinement_level import ConfinementState
 from nondum.host.control.arguments import Arguments
 from nondum.host.control.machine import Machine
 from nondum.host.control.news import News
@@ -61,7 +61,7 @@ class Questions:
     catalogue: Catalogue
     mind: Mind
     workers: Workers
-    standing: Standing
+    standing: ConfinementState
     """At which level workers are confined."""
     news: News
     stored: Callable[[], Awaitable[list[Row]]]

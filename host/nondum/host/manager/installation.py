@@ -44,7 +44,7 @@ from nondum.host.manager.memory_reservations import MemoryReservations
 from nondum.host.manager.payload_trust import PayloadTrust, TrustOptions
 from nondum.host.manager.state_folders import Folders, missing, remove, sweep
 from nondum.host.workers.leftovers import end_leftovers
-from nondum.host.workers.role import Standing
+from nondum.host.workers.role import Role
 from nondum.host.workers.spec import Limits, base_interpreter
 from nondum.host.workers.workers import Workers
 from nondum.sdk.description import PluginDescription
@@ -192,7 +192,7 @@ class Installation:
             return (BesideRefused(key, reason),)
         await self._workers.ended(effect.after)
         specs = [component.spec(key, self._options.limits) for component in self._prepared[key]]
-        standing = Standing.BESIDE if effect.beside else Standing.IN_FORCE
+        standing = Role.BESIDE if effect.beside else Role.IN_FORCE
         started = await asyncio.gather(
             *(self._workers.start(spec, standing) for spec in specs), return_exceptions=True
         )

@@ -15,7 +15,7 @@ LOOK_S = 2.0
 _AT_WORK = frozenset({Step.ACTIVE, Step.SUPERSEDED})
 
 
-class TryingAgain:
+class RefusalRetry:
     """Looks while `run` runs, and only while a payload waits. By the time of the event loop."""
 
     def __init__(

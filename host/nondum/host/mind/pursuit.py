@@ -28,7 +28,7 @@ from nondum.host.mind.search_order import Turns
 from nondum.host.mind.situation import NoPlan, Others, Outcome, Past, Planned, Situation, Waits
 from nondum.planning.execute.attempts import Attempts, Patience, Setbacks
 from nondum.planning.execute.independence import Reservation
-from nondum.planning.execute.plan_executive import Phase, TaskControl
+from nondum.planning.execute.plan_executive import Phase, PlanExecutive
 from nondum.planning.execute.replay import beginning_at, replayed
 from nondum.planning.execute.running import Run
 from nondum.planning.execute.task_tree import TaskTree
@@ -292,7 +292,7 @@ class Pursuit:
         asked = self._searched_for
         return asked is not None and asked.is_like(self._situation(goal.id))
 
-    def _exclude(self, control: TaskControl) -> None:
+    def _exclude(self, control: PlanExecutive) -> None:
         now_s = self._now_s()
         for name in control.exhausted:
             self._failures[name] = control.attempts.given_up(name) or ""

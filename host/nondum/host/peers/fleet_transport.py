@@ -11,13 +11,13 @@ from nondum.host.peers.finder import PeerFinder
 from nondum.host.peers.links.process import LinksProcess
 from nondum.transport.discovery import interfaces as network
 from nondum.transport.fleet import FleetEvent, Mesh
-from nondum.transport.peers import Handler, Identity, SocketsHere, Trust
-from nondum.transport.peers.socket_process.sockets import SocketsApart
+from nondum.transport.peers import Handler, Identity, LocalSockets, Trust
+from nondum.transport.peers.socket_process.sockets import SocketProcess
 
 if TYPE_CHECKING:  # zenoh is an extra
     from nondum.transport.fleet.zenoh import ZenohFleet
 
-_APART = functools.partial(SocketsApart, start=LinksProcess)
+_APART = functools.partial(SocketProcess, start=LinksProcess)
 ON_LOOPBACK = ("tcp://127.0.0.1:0",)
 
 
@@ -40,7 +40,7 @@ def fleet_of(
             on_event=on_event,
             listen=listens(config.peers),
             find=find,
-            sockets=_APART if config.peers.process else SocketsHere,
+            sockets=_APART if config.peers.process else LocalSockets,
         )
     from nondum.transport.fleet.zenoh import ZenohFleet
     from nondum.transport.fleet.zenoh_line import RouterAccess

@@ -24,7 +24,7 @@ UNKNOWN = "unknown"
 _OVER = frozenset({"reached", "halted", UNKNOWN})
 
 
-class GivenAway:
+class ForwardedGoals:
     """Rows as those of own goals (`GivenGoal.to_dict`, `holds`), with the `host` that has it."""
 
     def __init__(self) -> None:

@@ -17,7 +17,7 @@ from nondum.host.core.printable import printable
 from nondum.host.mind.goals import HIGHEST_PRIORITY
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.offers import prospect
-from nondum.host.peers.forwarded_goals import MOST_KEPT, GivenAway, replaced, standing
+from nondum.host.peers.forwarded_goals import MOST_KEPT, ForwardedGoals, replaced, standing
 from nondum.host.peers.remote_calls import Reaches
 from nondum.host.people.conversation import given_goal, wanted
 from nondum.host.people.stopping import Stopped, is_stop_for_stranger, said_to
@@ -55,7 +55,7 @@ class Goals:
         self._accepts = accepts
         self._givers: dict[str, str] = {}
         """Goal → the peer that gave it."""
-        self._away = GivenAway()
+        self._away = ForwardedGoals()
         self._telling: asyncio.Task[None] | None = None
         self._asking: set[asyncio.Task[None]] = set()
 

@@ -14,7 +14,7 @@ RECENT_S = 30.0
 MOST_KEPT = 16
 
 
-class Namesakes:
+class NameConflicts:
     """Remembers them while they are there."""
 
     def __init__(

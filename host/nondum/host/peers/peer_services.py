@@ -23,13 +23,13 @@ from nondum.host.peers.dispatch import Dispatcher
 from nondum.host.peers.finder import PeerFinder
 from nondum.host.peers.fleet_transport import fleet_of, listens, own_hosts
 from nondum.host.peers.goals import Goals
-from nondum.host.peers.name_conflicts import Namesakes
+from nondum.host.peers.name_conflicts import NameConflicts
 from nondum.host.peers.offered_entries import Policy, policy_of
 from nondum.host.peers.pairing_requests import PairingRequests
 from nondum.host.peers.peering import Peering
 from nondum.host.peers.placement.pins import Pins
 from nondum.host.peers.placement.placement import Placement
-from nondum.host.peers.rejected_hosts import Strangers
+from nondum.host.peers.rejected_hosts import RejectedHosts
 from nondum.host.peers.remote_calls import AllCalls, RemoteCalls
 from nondum.host.peers.serving import Serving
 from nondum.host.peers.stream_requests import StreamRequests
@@ -56,7 +56,7 @@ from nondum.transport.peers import (
 log = logging.getLogger(__name__)
 
 
-class Neighbourhood:
+class PeerServices:
     """`await open(…)` it, then `start`; `close` it before the workers."""
 
     def __init__(
@@ -91,8 +91,8 @@ class Neighbourhood:
             self._on_taken,
         )
         clock = asyncio.get_running_loop().time
-        self._strangers = Strangers(emit, clock)
-        self._namesakes = Namesakes(host, clock, self._hints)
+        self._strangers = RejectedHosts(emit, clock)
+        self._namesakes = NameConflicts(host, clock, self._hints)
         self.requests = Dispatcher()
         self.requests.add("behave", self.serving.behave, self.serving.orphaned)
         self.requests.hear("values", self.serving.values)
@@ -173,7 +173,7 @@ class Neighbourhood:
         answer: Reply,
         children: Children,
         judged_by: Callable[[str], Awaitable[Mapping[str, Any]]],
-    ) -> Neighbourhood:
+    ) -> PeerServices:
         """Read keys and trust, and look at this machine; `judged_by` is what payloads are judged by
         now. Raises `PeerRefused`."""
         keeper = await PeerTrustStore.open(

@@ -24,7 +24,7 @@ _FIXES = {
 """What a person can do; of other reasons people are told nothing, only counts."""
 
 
-class Strangers:
+class RejectedHosts:
     """Tells of those who are turned away."""
 
     def __init__(self, emit: Emit, clock: Callable[[], float]) -> None:

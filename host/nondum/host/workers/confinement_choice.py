@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from nondum.host.config import confinement_level
-from nondum.host.config.confinement_level import Standing, Wanted
+from nondum.host.config.confinement_level import ConfinementState, Wanted
 from nondum.host.sandbox.levels import bubblewrap
 from nondum.host.workers import confinement_probe
 from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined
@@ -15,7 +15,7 @@ from nondum.wheelhouse.format.confinement import Level
 
 def standing(
     wanted: Wanted, minimum: Level, kept_in: Path | None = None, place: Path | None = None
-) -> Standing:
+) -> ConfinementState:
     """The level to run at: the best one, or the one that is `wanted`. Blocks, see `probe.findings`.
 
     Raises `ConfigRefused` (CONFINEMENT_UNAVAILABLE) where that is not to be had, or below the
@@ -32,7 +32,7 @@ def standing(
     return confinement_level.chosen(found, wanted)
 
 
-def confinement(found: Standing, places: tuple[Path, ...]) -> Confinement:
+def confinement(found: ConfinementState, places: tuple[Path, ...]) -> Confinement:
     """What holds workers at a level that was found; their code and scratch are in `places`."""
     match found.level:
         case Level.SANDBOXED:

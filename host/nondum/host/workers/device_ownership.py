@@ -16,7 +16,7 @@ from nondum.host.sandbox.levels.users import is_workers
 _ANYBODY = stat.S_IROTH | stat.S_IWOTH
 
 
-class Lending:
+class DeviceOwnership:
     """Of one worker. All of it may block: not for the loop."""
 
     def __init__(self, user: int | None) -> None:

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Iterator
 from typing import Any, TypeAlias
 
-from nondum.host.workers.role import Standing
+from nondum.host.workers.role import Role
 from nondum.host.workers.supervisor import Supervisor
 
 Granted: TypeAlias = dict[str, dict[str, Any]]
@@ -39,12 +39,12 @@ class ExtraWorkers:
     def beside(self, component: str, payload: str) -> Supervisor | None:
         """That which may take over for a component."""
         found = self.get(component, payload)
-        return found if found is not None and found.standing is Standing.BESIDE else None
+        return found if found is not None and found.standing is Role.BESIDE else None
 
     async def left(self, component: str) -> None:
         """Wait until those that stood for a component have ended; somebody else stops them."""
         await self._ended(
-            o for o in self if o.spec.component == component and o.standing is Standing.LEAVING
+            o for o in self if o.spec.component == component and o.standing is Role.LEAVING
         )
 
     async def released(self, node: str) -> None:

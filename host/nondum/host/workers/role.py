@@ -12,7 +12,7 @@ from enum import Enum
 from nondum.host.core.events import Event, TrialFailed, WorkerLogged
 
 
-class Standing(Enum):
+class Role(Enum):
     """How a worker counts."""
 
     BESIDE = "beside"
@@ -23,9 +23,9 @@ class Standing(Enum):
     """Another one has taken its place; it is being stopped."""
 
 
-HEARD: Mapping[Standing, tuple[type[Event], ...]] = {
-    Standing.BESIDE: (TrialFailed, WorkerLogged),
-    Standing.IN_FORCE: (Event,),
-    Standing.LEAVING: (WorkerLogged,),
+HEARD: Mapping[Role, tuple[type[Event], ...]] = {
+    Role.BESIDE: (TrialFailed, WorkerLogged),
+    Role.IN_FORCE: (Event,),
+    Role.LEAVING: (WorkerLogged,),
 }
 """What others hear of it. What it claims meanwhile is kept with the worker."""

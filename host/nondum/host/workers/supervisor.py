@@ -13,7 +13,7 @@ from nondum.host.core.shielded import until_done
 from nondum.host.workers import problems, supervision
 from nondum.host.workers.in_flight import Search
 from nondum.host.workers.launcher import Launcher
-from nondum.host.workers.role import HEARD, Standing
+from nondum.host.workers.role import HEARD, Role
 from nondum.host.workers.spec import Timing, WorkerSpec
 from nondum.host.workers.supervision import Supervision
 from nondum.host.workers.worker import Worker, start_worker
@@ -54,7 +54,7 @@ class Supervisor:
     """One component's worker and the ones that come after it."""
 
     def __init__(
-        self, spec: WorkerSpec, household: Household, standing: Standing = Standing.IN_FORCE
+        self, spec: WorkerSpec, household: Household, standing: Role = Role.IN_FORCE
     ) -> None:
         self.spec = spec
         self.standing = standing
@@ -95,7 +95,7 @@ class Supervisor:
 
     def come_into_force(self) -> None:
         """From now on it stands for its component."""
-        self.standing = Standing.IN_FORCE
+        self.standing = Role.IN_FORCE
         if self._worker is not None:
             self._household.on_ready(self._worker)
             self._worker.tell_conditions()
@@ -103,7 +103,7 @@ class Supervisor:
     def withdraw(self) -> None:
         """Nobody shall count on it any more; `stop` it."""
         self._on_gone()
-        self.standing = Standing.LEAVING
+        self.standing = Role.LEAVING
 
     async def stop(self, grace_s: float) -> None:
         """End the worker, if there is one, and start no more. Stopping twice is allowed.
@@ -131,7 +131,7 @@ class Supervisor:
             problem = await self._work()
             if self.is_stopping:
                 return
-            if self.standing is Standing.BESIDE:
+            if self.standing is Role.BESIDE:
                 self._emit(events.TrialFailed(self.spec.payload, self.spec.component, (problem,)))
                 return
             component, payload = self.spec.component, self.spec.payload
@@ -184,7 +184,7 @@ class Supervisor:
 
     async def _start_worker(self) -> None:
         household = self._household
-        is_in_force = self.standing is Standing.IN_FORCE
+        is_in_force = self.standing is Role.IN_FORCE
         welcome = household.welcome(self.spec)
         self._worker = await start_worker(
             self.spec,
@@ -195,7 +195,7 @@ class Supervisor:
             on_crowded=household.search.begin,
             on_launched=household.search.watch,
         )
-        if self.standing is Standing.IN_FORCE:
+        if self.standing is Role.IN_FORCE:
             household.on_ready(self._worker)
         self._emit(events.WorkerReady(self.spec.component, self.spec.index, self.spec.payload))
         self._worker.tell_conditions()
@@ -206,5 +206,5 @@ class Supervisor:
             self._household.emit(event)
 
     def _on_gone(self) -> None:
-        if self._worker is not None and self.standing is Standing.IN_FORCE:
+        if self._worker is not None and self.standing is Role.IN_FORCE:
             self._household.on_gone(self._worker)

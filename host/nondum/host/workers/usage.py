@@ -13,7 +13,7 @@ from nondum.host.sandbox.inside import open_files
 TICKS_HZ = os.sysconf("SC_CLK_TCK")
 
 
-class Gauge:
+class UsageReader:
     """One worker's: of all its processes, where a cgroup holds them."""
 
     def __init__(self, first: Callable[[], int], cgroup: Cgroup | None) -> None:

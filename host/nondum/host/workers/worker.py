@@ -28,7 +28,7 @@ from nondum.host.sandbox.cgroups import Usage
 from nondum.host.sandbox.helper.grants import reachable, withdrawn
 from nondum.host.workers import problems, scratch
 from nondum.host.workers.call import Call
-from nondum.host.workers.device_ownership import Lending
+from nondum.host.workers.device_ownership import DeviceOwnership
 from nondum.host.workers.faults import Faults
 from nondum.host.workers.index import mismatches
 from nondum.host.workers.launcher import Launcher
@@ -47,7 +47,7 @@ from nondum.host.workers.news import (
 from nondum.host.workers.output import Output, Valve
 from nondum.host.workers.process import WorkerProcess, names_of
 from nondum.host.workers.spec import Timing, WorkerSpec
-from nondum.host.workers.usage import Gauge
+from nondum.host.workers.usage import UsageReader
 from nondum.planning.execute.running import RunState
 from nondum.planning.merge.core import core_value_types
 from nondum.sdk.description import PluginDescription
@@ -109,7 +109,7 @@ class Worker:
         """Names by which a node may have been made for it, to be removed with it."""
         self._granted: dict[str, dict[str, str]] = {}
         """Need → name → node that it has by that name."""
-        self._lending = Lending(process.user)
+        self._lending = DeviceOwnership(process.user)
         self._tail: deque[str] = deque(maxlen=TAIL_LINES)
         self._standstill = Standstill(spec.entry_point.partition(":")[0].partition(".")[0])
         self.dead_conditions: dict[str, Problem] = {}
@@ -121,7 +121,7 @@ class Worker:
         self._log_valve = Valve(self._loop.time)
         self._watch = Watch(spec.component, spec.limits, timing.spin_s)
         self._process = process
-        self._gauge = Gauge(lambda: self.pid, self._process.cgroup)
+        self._gauge = UsageReader(lambda: self.pid, self._process.cgroup)
         self._outputs: list[Output] = []
         with contextlib.ExitStack() as failed:
             failed.callback(self._close_outputs)

@@ -29,7 +29,7 @@ from nondum.host.workers.launcher import Launcher, WorkerLauncher
 from nondum.host.workers.logs import LogLine, Logs
 from nondum.host.workers.optional_inputs import Choice
 from nondum.host.workers.proxies import Answer, Proxy, plugin_manager
-from nondum.host.workers.role import Standing
+from nondum.host.workers.role import Role
 from nondum.host.workers.spec import Timing, WorkerSpec
 from nondum.host.workers.streams import Streams
 from nondum.host.workers.supervisor import Supervisor
@@ -90,9 +90,7 @@ class Workers:
         """The hooks of all running plugins; acting ones give awaitables. Pass `ctx=None`."""
         return self._manager.hook
 
-    async def start(
-        self, spec: WorkerSpec, standing: Standing = Standing.IN_FORCE
-    ) -> PluginDescription:
+    async def start(self, spec: WorkerSpec, standing: Role = Role.IN_FORCE) -> PluginDescription:
         """Start a component's worker and keep one alive until `stop`.
 
         Beside one of another payload, or if told so, it stands for nothing until `take_over`.
@@ -106,8 +104,8 @@ class Workers:
             await present.ended()
         in_force = self._supervisors.get(spec.component)
         is_second = in_force is not None and in_force.spec.payload != spec.payload
-        if is_second or standing is Standing.BESIDE:
-            supervisor = Supervisor(spec, self, Standing.BESIDE)
+        if is_second or standing is Role.BESIDE:
+            supervisor = Supervisor(spec, self, Role.BESIDE)
             self._others.add(supervisor)
         else:
             supervisor = self._supervisors[spec.component] = Supervisor(spec, self)
@@ -172,7 +170,7 @@ class Workers:
         supervisor = self._found(component, payload)
         if supervisor is None:
             return
-        if supervisor.standing is Standing.IN_FORCE:
+        if supervisor.standing is Role.IN_FORCE:
             self._others.add(supervisor, self._devices.pop(component, {}))
         try:
             await supervisor.stop(grace_s)

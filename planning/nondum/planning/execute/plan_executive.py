@@ -47,7 +47,7 @@ class Past:
     """What it answered, if it succeeded."""
 
 
-class TaskControl:
+class PlanExecutive:
     """Carries a plan out by regression. One `decide` is one tick."""
 
     def __init__(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from nondum.planning.execute.partial_order import GOAL, CausalLink
-from nondum.planning.execute.plan_executive import TaskControl, in_words
+from nondum.planning.execute.plan_executive import PlanExecutive, in_words
 from nondum.planning.execute.running import Run
 
 
@@ -57,7 +57,7 @@ class StepStatus:
     """Of its last run; None while it runs."""
 
 
-def step_status(control: TaskControl, index: int) -> StepStatus:
+def step_status(control: PlanExecutive, index: int) -> StepStatus:
     """Look at one step of a task. Times are those that the task was ticked with."""
     step = control.regression.steps[index]
     state = _state(control, index)
@@ -79,7 +79,7 @@ def step_status(control: TaskControl, index: int) -> StepStatus:
     )
 
 
-def _state(control: TaskControl, index: int) -> StepState:
+def _state(control: PlanExecutive, index: int) -> StepState:
     name = control.regression.steps[index].name
     if run := control.runs.get(name):
         return _running(run)
@@ -98,7 +98,7 @@ def _running(run: Run) -> StepState:
     return StepState.KEPT if run.is_established else StepState.RUNNING
 
 
-def _why(control: TaskControl, index: int, state: StepState) -> str:
+def _why(control: PlanExecutive, index: int, state: StepState) -> str:
     step = control.regression.steps[index]
     match state:
         case StepState.HALTING:
@@ -121,13 +121,13 @@ def _why(control: TaskControl, index: int, state: StepState) -> str:
             return f"{waits}; last time: {failure}" if failure else waits
 
 
-def _users(control: TaskControl, index: int) -> Iterator[str]:
+def _users(control: PlanExecutive, index: int) -> Iterator[str]:
     regression = control.regression
     consumers = dict.fromkeys(link.consumer for link in regression.uses_of(index))
     return ("the goal" if c == GOAL else regression.steps[c].name for c in consumers)
 
 
-def _comes_after(control: TaskControl, index: int) -> str:
+def _comes_after(control: PlanExecutive, index: int) -> str:
     regression = control.regression
     earlier = regression.order.before[index] & control.rest.steps
     if not earlier:

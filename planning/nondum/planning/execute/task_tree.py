@@ -1,6 +1,6 @@
 """The task tree: a plan as a py_trees composite, one leaf for each step.
 
-The composite decides (see `task_control`); leaves show where each step is and answer why. It is
+The composite decides (see `plan_executive`); leaves show where each step is and answer why. It is
 ticked like any other node: SUCCESS once an achieve goal is reached, RUNNING while it is under way
 or a maintain goal is held, FAILURE while it is stuck (then `needs_replan` says why). Being
 interrupted halts everything that it runs.
@@ -17,7 +17,7 @@ from py_trees.composites import Composite
 
 from nondum.planning.execute.attempts import Patience, Setbacks
 from nondum.planning.execute.partial_order import bits
-from nondum.planning.execute.plan_executive import Phase, TaskControl
+from nondum.planning.execute.plan_executive import Phase, PlanExecutive
 from nondum.planning.execute.regression import Regression
 from nondum.planning.execute.running import Run, Runner, World
 from nondum.planning.execute.step import steps_of, words
@@ -39,7 +39,7 @@ _STATUS = {
 class StepLeaf(Behaviour):
     """Shows one step of the plan. The composite acts; this only reports."""
 
-    def __init__(self, control: TaskControl, index: int) -> None:
+    def __init__(self, control: PlanExecutive, index: int) -> None:
         step = control.regression.steps[index]
         super().__init__(name=step.name)
         self.step = step
@@ -89,7 +89,7 @@ class TaskTree(Composite):
         needs of it goes on, the rest is halted.
         """
         steps = steps_of(task, plan, lasting)
-        self.control = TaskControl(
+        self.control = PlanExecutive(
             Regression(steps, words(task, task.goal)),
             runner=runner,
             kind=kind,

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from nondum.planning.ground.bounds import INSTANCES_LIMIT, work_for
-from nondum.planning.ground.expansion import Expander, Standing
+from nondum.planning.ground.expansion import Disjunction, Expander
 from nondum.planning.ground.instances import Change, Exploration, Instance
 from nondum.planning.ground.reachable_facts import reachable
 from nondum.planning.ground.work_limit import Spending
@@ -116,7 +116,7 @@ class _Drafting:
 
     def _stood_for(self, layer: int) -> Iterator[DraftRule]:
         """The rules of the facts that were made since last time."""
-        made: list[Standing] = list(self._expander.standing)
+        made: list[Disjunction] = list(self._expander.standing)
         self._expander.standing.clear()
         for standing in made:
             yield from (DraftRule(standing.fact, body, layer) for body in standing.bodies)

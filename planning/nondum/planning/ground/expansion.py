@@ -55,7 +55,7 @@ TRUE, FALSE = Literals(), Either(())
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class Disjunction:
     """A derived fact that stands for a disjunction: it holds where one of `bodies` does."""
 
     fact: int
@@ -71,7 +71,7 @@ class Expander:
     """What is true and cannot change need not be guarded."""
     work: Work
     """What writing out quantifiers may take."""
-    standing: list[Standing] = field(default_factory=list)
+    standing: list[Disjunction] = field(default_factory=list)
     """The derived facts that had to be made so far."""
     _relations: Relations = field(default_factory=Relations)
     _joins: dict[tuple[Quantified, Row], tuple[Join, Quantified, Domains]] = field(
@@ -195,7 +195,7 @@ class Expander:
                 for part in parts:
                     bodies += _split(self._small(part, name)) or ()
                 fact = self.found.table.number(name, (str(len(self.standing)),))
-                self.standing.append(Standing(fact, tuple(dict.fromkeys(bodies))))
+                self.standing.append(Disjunction(fact, tuple(dict.fromkeys(bodies))))
                 return Literals(positive=frozenset((fact,)))
         return tree
 
@@ -204,7 +204,7 @@ class Expander:
         if len(alternatives) == 1:
             return alternatives[0]
         fact = self.found.table.number(name, (str(len(self.standing)),))
-        self.standing.append(Standing(fact, tuple(alternatives)))
+        self.standing.append(Disjunction(fact, tuple(alternatives)))
         return Literals(positive=frozenset((fact,)))
 
 

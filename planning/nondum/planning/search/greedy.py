@@ -14,7 +14,7 @@ from heapq import heappop, heappush
 from nondum.planning.search.encoding import Encoded, State
 from nondum.planning.search.landmarks import Landmarks
 from nondum.planning.search.relaxation import Relaxation
-from nondum.planning.search.tree import Moves, Standing, Tree
+from nondum.planning.search.tree import Moves, SearchState, Tree
 
 _BOOST = 1000
 """Turns that preferred moves get for every state nearer to the goal than any before."""
@@ -40,7 +40,7 @@ class Greedy:
         self._nearest = _FAR
         self._start: State | None = encoded.init
 
-    def advance(self, effort: int) -> Moves | Standing:
+    def advance(self, effort: int) -> Moves | SearchState:
         """Go on for about so much work. A search that has ended must not be gone on with."""
         relaxation_effort = self._relaxation.effort
         if self._start is not None:
@@ -56,9 +56,9 @@ class Greedy:
             self._expand(state, before)
             effort -= relaxation_effort
             if effort < 0:
-                return Standing.OPEN
+                return SearchState.OPEN
             reached = self._next()
-        return Standing.EXHAUSTED
+        return SearchState.EXHAUSTED
 
     def _expand(self, state: State, before: tuple[State, int] | None) -> None:
         estimate = self._relaxation.estimate(state)

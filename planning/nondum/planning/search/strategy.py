@@ -12,7 +12,7 @@ from nondum.planning.search.greedy import Greedy
 from nondum.planning.search.improvement import Improvement, eliminated
 from nondum.planning.search.landmarks import Landmarks
 from nondum.planning.search.relaxation import Relaxation
-from nondum.planning.search.tree import Moves, Standing
+from nondum.planning.search.tree import Moves, SearchState
 from nondum.planning.search.widths import Widths
 from nondum.sdk.planner import Answer, GaveUp, GroundTask, Plan, Unsolvable
 
@@ -40,16 +40,16 @@ def solve(task: GroundTask, is_over: IsOver) -> Answer:
     changes = Changes(encoded)
     found = _searched(encoded, changes, is_over)
     match found:
-        case Standing.EXHAUSTED:
+        case SearchState.EXHAUSTED:
             return Unsolvable("exhausted")
-        case Standing.OPEN:
+        case SearchState.OPEN:
             return GaveUp("the time was up")
     plan = _improved(encoded, changes, eliminated(encoded, found), is_over)
     steps = tuple(encoded.moves[index].action for index in plan)
     return Plan(steps, sum(task.actions[step].cost for step in steps))
 
 
-def _searched(encoded: Encoded, changes: Changes, is_over: IsOver) -> Moves | Standing:
+def _searched(encoded: Encoded, changes: Changes, is_over: IsOver) -> Moves | SearchState:
     relaxation = Relaxation(encoded, changes, [1] * len(encoded.moves))
     landmarks = Landmarks(encoded, changes)
     greedy = Greedy(encoded, relaxation, landmarks)
@@ -57,23 +57,23 @@ def _searched(encoded: Encoded, changes: Changes, is_over: IsOver) -> Moves | St
     turn = _FIRST_TURN
     while True:
         found = _advanced(greedy, turn, is_over)
-        if found is Standing.OPEN and not is_over():
+        if found is SearchState.OPEN and not is_over():
             widths = widths or Widths(encoded, relaxation, landmarks)
             found = _advanced(widths, turn, is_over)
-        if found is not Standing.OPEN or is_over():
+        if found is not SearchState.OPEN or is_over():
             return found
         turn += (turn + 1) // 2
 
 
-def _advanced(search: Greedy | Widths, turn: int, is_over: IsOver) -> Moves | Standing:
+def _advanced(search: Greedy | Widths, turn: int, is_over: IsOver) -> Moves | SearchState:
     """Have a search take its turn."""
     for _ in range(turn):
         if is_over():
             break
         found = search.advance(_SLICE)
-        if found is not Standing.OPEN:
+        if found is not SearchState.OPEN:
             return found
-    return Standing.OPEN
+    return SearchState.OPEN
 
 
 def _improved(encoded: Encoded, changes: Changes, plan: Moves, is_over: IsOver) -> Moves:

@@ -8,7 +8,7 @@ from typing import TypeAlias
 from nondum.planning.search.encoding import State
 
 
-class Standing(Enum):
+class SearchState(Enum):
     """How a search that has found no plan stands."""
 
     OPEN = "there are states left to go on from"

@@ -13,7 +13,7 @@ from nondum.planning.search.encoding import Encoded, State
 from nondum.planning.search.landmarks import Landmarks
 from nondum.planning.search.relaxation import Relaxation
 from nondum.planning.search.successors import Successors
-from nondum.planning.search.tree import Moves, Standing, Tree
+from nondum.planning.search.tree import Moves, SearchState, Tree
 
 _PER_STATE = 60
 """Work of making a state and looking whether it is new, in terms of `Relaxation.effort`."""
@@ -50,7 +50,7 @@ class Widths:
         self._effort = 0
         self._reach(encoded.init, None, None)
 
-    def advance(self, effort: int) -> Moves | Standing:
+    def advance(self, effort: int) -> Moves | SearchState:
         """Go on for about so much work. A search that has ended must not be gone on with."""
         self._effort = effort
         moves, after, tree = self._encoded.moves, self._encoded.after, self._tree
@@ -65,8 +65,8 @@ class Widths:
                         return tree.moves_to(reached)
             self._effort -= self._per_state * (len(applicable) + 1)
             if self._effort < 0:
-                return Standing.OPEN
-        return Standing.EXHAUSTED
+                return SearchState.OPEN
+        return SearchState.EXHAUSTED
 
     def _reach(self, state: State, before: tuple[State, int] | None, way: _Way | None) -> None:
         self._tree.add(state, before)

@@ -17,8 +17,8 @@ from tests.kit.descriptors import descriptors_left
 from nondum.host.sandbox.cgroups import CgroupLimits, Cgroups
 from nondum.host.sandbox.cgroups.groups import Cgroup, NoTree, known, problems_of, tree
 from nondum.host.sandbox.cgroups.hierarchies import Mounted, mounted
-from nondum.host.sandbox.cgroups.version1 import Legacy
-from nondum.host.sandbox.cgroups.version2 import Unified
+from nondum.host.sandbox.cgroups.version1 import Version1
+from nondum.host.sandbox.cgroups.version2 import Version2
 
 REAL = pytest.mark.skipif(os.geteuid() != 0, reason="making cgroups needs root")
 BOMB = "import os,sys\nsys.stdin.read(1)\nwhile True:\n    try: os.fork()\n    except OSError: pass"
@@ -133,7 +133,7 @@ def unified(top: Path, controllers: str) -> Path:
 
 def test_lent_part_of_version_2_is_limited_in_all(tmp_path: Path) -> None:
     own = unified(tmp_path, "cpuset cpu io memory pids")
-    made = Unified.open(own, tmp_path, "nondum-x")
+    made = Version2.open(own, tmp_path, "nondum-x")
     assert made is not None
     assert made.controllers == {"memory", "pids", "cpu"}
     cgroup = own / "nondum-x/lamp.1"
@@ -177,7 +177,7 @@ def test_version_1_is_taken_controller_by_controller(tmp_path: Path) -> None:
     for names in ("memory", "pids", "cpu,cpuacct"):
         (tmp_path / names).mkdir()
         hierarchies.append(Mounted(tmp_path / names, tmp_path / names, frozenset(names.split(","))))
-    made = Legacy.open(hierarchies, "nondum-x")
+    made = Version1.open(hierarchies, "nondum-x")
     assert made is not None
     made.make("lamp.1")
     (tmp_path / "memory/nondum-x/lamp.1/memory.limit_in_bytes").write_text("")
@@ -190,7 +190,7 @@ def test_version_1_is_taken_controller_by_controller(tmp_path: Path) -> None:
 
 
 def test_cgroup_that_cannot_be_limited_is_not_left(tmp_path: Path) -> None:
-    cgroups = Cgroups(found := Unified(tmp_path, frozenset({"memory"})))
+    cgroups = Cgroups(found := Version2(tmp_path, frozenset({"memory"})))
     with descriptors_left(0), pytest.raises(OSError) as failed:
         cgroups.make("lamp", CgroupLimits())
     assert failed.value.errno == errno.EMFILE
@@ -223,7 +223,7 @@ def test_cgroup_in_which_no_process_can_be_killed_says_why_it_is_left() -> None:
 
 
 def test_cgroup_of_version_1_that_is_made_in_part_is_not_left(tmp_path: Path) -> None:
-    found = Legacy({"memory": tmp_path / "memory", "pids": tmp_path / "pids"})
+    found = Version1({"memory": tmp_path / "memory", "pids": tmp_path / "pids"})
     (tmp_path / "memory").mkdir()
     with pytest.raises(FileNotFoundError, match="pids"):
         Cgroups(found).make("lamp", CgroupLimits())

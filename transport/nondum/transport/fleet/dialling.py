@@ -64,7 +64,7 @@ class _Wish:
         return (*kept, *self.hinted)[:ADDRESSES]
 
 
-class Meeting:
+class DialPolicy:
     """The wishes of one host."""
 
     def __init__(

@@ -8,7 +8,7 @@ from typing import Protocol, TypeAlias
 
 from nondum.sdk.wire import Body
 from nondum.transport.fleet.catalogues import Catalogues
-from nondum.transport.fleet.dialling import Meeting
+from nondum.transport.fleet.dialling import DialPolicy
 from nondum.transport.fleet.fleet import FleetEvent, Peer
 from nondum.transport.peers.allowance import USUAL, Allowance
 from nondum.transport.peers.calls import Call
@@ -16,12 +16,12 @@ from nondum.transport.peers.events import DialFailed, PeerEvent, PeerLost, PeerU
 from nondum.transport.peers.identity import Identity, Security
 from nondum.transport.peers.incoming_calls import Handler
 from nondum.transport.peers.keys import PeerKey
-from nondum.transport.peers.local_sockets import SocketsHere
+from nondum.transport.peers.local_sockets import LocalSockets
 from nondum.transport.peers.node import PeerNode, fresh_epoch
 from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.refusals import Refusals
 from nondum.transport.peers.sockets import MakeSockets
-from nondum.transport.peers.trust import Standing, Trust
+from nondum.transport.peers.trust import Trust, TrustState
 
 
 class Finder(Protocol):
@@ -52,7 +52,7 @@ class Mesh:
         find: Find | None = None,
         clock: Callable[[], datetime] = lambda: datetime.now(UTC),
         allowance: Allowance = USUAL,
-        sockets: MakeSockets = SocketsHere,
+        sockets: MakeSockets = LocalSockets,
     ) -> None:
         """Made on the running loop. Without `find`, hosts meet by `meet` only.
 
@@ -75,7 +75,7 @@ class Mesh:
             allowance=allowance,
             sockets=sockets,
         )
-        self._meeting = Meeting(identity.key, self._node, self.is_welcome)
+        self._meeting = DialPolicy(identity.key, self._node, self.is_welcome)
         self._finder: Finder | None = None
 
     @property
@@ -171,7 +171,7 @@ class Mesh:
         """Whether a host might be let in, by its key alone."""
         if self.security is Security.DEVELOPMENT:
             return True
-        return self._trust.standing(key) in (Standing.ADMITTED, Standing.MUST_CERTIFY)
+        return self._trust.standing(key) in (TrustState.ADMITTED, TrustState.MUST_CERTIFY)
 
     def _on_event(self, event: PeerEvent) -> None:
         match event:

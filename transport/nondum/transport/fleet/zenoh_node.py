@@ -31,7 +31,7 @@ from nondum.transport.peers.peer_table import PeerTable
 from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.refusals import Reason, Refusals
 from nondum.transport.peers.suspicion import Terms
-from nondum.transport.peers.trust import Admission, Standing, Trust
+from nondum.transport.peers.trust import Admission, Trust, TrustState
 
 SILENCE_S = 10.0
 """A peer that has told nothing for so long hangs: three of its tellings were missed."""
@@ -227,7 +227,7 @@ class ZenohNode:
     def _is_welcome(self, key: PeerKey) -> bool:
         if self.identity.security is Security.DEVELOPMENT:
             return True
-        return self._gate.trust.standing(key) in (Standing.ADMITTED, Standing.MUST_CERTIFY)
+        return self._gate.trust.standing(key) in (TrustState.ADMITTED, TrustState.MUST_CERTIFY)
 
     def _listener(self, place: Place) -> _Listener:
         if place not in self._listeners and len(self._listeners) >= DOORS:

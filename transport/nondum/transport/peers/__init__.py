@@ -6,7 +6,7 @@ from nondum.transport.peers.failures import CallFailed, PeerRefused, PeerUnreach
 from nondum.transport.peers.identity import Identity, Security
 from nondum.transport.peers.incoming_calls import Handler, IncomingCall, Lease
 from nondum.transport.peers.keys import HostKeys, PeerKey, fingerprint, load_or_create
-from nondum.transport.peers.local_sockets import SocketsHere
+from nondum.transport.peers.local_sockets import LocalSockets
 from nondum.transport.peers.node import PeerNode
 from nondum.transport.peers.refusals import Reason, Refusal, Refusals
 from nondum.transport.peers.trust import Admission, Trust
@@ -22,6 +22,7 @@ __all__ = [
     "IncomingCall",
     "Lease",
     "LinksFailed",
+    "LocalSockets",
     "Loss",
     "PeerEvent",
     "PeerKey",
@@ -34,7 +35,6 @@ __all__ = [
     "Refusal",
     "Refusals",
     "Security",
-    "SocketsHere",
     "Trust",
     "fingerprint",
     "load_or_create",

@@ -31,7 +31,7 @@ class Bounds:
     """Bytes."""
 
 
-class Once:
+class CallHistory:
     """The memory of one peer's calls in one epoch of it."""
 
     def __init__(self, bounds: Bounds | None = None) -> None:

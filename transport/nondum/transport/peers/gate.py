@@ -10,14 +10,14 @@ from datetime import datetime
 from nondum.sdk.errors import NondumError, Problem
 from nondum.transport.link.token_bucket import TokenBucket
 from nondum.transport.peers.allowance import USUAL, greetings
-from nondum.transport.peers.call_history import Once
+from nondum.transport.peers.call_history import CallHistory
 from nondum.transport.peers.enquiries import asks
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.identity import Identity, Security, is_loopback
 from nondum.transport.peers.keys import PeerKey, fingerprint
 from nondum.transport.peers.messages import Hello, agreed_version
 from nondum.transport.peers.refusals import Reason
-from nondum.transport.peers.trust import Admission, Standing, Trust
+from nondum.transport.peers.trust import Admission, Trust, TrustState
 from nondum.transport.peers.zap import DOMAIN, ConnectionAttempt, Entry
 
 PAST_EPOCHS = 8
@@ -42,7 +42,7 @@ class Acquaintance:
     """Theirs."""
     their_term: int = 0
     past: deque[int] = field(default_factory=lambda: deque(maxlen=PAST_EPOCHS))
-    once: Once = field(default_factory=Once)
+    once: CallHistory = field(default_factory=CallHistory)
     next_number: int = 1
     allowance: TokenBucket = field(default_factory=USUAL.bucket)
     """What it may still send of its own accord."""
@@ -62,7 +62,7 @@ class Acquaintance:
         is_new = (hello.epoch, hello.term) != (self.epoch, self.their_term)
         if hello.epoch != self.epoch:
             self.past.append(self.epoch)
-            self.epoch, self.once = hello.epoch, Once()
+            self.epoch, self.once = hello.epoch, CallHistory()
         self.their_term = hello.term
         return is_new
 
@@ -107,7 +107,7 @@ class Gate:
             return True
         if admission.by == "pairing":
             return admission.key in self.trust.paired
-        return self.trust.standing(admission.key) is Standing.MUST_CERTIFY
+        return self.trust.standing(admission.key) is TrustState.MUST_CERTIFY
 
     def has_expired(self, admission: Admission) -> bool:
         """Whether the certificate that let a peer in has ended."""
@@ -129,11 +129,11 @@ def judge(knock: ConnectionAttempt, me: Identity, trust: Trust) -> Reason | None
     if knock.key == me.key:
         return Reason.DUPLICATE
     match trust.standing(PeerKey(knock.key)):
-        case Standing.REVOKED:
+        case TrustState.REVOKED:
             return Reason.REVOKED
-        case Standing.UNKNOWN:
+        case TrustState.UNKNOWN:
             return Reason.UNKNOWN_KEY
-        case Standing.ADMITTED | Standing.MUST_CERTIFY:
+        case TrustState.ADMITTED | TrustState.MUST_CERTIFY:
             return None
 
 

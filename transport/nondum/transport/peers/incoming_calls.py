@@ -12,7 +12,7 @@ from typing import Any, Protocol, TypeAlias
 
 from nondum.sdk.errors import NondumError, Problem, ProtocolViolation
 from nondum.sdk.wire import Body
-from nondum.transport.peers.call_history import Once, Seen
+from nondum.transport.peers.call_history import CallHistory, Seen
 from nondum.transport.peers.calls import CREDIT, Send
 from nondum.transport.peers.drained import Sent
 from nondum.transport.peers.events import Loss
@@ -89,7 +89,7 @@ Finished: TypeAlias = Reply | Failure
 class IncomingCalls:
     """All that run for one peer, and the memory of those that ran."""
 
-    def __init__(self, caller: Admission, once: Once, handler: Handler, send: Send) -> None:
+    def __init__(self, caller: Admission, once: CallHistory, handler: Handler, send: Send) -> None:
         self._caller, self._once, self._handler, self._send = caller, once, handler, send
         self._loop = asyncio.get_running_loop()
         self._running: dict[int, IncomingCall] = {}

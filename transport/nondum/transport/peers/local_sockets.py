@@ -42,7 +42,7 @@ What comes in between fills this process's memory.
 """
 
 
-class SocketsHere:
+class LocalSockets:
     """A ZeroMQ context, its sockets, and the bounds of what comes over them (see `Sockets`)."""
 
     def __init__(self, me: Identity, trust: Trust, owner: Owner) -> None:

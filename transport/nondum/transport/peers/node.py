@@ -24,7 +24,7 @@ from nondum.transport.peers.identity import Identity, Security
 from nondum.transport.peers.incoming_calls import Handler
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.link import Link, Route
-from nondum.transport.peers.local_sockets import SocketsHere
+from nondum.transport.peers.local_sockets import LocalSockets
 from nondum.transport.peers.messages import Notice, encode
 from nondum.transport.peers.peer_table import PeerTable
 from nondum.transport.peers.pulse import Pulse
@@ -56,7 +56,7 @@ class PeerNode:
         epoch: int | None = None,
         clock: Callable[[], datetime] = lambda: datetime.now(UTC),
         allowance: Allowance = USUAL,
-        sockets: MakeSockets = SocketsHere,
+        sockets: MakeSockets = LocalSockets,
     ) -> None:
         """Made on the running loop. `trust` is not asked in development mode.
 

@@ -17,7 +17,7 @@ from nondum.transport.peers.keys import PeerKey, fingerprint
 _Key = TypeVar("_Key", bound=str)
 
 
-class Standing(Enum):
+class TrustState(Enum):
     """What is known of a key before its owner has said a word."""
 
     ADMITTED = "admitted"
@@ -72,13 +72,13 @@ class Trust:
             _without(self.fleets, key), _without(self.paired, key), _without(self.revoked, key)
         )
 
-    def standing(self, key: PeerKey) -> Standing:
+    def standing(self, key: PeerKey) -> TrustState:
         """What is known of a key alone."""
         if key in self.revoked:
-            return Standing.REVOKED
+            return TrustState.REVOKED
         if key in self.paired:
-            return Standing.ADMITTED
-        return Standing.MUST_CERTIFY if self.fleets else Standing.UNKNOWN
+            return TrustState.ADMITTED
+        return TrustState.MUST_CERTIFY if self.fleets else TrustState.UNKNOWN
 
     def admit(self, key: PeerKey, certificate: bytes, now: datetime) -> Admission:
         """Let a peer in that has proved its key and shown a certificate, or none (empty).
@@ -86,11 +86,11 @@ class Trust:
         Raises `PeerRefused` (KEY_REVOKED, KEY_UNKNOWN, CERTIFICATE_…).
         """
         match self.standing(key):
-            case Standing.REVOKED:
+            case TrustState.REVOKED:
                 raise PeerRefused(self._revoked(key))
-            case Standing.ADMITTED:
+            case TrustState.ADMITTED:
                 return Admission(key, self.paired[key], "pairing")
-            case Standing.UNKNOWN:
+            case TrustState.UNKNOWN:
                 raise PeerRefused(_unknown(key))
         if not certificate:
             raise PeerRefused(_unknown(key))

@@ -17,8 +17,8 @@ from pathlib import Path
 from nondum.host.sandbox.cgroups import hierarchies
 from nondum.host.sandbox.cgroups.hierarchies import Mounted
 from nondum.host.sandbox.cgroups.limits import CgroupLimits, Tree, Usage
-from nondum.host.sandbox.cgroups.version1 import Legacy
-from nondum.host.sandbox.cgroups.version2 import Unified
+from nondum.host.sandbox.cgroups.version1 import Version1
+from nondum.host.sandbox.cgroups.version2 import Version2
 from nondum.sdk.errors import Problem
 
 EMPTY_S = 1.0
@@ -202,9 +202,9 @@ def tree(hierarchies: Sequence[Mounted], owner: str) -> Tree:
     found: Tree | None = None
     for hierarchy in hierarchies:
         if not hierarchy.controllers:
-            found = Unified.open(hierarchy.own, hierarchy.top, owner)
+            found = Version2.open(hierarchy.own, hierarchy.top, owner)
     if found is None or not found.controllers:
-        found = Legacy.open(hierarchies, owner) or found
+        found = Version1.open(hierarchies, owner) or found
     return found or NoTree()
 
 

@@ -20,7 +20,7 @@ SHARES = 1024
 """cpu.shares of what has no weight of its own."""
 
 
-class Legacy:
+class Version1:
     """The cgroups below a folder in each of several hierarchies."""
 
     kind = "v1"
@@ -31,7 +31,7 @@ class Legacy:
         self.controllers = LIMITING & bases.keys()
 
     @classmethod
-    def open(cls, hierarchies: Iterable[Mounted], owner: str) -> Legacy | None:
+    def open(cls, hierarchies: Iterable[Mounted], owner: str) -> Version1 | None:
         """Make room for cgroups wherever a controller is mounted. None where there is no such."""
         bases: dict[str, Path] = {}
         for hierarchy in hierarchies:

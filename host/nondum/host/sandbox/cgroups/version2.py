@@ -20,7 +20,7 @@ LEAF = "daemon"
 PERIOD_US = 100_000
 
 
-class Unified:
+class Version2:
     """The cgroups below a folder of a version 2 hierarchy."""
 
     kind = "v2"
@@ -30,12 +30,12 @@ class Unified:
         self.controllers = controllers
 
     @classmethod
-    def open(cls, own: Path, top: Path, owner: str) -> Unified | None:
+    def open(cls, own: Path, top: Path, owner: str) -> Version2 | None:
         """Make room for cgroups in this process's own cgroup, or below the top one.
 
         None where neither can be written.
         """
-        best: Unified | None = None
+        best: Version2 | None = None
         for part in (own.parent if own.name == LEAF else own, top):
             tree = cls._below(part, owner)
             if tree is not None and (best is None or tree.controllers > best.controllers):
@@ -45,7 +45,7 @@ class Unified:
         return best
 
     @classmethod
-    def _below(cls, part: Path, owner: str) -> Unified | None:
+    def _below(cls, part: Path, owner: str) -> Version2 | None:
         if not WANTED & files.words(part / "cgroup.controllers"):
             return None  # they belong to version 1 here
         if not all(os.access(part / name, os.W_OK) for name in (".", "cgroup.procs")):

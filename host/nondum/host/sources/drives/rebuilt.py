@@ -33,7 +33,7 @@ _Slot = TypeVar("_Slot")
 log = logging.getLogger(__name__)
 
 
-class Rewritten(Generic[_Slot]):
+class RebuiltFolders(Generic[_Slot]):
     """Looks at what is plugged in, and says what is not as it was. Close it."""
 
     def __init__(self, changed: asyncio.Event, on_rewritten: Callable[[_Slot], None]) -> None:

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from nondum.host.core.events import DriveInserted, DriveRemoved, DrivesScanned, Emit
-from nondum.host.sources.drives.rebuilt import Rewritten
+from nondum.host.sources.drives.rebuilt import RebuiltFolders
 from nondum.host.sources.inotify import folders_watched
 from nondum.host.sources.slot_folders import (
     changed_or_due,
@@ -59,7 +59,7 @@ class SlotSource:
         """Tell what is there, then what comes and goes, until cancelled."""
         with (
             folders_watched(self._folders) as changed,
-            contextlib.closing(Rewritten(changed, self._rewritten.append)) as rewritten,
+            contextlib.closing(RebuiltFolders(changed, self._rewritten.append)) as rewritten,
         ):
             self._compare(emit)
             emit(DrivesScanned(self.kind, tuple(self._seen)))

@@ -16,7 +16,7 @@ from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.identity import Identity
 from nondum.transport.peers.keys import HostKeys, PeerKey
 from nondum.transport.peers.link import Route
-from nondum.transport.peers.local_sockets import SocketsHere
+from nondum.transport.peers.local_sockets import LocalSockets
 from nondum.transport.peers.presence import TICKS_AWAKE
 from nondum.transport.peers.refusals import Reason, Refusal
 from nondum.transport.peers.socket_process.pipe import WINDOW, Pipe, violation
@@ -36,7 +36,7 @@ class Service:
     def __init__(self, sock: socket.socket) -> None:
         """Own `sock`, the pipe to the daemon. Made on the running loop."""
         self._loop = asyncio.get_running_loop()
-        self._here: SocketsHere | None = None
+        self._here: LocalSockets | None = None
         self._served: dict[int, _Served] = {}
         self._numbers = itertools.count(2, 2)
         self._trust = Trust()
@@ -85,7 +85,7 @@ class Service:
                 self._listening = self._loop.create_task(self._listen(addresses))
             case ["begin", str(name), keys]:
                 me = Identity(name, HostKeys(PeerKey(keys[0]), keys[1]) if keys else None)
-                self._here = SocketsHere(me, self._trust, self._owner)
+                self._here = LocalSockets(me, self._trust, self._owner)
             case ["close"]:
                 self._end(is_asked=True)
             case _:

@@ -65,7 +65,7 @@ Start: TypeAlias = Callable[[socket.socket], Process]
 """
 
 
-class SocketsApart:
+class SocketProcess:
     """Sockets in a process that is started with the first `listen`."""
 
     def __init__(self, me: Identity, trust: Trust, owner: Owner, *, start: Start) -> None:
@@ -294,7 +294,7 @@ class _FarRoute:
     """Set before anything is told."""
 
     def __init__(
-        self, apart: SocketsApart, number: int, address: str, key: PeerKey | None = None
+        self, apart: SocketProcess, number: int, address: str, key: PeerKey | None = None
     ) -> None:
         """`key` of a dialled one."""
         self.number, self.address, self.key = number, address, key
